@@ -19,7 +19,7 @@ from chainunit.quantities import Layout
 from chainunit.study.commented import commented
 from chainunit.study.config import parse
 from chainunit.study.event import TYPES
-from chainunit.study.keys import catalogue_columns, key_tables
+from chainunit.study.keys import ENTRIES, catalogue_columns, key_tables
 from chainunit.study.parts import Parts, example
 from chainunit.study.schema import json_schema
 
@@ -51,7 +51,7 @@ def test_each_key_of_the_form_is_documented(machine, motor):
     assert {
         name
         for name in documented - asked
-        if not name.startswith(("event.", "report.units.", "sweep.parameter."))
+        if not name.startswith(("event.", "report.units.", *(f"{each}." for each in ENTRIES)))
     } == set()
 
 
@@ -79,6 +79,15 @@ def _one_key(table, key):
     if table.name == "sweep.parameter":
         own = f"{key.name} = {key.left_out}\n"
         return f'[[sweep.parameter]]\nname = "machine.r"\ntolerance = "1 mm"\n{own}'
+    if table.name.startswith("identify"):
+        own = f"{key.name} = {key.left_out}\n"
+        needed = {
+            "identify": "[identify]\n",
+            "identify.parameter": "[[identify.parameter]]\nname = 'machine.crank.m'\ndeviation = '5 %'\n",
+            "identify.run": "[[identify.run]]\nfile = 'a.csv'\n",
+            "identify.sensor": "[[identify.sensor]]\ncolumn = 'motor.i'\n",
+        }
+        return "".join(text + (own if name == table.name else "") for name, text in needed.items())
     if table.name == "optimize":
         return f"[optimize]\n{key.name} = {key.left_out}\n[optimize.free]\nr = {{ min = 0.1, max = 0.2 }}\n"
     if table.name in ("gear", "starter"):
@@ -207,7 +216,7 @@ def test_the_commands(tmp_path):
     ("asked", "tables", "keys"),
     [
         ("run.crank_speed", ["[run]"], ["crank_speed"]),
-        ("crank_speed", ["[run]"], ["crank_speed"]),
+        ("crank_speed", ["[run]", "[[identify.run]]"], ["crank_speed"]),
         ("machine.r", ["[machine] of ChamberForces", "[machine] of KnifeDrive"], ["r"]),
         ("KnifeDrive.knife.c", ["[machine] of KnifeDrive"], ["knife.c.x", "knife.c.y"]),
         ("event.rise", [f"[[event]] of {name}" for name in ("jam", "lumps", "overload", "surge")], ["rise"]),

@@ -32,11 +32,11 @@ from chainunit.study.optimum.program import AngleProgram
 from chainunit.study.optimum.requirements import Requirements
 from chainunit.study.optimum.result import as_dict, units_of
 from chainunit.study.optimum.search import Search
-from chainunit.study.optimum.study_file import toml_text
 from chainunit.study.optimum.table import wishes_of
 from chainunit.study.optimum.wishes import TurnLimit
 from chainunit.study.optimum.words import bindings, conflict_sentences
 from chainunit.study.parts import EXAMPLES, example
+from chainunit.study.study_file import toml_text
 from chainunit.study.verdict import ROCKER_GOOD
 
 LINKAGES = Path(__file__).parents[1] / "examples" / "linkages"

@@ -217,6 +217,34 @@ FILES = [
             (19, "sweep.parameter.4.to", "must be > from, 2"),
         ],
     ),
+    ("[identify]", [(1, "identify.parameter", "is missing; add"), (1, "identify.run", "is missing; add")]),
+    (
+        "[[identify.parameter]]\nname = 'machine.left.web_mas'\nfrom = 1\nto = 2\n"
+        "[[identify.parameter]]\nname = 'machine.left.web_mass'\nfrom = '40 kg'\nto = '12 kg'\n"
+        "[[identify.parameter]]\nname = 'feed.left.processing_force'\ndeviation = '-5 %'\n"
+        "[[identify.parameter]]\nname = 'machine.crank.m'\nfrom = 1\n"
+        "[[identify.parameter]]\nname = 'machine.ratio'\ndeviation = 1\n"
+        "[[identify.run]]\nname = 'Loaded run'\nbegin = '9 s'\nend = '3 s'\n"
+        "[identify.run.columns]\n'motor.current' = 'I'\n"
+        "[[identify.run]]\nfile = 'b.csv'\nfeed = 'half'\nadded = { 'machine.left.web_mass' = '15 m' }\n"
+        "[[identify.sensor]]\ncolumn = 'mark'\n[[identify.sensor]]\ncolumn = 'motor.i'\noffset = '1 V'\n",
+        [
+            (2, "identify.parameter.1.name", 'was "machine.left.web_mass" meant?'),
+            (8, "identify.parameter.2.to", "must be > from, 40 kg"),
+            (11, "identify.parameter.3.deviation", "must be > 0"),
+            (12, "identify.parameter.4 (machine.crank.m)", "must have from and to, or the standard deviation"),
+            (16, "identify.parameter.5.name", "count the teeth"),
+            (18, "identify.run.1.file", "must be given"),
+            (19, "identify.run.1.name", "must begin with a small letter"),
+            (21, "identify.run.1.end", "must be > begin"),
+            (23, "identify.run.1.columns.motor.current", "no such quantity"),
+            (26, "identify.run.2.feed", 'must be "same" or "none"'),
+            (29, "identify.sensor.1.column", "must be one of motor.i"),
+            (32, "identify.sensor.2.offset", "a number in A"),
+        ],
+    ),
+    ("organ = 'chain'\n[identify]\n[driveline]", [
+        (2, "identify", "driveline stands between"), (2, "identify", "organs are chains")]),
     ("[sweep]\n[sizing]", [(1, "sweep", "leave out one of the two")]),
     ("[sweep]\nmethod = 'grid'\npoints = 3", [(3, "sweep.points", "a grid has the points of its parameters")]),
     ("[[sweep.parameter]]\nname = 'machine.r'", [(1, "sweep.parameter.1 (machine.r)", "has no values")]),

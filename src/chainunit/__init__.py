@@ -15,6 +15,7 @@ __all__ = [
     "ChainUnitMachine",
     "ChamberForces",
     "GeometryError",
+    "IdentificationResult",
     "InputError",
     "RunError",
     "SideLoads",
@@ -25,6 +26,7 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
+    from .identifications import IdentificationResult
     from .machines.api import EMPTY, ChainUnitMachine
     from .machines.chain_unit import ChamberForces, SideLoads
     from .studies import BestResult, Study, StudyResult
@@ -38,6 +40,7 @@ else:
         "EMPTY": ".machines.api",
         "ChainUnitMachine": ".machines.api",
         "ChamberForces": ".machines.chain_unit",
+        "IdentificationResult": ".identifications",
         "SideLoads": ".machines.chain_unit",
         "Study": ".studies",
         "StudyResult": ".studies",

@@ -19,6 +19,7 @@ import typer.core
 from .console import finish, leave, progress_bar, study_file, terminal_console
 from .errors import InputError, InterruptedRunError, RunError, printable
 from .files import claim, clear, full
+from .identify_command import identify
 from .sweep_command import sweep
 
 if TYPE_CHECKING:
@@ -220,6 +221,7 @@ def _stopped_early(failure: RunError, output: Path, errors: Console) -> None:
 
 
 app.command()(sweep)
+app.command()(identify)
 
 
 @app.command()

@@ -33,6 +33,7 @@ RESULTS: Mapping[str, _Kind] = {
     "study": _Kind("a study", "result.json", "answers"),
     "sweep": _Kind("a sweep", "result.json", "best_by"),
     "optimize": _Kind("a search for the best machine", "result.json", "objectives"),
+    "identify": _Kind("an identification", "result.json", "proposals"),
     "compare": _Kind("a comparison", "comparison.json"),
     "linkage": _Kind("a linkage", "linkage.json"),
     "reproduce": _Kind("the papers", "reproduction.json"),

@@ -366,6 +366,13 @@ def variables(cls: type, prefix: str = "", context: str = "", default: Any = Non
             yield from variables(field.metadata["of"], name + ".", words, inner)
 
 
+def named_values(instance: Any, prefix: str = "") -> Iterator[tuple[Variable, float]]:
+    """Every scalar of an instance of a declaration, with `prefix` before its name, and its value."""
+    layout = Layout(type(instance))
+    for v, value in zip(layout.variables, layout.values(instance), strict=True):
+        yield dataclasses.replace(v, name=prefix + v.name), float(value)
+
+
 def finite(value: Any) -> float | None:
     """A number as JSON can hold it: None in place of None or a number that is not finite."""
     return None if value is None or not math.isfinite(value) else float(value)

@@ -6,7 +6,7 @@ import copy
 import dataclasses
 import shutil
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from html import escape
 from pathlib import Path
@@ -18,6 +18,7 @@ from .ending import in_temporary_folder
 from .errors import InputError, RunError, WriteError, near_name, shown
 from .files import claim, clear, write_all
 from .fmu.backends import Backend
+from .identifications import IdentificationResult, make_identification
 from .machines.machine import Machine
 from .places import lines_of
 from .progress import Report as Progress
@@ -27,12 +28,13 @@ from .report import files, html, optimum, results, series, terminal
 from .report import study as contents
 from .report.blocks import Report
 from .report.drawing import drawing
+from .reported import ReportedResult
 from .study import config as study_files
 from .study.config import Config
 from .study.foreign_machine import ForeignMachine
 from .study.measures import Answers, measures_of
 from .study.optimum.best import Best
-from .study.optimum.study_file import best_tables
+from .study.optimum.result import best_tables
 from .study.optimum.words import conflict_sentences
 from .study.parts import over_example, parts_of
 from .study.record import INSUFFICIENT, StudyRecord
@@ -238,6 +240,27 @@ class Study:
             result._write(place)
         return result
 
+    def identify(
+        self, folder: str | Path | None = None, progress: Progress | None = None
+    ) -> IdentificationResult:
+        """Identify the machine from recordings, as the table [identify] asks: two of a minute take some ten seconds.
+
+        Parameters
+        ----------
+        folder : the folder to which the files of ``chainunit identify -o`` are written
+        progress : as of `run`
+
+        Raises
+        ------
+        InputError
+            for a study without the table [identify], and with a line for each fault of the recordings.
+        RunError
+            where the fit does not end.
+        WriteError
+            for a file that cannot be written; the others are written.
+        """
+        return make_identification(self.config, None if folder is None else Path(folder), progress)
+
     def sweep(
         self,
         folder: str | Path | None = None,
@@ -388,8 +411,10 @@ class StudyResult:
         return html.fragment(self._summary)
 
 
-class BestResult:
+class BestResult(ReportedResult):
     """The result of a search for the best machine. Its `repr` shows the answer, the parameters and what binds."""
+
+    _command = "optimize"
 
     def __init__(self, config: Config, best: Best) -> None:
         self.config = config
@@ -423,36 +448,13 @@ class BestResult:
     def _tables(self, folder: Path) -> dict[str, Any]:
         if self.best.machine is None:
             raise RunError("no machine meets all limits: " + " ".join(conflict_sentences(self.best)))
-        return best_tables(self.config, self.best.machine, self.best.wishes.names, folder)
+        return best_tables(self.best, self.config, folder)
 
-    def to_json(self) -> str:
-        """All numbers with their units, as the text of result.json."""
-        return files.numbers_text(self._report)
+    def _clear(self, folder: Path) -> None:
+        clear(folder, *optimum.FILES)
 
-    def save(self, folder: str | Path) -> list[Path]:
-        """Write the files of ``chainunit optimize -o``; returns the files.
-
-        Raises
-        ------
-        InputError, WriteError
-            as `Study.optimize`.
-        """
-        with claim(Path(folder), "optimize") as place:
-            clear(place, *optimum.FILES)
-            return self._write(place)
-
-    def _write(self, folder: Path) -> list[Path]:
-        paths, failure = write_all(optimum.writers(self.best, self.config, self._report, folder))
-        if failure is not None:
-            raise WriteError(str(failure)) from failure
-        return paths
-
-    def __repr__(self) -> str:
-        return terminal.plain(self._report)
-
-    def _repr_html_(self) -> str:
-        """The same as HTML, for notebooks."""
-        return html.fragment(self._report)
+    def _writers(self, folder: Path) -> list[Callable[[], list[Path]]]:
+        return optimum.writers(self.best, self.config, self._report, folder)
 
 
 def _plain(value: Any) -> Any:

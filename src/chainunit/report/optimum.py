@@ -15,10 +15,10 @@ from ..progress import Report as Progress
 from ..reading import in_file
 from ..study.config import Config
 from ..study.optimum.best import Best, find_best
-from ..study.optimum.result import as_dict, units_of
-from ..study.optimum.study_file import best_tables, toml_text
+from ..study.optimum.result import as_dict, best_tables, units_of
 from ..study.optimum.table import wishes_of
 from ..study.optimum.wishes import Wishes
+from ..study.study_file import toml_text
 from . import blocks as b
 from . import figure as fig
 from . import files
@@ -100,8 +100,7 @@ def writers(best: Best, config: Config, report: b.Report, folder: Path) -> list[
     report."""
 
     def study_file() -> list[Path]:
-        assert best.machine is not None
-        text = toml_text(best_tables(config, best.machine, best.wishes.names, folder))
+        text = toml_text(best_tables(best, config, folder))
         with whole(folder / FILE) as part:
             part.write_text(text, "utf-8")
         return [folder / FILE]

@@ -89,10 +89,25 @@ def _company(data: Mapping[str, Any], parts: Parts) -> Iterator[tuple[str, str]]
             yield ("optimize", _NEEDS_MODEL)
         if data.get("organ") == "chain":
             yield ("optimize", _TWO_BARS)
+    if "identify" in data:
+        yield from _identify_company(data, foreign)
     if "torsion" in data and "driveline" not in data:
         yield ("torsion", "is of a driveline; add [driveline], or leave it out")
     if "chain" in data and data.get("organ") != "chain":
         yield ("chain", 'is of organs that are chains; add organ = "chain", or leave it out')
+
+
+def _identify_company(data: Mapping[str, Any], foreign: Mapping[str, bool]) -> Iterator[tuple[str, str]]:
+    """The same of a study with an identification."""
+    unfit = {
+        "machine": foreign["machine"] and "machine is an FMU",
+        "motor": foreign["motor"] and "motor is an FMU",
+        "sizing": "sizing" in data and "motor is not known before it is chosen",
+        "driveline": "driveline" in data and "driveline stands between motor and machine",
+        "organ": data.get("organ") == "chain" and "organs are chains",
+    }
+    for words in filter(None, unfit.values()):
+        yield ("identify", f"needs a motor and a machine of two-bar organs as models, and here the {words}")
 
 
 def _sweep_company(data: Mapping[str, Any], foreign: Mapping[str, bool]) -> Iterator[tuple[str, str]]:

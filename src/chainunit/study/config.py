@@ -27,6 +27,7 @@ from .event_table import RandomEvent, read_events, read_random_event
 from .events import OneSidedFeed
 from .first_checks import check_values, independent, plate_of, without
 from .foreign_machine import ForeignMachine, ForeignModel
+from .identification.reading import IdentificationPlan, read_identification
 from .optimum.table import read_wishes
 from .optimum.wishes import Wishes
 from .parts import Parts, beside, example, over_example, with_linkage
@@ -99,6 +100,8 @@ class Config:
     """the organs as chains, or None for two bars"""
     optimize: Wishes | None
     """the table of a search for the best machine; a study makes none"""
+    identify: IdentificationPlan | None
+    """the table of an identification; a study makes none"""
     foreign: ForeignMotor | None
     """the motor, if it is a foreign FMU; `motor` then has no meaning"""
     sweep: SweepPlan | None
@@ -309,6 +312,8 @@ def _config(
             loads, run, by_motor = values["feed"], values["run"], bool(parts.designation or "sizing" in data)
             given = values["optimize"], checked.optimize, parts.machine
             of_study["optimize"] = read_wishes(*given, machine, loads, run.crank_speed, by_motor)
+    with faults.collected():
+        of_study["identify"] = _identification(data, checked, parts, machine, values, source)
     faults.refuse()
     config = Config(
         title=checked.title,
@@ -361,6 +366,25 @@ def _sweep(
     fixed = {"machine.ratio": "follows from the motor's rated speed"} if parts.designation else {}
     quantities = Sweepable.of(machine, values["feed"], values["run"], events)
     return read_plan(checked.sweep, values["sweep"], parts.machine, quantities, fixed)
+
+
+def _identification(
+    data: Mapping[str, Any],
+    checked: Any,
+    parts: Parts,
+    machine: Machine | None,
+    values: Mapping[str, Any],
+    source: str,
+) -> IdentificationPlan | None:
+    """The plan of the table [identify]; None without one, and for a machine that was refused."""
+    if "identify" not in data or machine is None:
+        return None
+    declared = [(machine.p, "machine"), (values["feed"], "feed")]
+    if parts.gives_motor:
+        declared.append((values["motor"], "motor"))
+    fixed = {"machine.ratio": "is needed to read the recordings; count the teeth"}
+    speed = values["run"].crank_speed
+    return read_identification(checked.identify, values["identify"], declared, speed, fixed, source)
 
 
 def _read_sections(

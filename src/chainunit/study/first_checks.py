@@ -98,6 +98,7 @@ def without(data: Mapping[str, Any], faults: Collection[InputError]) -> dict[str
 
 
 _LISTS = (
+    *(f"identify.{name}" for name in ("parameter", "run", "sensor")),
     *(f"sweep.{name}" for name in ("parameter", "quantities", "measures")),
     *(f"optimize.{name}" for name in ("objectives", "free", "limits")),
 )

@@ -24,6 +24,7 @@ from ..text import CHOICES as UNITS
 from ..units import shortest_text
 from .config import Config, parse
 from .event import TYPES, Event
+from .identification.table import RUN_KEYS, SENSOR_KEYS, ParameterEntry, RunTable, SensorTable
 from .parts import ReportTable
 from .sections import CHOICES, SECTIONS, Ratios, SystemTable
 from .sweep_table import SweepEntry
@@ -40,11 +41,24 @@ _FOLLOWS = {
     "sweep.quantities": "without measures peak(crank_torque) and rms(crank_torque)",
     "sweep.event": "the only one of the study, or that whose quantities are swept",
     "sweep.best": "the first one",
+    "identify.run.name": "run_1, run_2, ..",
+    "identify.run.crank_speed": "run.crank_speed",
+    "identify.run.begin": "the first row",
+    "identify.run.end": "the last row",
+    "identify.sensor.noise": "identify.noise",
+    "identify.sensor.gain": "identify.gain",
+    "identify.sensor.offset": "5 % of the RMS of a current or torque, 0 of others",
+    "identify.sensor.resolution": "0",
 }
 """By key, the source of its value if the file leaves the key out."""
 
 
 _VALUE = "a number, or a text with a unit"
+
+
+def _fields(keys: Mapping[str, Any]) -> dict[str, FieldInfo]:
+    """Fields with their types, from pairs of both."""
+    return {name: FieldInfo.from_annotated_attribute(of, field) for name, (of, field) in keys.items()}
 
 
 @dataclass(frozen=True)
@@ -104,7 +118,7 @@ class KeyTable:
     @property
     def is_list(self) -> bool:
         """Whether a file may have several tables of this name."""
-        return self.name in ("event", PARAMETERS)
+        return self.name in ("event", *ENTRIES)
 
     @property
     def bracketed(self) -> str:
@@ -114,8 +128,15 @@ class KeyTable:
         return f"[{self.name}]" if self.name else "before all tables"
 
 
-PARAMETERS = "sweep.parameter"
-"""Name of the tables with the parameters of a sweep."""
+_ENTRIES: Mapping[str, tuple[str, type | None, Mapping[str, Any]]] = {
+    "sweep.parameter": ("Parameter of a sweep", None, SweepEntry.model_fields),
+    "identify.parameter": ("Number that is sought", None, ParameterEntry.model_fields),
+    "identify.run": ("Recorded run", RunTable, _fields(RUN_KEYS)),
+    "identify.sensor": ("Sensor of a recording", SensorTable, _fields(SENSOR_KEYS)),
+}
+"""By the name of a list of tables in a table: its title, the declaration of its quantities, and its other keys."""
+ENTRIES = tuple(_ENTRIES)
+"""Names of the lists of tables in a table."""
 
 
 @cache
@@ -137,7 +158,7 @@ def key_tables() -> tuple[KeyTable, ...]:
         ),
         *(KeyTable("motor", "Motor", tuple(_of_motor(name)), name) for name in MOTORS),
         *(KeyTable(name, SECTIONS[name].title, tuple(_of_section(name))) for name in SECTIONS),
-        KeyTable(PARAMETERS, "Parameter of a sweep", tuple(_of_fields(_entry_fields()))),
+        *(KeyTable(name, title, tuple(_of_entry(name))) for name, (title, *_) in _ENTRIES.items()),
         KeyTable("report", "Report", tuple(_of_report())),
         *(KeyTable("event", _first_sentence(of), tuple(_of_event(of)), name) for name, of in TYPES.items()),
     )
@@ -257,8 +278,14 @@ def _of_event(of: type[Event]) -> Iterator[Key]:
     yield from _numbers(of.Parameters, of.Parameters(), whole=of.counts)
 
 
-def _entry_fields() -> dict[str, Any]:
-    return {name: (field.annotation, field) for name, field in SweepEntry.model_fields.items()}
+def _of_entry(name: str) -> Iterator[Key]:
+    _, declared, fields = _ENTRIES[name]
+    keys = list(_of_fields({key: (field.annotation, field) for key, field in fields.items()}))
+    if declared is not None:
+        keys += _numbers(declared, declared(), table=name)
+    for key in keys:
+        follows = _FOLLOWS.get(f"{name}.{key.name}", "")
+        yield dataclasses.replace(key, follows=follows) if follows else key
 
 
 def _of_fields(fields: Mapping[str, Any], config: Config | None = None) -> Iterator[Key]:

@@ -17,7 +17,10 @@ from ..reading import may_be_share
 from ..unit_patterns import pattern, zero
 from .event import TYPES
 from .event_table import LONGEST_NAME, PLACED, RESERVED
-from .keys import PARAMETERS, Key, KeyTable, key_tables
+from .identification.measurands import MEASURANDS
+from .identification.table import MOST_PARAMETERS as MOST_SOUGHT
+from .identification.table import MOST_RUNS, MOST_SENSORS
+from .keys import ENTRIES, Key, KeyTable, key_tables
 from .parts import LONGEST_FILE
 from .schema_rules import OF_PARTS, rules
 from .sweep_table import MEASURES_OF_SWEEP, MOST_PARAMETERS, MOST_RESULTS, MOST_VALUES
@@ -34,14 +37,34 @@ _FORMS: dict[str, dict[str, Any]] = {
     "sweep.quantities": {"items": {"type": "string"}, "maxItems": MOST_RESULTS},
     "sweep.measures": {"items": {"enum": list(MEASURES_OF_SWEEP)}, "maxItems": len(MEASURES_OF_SWEEP)},
     "sweep.parameter": {"maxItems": MOST_PARAMETERS},
-    f"{PARAMETERS}.name": {"minLength": 1},
-    f"{PARAMETERS}.values": {"items": _VALUE, "minItems": 1, "maxItems": MOST_VALUES},
+    "sweep.parameter.name": {"minLength": 1},
+    "identify.parameter": {"maxItems": MOST_SOUGHT, "minItems": 1},
+    "identify.run": {"maxItems": MOST_RUNS, "minItems": 1},
+    "identify.sensor": {"maxItems": MOST_SENSORS},
+    "identify.parameter.name": {"minLength": 1},
+    "identify.run.name": {"pattern": r"^[a-z][a-z0-9_]{0,19}$"},
+    "identify.run.file": {"minLength": 1},
+    "identify.sensor.column": {"enum": [name for name, each in MEASURANDS.items() if each.analog]},
+    "sweep.parameter.values": {"items": _VALUE, "minItems": 1, "maxItems": MOST_VALUES},
     "event.name": _EVENT_NAME,
     "catalogue": {"maxLength": LONGEST_FILE, "pattern": r"^[^\x00-\x1f\x7f]*$"},
     "system.machine": {"minLength": 1, "maxLength": LONGEST_FILE},
     "system.motor": {"minLength": 1, "maxLength": LONGEST_FILE},
 }
 """By the name of a key, further conditions on its text or list."""
+_CONDITIONS: dict[str, dict[str, Any]] = {
+    "sweep.parameter": {
+        "required": ["name"],
+        "oneOf": [{"required": ["from", "to"]}, {"required": ["values"]}, {"required": ["tolerance"]}],
+    },
+    "identify.parameter": {
+        "required": ["name"],
+        "anyOf": [{"required": ["from", "to"]}, {"required": ["deviation"]}],
+    },
+    "identify.run": {"required": ["file"]},
+    "identify.sensor": {"required": ["column"]},
+}
+"""By the name of a list of tables, the keys that each of them must have."""
 
 
 def json_schema() -> dict[str, Any]:
@@ -66,8 +89,9 @@ class _Schema:
                 self.definitions[f"event.{table.of}"] = self._event(table)
                 continue
             place = properties
-            if table.name == PARAMETERS:
-                properties["sweep"]["properties"]["parameter"]["items"] = self._of_sweep(table)
+            if table.name in ENTRIES:
+                above, _, name = table.name.partition(".")
+                properties[above]["properties"][name]["items"] = self._entry(table)
                 continue
             if table.name:
                 place = _object(properties, table.name, table.title)["properties"]
@@ -148,17 +172,14 @@ class _Schema:
             "required": needed,
         }
 
-    def _of_sweep(self, table: KeyTable) -> dict[str, Any]:
-        """The table of a swept parameter: its values in one of three ways."""
-        ways = ({"required": ["from", "to"]}, {"required": ["values"]}, {"required": ["tolerance"]})
+    def _entry(self, table: KeyTable) -> dict[str, Any]:
+        """A table of a list in a table."""
         return {
             "type": "object",
             "description": table.title,
             "additionalProperties": False,
             "properties": {key.name: self._form(key, table) for key in table.keys},
-            "required": ["name"],
-            "oneOf": list(ways),
-        }
+        } | _CONDITIONS[table.name]
 
     def _form(self, key: Key, table: KeyTable) -> dict[str, Any]:
         description = {"description": _sentence(key)}

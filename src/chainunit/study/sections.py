@@ -20,6 +20,7 @@ from ..mechanism.models import MachineModel
 from ..quantities import Value, declaration, group, quantity, variables
 from ..reading import given_values, schema, to_number
 from ..system import NAMES
+from .identification import table as identify_table
 from .optimum import table as optimize_table
 from .sweep_table import FIELDS, WHOLE, SweepTable
 
@@ -443,6 +444,15 @@ SECTIONS: Mapping[str, FileSection] = {
             ),
         },
         title="Torsion of the driveline",
+    ),
+    "identify": FileSection(
+        identify_table.IdentifyTable,
+        optional=True,
+        whole=identify_table.WHOLE,
+        keys=identify_table.FIELDS,
+        title="Identification from recordings",
+        is_used=lambda config: False,
+        apart=True,
     ),
     "sweep": FileSection(
         SweepTable, optional=True, whole=WHOLE, keys=FIELDS, title="Sweep", is_used=lambda config: False

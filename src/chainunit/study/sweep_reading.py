@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from ..errors import Faults, InputError, near_name, refusal_prefix, shown
 from ..mechanism.models import MachineModel
-from ..quantities import Layout, Quantity, Variable, variables
+from ..quantities import Quantity, Variable, named_values, variables
 from ..reading import given_values, read_table, to_number
 from ..refusals import unit_behind
 from .cycle_quantities import CycleBasis, cycle_quantity
 from .event import Event
-from .sections import Run
 from .sweep_plan import MOST_OF_HYPERCUBE, SweepPlan, SweptParameter
 from .sweep_table import (
     LOADS_OF_SWEEP,
@@ -44,25 +43,17 @@ class Sweepable:
     def of(cls, machine: Any, feed: Any, run: Any, events: Mapping[str, Event]) -> Sweepable:
         """Those of a machine with its parameters, its feed, the table [run] and the events of a study."""
         own = [
-            *((v, "machine.") for v in _with_values(type(machine.p), machine.p)),
-            *((v, "feed.") for v in _with_values(type(feed), feed)),
-            *((v, "run.") for v in _with_values(Run, run) if f"run.{v[0].name}" == SPEED),
+            *named_values(machine.p, "machine."),
+            *named_values(feed, "feed."),
+            *(each for each in named_values(run, "run.") if each[0].name == SPEED),
             *(
-                (v, f"event.{name}.")
+                each
                 for name, event in events.items()
-                for v in _with_values(type(event.p), event.p)
-                if v[0].name not in event.counts
+                for each in named_values(event.p, f"event.{name}.")
+                if each[0].name.removeprefix(f"event.{name}.") not in event.counts
             ),
         ]
-        full = {prefix + v.name: (dataclasses.replace(v, name=prefix + v.name), x) for (v, x), prefix in own}
-        return cls(
-            {name: v for name, (v, _) in full.items()}, {name: x for name, (_, x) in full.items()}, events
-        )
-
-
-def _with_values(declared: type, values: Any) -> Iterator[tuple[Variable, float]]:
-    known = Layout(declared).by_name(values)
-    return ((v, known[v.name]) for v in variables(declared))
+        return cls({v.name: v for v, _ in own}, {v.name: x for v, x in own}, events)
 
 
 def read_plan(

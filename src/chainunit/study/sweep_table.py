@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model
-from pydantic_core import PydanticCustomError
+from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from ..quantities import Value, declaration, quantity
 from .cycle_quantities import CycleBasis
+from .entry_values import Entered
 
 METHODS = ("grid", "latin_hypercube", "sobol")
 DISTRIBUTIONS = ("uniform", "normal")
@@ -82,15 +81,6 @@ FIELDS: Mapping[str, Any] = {
 """Keys of the table that are no quantities, as pydantic fields."""
 
 
-def _admitted(given: Any) -> Any:
-    """A number or a text; its quantity, and so its unit, stand in another key."""
-    is_number = isinstance(given, int | float) and not isinstance(given, bool) and math.isfinite(given)
-    if is_number or isinstance(given, str):
-        return given
-    raise PydanticCustomError("number_or_text", "must be a number, or a text with a unit")
-
-
-_Entered = Annotated[Any, BeforeValidator(_admitted)]
 _ENTRY: dict[str, Any] = {
     "name": (
         str,
@@ -101,18 +91,18 @@ _ENTRY: dict[str, Any] = {
             '"event.jam_left.force"',
         ),
     ),
-    "from": (_Entered, Field(None, description="least value")),
-    "to": (_Entered, Field(None, description="largest value")),
+    "from": (Entered, Field(None, description="least value")),
+    "to": (Entered, Field(None, description="largest value")),
     "points": (
-        _Entered,
+        Entered,
         Field(None, description="number of values of a grid between these, 11 by default; of a tolerance 3"),
     ),
     "values": (
-        list[_Entered],
+        list[Entered],
         Field([], max_length=MOST_VALUES, description="values, in place of from and to"),
     ),
     "tolerance": (
-        _Entered,
+        Entered,
         Field(None, description="largest difference from the value of the study, in place of from and to"),
     ),
     "distribution": (

@@ -24,6 +24,8 @@ TOLD = 0.5
 SHARP = 0.1
 """The same of a combination that is worth naming."""
 MOST_TERMS = 4
+ROUNDING = 1.05
+"""Factor by which the standard deviation of a sum may grow as its factors are rounded."""
 WEAK = 1e3
 """Standard deviation that stands for no prior, in parts of that of the prior: it makes a singular matrix regular."""
 BLIND, PART = 1e-4, 0.05
@@ -60,8 +62,10 @@ class Combination:
 
     def __str__(self) -> str:
         first, *others = self.terms
-        words = "".join(f" {'+' if c > 0.0 else '-'} {_factor(abs(c))}{_short(name)}" for name, c in others)
-        return _short(first[0]) + words
+        words = "".join(
+            f" {'+' if c > 0.0 else '-'} {_factor(abs(c))}{short_name(name)}" for name, c in others
+        )
+        return short_name(first[0]) + words
 
 
 @dataclass(frozen=True)
@@ -130,14 +134,31 @@ def _combinations(problem: Problem, fisher: Any) -> tuple[Combination, ...]:
             others.append(min(left, key=lambda k: _rest(covariance, first, [*others, k])))
             deviation = math.sqrt(_rest(covariance, first, others))
             if deviation < SHARP * unknown.spread:
-                factors = -np.linalg.solve(covariance[np.ix_(others, others)], covariance[others, first])
+                factors, deviation = _factors(covariance, first, others)
                 names = [sought[k].name for k in others]
-                terms = ((unknown.name, 1.0), *zip(names, map(float, factors), strict=True))
+                terms = ((unknown.name, 1.0), *zip(names, factors, strict=True))
                 found.setdefault(
                     frozenset((unknown.name, *names)), Combination(terms, unknown.unit, deviation)
                 )
                 break
     return tuple(found.values())
+
+
+def _factors(covariance: Any, first: int, others: Sequence[int]) -> tuple[list[float], float]:
+    """The factors of the other numbers with which their sum with the first one has the least standard deviation, and
+    that deviation. They have so few digits that the sum as it is written has as good as the least one."""
+    best = -np.linalg.solve(covariance[np.ix_(others, others)], covariance[others, first])
+    least, own = (
+        math.sqrt(_rest(covariance, first, others)),
+        covariance[np.ix_([first, *others], [first, *others])],
+    )
+    for digits in range(2, 8):
+        factors = [float(f"{x:.{digits}g}") for x in best]
+        weights = np.array([1.0, *factors])
+        deviation = math.sqrt(float(weights @ own @ weights))
+        if deviation < ROUNDING * least:
+            break
+    return factors, deviation
 
 
 def _blind(problem: Problem, fisher: Any) -> tuple[Combination, ...]:
@@ -224,7 +245,7 @@ def _candidates(problem: Problem) -> Iterator[tuple[str, RecordedRun]]:
         if u.name.endswith(("web_mass", "wall_mass")) and not any(
             u.name in run.added for run in problem.runs
         ):
-            yield f"with {ADDED:g} kg added to {_short(u.name)}", replace(own, added={u.name: ADDED})
+            yield f"with {ADDED:g} kg added to {short_name(u.name)}", replace(own, added={u.name: ADDED})
 
 
 def _simulated(problem: Problem, run: RecordedRun, z: Any, workers: int) -> RecordedRun:
@@ -241,9 +262,10 @@ def _simulated(problem: Problem, run: RecordedRun, z: Any, workers: int) -> Reco
     return replace(run, recording=Recording("simulated", time, columns, run.recording.heads))
 
 
-def _short(name: str) -> str:
+def short_name(name: str) -> str:
+    """A name of the system without that of the machine."""
     return name.removeprefix("machine.")
 
 
 def _factor(x: float) -> str:
-    return "" if abs(x - 1.0) < 0.005 else f"{x:.2g} "
+    return "" if x == 1.0 else f"{x:.7g} "

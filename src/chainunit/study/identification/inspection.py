@@ -84,7 +84,7 @@ def _of_column(
         words = f"keeps the value {_size(name, float(x[stuck[0]]))} from {begin:.3g} to {end:.3g} s: "
         words += "the sensor or the logger is stuck; " + (
             "record again" if end - begin > 0.5 * (recording.time[-1] - recording.time[0]) else
-            "leave this part out (from, to), or record again"
+            "leave this part out (begin, end), or record again"
         )  # fmt: skip
         yield _fault(recording, name, words)
         return
@@ -119,8 +119,8 @@ def _rows(recording: Recording, crank_speed: float) -> Iterator[InputError]:
         yield _fault(
             recording, "time",
             f"{100.0 * recording.missing:.0f} % of the rows are missing, {end - begin:.3g} s of them in one piece "
-            f"from {begin:.3g} s; must be <= {100.0 * MISSING:.0f} %: name a part without gaps (from, to), or record "
-            "again",
+            f"from {begin:.3g} s; must be <= {100.0 * MISSING:.0f} %: name a part without gaps (begin, end), or "
+            "record again",
         )  # fmt: skip
     span = float(recording.time[-1] - recording.time[0])
     if span < FEWEST_TURNS * turn:

@@ -15,6 +15,7 @@ from ..arrays import rms
 from .measurands import COUNTS, MEASURANDS
 from .plant import ANGLE, CRANK, AnyPlant, Course, Nuisance, Overview, Response
 from .recording import Recording
+from .unknown import Unknown
 
 JITTER = 2e-5
 """Scatter of the instants at which rows are sampled [s]."""
@@ -32,25 +33,6 @@ AHEAD = 0.04
 """Part of a run with an encoder by which the simulation is longer: with the start values its speed is another."""
 _CHANGE = 0.2
 """Change of an unknown for which the derivatives are integrated, in parts of its spread."""
-
-
-@dataclass(frozen=True)
-class Unknown:
-    """A number that is sought: its start value, its bounds, and its prior, the start value with the standard
-    deviation `spread`. Bounds alone have the standard deviation of an even distribution."""
-
-    name: str
-    unit: str
-    start: float
-    low: float
-    high: float
-    spread: float
-    is_nuisance: bool = False
-
-    @classmethod
-    def within(cls, name: str, unit: str, low: float, high: float) -> Unknown:
-        """One of which only the bounds are known."""
-        return cls(name, unit, 0.5 * (low + high), low, high, (high - low) / math.sqrt(12.0))
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from ...quantities import finite
 from ...text import Units, array_entry, entry, shown_in
 from ..config import Config
 from ..organ_limits import limits_of_organs
+from ..study_file import changed_tables
 from ..verdict import passed_limits
 from .best import Best
 from .checks import STEPS
@@ -37,6 +39,14 @@ def as_dict(best: Best, config: Config) -> dict[str, Any]:
     """All results, ready for JSON, each number with its unit."""
     with shown_in(units_of(best, config)):
         return _as_dict(best, config)
+
+
+def best_tables(best: Best, config: Config, folder: Path) -> dict[str, Any]:
+    """The tables of the study file with the best machine, as a file in `folder` has them."""
+    assert best.machine is not None
+    own = best.machine.by_name
+    values = {f"machine.{name}": own[name] for name in best.wishes.names}
+    return changed_tables(config, values, "the best machine", folder)
 
 
 def units_of(best: Best, config: Config) -> Units:

@@ -1,4 +1,4 @@
-"""The study file with the best machine: the tables of the study, with the new values in [machine]."""
+"""Study files as text: the tables of a study, with other values of some of its numbers."""
 
 from __future__ import annotations
 
@@ -12,36 +12,45 @@ from datetime import date, time
 from pathlib import Path
 from typing import Any
 
-from ...machines.machine import Machine
-from ..config import Config
-from ..parts import LENGTHS
+from .config import Config
+from .parts import LENGTHS
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
-def best_tables(config: Config, machine: Machine, names: tuple[str, ...], folder: Path) -> dict[str, Any]:
-    """The tables of the study with the parameters `names` of a machine, as a file in `folder` has them: names of
-    other files are relative to it. Lengths that came from [ratios] are given one by one."""
+def changed_tables(config: Config, values: Mapping[str, float], title: str, folder: Path) -> dict[str, Any]:
+    """The tables of a study with other `values` by full name ("machine.crank.m"), as a file in `folder` has them:
+    names of other files are relative to it. `title` follows that of the study. Where one length of a chain unit
+    changes, all are given one by one."""
     tables = copy.deepcopy(dict(config.tables))
-    values = machine.by_name
-    written = set(names)
-    if machine.model.sides and written & set(LENGTHS):
+    written = dict(values)
+    lengths = [f"machine.{name}" for name in LENGTHS]
+    if config.machine.model.sides and written.keys() & set(lengths):
         # a file that gives one length takes none from the ratios of the example
-        written |= set(LENGTHS)
+        own = config.machine.by_name
+        written = {f"machine.{name}": own[name] for name in LENGTHS} | written
         tables.pop("ratios", None)
-    section = tables.setdefault("machine", {})
-    for name in [name for name in machine.model.parameter_layout.names if name in written]:
-        inner = section
+    for name, value in sorted(written.items(), key=lambda item: _place(config, item[0])):
         *above, last = name.split(".")
+        inner = tables
         for part in above:
             inner = inner.setdefault(part, {})
-        inner[last] = float(values[name])
-    tables["title"] = f"{config.title}: the best machine" if config.title else "The best machine"
+        inner[last] = float(value)
+    tables["title"] = f"{config.title}: {title}" if config.title else title.capitalize()
     for table, key in (("", "catalogue"), ("system", "machine"), ("system", "motor"), ("machine", "linkage")):
         inner = tables.get(table, {}) if table else tables
         if isinstance(inner.get(key), str) and inner[key].lower().endswith((".toml", ".fmu", ".csv")):
             inner[key] = _from(folder, Path(config.source).parent / inner[key])
+    for run in tables.get("identify", {}).get("run", ()):
+        run["file"] = _from(folder, Path(config.source).parent / run["file"])
     return tables
+
+
+def _place(config: Config, name: str) -> int:
+    """The place of a parameter of the machine in its declaration; others stay behind them."""
+    names = config.machine.model.parameter_layout.names
+    own = name.removeprefix("machine.")
+    return names.index(own) if own in names else len(names)
 
 
 def _from(folder: Path, file: Path) -> str:

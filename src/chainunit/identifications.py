@@ -1,0 +1,72 @@
+"""`IdentificationResult`: an identified machine from Python."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .files import claim
+from .progress import Report as Progress
+from .report import identification as contents
+from .reported import ReportedResult
+from .study.config import Config
+from .study.identification.identification import IdentifiedMachine, identify
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+class IdentificationResult(ReportedResult):
+    """An identified machine. Its `repr` shows the numbers and the limits of the recordings; `found` is all that the
+    fit found."""
+
+    _command = "identify"
+
+    def __init__(self, found: IdentifiedMachine) -> None:
+        self.found = found
+        self._report = contents.identification_report(found)
+
+    @property
+    def is_described(self) -> bool:
+        """Whether the model describes the recordings: the residuals may be noise."""
+        return self.found.is_described
+
+    @property
+    def numbers(self) -> pd.DataFrame:
+        """The sought numbers by name: value, standard deviation, interval of 95 % (low, high), unit, and whether the
+        recordings tell the number; the value of one that they do not tell is no number."""
+        import pandas as pd
+
+        rows = {
+            name: {
+                "value": each.value if each.is_told else float("nan"),
+                "deviation": each.deviation,
+                "low": each.low,
+                "high": each.high,
+                "unit": each.unknown.unit,
+                "is_told": each.is_told,
+            }
+            for name, each in self.found.estimates.items()
+        }
+        return pd.DataFrame.from_dict(rows, orient="index")
+
+    def _clear(self, folder: Path) -> None:
+        contents.prepare(folder)
+
+    def _writers(self, folder: Path) -> list[Callable[[], list[Path]]]:
+        return contents.writers(self.found, self._report, folder)
+
+
+def make_identification(
+    config: Config, folder: Path | None, progress: Progress | None = None
+) -> IdentificationResult:
+    """Identify the machine of a study, see `chainunit.Study.identify`."""
+    report = progress or (lambda *_: None)
+    if folder is None:
+        return IdentificationResult(identify(config, report))
+    with claim(folder, "identify") as place:
+        result = IdentificationResult(identify(config, report))
+        result._clear(place)
+        result._write(place)
+    return result

@@ -1,0 +1,285 @@
+"""The identification of a machine: its recordings, the numbers that they can tell, the fit, and its checks."""
+
+from __future__ import annotations
+
+import math
+import os
+import tempfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...drives.induction_motor import InductionMotor
+from ...errors import Faults, InputError
+from ...progress import Report
+from ..arrays import rms
+from ..choice import choose
+from ..config import Config
+from ..drive import Drive
+from .fit import MOST_ROUNDS, Fit, fit
+from .information import Combination, Information, information
+from .inspection import Expectation, inspect
+from .measurands import MEASURANDS
+from .plant import Plant
+from .problem import Comparison, Problem, RecordedRun, Sensor
+from .reading import OFFSET_SHARE, WITH_OFFSET, IdentificationPlan, PlannedRun
+from .recording import Recording, read_recording
+from .residuals import ResidualCheck, check_residuals
+from .unknown import Unknown
+
+SIGNALS = ("motor.i", "motor.u", "motor.power", "crank.tau")
+"""Quantities of which a recording must have one: they tell the torque."""
+OF_INTERVAL = 1.959964
+"""Half the width of an interval of 95 %, in standard deviations."""
+WIDE, NEAR = 5.0, 1.2
+"""Factors by which the RMS of a column may differ from the simulated one: of a current, power or torque, which depend
+on the sought numbers; and of a speed or a voltage under control."""
+CONTROL = ("speed_control.kp", "speed_control.ki", "current_control.kp", "current_control.ki")
+"""Gains of the control of a motor, of which the course of its current depends."""
+_STEADY = ("motor.w", "crank.w", "motor.u")
+
+
+@dataclass(frozen=True)
+class FittedNumber:
+    """A sought number after the fit: its value, its standard deviation, the ends of its interval of 95 % within its
+    bounds, and whether the recordings tell it. The value of a number that they do not tell has a meaning together
+    with the others alone."""
+
+    unknown: Unknown
+    value: float
+    deviation: float
+    low: float
+    high: float
+    is_told: bool
+
+
+@dataclass(frozen=True)
+class IdentifiedMachine:
+    """An identified machine.
+
+    `before` is what the runs can tell at the start values, with further runs in order; `after` the same at the fitted
+    values. `best` are the normal equations there, and `checks` those of the residuals.
+    """
+
+    config: Config
+    plan: IdentificationPlan
+    problem: Problem
+    before: Information
+    best: Fit
+    after: Information
+    checks: tuple[ResidualCheck, ...]
+
+    @property
+    def estimates(self) -> dict[str, FittedNumber]:
+        """The sought numbers by the full names of the study file."""
+        told = {each.name: each.is_told for each in self.after.outlooks}
+        found = zip(self.problem.unknowns, self.best.z, self.best.deviations, strict=True)
+        values = {unknown.name: (float(x), float(s)) for unknown, x, s in found}
+        estimates = {}
+        for own in self.plan.sought:
+            name = system_name(own.name)
+            x, s = values[name]
+            low, high = max(own.low, x - OF_INTERVAL * s), min(own.high, x + OF_INTERVAL * s)
+            estimates[own.name] = FittedNumber(own, x, s, low, high, told[name])
+        return estimates
+
+    @property
+    def covariance(self) -> Any:
+        """The covariance of the sought numbers, shape (sought, sought)."""
+        count = len(self.plan.sought)
+        return self.best.covariance[:count, :count]
+
+    @property
+    def is_described(self) -> bool:
+        """Whether the residuals may be noise."""
+        return all(check.is_noise for check in self.checks)
+
+    def courses(self, comparison: Comparison) -> tuple[Any, Any]:
+        """A measured column and the simulated one, as its sensor would show it, each of shape (n,)."""
+        run = next(each for each in self.problem.runs if each.name == comparison.run)
+        measured = run.recording.columns[comparison.column]
+        return measured, measured - comparison.residuals * comparison.size
+
+    def combined(self, combination: Combination) -> tuple[float, float]:
+        """The value of a sum of sought numbers, and its standard deviation."""
+        places = [self.problem.place[name] for name, _ in combination.terms]
+        factors = np.array([factor for _, factor in combination.terms])
+        variance = factors @ self.best.covariance[np.ix_(places, places)] @ factors
+        return float(factors @ self.best.z[places]), math.sqrt(float(variance))
+
+
+def system_name(name: str) -> str:
+    """The name that a number of the study file has in the simulated system: a feed is an input of the machine."""
+    return name.replace("feed.", "machine.", 1) if name.startswith("feed.") else name
+
+
+def identify(config: Config, report: Report = lambda *_: None) -> IdentifiedMachine:
+    """Identify the machine of a study from the recordings of its table [identify].
+
+    Raises
+    ------
+    InputError
+        for a study without that table, and with a line for each fault of the recordings.
+    RunError
+        where the fit does not end.
+    """
+    plan = plan_of(config)
+    workers = min(2, os.cpu_count() or 1)
+    report("reading recordings", 0.0, 1.0)
+    recordings = _recordings(plan)
+    drive = _drive(config, recordings)
+    report("simulating", 0.1, 1.0)
+    problem = _problem(config, plan, drive, recordings)
+    _inspect(problem, drive, workers)
+    report("what the recordings can tell", 0.15, 1.0)
+    start = problem.started(workers)
+    before = information(problem, start, workers)
+    best = fit(
+        problem,
+        start,
+        workers,
+        report=lambda rounds, cost: report(
+            f"round {rounds}", 0.3 + 0.6 * min(1.0, rounds / MOST_ROUNDS), 1.0
+        ),
+        starts=plan.starts,
+        seed=plan.seed,
+    )
+    report("checks", 0.95, 1.0)
+    after = information(problem, best.z, workers, propose=False)
+    return IdentifiedMachine(config, plan, problem, before, best, after, tuple(check_residuals(best)))
+
+
+def plan_of(config: Config) -> IdentificationPlan:
+    """The plan of a study.
+
+    Raises
+    ------
+    InputError
+        for a study without the table [identify].
+    """
+    if config.identify is None:
+        raise InputError(
+            "identify: is missing; add [[identify.run]] with the recordings, and [[identify.parameter]] with the "
+            "numbers that are sought",
+            key="identify",
+        )
+    return config.identify
+
+
+def _recordings(plan: IdentificationPlan) -> dict[str, Recording]:
+    """The recordings by the names of the runs, each with the part that counts."""
+    faults, recordings = Faults(), dict[str, Recording]()
+    for run in plan.runs:
+        with faults.collected():
+            recording = read_recording(run.file, run.columns).part(run.begin, run.end)
+            if not recording.columns.keys() & set(SIGNALS):
+                raise InputError(
+                    f"{run.file}: has no column that tells the torque; must have one of {', '.join(SIGNALS)}"
+                )
+            recordings[run.name] = recording
+    faults.refuse()
+    return recordings
+
+
+def _drive(config: Config, recordings: Mapping[str, Recording]) -> Drive:
+    """The drive of the study, tuned where the file does not give the gains of its control."""
+    of_motor = sorted({name for each in recordings.values() for name in each.columns if name in SIGNALS[:3]})
+    if of_motor and not (config.gives("motor") or config.plate is not None):
+        raise InputError(
+            f"motor: is missing, and the recordings have {', '.join(of_motor)}; add [motor] with its data, or "
+            "system.motor with a motor of the catalogue",
+            "motor",
+        )
+    with tempfile.TemporaryDirectory() as folder:
+        return choose(config, Path(folder), lambda *_: None).drive
+
+
+def _problem(
+    config: Config, plan: IdentificationPlan, drive: Drive, recordings: Mapping[str, Recording]
+) -> Problem:
+    sought = [Unknown(system_name(u.name), u.unit, u.start, u.low, u.high, u.spread) for u in plan.sought]
+    measured = dict.fromkeys(name for each in recordings.values() for name in each.columns if name != "mark")
+    plant = Plant(drive, list(measured), [u.name for u in sought])
+    runs = [_run(config, drive, run, recordings[run.name]) for run in plan.runs]
+    return Problem(plant, runs, sought, _sensors(plan, measured, recordings))
+
+
+def _run(config: Config, drive: Drive, run: PlannedRun, recording: Recording) -> RecordedRun:
+    values: dict[str, float] = {
+        name: float(x)
+        for name, x in drive.reference(run.crank_speed).items()
+        if not name.startswith("model.")
+    }
+    feed = drive.loads(config.feed) if run.has_feed else dict.fromkeys(drive.loads(config.feed), 0.0)
+    sought = {system_name(u.name) for u in plan_of(config).sought}
+    # a sought feed of a loaded run is free
+    values |= {name: float(x) for name, x in feed.items() if not (run.has_feed and name in sought)}
+    added = {system_name(name): x for name, x in run.added.items()}
+    return RecordedRun(run.name, recording, run.crank_speed, values, added, run.ambient)
+
+
+def _sensors(
+    plan: IdentificationPlan, measured: Mapping[str, Any], recordings: Mapping[str, Recording]
+) -> dict[str, Sensor]:
+    sensors = {}
+    for name in measured:
+        if not MEASURANDS[name].analog:
+            continue
+        own = plan.sensor(name)
+        size = max(rms(each.columns[name]) for each in recordings.values() if name in each.columns)
+        usual = OFFSET_SHARE * size if name in WITH_OFFSET else 0.0
+        sensors[name] = Sensor(
+            own.noise, own.resolution, own.gain, usual if own.offset is None else own.offset
+        )
+    return sensors
+
+
+def _inspect(problem: Problem, drive: Drive, workers: int) -> None:
+    """Refuse recordings with faults; the sizes to expect are those of the drive at the start values."""
+    faults = Faults()
+    for run in problem.runs:
+        response = problem.simulated(run, problem.starts, workers)
+        expected = {}
+        for name in run.recording.columns:
+            if MEASURANDS[name].analog:
+                size, factor = rms(response.values[name]), NEAR if name in _STEADY else WIDE
+                expected[name] = Expectation(
+                    size / factor,
+                    size * factor,
+                    f"{1.0 / factor:.2g} to {factor:g} times the simulated one",
+                    True,
+                )
+        faults.add(inspect(run.recording, expected, run.crank_speed, drive.ratio))
+    faults.refuse()
+
+
+def remarks(found: IdentifiedMachine) -> Iterator[str]:
+    """Sentences on data that are missing or assumed."""
+    runs, config = found.problem.runs, found.config
+    columns = {name for run in runs for name in run.recording.columns}
+    if (
+        issubclass(config.motor_type, InductionMotor)
+        and "motor.i" in columns
+        and "motor.power" not in columns
+    ):
+        _, current = found.courses(next(each for each in found.best.comparisons if each.column == "motor.i"))
+        swing = np.ptp(current) / np.mean(current)
+        yield (
+            f"The recordings have no active power. The current of this induction motor changes by {100.0 * swing:.2g}"
+            " % within a turn, as most of it magnetises the motor: record the power, too, which tells far more"
+        )
+    for run in runs:
+        if not {"mark", "motor.count"} & run.recording.columns.keys():
+            yield (
+                f"{run.recording.source} has neither a mark nor an encoder: the angle of the crank follows from the "
+                "course of the other columns, and machines that are alike in both halves of a turn may be taken for "
+                "each other"
+            )
+    if config.motor_type.follows(config.motor) if config.motor is not None else False:
+        tuned = [f"motor.{name}" for name in CONTROL if f"motor.{name}" not in config.given]
+        if tuned:
+            names = ", ".join(tuned)
+            yield f"{names}: not in the file, and tuned as for a new drive; give those of the real converter"

@@ -1,0 +1,217 @@
+"""The result of an identification as data: the content of result.json, and of the study file with its values."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ... import __version__
+from ...refusals import unit_behind
+from ...text import array_entry, entry, shown_in
+from ..study_file import changed_tables
+from .identification import FittedNumber, IdentifiedMachine, remarks, system_name
+from .information import Combination, short_name
+from .measurands import MEASURANDS
+from .residuals import ResidualCheck
+
+CORRELATED = 0.8
+"""Correlation from which a pair of numbers is named."""
+MOST_PAIRS = 12
+CLASSES = 90
+"""Number of crank angles at which measured and simulated courses are compared."""
+LOUD = 1.5
+"""Noise in parts of the stated one from which a sentence names it."""
+
+
+def as_dict(found: IdentifiedMachine) -> dict[str, Any]:
+    """All results, ready for JSON, each number with its unit."""
+    with shown_in(found.config.units):
+        return _as_dict(found)
+
+
+def _as_dict(found: IdentifiedMachine) -> dict[str, Any]:
+    config, best = found.config, found.best
+    estimates = found.estimates
+    told = sum(each.is_told for each in estimates.values())
+    return {
+        "chainunit": __version__,
+        "title": config.title,
+        "source": config.source,
+        "report": dict(config.labels),
+        "status": "complete" if found.is_described else "the model does not describe the recordings",
+        "sought": entry(float(len(estimates)), "1"),
+        "told": entry(float(told), "1"),
+        "runs": {run.name: _run(found, k) for k, run in enumerate(found.plan.runs)},
+        "numbers": {name: _number(found, each) for name, each in estimates.items()},
+        "covariance": {
+            "names": list(estimates),
+            "units": [each.unknown.unit for each in estimates.values()],
+            "values": [each.value for each in estimates.values()],
+            "matrix": found.covariance.tolist(),
+        },
+        "correlations": list(_correlations(found)),
+        "combinations": [_combination(found, each) for each in found.after.combinations],
+        "blind": [_blind(found, each) for each in found.after.blind],
+        "proposals": [
+            {"text": each.words, "factor": entry(each.factor, "1"), "told": entry(float(each.told), "1")}
+            for each in found.before.proposals
+        ],
+        "residuals": [_check(found, each) for each in found.checks],
+        "sensors": dict(_nuisances(found)),
+        "fit": {
+            "rounds": entry(float(best.rounds), "1"),
+            "starts": entry(float(best.starts), "1"),
+            "agreeing": entry(float(best.agreeing), "1"),
+        },
+        "remarks": list(remarks(found)),
+        "courses": {run.name: _courses(found, run.name) for run in found.plan.runs},
+    }
+
+
+def _run(found: IdentifiedMachine, k: int) -> dict[str, Any]:
+    run, recording = found.plan.runs[k], found.problem.runs[k].recording
+    return {
+        "file": str(run.file),
+        "columns": list(recording.columns),
+        "rows": entry(float(len(recording.time)), "1"),
+        "duration": entry(float(recording.time[-1] - recording.time[0]), "s"),
+        "rate": entry(1.0 / recording.step, "1"),
+        "crank_speed": entry(run.crank_speed, "rad/s", "speed"),
+        "ambient": entry(run.ambient, "K", "temperature"),
+        "feed": "that of all loaded runs" if run.has_feed else "none",
+        "added": {name: entry(x, found.plan.variables[name].unit) for name, x in run.added.items()},
+    }
+
+
+def _number(found: IdentifiedMachine, each: FittedNumber) -> dict[str, Any]:
+    """A sought number: with its value only where the recordings tell it."""
+    variable = found.plan.variables[each.unknown.name]
+    before = next(one for one in found.before.outlooks if one.name == system_name(each.unknown.name))
+    own, unit, kind = each.unknown, variable.unit, variable.kind
+    return {
+        "title": variable.description,
+        "told": each.is_told,
+        "value": entry(each.value if each.is_told else None, unit, kind),
+        "deviation": entry(each.deviation, unit, "difference" if unit == "K" else ""),
+        "from": entry(each.low, unit, kind),
+        "to": entry(each.high, unit, kind),
+        "given": entry(own.start, unit, kind),
+        "given_deviation": entry(own.spread, unit),
+        "least": entry(own.low, unit, kind),
+        "most": entry(own.high, unit, kind),
+        "expected": entry(before.by_both, unit),
+        "by_runs": entry(before.by_runs, unit),
+    }
+
+
+def _correlations(found: IdentifiedMachine) -> Iterator[dict[str, Any]]:
+    """The pairs of numbers with the largest correlations."""
+    names = [each.name for each in found.plan.sought]
+    scale = 1.0 / np.sqrt(np.diag(found.covariance))
+    matrix = found.covariance * np.outer(scale, scale)
+    pairs = sorted(((i, k) for i in range(len(names)) for k in range(i)), key=lambda pair: -abs(matrix[pair]))
+    for i, k in pairs[:MOST_PAIRS]:
+        if abs(matrix[i, k]) >= CORRELATED:
+            yield {"first": names[k], "second": names[i], "correlation": entry(float(matrix[i, k]), "1")}
+
+
+def _combination(found: IdentifiedMachine, each: Combination) -> dict[str, Any]:
+    value, deviation = found.combined(each)
+    return {
+        "text": str(each),
+        "terms": dict(each.terms),
+        "value": entry(value, each.unit),
+        "deviation": entry(deviation, each.unit),
+        "by_runs": entry(each.deviation, each.unit),
+    }
+
+
+def _blind(found: IdentifiedMachine, each: Combination) -> dict[str, Any]:
+    """A change of numbers together that leaves no trace."""
+    units = {system_name(u.name): u.unit for u in found.plan.sought}
+    changes = [
+        f"{short_name(name)} {'up' if factor > 0.0 else 'down'} by {abs(factor):.3g}{unit_behind(units[name])}"
+        for name, factor in each.terms
+    ]
+    return {"text": " with ".join(changes), "terms": dict(each.terms)}
+
+
+def _check(found: IdentifiedMachine, each: ResidualCheck) -> dict[str, Any]:
+    unit = MEASURANDS[each.column].unit
+    return {
+        "run": each.run,
+        "column": each.column,
+        "is_noise": each.is_noise,
+        "statistic": entry(each.statistic, "1"),
+        "limit": entry(each.limit, "1"),
+        "noise": entry(each.noise, "1"),
+        "orders": [
+            {"order": entry(float(order), "1"), "amplitude": entry(size, unit)} for order, size in each.orders
+        ],
+    }
+
+
+def _nuisances(found: IdentifiedMachine) -> Iterator[tuple[str, dict[str, Any]]]:
+    best = found.best
+    for unknown, x, s in zip(found.problem.unknowns, best.z, best.deviations, strict=True):
+        if unknown.is_nuisance:
+            kind = "difference" if unknown.unit == "K" else ""
+            value = entry(float(x), unknown.unit, "temperature" if unknown.unit == "K" else "")
+            yield unknown.name, {"value": value, "deviation": entry(float(s), unknown.unit, kind)}
+
+
+def _courses(found: IdentifiedMachine, run: str) -> dict[str, Any]:
+    """By analog column, the mean measured and simulated values in classes of the crank angle."""
+    courses: dict[str, Any] = {}
+    edges = np.linspace(0.0, 2.0 * math.pi, CLASSES + 1)
+    for each in found.best.comparisons:
+        if each.run != run or not MEASURANDS[each.column].analog:
+            continue
+        measured, simulated = found.courses(each)
+        place = np.digitize(np.mod(each.angle, 2.0 * math.pi), edges[1:-1])
+        count = np.bincount(place, minlength=CLASSES)
+        some = count > 0
+
+        def mean(x: Any, place: Any = place, count: Any = count, some: Any = some) -> Any:
+            return np.bincount(place, x, CLASSES)[some] / count[some]
+
+        unit = MEASURANDS[each.column].unit
+        courses[each.column] = {
+            "angle": array_entry(0.5 * (edges[1:] + edges[:-1])[some], "rad"),
+            "measured": array_entry(mean(measured), unit),
+            "simulated": array_entry(mean(simulated), unit),
+            "noise": array_entry(each.size / np.sqrt(count[some]), unit),
+        }
+    return courses
+
+
+def sentences(found: IdentifiedMachine) -> list[str]:
+    """Sentences that judge an identification."""
+    words = []
+    for check in found.checks:
+        unit = MEASURANDS[check.column].unit
+        if not check.is_noise:
+            order, size = check.orders[0]
+            words.append(
+                f"{check.column} of the run {check.run}: the model does not describe it. Order {order} of the crank "
+                f"remains, with {size:.2g} {unit}; check the dimensions, the gear ratio, and the control"
+            )
+        if check.noise > LOUD:
+            words.append(
+                f"{check.column} of the run {check.run}: its noise is {check.noise:.2g} times the stated one; state "
+                "its own (identify.sensor.noise), as all deviations grow with it"
+            )
+    return words
+
+
+def identified_tables(found: IdentifiedMachine, folder: Path) -> dict[str, Any]:
+    """The tables of the study with the fitted values, as a file in `folder` has them. A number that the recordings do
+    not tell has its fitted value, too: only all of them together give the measured courses."""
+    values = {name: each.value for name, each in found.estimates.items()}
+    tables = changed_tables(found.config, values, "identified", folder)
+    tables.pop("identify", None)
+    return tables

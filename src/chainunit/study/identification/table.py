@@ -1,0 +1,155 @@
+"""The table [identify] of a study file and its entries: declarations only."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, create_model
+
+from ...quantities import Value, declaration, quantity
+from ...reading import schema
+from ..entry_values import Entered
+
+FEEDS = ("same", "none")
+"""The feed of a run: that of all loaded runs, or none."""
+MOST_PARAMETERS, MOST_RUNS, MOST_SENSORS = 40, 12, 12
+
+
+@declaration
+class IdentifyTable:
+    """The identification of a machine from recordings of its motor."""
+
+    noise: Value = quantity(
+        "1",
+        "standard deviation of the noise of a sensor, in parts of the RMS of its column; of sensors without a table",
+        default=0.01,
+        min=1e-6,
+        max=1.0,
+        kind="percent",
+    )
+    gain: Value = quantity(
+        "1",
+        "standard deviation of the gain of a sensor; of sensors without a table",
+        default=0.01,
+        min=0.0,
+        max=1.0,
+        kind="percent",
+    )
+    starts: Value = quantity(
+        "1", "number of starts of the fit, spread over the bounds", default=1.0, min=1.0, max=100.0
+    )
+    seed: Value = quantity("1", "seed of the starts", default=1.0, min=0.0, max=1e9)
+
+
+WHOLE = ("starts", "seed")
+"""Quantities of the table that are whole numbers."""
+
+FIELDS: Mapping[str, Any] = {
+    "parameter": (
+        list[Any],
+        Field(
+            [],
+            max_length=MOST_PARAMETERS,
+            description="numbers that are sought: tables [[identify.parameter]]",
+        ),
+    ),
+    "run": (list[Any], Field([], max_length=MOST_RUNS, description="recordings: tables [[identify.run]]")),
+    "sensor": (
+        list[Any],
+        Field([], max_length=MOST_SENSORS, description="knowledge of sensors: tables [[identify.sensor]]"),
+    ),
+}
+"""Keys of the table that are no quantities, as pydantic fields."""
+
+
+@declaration
+class RunTable:
+    """A recorded run."""
+
+    crank_speed: Value = quantity(
+        "rad/s", "speed of the crank in this run", default=3.0, min=0.01, max=1000.0, kind="speed"
+    )
+    begin: Value = quantity("s", "time of the recording from which it counts", default=0.0, min=-1e9, max=1e9)
+    end: Value = quantity("s", "time of the recording up to which it counts", default=0.0, min=-1e9, max=1e9)
+    ambient: Value = quantity("K", "temperature of the surroundings", default=293.15, min=230.0, max=340.0)
+
+
+@declaration
+class SensorTable:
+    """The knowledge of a sensor."""
+
+    noise: Value = quantity(
+        "1",
+        "standard deviation of its noise, in parts of the RMS of its column",
+        default=0.01,
+        min=1e-6,
+        max=1.0,
+        kind="percent",
+    )
+    gain: Value = quantity(
+        "1", "standard deviation of its gain", default=0.01, min=0.0, max=1.0, kind="percent"
+    )
+
+
+PARAMETER_KEYS: Mapping[str, Any] = {
+    "name": (
+        str,
+        Field(
+            "",
+            min_length=1,
+            description='full name of a quantity, such as "machine.left.web_mass", "feed.left.material_mass", '
+            '"motor.rotor.J"',
+        ),
+    ),
+    "from": (Entered, Field(None, description="least value")),
+    "to": (Entered, Field(None, description="largest value")),
+    "deviation": (
+        Entered,
+        Field(
+            None,
+            description="standard deviation of the value of the study from the true one, as of a weighing or a "
+            'drawing; a number in the unit of the quantity, or a share of the value, such as "5 %"',
+        ),
+    ),
+}
+SENSOR_KEYS: Mapping[str, Any] = {
+    "column": (str, Field("", min_length=1, description='quantity that it measures, such as "motor.i"')),
+    "offset": (
+        Entered,
+        Field(None, description="standard deviation of its offset, in the unit of the quantity"),
+    ),
+    "resolution": (Entered, Field(None, description="step of its converter, in the unit of the quantity")),
+}
+RUN_KEYS: Mapping[str, Any] = {
+    "name": (str, Field("", min_length=1, description="name of the run, in small letters, digits and _")),
+    "file": (
+        str,
+        Field("", min_length=1, description="recording (CSV, or CSV.gz), relative to the study file"),
+    ),
+    "feed": (
+        Literal[FEEDS],
+        Field("same", description="feed of the machine: the one that is sought in all loaded runs, or none"),
+    ),
+    "columns": (
+        dict[str, Any],
+        Field({}, description="by quantity, the head of its column, where that is not the quantity's name"),
+    ),
+    "added": (
+        dict[str, Any],
+        Field(
+            {}, description="what was added to a sought number for this run, by its full name: a known mass"
+        ),
+    ),
+}
+
+ParameterEntry: type[BaseModel] = create_model(
+    "identify_parameter", __config__=ConfigDict(extra="forbid"), **PARAMETER_KEYS
+)
+"""The form of an entry [[identify.parameter]]."""
+
+
+def entry_form(declared: type, keys: Mapping[str, Any], prefix: str) -> type[BaseModel]:
+    """The form of an entry of these declared quantities and other keys; `prefix` stands before their names in a
+    refusal."""
+    return schema(declared, "identify_entry", prefix, **keys)

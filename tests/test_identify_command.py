@@ -1,0 +1,220 @@
+"""``chainunit identify``: from recordings in files to numbers, page and study file."""
+
+from __future__ import annotations
+
+import json
+import math
+import tomllib
+
+import numpy as np
+import pytest
+from command import chainunit
+
+from chainunit import InputError, Study
+from chainunit.native.compilers import compiler
+from chainunit.study import config as study_files
+from chainunit.study.choice import choose
+from chainunit.study.identification.measurands import MEASURANDS
+from chainunit.study.identification.synthetic import HiddenRun, Logger, synthetic
+
+pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
+FILE = """
+title = "A mill"
+[motor]
+speed_control.kp = 0.1017
+speed_control.ki = 0.6102
+current_control.kp = 33
+current_control.ki = 2850
+[run]
+crank_speed = 3
+[feed]
+left.processing_force = 0
+right.processing_force = 0
+[identify]
+gain = 0
+[[identify.parameter]]
+name = "feed.left.material_mass"
+from = "10 kg"
+to = "60 kg"
+[[identify.parameter]]
+name = "feed.right.material_mass"
+from = 10
+to = 60
+[[identify.parameter]]
+name = "machine.left.web_mass"
+deviation = "20 %"
+[[identify.parameter]]
+name = "machine.joint_damping"
+from = 0.1
+to = 3
+[[identify.run]]
+name = "loaded"
+file = "loaded.csv.gz"
+[[identify.sensor]]
+column = "motor.i"
+offset = "0.1 A"
+"""
+EMPTY = '[[identify.run]]\nname = "empty"\nfile = "empty.csv"\nfeed = "none"\n'
+TRUTH = {
+    "feed.left.material_mass": 41.0,
+    "feed.right.material_mass": 24.0,
+    "machine.left.web_mass": 24.5,
+    "machine.joint_damping": 1.3,
+}
+HEADS = {"motor.i": "I_A [mA]", "motor.w": "n [rev/min]"}
+FACTORS = {"motor.i": 1e3, "motor.w": 60.0 / (2.0 * math.pi)}
+
+
+def write(folder, name, *, empty=False, heads=HEADS, seed=3, **changes):
+    """Write a recording with a logger's own names and units; `changes` are functions of columns."""
+    config = study_files.parse(FILE)
+    drive = choose(config, folder, lambda *_: None).drive
+    values = {key.replace("feed.", "machine."): x for key, x in TRUTH.items()}
+    values |= {f"machine.{side}.processing_force": 0.0 for side in ("left", "right")} | {"motor.w_ref": 150.0}
+    if empty:
+        values |= {key: 0.0 for key in values if "material" in key}
+    run = HiddenRun(3.0, 12.0, values, angle=1.0, temperature=300.0)
+    logger = Logger(rate=200.0, offset={"motor.i": 0.03}, mark_angle=0.1)
+    recording = synthetic(drive, ["motor.i", "motor.u", "motor.w"], run, logger, np.random.default_rng(seed))
+    columns = {"time": recording.time, **recording.columns}
+    for key, change in changes.items():
+        columns[key.replace("_", ".")] = change(columns[key.replace("_", ".")])
+    table = np.stack([x * FACTORS.get(key, 1.0) if heads else x for key, x in columns.items()], axis=1)
+    names = [heads.get(key, f"{key} [{MEASURANDS[key].unit}]") for key in columns]
+    np.savetxt(folder / name, table, "%.7g", ",", header=",".join(names), comments="")
+
+
+COLUMNS = 'columns = { "motor.i" = "I_A", "motor.w" = "n" }\n'
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """The folder of a finished identification from two runs."""
+    folder = tmp_path_factory.mktemp("identify")
+    write(folder, "loaded.csv.gz")
+    write(folder, "empty.csv", empty=True, seed=5)
+    text = FILE.replace('"loaded.csv.gz"\n', f'"loaded.csv.gz"\n{COLUMNS}') + EMPTY + COLUMNS
+    (folder / "mine.toml").write_text(text, "utf-8")
+    done = chainunit("identify", "mine.toml", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    (folder / "stdout.txt").write_text(done.stdout, "utf-8")
+    return folder
+
+
+def test_the_numbers_are_found_and_written(folder):
+    """Within four standard deviations; the study file has them, and runs; the page and the pictures are there."""
+    result = json.loads((folder / "identified" / "result.json").read_text("utf-8"))
+    for name, true in TRUTH.items():
+        own = result["numbers"][name]
+        assert own["told"] and abs(own["value"]["value"] - true) < 4.0 * own["deviation"]["value"], name
+        # an interval of 95 %
+        half = 1.96 * own["deviation"]["value"]
+        assert own["from"]["value"] == pytest.approx(own["value"]["value"] - half, rel=1e-3)
+        assert own["to"]["value"] == pytest.approx(own["value"]["value"] + half, rel=1e-3)
+    assert abs(result["sensors"]["loaded.offset(motor.i)"]["value"]["value"] - 0.03) < 0.01
+    covariance = result["covariance"]
+    np.testing.assert_allclose(
+        np.sqrt(np.diag(covariance["matrix"])),
+        [result["numbers"][name]["deviation"]["value"] for name in covariance["names"]],
+    )
+    tables = tomllib.loads((folder / "identified" / "identified.toml").read_text("utf-8"))
+    assert "identify" not in tables and tables["title"] == "A mill: identified"
+    assert tables["feed"]["left"]["material_mass"] == pytest.approx(
+        result["numbers"]["feed.left.material_mass"]["value"]["value"]
+    )
+    config = study_files.load(folder / "identified" / "identified.toml")
+    assert config.machine.by_name["left.web_mass"] == pytest.approx(tables["machine"]["left"]["web_mass"])
+    written = {each.name for each in (folder / "identified").iterdir()}
+    assert written >= {"report.html", "result.md", "course_loaded.png", "course_empty.png"}
+    assert "identified.toml" in (folder / "stdout.txt").read_text("utf-8")
+
+
+def test_the_courses_are_means_of_the_recordings(folder):
+    """By a second route: classes of the angle between two passes of the mark."""
+    result = json.loads((folder / "identified" / "result.json").read_text("utf-8"))
+    time, current, _, _, mark = np.loadtxt(folder / "empty.csv", delimiter=",", skiprows=1).T
+    passed = time[mark > 0.5] - 0.0025
+    angle = np.interp(time, passed, 2.0 * math.pi * np.arange(len(passed))) + 0.1
+    inside = (time > passed[0]) & (time < passed[-1])
+    course = result["courses"]["empty"]["motor.i"]
+    for k in (5, 30, 60):
+        at = course["angle"]["value"][k]
+        near = inside & (np.abs((angle - at + math.pi) % (2.0 * math.pi) - math.pi) < 0.12)
+        own = np.mean(current[near]) * 1e-3
+        assert course["measured"]["value"][k] == pytest.approx(own, abs=0.03)
+        assert course["simulated"]["value"][k] == pytest.approx(course["measured"]["value"][k], abs=0.02)
+
+
+def test_one_run_does_not_tell_web_from_feed(tmp_path):
+    """It says so, shows no bare number, and proposes an empty run; from Python the same."""
+    write(tmp_path, "loaded.csv.gz", heads={})
+    text = FILE.replace('deviation = "20 %"', "from = 12\nto = 32")
+    (tmp_path / "mine.toml").write_text(text, "utf-8")
+    done = chainunit("identify", "mine.toml", "-o", "out", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    words = " ".join(done.stdout.split())
+    assert "These recordings tell 2 of 4 numbers" in words
+    assert "No trace in any column: left.material_mass" in words or "left.web_mass up by 1 kg" in words
+    result = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))
+    own = result["numbers"]["machine.left.web_mass"]
+    assert (
+        not own["told"] and own["value"]["value"] is None and own["from"]["value"] < 24.5 < own["to"]["value"]
+    )
+    assert result["proposals"][0]["text"] == "empty"
+    (total,) = result["combinations"]
+    true = sum(
+        factor * TRUTH[name.replace("machine.left.material", "feed.left.material")]
+        for name, factor in total["terms"].items()
+    )
+    assert abs(total["value"]["value"] - true) < 4.0 * total["deviation"]["value"] < 2.0
+    found = Study.from_file(tmp_path / "mine.toml").identify(tmp_path / "again")
+    assert found.is_described and "A mill" in repr(found)
+    again = json.loads((tmp_path / "again" / "result.json").read_text("utf-8"))
+    assert again["numbers"] == result["numbers"] and again["courses"] == result["courses"]
+    numbers = found.numbers
+    assert list(numbers.index) == list(TRUTH) and numbers["is_told"].sum() == 2
+    assert math.isnan(numbers.loc["machine.left.web_mass", "value"])
+
+
+@pytest.mark.parametrize(
+    ("column", "change", "words"),
+    [
+        ("motor_i", lambda x: 1e3 * x, "the values look like mA"),
+        ("motor_i", lambda x: -x, "the sign is reversed"),
+        ("motor_i", lambda x: np.minimum(x, 0.8 * x.max()), "it is clipped"),
+        ("motor_w", lambda x: np.where(np.arange(len(x)) > 500, x[500], x), "is stuck"),
+        ("motor_w", lambda x: 0.0 * x, "the machine stands"),
+    ],
+)
+def test_a_bad_recording_is_refused_by_its_column(column, change, words, tmp_path):
+    write(tmp_path, "loaded.csv.gz", heads={}, **{column: change})
+    (tmp_path / "mine.toml").write_text(FILE, "utf-8")
+    done = chainunit("identify", "mine.toml", "-o", "out", cwd=tmp_path)
+    assert done.returncode == 2 and not (tmp_path / "out").exists()
+    assert words in done.stderr and f"column {column.replace('_', '.')}" in done.stderr
+
+
+def test_a_wrong_gear_is_recognised(tmp_path):
+    """The exit status is 1, and the judgement names the column; the numbers are kept."""
+    write(tmp_path, "loaded.csv.gz", heads={})
+    (tmp_path / "mine.toml").write_text(FILE + "[machine]\nr = 0.16\n", "utf-8")
+    done = chainunit("identify", "mine.toml", "-o", "out", cwd=tmp_path)
+    assert done.returncode == 1
+    assert "The model does not describe the recordings." in " ".join(done.stdout.split())
+    result = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))
+    assert any(not each["is_noise"] for each in result["residuals"])
+
+
+def test_refusals(tmp_path):
+    (tmp_path / "mine.toml").write_text(FILE, "utf-8")
+    done = chainunit("identify", "mine.toml", cwd=tmp_path)
+    assert done.returncode == 2 and "loaded.csv.gz" in done.stderr and not (tmp_path / "identified").exists()
+    with pytest.raises(InputError, match="identify: is missing"):
+        Study().identify()
+    write(tmp_path, "loaded.csv.gz", heads={})
+    begin, end = FILE.index("[motor]"), FILE.index("[run]")
+    (tmp_path / "mine.toml").write_text(FILE[:begin] + FILE[end:], "utf-8")
+    done = chainunit("identify", "mine.toml", cwd=tmp_path)
+    assert (
+        done.returncode == 2 and "motor: is missing, and the recordings have motor.i, motor.u" in done.stderr
+    )
