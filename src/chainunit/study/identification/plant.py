@@ -272,7 +272,8 @@ class Plant:
         free = self._free
         states = {name: powered.states[name].copy() for name in free.states}
         # later by dt, the speed has changed by the former acceleration, and not yet by the new one
-        then = free.run(course.values, states, [], (span[0], span[0]), course.step)
+        now = {name: x[:1] for name, x in states.items()}
+        then = free.run(course.values, now, [], (span[0], span[0]), course.step)
         fall = powered.values["motor.a"][-1] - then.values["motor.a"][0]
         states["motor.w"][1:] += [size * fall * (name == OFF) for name, size in changes]
         return free.run(course.values, states, changes, span, course.step, workers)
@@ -292,5 +293,6 @@ def _joined(powered: Response, rolling: Response, off: float) -> Response:
         both(powered.values, rolling.values),
         both(powered.slopes, rolling.slopes),
         len(powered.time),
-        {name: (before, after) if name in MOVING else (before,) for name in powered.values},
+        # a mark that is passed backwards is no mark
+        {name: (before, after) if name in MOVING else (before,) for name in (*powered.values, "mark")},
     )

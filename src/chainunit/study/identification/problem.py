@@ -293,7 +293,7 @@ class Problem:
         for name, y in recording.columns.items():
             if name == "mark":
                 passed = mark_times(recording)
-                passed = passed[response.describes(CRANK, passed)]
+                passed = passed[response.describes(name, passed)]
                 if len(passed) < 2:
                     continue
                 at, sooner = self._clock(run, passed, value)

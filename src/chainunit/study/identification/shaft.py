@@ -178,7 +178,7 @@ class MeasuredShaft:
                 course.rows,
                 dict.fromkeys(kept, none),
                 dict.fromkeys(kept, nothing),
-                spans=dict.fromkeys(kept, ()),
+                spans=dict.fromkeys((*kept, "mark"), ()),
             )
         own, ratio = course.nuisances, self.ratio
         names = {INERTIA: ("motor.rotor.J", ratio**-2), FRICTION: ("motor.rotor.d", ratio**-2)}
@@ -195,7 +195,8 @@ class MeasuredShaft:
             states[state][1:] = [size * ratio * (name == nuisance) for name, size in changes]
         piece = loop.run(values, states, turned, (off, course.end), course.step, workers)
         response = loop.response(piece)
-        return replace(response, spans=dict.fromkeys(response.values, ((off + GUARD, math.inf),)))
+        spans = dict.fromkeys(response.values, ((off + GUARD, math.inf),))
+        return replace(response, spans={**spans, "mark": ()})
 
     @cached_property
     def _free(self) -> SourcedLoop:

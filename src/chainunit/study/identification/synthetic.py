@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -17,10 +18,11 @@ from ...batch.transients import Transients, signal_table
 from ...errors import InputError
 from ...system.compiled_simulation import LONGEST, CompiledSystem
 from ...system.reference import monolithic
+from ...system.signals import at_time
 from ..arrays import rms
 from ..drive import Drive
 from .measurands import COUNTS, MEASURANDS
-from .plant import source_of
+from .plant import MOVING, free, source_of
 from .problem import JITTER
 from .recording import Recording
 
@@ -70,7 +72,8 @@ class HiddenRun:
     `values` of parameters and inputs of the system by full name, those of inputs also as `Profile` whose times count
     from the first row; the speed of the crank at the begin [rad/s]; the crank angle at the first row if the motor
     kept its speed [rad]; the `temperature` of the winding at the begin [K], by default that of the surroundings; the
-    time from the first to the last row, and the time that is simulated `before` [s].
+    time from the first to the last row, and the time that is simulated `before` [s]. At the time `off` [s] after the
+    first row the motor is switched off; its electric quantities are zero from then on.
     """
 
     crank_speed: float
@@ -79,6 +82,7 @@ class HiddenRun:
     angle: float = 0.0
     temperature: float | None = None
     before: float = 10.0
+    off: float | None = None
 
 
 def synthetic(
@@ -130,44 +134,70 @@ def _simulated(
     drive: Drive, measured: Sequence[str], run: HiddenRun, at: Any, integrator: str
 ) -> dict[str, Any]:
     """The measured quantities and the angle of the motor at these times [s], each of shape (times,)."""
-    profiles = {name: x for name, x in run.values.items() if hasattr(x, "changes")}
-    graph = drive.graph.with_values(
-        {name: float(x) for name, x in run.values.items() if name not in profiles}
-    )
-    system = CompiledSystem(graph)
-    sources = {name: source_of(drive, name, system.outputs) for name in measured}
-    outputs = list(dict.fromkeys(["motor.phi", *(output for output, _ in sources.values())]))
-    speed = run.crank_speed * drive.ratio
-    layout = system.model.state_layout
-    assert layout is not None
-    begin = -run.before
-    first = system.inputs | {name: float(x(begin)) for name, x in profiles.items()}
+    system = CompiledSystem(drive.graph.with_values(_numbers(run.values)))
+    speed, begin = run.crank_speed * drive.ratio, -run.before
+    first = {name: float(at_time(x, begin)) for name, x in run.values.items()}
     start = {"motor.phi_start": run.angle * drive.ratio - speed * run.before, "motor.w_start": speed}
-    states = dict(zip(layout.names, system.start(first, start), strict=True))
+    states = dict(zip(_states(system), system.start(first, start), strict=True))
     if run.temperature is not None:
         states[f"motor.{drive.motor.temperature}"] = run.temperature
+    end = float(np.max(at)) + 2.0 * _STEP
+    cuts = [begin, end] if run.off is None else [begin, run.off, end]
+    course = {name: np.zeros(len(at)) for name in ("motor.phi", *measured)}
+    for own, (low, high) in zip((drive, free(drive)), pairwise(cuts), strict=False):
+        here = (at >= low) & (at <= high)
+        names = measured if own is drive else [name for name in measured if name in MOVING]
+        known = CompiledSystem(own.graph).outputs
+        sources = {name: source_of(own, name, known) for name in names} | {"motor.phi": ("motor.phi", 1.0)}
+        outputs = list(dict.fromkeys(output for output, _ in sources.values()))
+        rows, states = _stretch(own, run.values, states, outputs, (low, high), at[here], integrator)
+        for name, (output, factor) in sources.items():
+            course[name][here] = factor * rows[output]
+        for name in set(measured) - set(names):
+            course[name][here] = 0.0
+    return course
+
+
+def _numbers(values: Mapping[str, Any]) -> dict[str, float]:
+    return {name: float(x) for name, x in values.items() if not hasattr(x, "changes")}
+
+
+def _states(system: CompiledSystem) -> Sequence[str]:
+    assert system.model.state_layout is not None
+    return system.model.state_layout.names
+
+
+def _stretch(
+    drive: Drive, values: Mapping[str, Any], states: Mapping[str, float], outputs: Sequence[str],
+    span: tuple[float, float], at: Any, integrator: str,
+) -> tuple[dict[str, Any], dict[str, float]]:  # fmt: skip
+    """The outputs at these times [s] of a stretch without a switch, and the states at its end."""
+    known = drive.graph.values.keys() | CompiledSystem(drive.graph).inputs.keys()
+    profiles = {name: x for name, x in values.items() if hasattr(x, "changes") and name in known}
+    graph = drive.graph.with_values({name: x for name, x in _numbers(values).items() if name in known})
+    system = CompiledSystem(graph)
+    names, (begin, end) = _states(system), span
+    own = {name: states[name] for name in names}
     if integrator == "monolithic":
         # rows that jitter before one another are solved in order
-        times, places = np.unique(at, return_inverse=True)
-        solved = monolithic(graph, profiles, [begin, *times], rtol=1e-9, start=states)
-        rows = {output: solved[output].values[1:][places] for output in outputs}
-    else:
-        changes = max((len(x.changes) for x in profiles.values()), default=0)
-        loop = Transients(system.model, outputs, driven=list(profiles), changes=changes)
-        result = loop.run(
-            system.p,
-            system.inputs,
-            list(states.values()),
-            begin=begin,
-            step=_STEP,
-            stop=[float(np.max(at)) + 2.0 * _STEP],
-            signals=signal_table(list(profiles), [profiles], {}, changes),
-            longest=LONGEST * _STEP,
-        )
-        failure = result.failure(0)
-        if failure is not None:
-            raise failure
-        rows = {
-            output: CubicSpline(result.times[0], result.rows[k, 0])(at) for k, output in enumerate(outputs)
-        }
-    return {"motor.phi": rows["motor.phi"]} | {name: f * rows[o] for name, (o, f) in sources.items()}
+        times, places = np.unique(np.append(at, end), return_inverse=True)
+        solved = monolithic(graph, profiles, [begin, *times], rtol=1e-9, start=own)
+        rows = {output: solved[output].values[1:][places[:-1]] for output in outputs}
+        return rows, {name: float(solved[name][-1]) for name in names}
+    changes = max((len(x.changes) for x in profiles.values()), default=0)
+    loop = Transients(system.model, outputs, driven=list(profiles), changes=changes)
+    result = loop.run(
+        system.p,
+        system.inputs,
+        list(own.values()),
+        begin=begin,
+        step=_STEP,
+        stop=[end],
+        signals=signal_table(list(profiles), [profiles], {}, changes),
+        longest=LONGEST * _STEP,
+    )
+    failure = result.failure(0)
+    if failure is not None:
+        raise failure
+    rows = {output: CubicSpline(result.times[0], result.rows[k, 0])(at) for k, output in enumerate(outputs)}
+    return rows, dict(zip(names, map(float, result.states[:, 0]), strict=True))
