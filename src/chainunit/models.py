@@ -10,6 +10,7 @@ from .drives.motors import MOTORS
 from .errors import InputError, near_name
 from .machines.flexible import ChainUnitFlexible
 from .machines.linkages.file import read_linkage
+from .machines.load_observer import LoadObserver
 from .mechanism.models import MACHINES as MACHINES
 from .model import Model
 
@@ -24,6 +25,7 @@ _MODELS: tuple[type[Model], ...] = (
     CardanDriveline,
     *(machine for machine in MACHINES.values() if machine is not _CHAIN_UNIT),
     ChainUnitFlexible,
+    LoadObserver,
 )
 MODELS = {model.name: model for model in _MODELS}
 """All models."""

@@ -12,6 +12,7 @@ parts are known from the motion, except for the third derivatives.
 
 from __future__ import annotations
 
+import copy
 import functools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
@@ -69,6 +70,16 @@ class Mechanism:
                 if joint not in self.slides:
                     turn = links[joint[1]].t1
                     self.turns[joint] = turn if carrier is None else turn - links[carrier].t1
+
+    def with_bodies(self, linkage: Linkage) -> Mechanism:
+        """The same motion with the bodies and loads of another linkage of the same lengths."""
+        other = copy.copy(self)
+        other.linkage = linkage
+        bars = (bar for group in (linkage.driver, *linkage.groups) for bar in group.bars)
+        other.bodies = {
+            bar.name: body_on(self.links[bar.name], bar.mass) for bar in bars if bar.mass is not None
+        }
+        return other
 
     def third(self) -> tuple[dict[str, Third], dict[str, Vec2]]:
         """Third derivatives by q of each link and of each pin that is not in the ground."""

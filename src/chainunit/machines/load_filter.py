@@ -1,0 +1,119 @@
+"""The filter of `chainunit.machines.load_observer`: rates of a covariance, and of alarms.
+
+Symmetric matrices are lists of rows; states store the upper triangle, row after row. Numbers are those of any engine
+`xp`. Standard library only.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+UNKNOWNS = ("speed", "left_feed", "right_feed", "left_force", "right_force", "offset")
+"""What the filter estimates, in the order of its matrices."""
+SIZE = len(UNKNOWNS)
+TRIANGLE = tuple((i, j) for i in range(SIZE) for j in range(i, SIZE))
+"""The places of the stored entries."""
+
+Matrix = list[list[Any]]
+
+
+def symmetric(entries: Sequence[Any]) -> Matrix:
+    """The matrix of the stored entries."""
+    rows: Matrix = [[0.0] * SIZE for _ in range(SIZE)]
+    for (i, j), entry in zip(TRIANGLE, entries, strict=True):
+        rows[i][j] = rows[j][i] = entry
+    return rows
+
+
+def covariance_rates(
+    P: Matrix, gradient: Sequence[Any], decay: Sequence[Any], density: Sequence[Any], rate: Any
+) -> list[Any]:
+    """Rates of the covariance `P` of a Kalman-Bucy filter, by stored entries (the equation of Riccati):
+
+        dP/dt = A P + P A' + Q - P C' C P rate
+
+    The first unknown is measured, with a noise of the density 1/`rate`; its rate has the `gradient` by all unknowns.
+    The others decay by themselves with the rates `decay`. `density` are the densities of the noise that drives each.
+    """
+    forced = [sum(a * p for a, p in zip(gradient, row, strict=True)) for row in P]
+    rates = []
+    for i, j in TRIANGLE:
+        entry = -(P[i][0] * P[j][0] * rate) - (decay[i] + decay[j]) * P[i][j]
+        rates.append(entry + _driven(i, j, forced, density))
+    return rates
+
+
+def error_rates(
+    S: Matrix,
+    gain: Sequence[Any],
+    gradient: Sequence[Any],
+    decay: Sequence[Any],
+    density: Sequence[Any],
+    rate: Any,
+) -> list[Any]:
+    """Rates of the covariance `S` of the errors that a filter with this `gain` has under noise of other densities
+    than its own, by stored entries (the equation of Lyapunov):
+
+        dS/dt = (A - K C) S + S (A - K C)' + Q + K K'/rate
+    """
+    forced = [sum(a * s for a, s in zip(gradient, row, strict=True)) for row in S]
+    rates = []
+    for i, j in TRIANGLE:
+        corrected = gain[i] * S[0][j] + gain[j] * S[0][i] - gain[i] * gain[j] / rate
+        rates.append(_driven(i, j, forced, density) - corrected - (decay[i] + decay[j]) * S[i][j])
+    return rates
+
+
+def _driven(i: int, j: int, forced: Sequence[Any], density: Sequence[Any]) -> Any:
+    """The part of an entry's rate by the rate of the first unknown and by the driving noise."""
+    entry: Any = density[i] if i == j else 0.0
+    if i == 0:
+        entry = entry + forced[j]
+    if j == 0:
+        entry = entry + forced[i]
+    return entry
+
+
+def difference(matrix: Matrix, i: int, j: int) -> Any:
+    """The variance of the difference of two unknowns."""
+    return matrix[i][i] + matrix[j][j] - 2.0 * matrix[i][j]
+
+
+LEAST_LEVEL = 3.0
+"""Least level of an alarm in standard deviations. A permanent error beyond the level is no matter of rates: at this
+level three machines of a thousand have one."""
+
+
+def level(xp: Any, deviation: Any, swing: Any, rate: Any) -> Any:
+    """The level, in parts of the `deviation` of a stationary Gaussian quantity, that its size exceeds `rate` times a
+    second.
+
+    By Rice's formula the quantity rises through the level z, or falls through -z, `swing`/(pi deviation) exp(-z^2/2)
+    times a second; `swing` is the standard deviation of its derivative. A part of the quantity that is constant in
+    each machine has no share in `swing`: then the formula gives the mean over the machines.
+    """
+    ratio = swing / (deviation * rate) * (1.0 / math.pi)
+    return xp.sqrt(2.0 * xp.log(xp.maximum(ratio, math.exp(0.5 * LEAST_LEVEL * LEAST_LEVEL))))
+
+
+_ERF = (0.254829592, -0.284496736, 1.421413741, -1.453152027, 1.061405429)
+
+
+def normal_probability(xp: Any, z: Any) -> Any:
+    """The probability that a standard normal number is below `z`; error below 1e-7 (Abramowitz, Stegun, 7.1.26)."""
+    size = xp.abs(z) * math.sqrt(0.5)
+    t = 1.0 / (1.0 + 0.3275911 * size)
+    series: Any = 0.0
+    for factor in reversed(_ERF):
+        series = (series + factor) * t
+    tail = 0.5 * series * xp.exp(-size * size)
+    # `tail` below zero, 1 - `tail` above
+    above = step(xp, z, 0.0)
+    return tail + above * (1.0 - 2.0 * tail)
+
+
+def step(xp: Any, x: Any, at: Any) -> Any:
+    """0 where `x` is below `at`, 1 where it is above: a steep ramp, which every engine has."""
+    return xp.minimum(xp.maximum(1e9 * (x - at), 0.0), 1.0)

@@ -1,0 +1,553 @@
+"""An observer of the loads of a chain unit: from the motion and a measured signal of the motor to the feed and the
+processing force of each side.
+
+The signal gives the torque T on the motor's rotor. At the motor's shaft
+
+    (rotor.J + J(phi, feed)/ratio^2) dw/dt = T - offset - rotor.d w - tau_bias(phi, w, feed, force)/ratio
+
+with the machine's J and tau_bias (`chainunit.machines.chain_unit`). An extended Kalman-Bucy filter estimates the
+speed, the loads and the offset from the measured speed. Its gradient is the exact derivative of the machine's torque,
+by dual numbers; angle and motion of the links are computed once for all directions.
+
+Two covariances are states. The one of the filter (`covariance`) counts on loads that may change by their `change` in
+a second; the gain follows from it. The other one (`quiet`) is that of the errors which this gain makes while the
+loads only fluctuate; the thresholds of the alarms follow from it. Both are in parts of the sizes of `sizes`. While
+nothing is measured, as at rest, the estimates stay and the variances grow up to the square of the spread.
+
+A load that jumps, such as a jam, is no slow change: the measured speed runs away from the estimated one. The mean
+deviation over `ONSET` is the state `surprise`; beyond `GATE` standard deviations both covariances grow by what could
+explain it, and thus the filter forgets the loads and learns them anew. As long as the data leave the side open, the
+thresholds are wide and there is no alarm.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any, ClassVar, NamedTuple
+
+from ..drives.motor import Rotor
+from ..engines import Dual, dual, slope
+from ..integrate import Solver
+from ..mechanism.machine import MachineState, Mechanism
+from ..model import Model, Part
+from ..quantities import Value, declaration, declared_class, group, quantity
+from . import chain_unit
+from .chain_unit import ChamberForces, SideLoads
+from .load_filter import (
+    TRIANGLE,
+    UNKNOWNS,
+    covariance_rates,
+    difference,
+    error_rates,
+    level,
+    normal_probability,
+    step,
+    symmetric,
+)
+
+ONSET = 0.02
+"""Time over which the deviation of the speed is averaged to notice a jump [s]."""
+GATE = 6.0
+"""Mean deviation of the speed from which a load has jumped, in standard deviations."""
+FEED_JUMP = 3.0
+"""Jump of the feed in parts of its spread; the jump of the force is its spread."""
+FIRST_FORCE = 0.01
+"""Variance of the forces at the start, in parts of their spread squared: a machine starts without a jam."""
+_LEAST = 1e-12
+"""Least variance, in parts of the sizes squared, of which a root is taken: it has a derivative."""
+SLOWEST = 0.1
+"""Least crank speed of which thresholds take notice [rad/s]: at rest a turn has no duration."""
+
+
+@declaration
+class SignalWeights:
+    """The torque on the rotor from the measured signals: torque (u.torque - zero) of a torque sensor, plus current
+    u.current of an armature, plus power (u.power - resistance u.current^2) of an induction motor."""
+
+    torque: Value = quantity("1", "factor of the measured torque", default=0.0, min=-1e3, max=1e3)
+    current: Value = quantity(
+        "N.m/A", "torque per current: the motor constant", default=1.27, min=-1e6, max=1e6
+    )
+    power: Value = quantity(
+        "s/rad", "torque per power: 1 over the synchronous speed", default=0.0, min=-1e3, max=1e3
+    )
+    resistance: Value = quantity(
+        "Ohm", "three times the resistance of a phase, for the power", default=0.0, min=0.0
+    )
+    zero: Value = quantity("N.m", "torque at the signal's zero", default=0.0, min=-1e6, max=1e6, tunable=True)
+
+
+@declaration
+class Noise:
+    """Noise of the measured signals."""
+
+    torque: Value = quantity(
+        "N.m", "standard deviation of the torque from the signal", default=0.006, above=0.0
+    )
+    w: Value = quantity("rad/s", "standard deviation of the measured speed", default=1.5, above=0.0)
+    rate: Value = quantity("Hz", "rate of independent samples", default=1000.0, above=0.0)
+
+
+@declaration
+class FeedCourse:
+    """What is known of the feed of a side before it is measured."""
+
+    expected: Value = quantity("kg", "usual feed of a side", default=30.0, min=0.0)
+    spread: Value = quantity(
+        "kg", "standard deviation of the feed from the usual one", default=15.0, above=0.0
+    )
+    change: Value = quantity(
+        "kg", "standard deviation of the change in a second that the filter follows", default=2.5, above=0.0
+    )
+    fluctuation: Value = quantity(
+        "1", "standard deviation of the natural fluctuation, share of the usual feed", default=0.03, min=0.0,
+        max=1.0, kind="percent",
+    )  # fmt: skip
+    time: Value = quantity("s", "correlation time of the fluctuation", default=10.0, above=0.0)
+
+
+@declaration
+class ForceCourse:
+    """What is known of the processing force of a side before it is measured."""
+
+    expected: Value = quantity("N", "usual force", default=0.0, min=0.0)
+    spread: Value = quantity(
+        "N",
+        "standard deviation of the force from the usual one, and size of a jam",
+        default=1000.0,
+        above=0.0,
+    )
+    change: Value = quantity(
+        "N", "standard deviation of the change in a second that the filter follows", default=10.0, above=0.0
+    )
+    fluctuation: Value = quantity("N", "standard deviation of the natural fluctuation", default=5.0, min=0.0)
+    time: Value = quantity("s", "correlation time of the fluctuation", default=10.0, above=0.0)
+
+
+@declaration
+class Offset:
+    """What is known of the offset of the torque: zero error of the signal, and friction that is not in the model."""
+
+    spread: Value = quantity("N.m", "standard deviation", default=0.1, above=0.0)
+    change: Value = quantity("N.m", "standard deviation of the change in a second", default=1e-3, above=0.0)
+
+
+@declaration
+class Uncertainty:
+    """False imbalance that errors of the machine's parameters make (`chainunit.study.false_loads`), and the imbalance
+    that is an overload."""
+
+    uncertainty: Value = quantity("kg", "standard deviation of the false imbalance", default=0.0, min=0.0)
+    force_uncertainty: Value = quantity(
+        "N", "standard deviation of the false imbalance of the forces", default=0.0, min=0.0
+    )
+    overload: Value = quantity("kg", "imbalance of the feed that overloads a side", default=12.0, above=0.0)
+    force_overload: Value = quantity(
+        "N", "imbalance of the forces that overloads a side", default=1000.0, above=0.0
+    )
+
+
+@declaration
+class AlarmRule:
+    """The alarm."""
+
+    rate: Value = quantity(
+        "1", "permitted false alarms in a million turns of the crank", default=1.0, above=0.0, max=1e5
+    )
+
+
+@declaration
+class Parameters(chain_unit.Parameters):
+    """Parameters of the machine, of the signal, and what is known of the loads. The start values are those of the
+    packaged machine on a DC motor of the start values of `DcMotor`."""
+
+    ratio: Value = quantity(
+        "1", "gear ratio, motor turns per crank turn", default=50.0, above=0.0, max=1e6, usual=(1.0, 500.0)
+    )
+    rotor: Rotor = group(Rotor, "rotor of the motor", default=Rotor())
+    signal: SignalWeights = group(SignalWeights, "measured signal", default=SignalWeights())
+    noise: Noise = group(Noise, "noise", default=Noise())
+    feed: FeedCourse = group(FeedCourse, "feed of a side", default=FeedCourse())
+    force: ForceCourse = group(ForceCourse, "processing force of a side", default=ForceCourse())
+    offset: Offset = group(Offset, "offset of the torque", default=Offset())
+    imbalance: Uncertainty = group(Uncertainty, "imbalance", default=Uncertainty())
+    alarm: AlarmRule = group(AlarmRule, "alarm", default=AlarmRule())
+    solver: Solver = group(Solver, "internal integrator", default=Solver())
+
+
+@declaration
+class Inputs:
+    """Motion and measured signals of the motor. A signal whose factor is zero need not be connected."""
+
+    phi: Value = quantity(
+        "rad", "motor angle; crank angle is phi/ratio, from the upward vertical, clockwise", default=0.0
+    )
+    w: Value = quantity("rad/s", "measured motor speed", default=0.0)
+    torque: Value = quantity("N.m", "measured torque on the rotor", default=0.0)
+    current: Value = quantity("A", "measured current", default=0.0)
+    power: Value = quantity("W", "measured active power", default=0.0, nominal=100.0)
+
+
+@declaration
+class LoadEstimate:
+    """Estimated loads of a side."""
+
+    material_mass: Value = quantity("kg", "estimated material on the organ", nominal=30.0)
+    processing_force: Value = quantity("N", "estimated processing force", nominal=100.0)
+
+
+_ENTRIES = tuple(f"{UNKNOWNS[i]}_{UNKNOWNS[j]}" for i, j in TRIANGLE)
+Covariance = declared_class(
+    "Covariance",
+    (),
+    [(name, Value, quantity("1", "entry in parts of the sizes")) for name in _ENTRIES],
+)
+"""The stored entries of a covariance."""
+
+
+@declaration
+class States:
+    """Estimates, and the covariances of their errors."""
+
+    speed: Value = quantity("rad/s", "estimated motor speed", nominal=100.0)
+    left: LoadEstimate = group(LoadEstimate, "left organ")
+    right: LoadEstimate = group(LoadEstimate, "right organ")
+    torque_offset: Value = quantity("N.m", "estimated offset of the torque")
+    surprise: Value = quantity("rad/s", "mean deviation of the measured speed from the estimated one")
+    covariance: Any = group(Covariance, "covariance of the filter")
+    quiet: Any = group(Covariance, "covariance of the errors while the loads only fluctuate")
+
+
+@declaration
+class SideJudgement:
+    """What is known of the loads of a side."""
+
+    material_mass_deviation: Value = quantity("kg", "standard deviation of the estimated material")
+    processing_force_deviation: Value = quantity(
+        "N", "standard deviation of the estimated processing force", nominal=100.0
+    )
+    web_pull: Value = quantity(
+        "N",
+        "least axial pull in the web with the estimated loads; negative where it would push",
+        nominal=100.0,
+    )
+    overload: Value = quantity("1", "probability that the side is overloaded against the other one")
+
+
+@declaration
+class Imbalance:
+    """Left minus right, with the thresholds of the alarm."""
+
+    feed: Value = quantity("kg", "imbalance of the feed")
+    feed_deviation: Value = quantity("kg", "standard deviation of the imbalance of the feed")
+    feed_threshold: Value = quantity("kg", "imbalance of the feed from which there is an alarm")
+    force: Value = quantity("N", "imbalance of the processing forces", nominal=100.0)
+    force_deviation: Value = quantity("N", "standard deviation of the imbalance of the forces", nominal=100.0)
+    force_threshold: Value = quantity(
+        "N", "imbalance of the forces from which there is an alarm", nominal=100.0
+    )
+
+
+@declaration
+class RockerEstimate:
+    """The load of the rocker."""
+
+    tau: Value = quantity(
+        "N.m", "torque on the rocker for both organs, with the estimated loads", nominal=100.0
+    )
+
+
+@declaration
+class Grounds:
+    """What the alarm rests on."""
+
+    feed: Value = quantity("1", "imbalance of the feed in parts of its threshold; positive left")
+    force: Value = quantity("1", "imbalance of the forces in parts of its threshold; positive left")
+
+
+@declaration
+class Outputs:
+    """Loads with their deviations, forces that follow, and the alarm."""
+
+    left: SideJudgement = group(SideJudgement, "left organ")
+    right: SideJudgement = group(SideJudgement, "right organ")
+    imbalance: Imbalance = group(Imbalance, "imbalance")
+    rocker: RockerEstimate = group(RockerEstimate, "rocker")
+    grounds: Grounds = group(Grounds, "ground of the alarm")
+    alarm: Value = quantity("1", "side that is overloaded: 1 left, -1 right, 0 none")
+
+
+def machine_inputs(u: Any, w: Any, left: SideLoads, right: SideLoads, a: Any = 0.0) -> chain_unit.Inputs:
+    """The inputs of the machine at the motor's angle, at its speed `w` and acceleration `a`, with these loads."""
+    return chain_unit.Inputs(phi=u.phi, w=w, a=a, left=left, right=right)
+
+
+def rotor_torque(p: Any, u: Any) -> Any:
+    """The torque on the rotor from the measured signals [N m]."""
+    s = p.signal
+    electric = s.current * u.current + s.power * (u.power - s.resistance * (u.current * u.current))
+    return s.torque * u.torque + electric - s.zero
+
+
+class Balance(NamedTuple):
+    """The balance of the shaft with the estimated loads: its `inertia` [kg m2], its acceleration [rad/s2], the
+    `gradient` of this by the unknowns in the order of `UNKNOWNS`, and the state of the machine."""
+
+    inertia: Any
+    acceleration: Any
+    gradient: list[Any]
+    machine: MachineState
+
+
+def balance(xp: Any, p: Any, u: Any, x: Any) -> Balance:
+    """The balance of the shaft at the estimates `x`, with exact derivatives."""
+    loads = [
+        x.left.material_mass,
+        x.right.material_mass,
+        x.left.processing_force,
+        x.right.processing_force,
+    ]
+    w, ratio = x.speed / p.ratio, p.ratio
+
+    def linkage(engine: Any, values: list[Any]) -> Any:
+        sides = (
+            SideLoads(material_mass=m, processing_force=f)
+            for m, f in zip(values[:2], values[2:], strict=True)
+        )
+        return ChamberForces.linkage(engine, p, machine_inputs(u, x.speed, *sides))
+
+    m = Mechanism(xp, linkage(xp, loads), u.phi / ratio, (), ChamberForces.topology())
+    s = MachineState(xp, m, w)
+    inertia = p.rotor.J + s.J / (ratio * ratio)
+    driving = rotor_torque(p, u) - x.torque_offset - p.rotor.d * x.speed
+    a = (driving - s.bias / ratio) / inertia
+
+    engine = dual(xp)
+    turning = MachineState(engine, m, Dual(w, 1.0 / ratio))
+    gradient = [-(p.rotor.d + slope(turning.bias) / ratio) / inertia]
+    for k in range(len(loads)):
+        seeded = [Dual(v, 1.0) if i == k else v for i, v in enumerate(loads)]
+        one = MachineState(engine, m.with_bodies(linkage(engine, seeded)), w)
+        gradient.append(-(slope(one.bias) + slope(one.J) * (a / ratio)) / (ratio * inertia))
+    return Balance(inertia, a, [*gradient, -1.0 / inertia], s)
+
+
+def sizes(p: Any) -> list[Any]:
+    """The sizes of the unknowns, in parts of which the covariances are stored."""
+    return [p.noise.w, p.feed.spread, p.feed.spread, p.force.spread, p.force.spread, p.offset.spread]
+
+
+def densities(p: Any) -> list[Any]:
+    """The densities of the noise that drives the unknowns after the speed, in parts of their sizes [1/s]."""
+    shares = (p.feed.change / p.feed.spread, p.force.change / p.force.spread)
+    feed, force = (share * share for share in shares)
+    offset = p.offset.change / p.offset.spread
+    return [feed, feed, force, force, offset * offset]
+
+
+class _Judgement(NamedTuple):
+    """An imbalance, its standard deviation, and its threshold."""
+
+    value: Any
+    deviation: Any
+    threshold: Any
+
+    @property
+    def share(self) -> Any:
+        """The imbalance in parts of the threshold."""
+        return self.value / self.threshold
+
+
+def _judge(
+    xp: Any, p: Any, x: Any, unknown: int, value: Any, of: Any, usual: Any, uncertainty: Any
+) -> _Judgement:
+    """The judgement of an imbalance; `unknown` is the place of its left side, `of` what is known of the load, `usual`
+    its natural fluctuation."""
+    size = of.spread * of.spread
+    known, quiet = (
+        xp.maximum(difference(symmetric(_entries(matrix)), unknown, unknown + 1), _LEAST) * size
+        for matrix in (x.covariance, x.quiet)
+    )
+    natural, permanent = 2.0 * (usual * usual), uncertainty * uncertainty
+    # the time in which the filter follows a change
+    lag = known / (2.0 * (of.change * of.change))
+    swing = natural / (of.time * lag) + quiet / (lag * lag)
+    deviation = xp.sqrt(natural + quiet + permanent)
+    turn = 2.0 * math.pi * p.ratio / xp.maximum(xp.abs(x.speed), SLOWEST * p.ratio)
+    # each of the two grounds has half of the false alarms
+    z = level(xp, deviation, xp.sqrt(swing), 0.5e-6 * p.alarm.rate / turn)
+    noise = p.noise.w * p.noise.w / (2.0 * ONSET * p.noise.rate)
+    # a load that begins to jump
+    widening = xp.maximum(1.0, x.surprise * x.surprise / (0.25 * GATE * GATE * noise))
+    return _Judgement(value, xp.sqrt(known + permanent), z * deviation * widening)
+
+
+def _entries(covariance: Any) -> list[Any]:
+    return [getattr(covariance, name) for name in _ENTRIES]
+
+
+def _filter_rates(p: Any, u: Any, x: Any, b: Balance, jump: Any) -> list[Any]:
+    """Rates of the states; `jump` is the rate at which the variance of the forces grows by a jump, in parts of their
+    spread squared."""
+    scale, rate = sizes(p), p.noise.rate
+    gradient = [g * size / scale[0] for g, size in zip(b.gradient, scale, strict=True)]
+    signal = p.noise.torque / (b.inertia * scale[0])
+    driven = densities(p)
+    decay = [0.0, *(0.5 * q for q in driven)]
+    jumps = [jump * (FEED_JUMP * FEED_JUMP), jump * (FEED_JUMP * FEED_JUMP), jump, jump, 0.0]
+    P, quiet = symmetric(_entries(x.covariance)), symmetric(_entries(x.quiet))
+    gain = [row[0] * rate for row in P]
+    first = signal * signal / rate
+    followed = [first, *(q + more for q, more in zip(driven, jumps, strict=True))]
+    disturbed = [first, *(q + more for q, more in zip(_disturbances(p), jumps, strict=True))]
+    difference_of_speed = u.w - x.speed
+    correction = [k * size * (difference_of_speed / scale[0]) for k, size in zip(gain, scale, strict=True)]
+    speed, left_feed, right_feed, left_force, right_force, offset = correction
+    return [
+        b.acceleration + speed,
+        left_feed,
+        left_force,
+        right_feed,
+        right_force,
+        offset,
+        (difference_of_speed - x.surprise) / ONSET,
+        *covariance_rates(P, gradient, decay, followed, rate),
+        *error_rates(quiet, gain, gradient, decay, disturbed, rate),
+    ]
+
+
+def _disturbances(p: Any) -> list[Any]:
+    """The densities of the disturbances in normal running, in parts of the sizes [1/s]. The feed has none: the filter
+    follows its fluctuation, whose whole variance counts in the threshold."""
+    share = p.force.fluctuation / p.force.spread
+    force = 2.0 * share * share / p.force.time
+    offset = p.offset.change / p.offset.spread
+    return [0.0, 0.0, force, force, offset * offset]
+
+
+def _jump(xp: Any, p: Any, x: Any, b: Balance) -> Any:
+    """The rate at which the variance of the forces grows while the speed is off, in parts of their spread squared."""
+    noise = p.noise.w * p.noise.w / (2.0 * ONSET * p.noise.rate)
+    beyond = xp.maximum(x.surprise * x.surprise - (GATE * GATE) * noise, 0.0) / (ONSET * ONSET)
+    spreads = [FEED_JUMP * p.feed.spread] * 2 + [p.force.spread] * 2
+    explained = [g * spread for g, spread in zip(b.gradient[1:5], spreads, strict=True)]
+    # a part of the lever of B, so that the sum is not zero in a dead position
+    lever = 0.2 * p.r * p.e / (p.h * p.ratio) * p.force.spread / b.inertia
+    return xp.minimum(beyond / (sum(e * e for e in explained) + lever * lever), 4.0) / ONSET
+
+
+def _outputs(xp: Any, p: Any, u: Any, x: Any, b: Balance) -> Outputs:
+    at_crank = b.acceleration / p.ratio
+    left_loads, right_loads = (
+        SideLoads(material_mass=side.material_mass, processing_force=side.processing_force)
+        for side in (x.left, x.right)
+    )
+    of_machine = ChamberForces.probes(
+        xp, p, machine_inputs(u, x.speed, left_loads, right_loads, b.acceleration), b.machine, at_crank
+    )
+    feed_imbalance = x.left.material_mass - x.right.material_mass
+    force_imbalance = x.left.processing_force - x.right.processing_force
+    natural, limits = p.feed.fluctuation * p.feed.expected, p.imbalance
+    feed = _judge(xp, p, x, 1, feed_imbalance, p.feed, natural, limits.uncertainty)
+    force = _judge(xp, p, x, 3, force_imbalance, p.force, p.force.fluctuation, limits.force_uncertainty)
+    left = xp.maximum(feed.share, force.share)
+    right = xp.maximum(-feed.share, -force.share)
+    side = 2.0 * step(xp, left, right) - 1.0
+
+    def of_side(name: str, hand: float) -> SideJudgement:
+        place = 1 if hand > 0.0 else 2
+        variances = [getattr(x.covariance, f"{UNKNOWNS[k]}_{UNKNOWNS[k]}") for k in (place, place + 2)]
+        deviations = [
+            xp.sqrt(xp.maximum(v, _LEAST)) * spread
+            for v, spread in zip(variances, (p.feed.spread, p.force.spread), strict=True)
+        ]
+        by_feed = normal_probability(xp, (hand * feed.value - limits.overload) / feed.deviation)
+        by_force = normal_probability(xp, (hand * force.value - limits.force_overload) / force.deviation)
+        return SideJudgement(
+            material_mass_deviation=deviations[0],
+            processing_force_deviation=deviations[1],
+            web_pull=of_machine[name].web_pull,
+            overload=xp.maximum(by_feed, by_force),
+        )
+
+    return Outputs(
+        left=of_side("left", 1.0),
+        right=of_side("right", -1.0),
+        imbalance=Imbalance(
+            feed=feed.value,
+            feed_deviation=feed.deviation,
+            feed_threshold=feed.threshold,
+            force=force.value,
+            force_deviation=force.deviation,
+            force_threshold=force.threshold,
+        ),
+        rocker=RockerEstimate(tau=of_machine["rocker"].tau),
+        grounds=Grounds(feed=feed.share, force=force.share),
+        alarm=side * step(xp, xp.maximum(left, right), 1.0),
+    )
+
+
+class LoadObserver(Model):
+    """An observer of the feed and the processing forces of a chain unit beside its motor.
+
+    Connect phi and w, and one of the signals. In a co-simulation the inputs are held over a step: estimates are late
+    by half a step.
+    """
+
+    name = "LoadObserver"
+    description = (
+        "Observer of a chain unit: from motion and a measured signal of the motor to feed and processing force of "
+        "each side with standard deviations, and an alarm where one side is overloaded"
+    )
+    Parameters = Parameters
+    Inputs = Inputs
+    States = States
+    parts: ClassVar[tuple[Part, ...]] = (Part(Outputs, _outputs),)
+    required = ChamberForces.required
+
+    @staticmethod
+    def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
+        """The limits of the machine."""
+        yield from ChamberForces.requirements(xp, p)
+
+    @staticmethod
+    def shared(xp: Any, p: Any, u: Any, x: Any) -> Balance:
+        """The balance of the shaft."""
+        return balance(xp, p, u, x)
+
+    @staticmethod
+    def derivatives(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+        """Time derivatives of the states, in declared order."""
+        b = balance(xp, p, u, x)
+        return _filter_rates(p, u, x, b, _jump(xp, p, x, b))
+
+    @classmethod
+    def start_states(cls, xp: Any, p: Any, u: Any, z: list[Any]) -> Any:
+        """The usual loads, and the measured speed."""
+        side = LoadEstimate(material_mass=p.feed.expected, processing_force=p.force.expected)
+        # the speed as if it had been averaged over 10 ms
+        variances = [xp.minimum(100.0 / p.noise.rate, 1.0), 1.0, 1.0, FIRST_FORCE, FIRST_FORCE, 1.0]
+        start = {
+            name: variances[i] if i == j else 0.0 for name, (i, j) in zip(_ENTRIES, TRIANGLE, strict=True)
+        }
+        return States(
+            speed=u.w,
+            left=side,
+            right=side,
+            torque_offset=0.0,
+            surprise=0.0,
+            covariance=Covariance(**start),
+            quiet=Covariance(**start),
+        )
+
+    @staticmethod
+    def internal_step(xp: Any, p: Any) -> Any:
+        """Longest internal step: 2 ms, or the time in which the filter finds loads that have jumped by their spread,
+        if this is shorter."""
+        lever = p.r * p.e / (p.h * p.ratio)
+        unknown = lever * (2.0 * p.force.spread + 2.0 * p.g * p.feed.spread) + p.offset.spread
+        jerk = unknown / (p.rotor.J * p.noise.w)
+        # of the cubic pole of a speed that an unknown acceleration drives
+        pole = xp.exp(xp.log(jerk * jerk * p.noise.rate) * (1.0 / 3.0))
+        return xp.minimum(2e-3, 1.5 / pole)
