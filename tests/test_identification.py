@@ -16,6 +16,7 @@ from chainunit.study.identification import residuals
 from chainunit.study.identification.fit import fit, normal
 from chainunit.study.identification.information import information
 from chainunit.study.identification.plant import Plant
+from chainunit.study.identification.posterior import posterior
 from chainunit.study.identification.problem import Comparison, Problem, RecordedRun, Sensor, Unknown
 from chainunit.study.identification.recording import Recording
 from chainunit.study.identification.residuals import check_residuals
@@ -162,8 +163,13 @@ def test_the_residuals_tell_a_wrong_machine(loaded, empty):
     ]
     assert all(each.is_noise and 0.9 < each.noise < 1.1 for each in right)
     loud = Problem(problem.plant, problem.runs, SOUGHT, {**SENSORS, "motor.w": Sensor(noise=0.005)})
-    (own, *_) = [each for each in check_residuals(fit(loud)) if each.column == "motor.w"]
+    best = fit(loud)
+    (own, *_) = [each for each in check_residuals(best) if each.column == "motor.w"]
     assert own.is_noise and 1.8 < own.noise < 2.2
+    # the column counts by its measured noise, and the deviations are those that follow from it
+    np.testing.assert_allclose(
+        best.deviations[: len(SOUGHT)], fit(problem).deviations[: len(SOUGHT)], rtol=0.02
+    )
     wrong = problem_of(*recordings, empty=(1,), r=0.153)
     worst = max(check_residuals(fit(wrong)), key=lambda each: each.statistic)
     assert worst.column == "motor.i" and worst.statistic > 2.0 * worst.limit and not worst.is_noise
@@ -182,6 +188,68 @@ def test_the_statistic_of_noise_is_that_of_its_distribution():
     wave = rng.standard_normal(1500) + 0.9 * np.cos(3.0 * angle + 0.4)
     own = residuals.check(Comparison("run", "motor.i", wave, None, (), angle, 0.2), 63.7)
     assert own.orders[0] == (3, pytest.approx(0.18, abs=0.02)) and not own.is_noise
+
+
+def test_the_distribution_of_numbers_that_are_told_is_normal(loaded, empty):
+    """Around the fit, with its deviations and correlations."""
+    problem = problem_of(*(without(each, "motor.count") for each in (loaded, empty)), empty=(1,))
+    best, count = fit(problem), len(SOUGHT)
+    found = posterior(problem, best)
+    for each, x, s in zip(found.marginals, best.z, best.deviations, strict=False):
+        assert each.value == pytest.approx(x, abs=0.15 * s)
+        assert each.deviation == pytest.approx(s, rel=0.1)
+        assert (each.high - each.low) / (2.0 * 1.96 * s) == pytest.approx(1.0, abs=0.15)
+    size = best.deviations[:count]
+    own = found.covariance / np.outer(size, size)
+    np.testing.assert_allclose(own, best.covariance[:count, :count] / np.outer(size, size), atol=0.15)
+
+
+def test_the_distribution_of_numbers_that_are_not_told_is_that_of_their_bounds(loaded):
+    """One run tells the sum of feed and web alone: each of them lies within bounds that hold for both, and evenly."""
+    sought = [
+        Unknown.within("machine.left.material_mass", "kg", 20.0, 60.0),
+        Unknown.within("machine.left.web_mass", "kg", 15.0, 30.0),
+    ]
+    problem = problem_of(without(loaded, "motor.count"), sought=sought)
+    best = fit(problem)
+    found = posterior(problem, best)
+    feed, web = found.samples.T
+    total = float(np.sum(best.z[:2]))
+    assert np.std(feed + web) < 0.5
+    assert found.samples[:, 1].min() > 15.0 and found.samples[:, 1].max() < 30.0
+    low, high = max(15.0, total - 60.0), min(30.0, total - 20.0)
+    assert found.marginals[1].value == pytest.approx(0.5 * (low + high), abs=0.4)
+    assert found.marginals[1].deviation == pytest.approx((high - low) / np.sqrt(12.0), rel=0.06)
+    assert found.marginals[1].low == pytest.approx(low + 0.025 * (high - low), abs=0.3)
+    assert found.marginals[0].high == pytest.approx(total - low - 0.025 * (high - low), abs=0.4)
+
+
+def test_a_product_bends_the_distribution():
+    """Of two numbers of which the data tell the product alone, against the integral over the distribution. Without
+    the second derivatives the mean is off by a quarter of the deviation."""
+    data = 6.0 + np.random.default_rng(0).standard_normal(400)
+
+    class Product:
+        unknowns = sought = (Unknown.within("a", "1", 2.0, 3.0), Unknown.within("b", "1", 2.0, 2.6))
+        starts, spreads = np.array([2.5, 2.3]), np.array([1.0, 0.6]) / np.sqrt(12.0)
+        bounds = np.array([2.0, 2.0]), np.array([3.0, 2.6])
+
+        def comparisons(self, z, workers=1):
+            slopes = np.tile([z[1], z[0]], (len(data), 1))
+            yield Comparison("run", "x", data - z[0] * z[1], slopes, (0, 1), None, 1.0)
+
+        def thinned(self, step):
+            return self
+
+    problem, product = Product(), np.mean(data)
+    found = posterior(problem, normal(problem, np.array([2.4, product / 2.4])))
+    axes = np.linspace(2.0, 3.0, 1001), np.linspace(2.0, 2.6, 601)
+    a, b = np.meshgrid(*axes, indexing="ij")
+    density = np.exp(-0.5 * len(data) * (product - a * b) ** 2)
+    mean = np.sum(a * density) / np.sum(density)
+    deviation = np.sqrt(np.sum((a - mean) ** 2 * density) / np.sum(density))
+    assert found.marginals[0].value == pytest.approx(mean, abs=0.1 * deviation)
+    assert found.marginals[0].deviation == pytest.approx(deviation, rel=0.06)
 
 
 def test_what_is_known_beforehand_counts(loaded):
@@ -249,7 +317,8 @@ def test_a_combination_has_the_deviation_that_is_stated(loaded):
 
 
 def test_the_expected_deviations_are_those_of_the_fit(loaded, empty):
+    """But for the measured noise, which deviates from the stated one by parts of a hundred in 2400 rows."""
     problem = problem_of(*(without(each, "motor.count") for each in (loaded, empty)), empty=(1,))
     best = fit(problem)
     expected = [each.by_both for each in information(problem, best.z, propose=False).outlooks]
-    np.testing.assert_allclose(expected, best.deviations[: len(SOUGHT)], rtol=1e-6)
+    np.testing.assert_allclose(expected, best.deviations[: len(SOUGHT)], rtol=0.05)

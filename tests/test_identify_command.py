@@ -119,9 +119,10 @@ def test_the_numbers_are_found_and_written(folder):
     )
     tables = tomllib.loads((folder / "identified" / "identified.toml").read_text("utf-8"))
     assert "identify" not in tables and tables["title"] == "A mill: identified"
-    assert tables["feed"]["left"]["material_mass"] == pytest.approx(
-        result["numbers"]["feed.left.material_mass"]["value"]["value"]
-    )
+    own = result["numbers"]["feed.left.material_mass"]
+    assert tables["feed"]["left"]["material_mass"] == pytest.approx(own["fitted"]["value"])
+    # the best fit is near the mean of the distribution
+    assert abs(own["fitted"]["value"] - own["value"]["value"]) < 0.3 * own["deviation"]["value"]
     config = study_files.load(folder / "identified" / "identified.toml")
     assert config.machine.by_name["left.web_mass"] == pytest.approx(tables["machine"]["left"]["web_mass"])
     written = {each.name for each in (folder / "identified").iterdir()}

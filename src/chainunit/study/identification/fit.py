@@ -24,6 +24,8 @@ ALIKE = 1.005
 """Sums of squares that differ by less than this factor are those of the same point."""
 DAMPING = 1e-2
 """Damping of the first step, in parts of what is known beforehand."""
+STATED = 100.0
+"""Number of rows that would tell the noise of a column as well as its sensor's data sheet does."""
 SETTLINGS = 5
 """Most steps of the unknowns of clocks and sensors without simulation."""
 NEAR = 1.5
@@ -35,10 +37,12 @@ ENOUGH = 1e-2
 @dataclass(frozen=True)
 class Normal:
     """The `comparisons` at a point `z`, their sum of squares with that of the priors, its gradient, and the matrix of
-    the normal equations: of the runs alone, `fisher`, and with the priors, `matrix`."""
+    the normal equations: of the runs alone, `fisher`, and with the priors, `matrix`. By run and column, `weights` are
+    factors on the residuals."""
 
     z: Any
     comparisons: tuple[Comparison, ...]
+    weights: Mapping[tuple[str, str], float]
     cost: float
     gradient: Any
     fisher: Any
@@ -82,8 +86,9 @@ def _normal(
     size = len(spread)
     fisher, gradient = np.zeros((size, size)), (problem.starts - z) / spread**2
     cost = float(np.sum(((z - problem.starts) / spread) ** 2))
+    weights = {(c.run, c.column): 1.0 / (scales or {}).get((c.run, c.column), 1.0) for c in comparisons}
     for each in comparisons:
-        factor = 1.0 / (scales or {}).get((each.run, each.column), 1.0)
+        factor = weights[each.run, each.column]
         residuals, slopes = each.residuals * factor, each.slopes * factor
         r = np.abs(residuals)
         weight = np.minimum(1.0, OUTLIER / np.maximum(r, OUTLIER))
@@ -91,7 +96,7 @@ def _normal(
         weighted, places = slopes * weight[:, None], np.array(each.places, int)
         fisher[np.ix_(places, places)] += slopes.T @ weighted
         gradient[places] += weighted.T @ residuals
-    return Normal(z, comparisons, cost, gradient, fisher, fisher + np.diag(1.0 / spread**2))
+    return Normal(z, comparisons, weights, cost, gradient, fisher, fisher + np.diag(1.0 / spread**2))
 
 
 @dataclass(frozen=True)
@@ -146,9 +151,10 @@ def fit(
         z = np.where([".count." in u.name for u in problem.unknowns], problem.starts, best.z)
     rounds = rounds_of(problem)
     whole = rounds.down(_near(rounds, z), None, 0.0)
+    whole = rounds.down(whole, _noises(whole), 0.0)
     agreeing = sum(end.cost < ALIKE * best.cost for end in ends) if ends else 1
-    point = whole.z, whole.comparisons, whole.cost, whole.gradient, whole.fisher, whole.matrix
-    return Fit(*point, next(counter) - 1, starts, agreeing)
+    point = whole.z, whole.comparisons, whole.weights, whole.cost, whole.gradient, whole.fisher
+    return Fit(*point, whole.matrix, next(counter) - 1, starts, agreeing)
 
 
 def _first_turns(problem: Problem) -> Problem:
@@ -187,6 +193,17 @@ def _near(rounds: _Rounds, z: Any) -> Normal:
 
 def _scales(at: Normal) -> dict[tuple[str, str], float]:
     return {key: max(1.0, math.sqrt(share)) for key, share in at.shares.items()}
+
+
+def _noises(at: Normal) -> dict[tuple[str, str], float]:
+    """The measured noise of each column in parts of the stated one, which counts as some rows."""
+    return {
+        (each.run, each.column): math.sqrt(
+            (STATED + float(np.sum(np.minimum(each.residuals**2, OUTLIER**2))))
+            / (STATED + len(each.residuals))
+        )
+        for each in at.comparisons
+    }
 
 
 class _Rounds:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 import os
 import tempfile
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +23,7 @@ from .information import Combination, Information, information
 from .inspection import Expectation, inspect
 from .measurands import MEASURANDS
 from .plant import Plant
+from .posterior import Posterior, posterior
 from .problem import Comparison, Problem, RecordedRun, Sensor
 from .reading import OFFSET_SHARE, WITH_OFFSET, IdentificationPlan, PlannedRun
 from .recording import Recording, read_recording
@@ -32,8 +32,6 @@ from .unknown import Unknown
 
 SIGNALS = ("motor.i", "motor.u", "motor.power", "crank.tau")
 """Quantities of which a recording must have one: they tell the torque."""
-OF_INTERVAL = 1.959964
-"""Half the width of an interval of 95 %, in standard deviations."""
 WIDE, NEAR = 5.0, 1.2
 """Factors by which the RMS of a column may differ from the simulated one: of a current, power or torque, which depend
 on the sought numbers; and of a speed or a voltage under control."""
@@ -44,11 +42,12 @@ _STEADY = ("motor.w", "crank.w", "motor.u")
 
 @dataclass(frozen=True)
 class FittedNumber:
-    """A sought number after the fit: its value, its standard deviation, the ends of its interval of 95 % within its
-    bounds, and whether the recordings tell it. The value of a number that they do not tell has a meaning together
-    with the others alone."""
+    """A sought number: its value in the best fit, `fitted`, which has a meaning together with those of all others;
+    its mean `value` in the distribution that the recordings leave, its standard deviation, the ends of its interval
+    of 95 %, and whether the recordings tell it."""
 
     unknown: Unknown
+    fitted: float
     value: float
     deviation: float
     low: float
@@ -61,7 +60,8 @@ class IdentifiedMachine:
     """An identified machine.
 
     `before` is what the runs can tell at the start values, with further runs in order; `after` the same at the fitted
-    values. `best` are the normal equations there, and `checks` those of the residuals.
+    values. `best` are the normal equations there, `posterior` is the distribution of the sought numbers around them,
+    and `checks` are those of the residuals.
     """
 
     config: Config
@@ -69,6 +69,7 @@ class IdentifiedMachine:
     problem: Problem
     before: Information
     best: Fit
+    posterior: Posterior
     after: Information
     checks: tuple[ResidualCheck, ...]
 
@@ -76,21 +77,22 @@ class IdentifiedMachine:
     def estimates(self) -> dict[str, FittedNumber]:
         """The sought numbers by the full names of the study file."""
         told = {each.name: each.is_told for each in self.after.outlooks}
-        found = zip(self.problem.unknowns, self.best.z, self.best.deviations, strict=True)
-        values = {unknown.name: (float(x), float(s)) for unknown, x, s in found}
-        estimates = {}
-        for own in self.plan.sought:
-            name = system_name(own.name)
-            x, s = values[name]
-            low, high = max(own.low, x - OF_INTERVAL * s), min(own.high, x + OF_INTERVAL * s)
-            estimates[own.name] = FittedNumber(own, x, s, low, high, told[name])
-        return estimates
+        return {
+            own.name: FittedNumber(
+                own, float(x), each.value, each.deviation, each.low, each.high, told[each.name]
+            )
+            for own, x, each in zip(
+                self.plan.sought,
+                self.best.z[: len(self.plan.sought)],
+                self.posterior.marginals,
+                strict=True,
+            )
+        }
 
     @property
     def covariance(self) -> Any:
         """The covariance of the sought numbers, shape (sought, sought)."""
-        count = len(self.plan.sought)
-        return self.best.covariance[:count, :count]
+        return self.posterior.covariance
 
     @property
     def is_described(self) -> bool:
@@ -106,9 +108,8 @@ class IdentifiedMachine:
     def combined(self, combination: Combination) -> tuple[float, float]:
         """The value of a sum of sought numbers, and its standard deviation."""
         places = [self.problem.place[name] for name, _ in combination.terms]
-        factors = np.array([factor for _, factor in combination.terms])
-        variance = factors @ self.best.covariance[np.ix_(places, places)] @ factors
-        return float(factors @ self.best.z[places]), math.sqrt(float(variance))
+        sums = self.posterior.samples[:, places] @ [factor for _, factor in combination.terms]
+        return float(np.mean(sums)), float(np.std(sums))
 
 
 def system_name(name: str) -> str:
@@ -149,7 +150,8 @@ def identify(config: Config, report: Report = lambda *_: None) -> IdentifiedMach
     )
     report("checks", 0.95, 1.0)
     after = information(problem, best.z, workers, propose=False)
-    return IdentifiedMachine(config, plan, problem, before, best, after, tuple(check_residuals(best)))
+    around = posterior(problem, best, workers, plan.seed)
+    return IdentifiedMachine(config, plan, problem, before, best, around, after, tuple(check_residuals(best)))
 
 
 def plan_of(config: Config) -> IdentificationPlan:
@@ -200,7 +202,7 @@ def _drive(config: Config, recordings: Mapping[str, Recording]) -> Drive:
 def _problem(
     config: Config, plan: IdentificationPlan, drive: Drive, recordings: Mapping[str, Recording]
 ) -> Problem:
-    sought = [Unknown(system_name(u.name), u.unit, u.start, u.low, u.high, u.spread) for u in plan.sought]
+    sought = [replace(u, name=system_name(u.name)) for u in plan.sought]
     measured = dict.fromkeys(name for each in recordings.values() for name in each.columns if name != "mark")
     plant = Plant(drive, list(measured), [u.name for u in sought])
     runs = [_run(config, drive, run, recordings[run.name]) for run in plan.runs]

@@ -21,8 +21,8 @@ JITTER = 2e-5
 """Scatter of the instants at which rows are sampled [s]."""
 OUTLIER = 6.0
 """Size of a residual, in standard deviations, from which it counts less."""
-LONGEST_STEP = 2e-3
-"""Longest time between rows of a simulation [s], between which it is interpolated."""
+STEP = 2e-3
+"""Time between the rows of a simulation [s], between which it is interpolated."""
 ANGLES, TURNS = 24, 3.0
 """Number of crank angles at which a run without marks is tried, and the turns that are tried."""
 ORDERS, SLIP = (1, 2, 3), 1e4
@@ -215,6 +215,20 @@ class Problem:
                 total += float(np.corrcoef(y, x)[0, 1]) if np.ptp(x) else 0.0
         return total
 
+    def thinned(self, step: float) -> Problem:
+        """The problem with rows at this distance in time [s], or at its own if that is longer. A mark stands in the
+        first row behind it."""
+        runs = []
+        for run in self.runs:
+            own, every = run.recording, max(1, round(step / run.recording.step))
+            begins = np.arange(0, len(own.time), every)
+            columns = {
+                name: np.maximum.reduceat(x, begins) if name == "mark" else x[begins]
+                for name, x in own.columns.items()
+            }
+            runs.append(replace(run, recording=Recording(own.source, own.time[begins], columns, own.heads)))
+        return Problem(self.plant, runs, self.sought, self.sensors)
+
     @cached_property
     def simulated_with(self) -> Any:
         """Whether a change of the unknown needs another simulation, shape (unknowns,). The others are those of clocks
@@ -256,7 +270,7 @@ class Problem:
             run.crank_speed,
             begin,
             end + margin,
-            min(recording.step, LONGEST_STEP),
+            STEP,
             self._clock(run, np.union1d(recording.time, mark_times(recording)), value)[0],
             run.off,
         )

@@ -96,6 +96,7 @@ def _number(found: IdentifiedMachine, each: FittedNumber) -> dict[str, Any]:
         "title": variable.description,
         "told": each.is_told,
         "value": entry(each.value if each.is_told else None, unit, kind),
+        "fitted": entry(each.fitted if each.is_told else None, unit, kind),
         "deviation": entry(each.deviation, unit, "difference" if unit == "K" else ""),
         "from": entry(each.low, unit, kind),
         "to": entry(each.high, unit, kind),
@@ -211,7 +212,7 @@ def sentences(found: IdentifiedMachine) -> list[str]:
 def identified_tables(found: IdentifiedMachine, folder: Path) -> dict[str, Any]:
     """The tables of the study with the fitted values, as a file in `folder` has them. A number that the recordings do
     not tell has its fitted value, too: only all of them together give the measured courses."""
-    values = {name: each.value for name, each in found.estimates.items()}
+    values = {name: each.fitted for name, each in found.estimates.items()}
     tables = changed_tables(found.config, values, "identified", folder)
     tables.pop("identify", None)
     return tables

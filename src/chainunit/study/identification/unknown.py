@@ -18,8 +18,9 @@ class Unknown:
     high: float
     spread: float
     is_nuisance: bool = False
+    is_even: bool = False
 
     @classmethod
     def within(cls, name: str, unit: str, low: float, high: float) -> Unknown:
         """One of which only the bounds are known."""
-        return cls(name, unit, 0.5 * (low + high), low, high, (high - low) / math.sqrt(12.0))
+        return cls(name, unit, 0.5 * (low + high), low, high, (high - low) / math.sqrt(12.0), is_even=True)

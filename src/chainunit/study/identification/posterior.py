@@ -1,0 +1,184 @@
+"""Values of what is sought with their intervals: the distribution that recordings and what is known beforehand leave.
+
+Near the best fit the simulated columns are taken as quadratic along the directions in which the distribution is wide,
+and as linear along all others. A number of which only the bounds are known is evenly distributed within them
+beforehand. The distribution is sampled: what the recordings hardly tell has the form that its bounds give it, and
+products, such as that of friction and weight, which are told much better than each factor, bend it.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .fit import Normal, inverse
+from .problem import Problem
+
+WIDE = 0.02
+"""Standard deviation of a direction, in parts of that known beforehand, from which on it counts as wide."""
+MOST_WIDE = 6
+STEP = 5e-3
+"""Time between the rows that are taken for second derivatives [s]."""
+CHAINS, STEPS, KEPT = 300, 1200, 10
+"""Number of chains, their steps, of which the second half counts, and states that are kept of each."""
+LEVEL = 0.95
+"""Probability of an interval."""
+
+
+@dataclass(frozen=True)
+class Marginal:
+    """A sought number: its mean `value`, its standard `deviation`, the interval from `low` to `high` that contains it
+    with a probability of 95 %, and the standard deviation `spread` that was known beforehand."""
+
+    name: str
+    unit: str
+    value: float
+    deviation: float
+    low: float
+    high: float
+    spread: float
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """The distributions of all sought numbers, and `samples` of them, shape (samples, numbers)."""
+
+    marginals: tuple[Marginal, ...]
+    samples: Any
+
+    @property
+    def covariance(self) -> Any:
+        """The covariance of the sought numbers, shape (numbers, numbers)."""
+        return np.atleast_2d(np.cov(self.samples, rowvar=False))
+
+
+def posterior(problem: Problem, best: Normal, workers: int = 2, seed: int = 0) -> Posterior:
+    """The distribution of the sought numbers around the best fit."""
+    rng = np.random.default_rng(seed)
+    bent = _Bent(problem, best, workers)
+    samples = bent.sampled(rng)
+    edges = np.quantile(samples, [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL], axis=0)
+    means, deviations = np.mean(samples, axis=0), np.std(samples, axis=0, ddof=1)
+    rows = np.stack([means, deviations, *edges], axis=1)
+    marginals = tuple(
+        Marginal(u.name, u.unit, float(x), float(s), float(low), float(high), u.spread)
+        for u, (x, s, low, high) in zip(problem.sought, rows, strict=True)
+    )
+    return Posterior(marginals, samples)
+
+
+class _Bent:
+    """The distribution near the best fit. The change of all unknowns is `across` @ a + `along` @ b, with the places
+    `a` in the wide directions and `b` in all others. Given `a`, `b` is normal."""
+
+    def __init__(self, problem: Problem, best: Normal, workers: int) -> None:
+        self._problem, self._z = problem, best.z
+        count, size = len(problem.sought), len(best.z)
+        spread = problem.spreads
+        covariance = best.covariance
+        own = covariance[:count, :count] / np.outer(spread[:count], spread[:count])
+        sizes, directions = np.linalg.eigh(own)
+        wide = np.flatnonzero(np.sqrt(sizes) > WIDE)[-MOST_WIDE:]
+        # along a direction the nuisances follow
+        follow = covariance[:, :count] @ np.linalg.inv(covariance[:count, :count])
+        ridges = follow @ (spread[:count, None] * directions) * np.sqrt(sizes)
+        self._across = ridges[:, wide]
+        rest = [k for k in range(count) if k not in wide]
+        self._along = np.hstack([ridges[:, rest], np.eye(size)[:, count:] * spread[count:]])
+        self._pairs = list(itertools.combinations_with_replacement(range(len(wide)), 2))
+        self._reduce(best, workers)
+
+    def _reduce(self, best: Normal, workers: int) -> None:
+        """The sum of squares as a quadratic form of (1, a, products of a, b), reduced by the best b."""
+        problem = self._problem
+        even = np.array([u.is_even for u in problem.unknowns])
+        known = np.where(even, 0.0, 1.0 / problem.spreads**2)
+        wide, pairs = self._across.shape[1], len(self._pairs)
+        basis = np.hstack([self._across, self._along])
+        linear = 1 + np.r_[0:wide, wide + pairs : wide + pairs + self._along.shape[1]]
+        matrix = np.zeros((1 + wide + pairs + self._along.shape[1],) * 2)
+        matrix += self._squares(best, workers, linear)
+        matrix[np.ix_(linear, linear)] += basis.T @ (known[:, None] * basis)
+        # the gradient is that of all rows; without the pull of a prior where there are bounds alone
+        pull = (problem.starts - best.z) / problem.spreads**2
+        matrix[0, linear] = matrix[linear, 0] = -basis.T @ (best.gradient - np.where(even, pull, 0.0))
+        places = slice(0, 1 + wide + pairs), slice(1 + wide + pairs, None)
+        inner = matrix[places[1], places[1]]
+        self._mean = -np.linalg.solve(inner, matrix[places[1], places[0]])
+        self._form = matrix[places[0], places[0]] + matrix[places[0], places[1]] @ self._mean
+        self._root = np.linalg.cholesky(inverse(inner))
+
+    def _squares(self, best: Normal, workers: int, linear: Any) -> Any:
+        """The products of the derivatives of all columns, of first order and of second order by pairs."""
+        wide, basis = self._across.shape[1], np.hstack([self._across, self._along])
+        problem = self._problem.thinned(STEP)
+        low, high = problem.bounds
+        base = list(problem.comparisons(best.z, workers))
+        seconds = np.empty((len(base), wide), object)
+        for k in range(wide):
+            step = self._across[:, k]
+            ahead, behind = (_room(best.z, sign * step, low, high) for sign in (1.0, -1.0))
+            size = max(min(ahead, 1.0), 0.1) if ahead >= behind else -max(min(behind, 1.0), 0.1)
+            moved = problem.comparisons(best.z + size * step, workers)
+            for n, (here, there) in enumerate(zip(base, moved, strict=True)):
+                seconds[n, k] = (there.slopes - here.slopes) @ self._across[list(here.places)] / size
+        total = np.zeros((1 + wide + len(self._pairs) + self._along.shape[1],) * 2)
+        for here, own, full in zip(base, seconds, best.comparisons, strict=True):
+            table = np.zeros((len(here.slopes), len(total)))
+            table[:, linear] = here.slopes @ basis[list(here.places)]
+            for n, (i, j) in enumerate(self._pairs):
+                # half of the second derivative; of a mixed one, the mean of both
+                table[:, 1 + wide + n] = 0.5 * (own[i][:, j] + (own[j][:, i] if i != j else 0.0))
+            # in the thinned columns, the sizes of the noise are others by a trifle
+            factor = best.weights[here.run, here.column] * here.size / full.size
+            total += factor**2 * len(full.residuals) / len(here.residuals) * (table.T @ table)
+        return total
+
+    def _terms(self, a: Any) -> Any:
+        """One, `a` and its products, shape (chains, terms)."""
+        products = [a[:, i] * a[:, j] for i, j in self._pairs]
+        return np.column_stack([np.ones(len(a)), a, *products])
+
+    def _drawn(self, a: Any, rng: Any) -> tuple[Any, Any]:
+        """The logarithm of the density at `a`, shape (chains,), and sought numbers, shape (chains, numbers)."""
+        problem, terms = self._problem, self._terms(a)
+        count = len(problem.sought)
+        b = terms @ self._mean.T + rng.standard_normal((len(a), self._along.shape[1])) @ self._root.T
+        z = self._z[:count] + a @ self._across[:count].T + b @ self._along[:count].T
+        low, high = (bound[:count] for bound in problem.bounds)
+        beyond = np.sum(np.maximum(np.maximum(low - z, z - high), 0.0) / problem.spreads[:count], axis=1)
+        density = -0.5 * np.einsum("ni,ij,nj->n", terms, self._form, terms)
+        # beyond the bounds there is nothing; the steep slope leads chains back that began there
+        return density - np.where(beyond > 0.0, 1e3 * (1.0 + beyond), 0.0), z
+
+    def sampled(self, rng: Any) -> Any:
+        """Samples of the sought numbers, shape (samples, numbers), by Metropolis' method in many chains: a step of a
+        chain is a part of the difference of two others (differential evolution)."""
+        wide = self._across.shape[1]
+        if not wide:
+            return self._drawn(np.zeros((CHAINS * KEPT, 0)), rng)[1]
+        a = rng.standard_normal((CHAINS, wide))
+        density, z = self._drawn(a, rng)
+        kept = []
+        for step in range(STEPS):
+            others = np.array([rng.permutation(CHAINS) for _ in range(2)])
+            jump = 1.0 if step % 10 == 9 else 1.7 / math.sqrt(2.0 * wide)
+            tried = a + jump * (a[others[0]] - a[others[1]]) + 1e-3 * rng.standard_normal(a.shape)
+            new, there = self._drawn(tried, rng)
+            taken = np.log(rng.random(CHAINS)) < new - density
+            a, z = np.where(taken[:, None], tried, a), np.where(taken[:, None], there, z)
+            density = np.where(taken, new, density)
+            if step >= STEPS // 2 and (step + 1) % (STEPS // 2 // KEPT) == 0:
+                kept.append(z)
+        return np.concatenate(kept)
+
+
+def _room(z: Any, step: Any, low: Any, high: Any) -> float:
+    """The largest factor on a step that stays within the bounds."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        room = np.where(step > 0.0, (high - z) / step, np.where(step < 0.0, (low - z) / step, math.inf))
+    return float(np.min(np.maximum(room, 0.0)))
