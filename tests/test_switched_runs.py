@@ -12,6 +12,7 @@ from chainunit.native.compilers import compiler
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 from chainunit.study.identification.fit import fit
+from chainunit.study.identification.information import information
 from chainunit.study.identification.plant import Plant
 from chainunit.study.identification.problem import Problem, RecordedRun, Sensor, Unknown
 from chainunit.study.identification.residuals import check_residuals
@@ -122,6 +123,20 @@ def test_a_coast_is_identified(kind):
         assert rows["run2", "motor.i"] == pytest.approx(2.5 * 200.0, abs=5)
         assert rows["run2", "motor.w"] == pytest.approx(8.0 * 200.0, abs=6)
     assert all(each.is_noise and 0.9 < each.noise < 1.1 for each in check_residuals(best))
+
+
+def test_a_coast_tells_inertia():
+    """Beside a steady run, wall and rocker are told more sharply by a coast than by a second steady run: while the
+    machine swings, its inertia works against no motor."""
+    first = run_of("dc", seed=1, integrator="compiled")
+    deviations = []
+    for second in (run_of("dc", integrator="compiled"), run_of("dc", 2.5, integrator="compiled")):
+        problem = problem_of("dc", first, second)
+        found = information(problem, problem.starts, propose=False).outlooks
+        deviations.append({each.name: each.by_runs for each in found})
+    steady, coast = deviations
+    for name in ("machine.left.wall_mass", "machine.rocker.I"):
+        assert coast[name] < 0.4 * steady[name], name
 
 
 def test_a_shaken_run_is_identified():
