@@ -2,7 +2,7 @@
 # # Synthetic recordings of a hidden machine
 #
 # The script simulates the packaged DC drive with a machine whose masses, friction and feed are hidden, and writes
-# the columns that the sensors of its motor would show: with noise, a converter of 12 bits, jitter, a clock that drifts,
+# what the sensors of its motor would show: with noise, a converter of 12 bits, jitter, a clock that drifts,
 # an offset, and a mark at an angle that is not quite 0. The recordings are no measurements of a real machine.
 #
 # `python make_recordings.py FOLDER` writes loaded.csv.gz, empty.csv.gz, watch.csv.gz and truth.json; by default into
