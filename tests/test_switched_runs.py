@@ -75,7 +75,7 @@ def problem_of(kind, *runs):
 @pytest.fixture
 def fine(monkeypatch):
     """Rows of a simulation so near to one another that the derivatives are not those of their interpolation."""
-    monkeypatch.setattr("chainunit.study.identification.problem.LONGEST_STEP", 4e-4)
+    monkeypatch.setattr("chainunit.study.identification.problem.STEP", 4e-4)
 
 
 @pytest.mark.parametrize("kind", ["dc", pytest.param("im", marks=SLOW), pytest.param("torque", marks=SLOW)])
