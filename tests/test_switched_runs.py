@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from derivatives import check_derivatives
@@ -123,6 +125,24 @@ def test_a_coast_is_identified(kind):
         assert rows["run2", "motor.i"] == pytest.approx(2.5 * 200.0, abs=5)
         assert rows["run2", "motor.w"] == pytest.approx(8.0 * 200.0, abs=6)
     assert all(each.is_noise and 0.9 < each.noise < 1.1 for each in check_residuals(best))
+
+
+@pytest.mark.parametrize("angles", [("mark",), ("motor.count",)])
+def test_a_coast_counts_until_rest(angles):
+    """The machine swings with falling amplitude, and is at rest some seconds before the end of 20 s."""
+    run = run_of("dc", 3.0, duration=20.0, angles=angles, integrator="compiled")
+    if "mark" not in angles:
+        columns = {name: x for name, x in run.recording.columns.items() if name != "motor.w"}
+        run = replace(run, recording=replace(run.recording, columns=columns))
+    (own,) = problem_of("dc", run).runs
+    again = run_of("dc", 3.0, duration=20.0, seed=7, integrator="compiled").recording
+    speed = again.columns["motor.w"] / 50.0
+    end = own.recording.time[-1]
+    assert 6.0 < end < 15.0 and np.array_equal(own.recording.time, run.recording.part(end=end).time)
+    assert np.max(np.abs(speed[(again.time > end - 1.5) & (again.time < end)])) > 0.3
+    assert np.max(np.abs(speed[again.time > end + 0.2])) < 0.36
+    steady = run_of("dc", duration=5.0, integrator="compiled")
+    assert problem_of("dc", steady).runs == (steady,)
 
 
 def test_a_coast_tells_inertia():

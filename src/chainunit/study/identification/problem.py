@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.ndimage import uniform_filter1d
 
 from ..arrays import rms
 from .measurands import COUNTS, MEASURANDS
@@ -31,6 +32,9 @@ of the encoder. The mean speed depends on the frequency of the supply and on the
 count is far more sensitive than any other column; within a turn it shows the motion."""
 AHEAD = 0.04
 """Part of a run with an encoder by which the simulation is longer: with the start values its speed is another."""
+STANDING, SMOOTHED = 0.1, 0.1
+"""Share of the crank speed of a run below which the machine stands, and the time over which its speed is averaged for
+that [s]."""
 _CHANGE = 0.2
 """Change of an unknown for which the derivatives are integrated, in parts of its spread."""
 
@@ -112,7 +116,7 @@ class Problem:
     Parameters
     ----------
     plant : what was recorded; its `by` are the names of `sought`
-    runs : the recordings
+    runs : the recordings; those after whose switch the machine comes to rest are taken until then
     sought : the unknown parameters and inputs of the system, by full name
     sensors : by measured quantity; all others have the usual noise
     """
@@ -124,7 +128,8 @@ class Problem:
         sought: Sequence[Unknown],
         sensors: Mapping[str, Sensor],
     ) -> None:
-        self.plant, self.runs, self.sought = plant, tuple(runs), tuple(sought)
+        self.plant, self.sought = plant, tuple(sought)
+        self.runs = tuple(until_rest(run, plant.ratio) for run in runs)
         self.sensors = {name: sensors.get(name, Sensor()) for run in runs for name in run.recording.columns}
         self.unknowns = (
             *self.sought,
@@ -362,6 +367,24 @@ def mark_times(recording: Recording) -> Any:
     if "mark" not in recording.columns:
         return np.zeros(0)
     return recording.time[recording.columns["mark"] > 0.5] - 0.5 * recording.step
+
+
+def until_rest(run: RecordedRun, ratio: float) -> RecordedRun:
+    """A run whose motor is switched off, until the machine has come to rest: friction that is smoothed lets it creep,
+    where a real one sticks. A run without a column of the speed or an encoder stays as it is."""
+    recording, columns = run.recording, run.recording.columns
+    if run.off is None or not {"crank.w", "motor.w", "motor.count"} & columns.keys():
+        return run
+    if "crank.w" in columns:
+        speed = columns["crank.w"]
+    elif "motor.w" in columns:
+        speed = columns["motor.w"] / ratio
+    else:
+        speed = np.gradient(columns["motor.count"], recording.time) * (2.0 * math.pi / COUNTS / ratio)
+    smooth = uniform_filter1d(speed, max(1, round(SMOOTHED / recording.step)))
+    swings = recording.time[np.abs(smooth) > STANDING * run.crank_speed]
+    rest = float(swings[-1]) if len(swings) else -math.inf
+    return replace(run, recording=recording.part(end=max(rest, run.off)))
 
 
 def speed_of(run: RecordedRun, ratio: float) -> float:
