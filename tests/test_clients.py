@@ -43,6 +43,11 @@ ALONE = {
         ["motor.phi", "motor.w", "motor.a", "motor.armature.i", "machine.tau", "machine.left.support.fx"],
     ),
     "KnifeDrive": ({"phi": 1.0, "a": 2.0}, ["tau", "J", "blade.y", "blade.tilt", "d_pin.fx", "margin"]),
+    # a machine that is held
+    "LoadObserver": (
+        {"phi": 20.0, "current": 0.3},
+        ["speed", "left.material_mass", "imbalance.feed_threshold", "rocker.tau", "quiet.offset_offset"],
+    ),
 }
 
 # a motor runs up at its current limit and turns the machine; the step is exact in binary, so that every client

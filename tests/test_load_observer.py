@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 import math
+from pathlib import Path
 
 import control
 import numpy as np
@@ -11,6 +13,7 @@ import pytest
 from scipy.linalg import expm
 from scipy.stats import norm
 
+from chainunit import InputError
 from chainunit.engines import MATH, numpy_
 from chainunit.fmu.native.export import export
 from chainunit.machines import load_filter
@@ -27,6 +30,7 @@ from chainunit.machines.load_observer import (
 )
 from chainunit.models import MODELS
 from chainunit.native.compilers import compiler
+from chainunit.study.false_loads import ANGLES, false_loads
 
 native = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 LOADS = ("left.material_mass", "right.material_mass", "left.processing_force", "right.processing_force")
@@ -144,10 +148,12 @@ def test_the_rates_of_both_covariances_are_riccatis_and_lyapunovs():
 def test_probability_and_level():
     for z in (-9.0, -3.0, -0.5, 0.0, 0.2, 1.0, 4.0):
         assert load_filter.normal_probability(MATH, z) == pytest.approx(norm.cdf(z), abs=1e-7)
-    z = load_filter.level(MATH, 2.0, 0.6, 1e-7)
-    assert 0.3 / math.pi * math.exp(-0.5 * z * z) == pytest.approx(1e-7)
+    z = load_filter.level(MATH, 0.5, 1e-6)
+    assert 2.0 * z * math.exp(-0.5 * z * z) / (math.sqrt(2.0 * math.pi) * 0.5) == pytest.approx(
+        1e-6, rel=1e-3
+    )
     # an error that does not change has no rate, but a share of the machines
-    assert load_filter.level(MATH, 2.0, 0.0, 1e-7) == load_filter.LEAST_LEVEL
+    assert load_filter.level(MATH, 1e9, 1e-6) >= load_filter.LEAST_LEVEL
 
 
 # -- at the machine
@@ -378,3 +384,81 @@ def test_covariances_stay_positive(observer, quiet):
 def entries_of():
     """The names of the stored entries."""
     return [f"{load_filter.UNKNOWNS[i]}_{load_filter.UNKNOWNS[j]}" for i, j in load_filter.TRIANGLE]
+
+
+# -- errors of the machine's parameters
+
+
+@native
+def test_false_loads_are_those_of_a_wrong_machine(observer, quiet):
+    """A web that is 10 % heavier than in the observer, and a wall: the observer estimates what was predicted."""
+    # the acceleration of the course, by the angles of a turn
+    count = round(observing.TURN / observing.STEP)
+    last = slice(quiet.shape[1] - 2 * count, quiet.shape[1])
+    crank = quiet[0, last] / observing.RATIO
+    a = np.gradient(quiet[1, last], observing.STEP) / observing.RATIO
+    angles = np.arange(ANGLES) * 2.0 * math.pi / ANGLES
+    order = np.argsort(crank % (2.0 * math.pi))
+    a = np.interp(angles, (crank % (2.0 * math.pi))[order], a[order], period=2.0 * math.pi)
+    p = Parameters()
+    names = ["left.web_mass", "right.wall_mass"]
+    false = false_loads(p, names, np.diag([1.0, 4.0]), 3.0, a)
+    for name, start in zip(names, (21.6, 54.0), strict=True):
+        change = 0.02 * start
+        values = observing.noise_of(quiet) | {name: start + change}
+        (imbalance,) = observing.observe(observer, quiet, values, ["imbalance.feed"])
+        found = np.mean(imbalance[-2 * count :])
+        answer = false.by_parameter[name]
+        assert found == pytest.approx(change * (answer[0] - answer[1]), rel=0.1), name
+    web, wall = (false.by_parameter[name] for name in names)
+    expected = math.hypot(web[0] - web[1], 2.0 * (wall[0] - wall[1]))
+    assert false.imbalance == pytest.approx(expected)
+    assert false.feed[0] == pytest.approx(math.hypot(web[0], 2.0 * wall[0]))
+
+
+def test_false_loads_of_the_feed_itself():
+    """A heavier web with all material on the web is like feed, except for the length over which it lies: none."""
+    false = false_loads(Parameters(), ["left.web_mass"], [[1.0]], 3.0)
+    np.testing.assert_allclose(false.by_parameter["left.web_mass"], [-1.0, 0.0, 0.0, 0.0, 0.0], atol=1e-6)
+    assert false.imbalance == pytest.approx(1.0)
+    with pytest.raises(InputError, match=r"left\.mass: is no parameter of LoadObserver"):
+        false_loads(Parameters(), ["left.mass"], [[1.0]], 3.0)
+    with pytest.raises(InputError, match=r"covariance: has the shape \(1, 1\), must be \(2, 2\)"):
+        false_loads(Parameters(), ["left.web_mass", "right.web_mass"], [[1.0]], 3.0)
+
+
+@native
+def test_the_threshold_widens_by_the_false_imbalance(observer, quiet):
+    """In the measure of the uncertainty beside noise and fluctuation."""
+    thresholds = []
+    for uncertainty in (0.0, 2.0, 20.0):
+        values = observing.noise_of(quiet) | {"imbalance.uncertainty": uncertainty}
+        rows = observing.observe(observer, quiet[:, :8000], values, ["imbalance.feed_threshold"])
+        thresholds.append(rows[0, -1])
+    assert thresholds[0] < thresholds[1] < thresholds[2]
+    assert 3.0 * 20.0 < thresholds[2] < 6.0 * 20.0
+
+
+@native
+@pytest.mark.slow
+@pytest.mark.parametrize("values", [{}, {"feed.time": 3.0}, {"feed.fluctuation": 0.0, "feed.change": 0.6}])
+def test_false_alarms_are_fewer_than_permitted(observer, values, monkeypatch):
+    """At 1,000 permitted in a million turns some hundred are counted: not more, and the formula is not far off."""
+    monkeypatch.syspath_prepend(Path(__file__).parents[1] / "bench")
+    bench = importlib.import_module("observer")
+    counts, rates, _ = bench.false_alarms(observer, 1000.0, 5_000, 40, values=values)
+    assert 0.1e-3 < np.sum(rates) < 1e-3, counts
+
+
+@native
+def test_thresholds_of_the_linear_filter(observer, monkeypatch):
+    """The estimates of the linear filter on the periodic solution have less variance than the thresholds assume."""
+    monkeypatch.syspath_prepend(Path(__file__).parents[1] / "bench")
+    bench = importlib.import_module("observer")
+    monkeypatch.setattr(bench, "RUN_IN", 30.0)
+    spread = {rate: bench.periodic_filter(observer, {"alarm.rate": rate}) for rate in (1.0, 1000.0)}
+    for rate, periodic in spread.items():
+        levels = periodic.thresholds / periodic.stationary()
+        memory = 0.5  # in turns, of estimates that follow within a turn
+        assert np.all(levels > load_filter.level(MATH, 2.0 * memory, 0.5e-6 * rate))
+        assert np.all(levels < 1.5 * load_filter.level(MATH, 0.5 * memory, 0.5e-6 * rate))

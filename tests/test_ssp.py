@@ -274,6 +274,9 @@ def test_runs_as_it_is(tool, package, tmp_path):
     np.testing.assert_array_equal(got[-1, 1:], [50.0, 45.0, 120.0, 3.9])
 
 
+SIGNALS = {"phi": "phi", "w": "w", "armature.i": "current"}
+"""Inputs of the observer by the outputs of the motor that they take."""
+
 # a second motor that follows the first: two instances of one model, each with its own start values
 ANOTHER = System(
     {
@@ -304,6 +307,44 @@ def test_another_system_by_pythonfmu(tool, another, tmp_path):
     reference = own(another, tmp_path / "out", names, 0.3, 1e-3)
     # what the second motor follows is one step old: first order
     assert np.max(np.abs(got - reference)) < 1e-3 * np.max(reference)
+
+
+OBSERVED = System(
+    {
+        "machine": component("ChamberForces", values={"ratio": 50.0}),
+        "motor": component("DcMotor", values={"w_start": 150.0}),
+        "observer": component("LoadObserver"),
+    },
+    shaft_joints("motor", "machine"),
+    [(f"motor.{source}", f"observer.{target}") for source, target in SIGNALS.items()],
+    {
+        "motor.w_ref": 150.0,
+        "observer.w": 150.0,
+        "machine.left.material_mass": 38.0,
+        "machine.right.material_mass": 24.0,
+    },
+)
+
+
+@pytest.mark.parametrize("tool", TOOLS)
+def test_an_observer_beside_machine_and_motor(tool, tmp_path):
+    """It takes plain signals of the motor. Its estimates are the loads, in the own master and in the tools."""
+    file = tmp_path / "observed.ssp"
+    ssp.export(OBSERVED, file, stop=8.0)
+    names = [
+        "observer.left.material_mass",
+        "observer.right.material_mass",
+        "observer.alarm",
+        "observer.speed",
+        "motor.w",
+    ]
+    got = run(tool, file, names, 8.0, 1e-3)
+    reference = own(file, tmp_path / "out", names, 8.0, 1e-3)
+    for rows in (got, reference):
+        np.testing.assert_allclose(rows[-1, :2], [38.0, 24.0], rtol=0.02)
+        assert rows[-1, 2] == 1.0
+        assert rows[-1, 3] == pytest.approx(rows[-1, 4], rel=1e-3)
+    np.testing.assert_allclose(got[-1], reference[-1], rtol=1e-2)
 
 
 @pytest.mark.parametrize("tool", TOOLS)

@@ -86,16 +86,24 @@ LEAST_LEVEL = 3.0
 level three machines of a thousand have one."""
 
 
-def level(xp: Any, deviation: Any, swing: Any, rate: Any) -> Any:
-    """The level, in parts of the `deviation` of a stationary Gaussian quantity, that its size exceeds `rate` times a
-    second.
+_ROUNDS = 4
 
-    By Rice's formula the quantity rises through the level z, or falls through -z, `swing`/(pi deviation) exp(-z^2/2)
-    times a second; `swing` is the standard deviation of its derivative. A part of the quantity that is constant in
-    each machine has no share in `swing`: then the formula gives the mean over the machines.
+
+def level(xp: Any, memory: Any, rate: Any) -> Any:
+    """The level, in standard deviations, that the size of a stationary Gaussian quantity exceeds `rate` times in some
+    time, where it forgets its value in the time `memory`, in the same unit.
+
+    From far below, a quantity that forgets like exp(-t/memory) rises above z, or falls below -z,
+    2 z exp(-z^2/2)/(sqrt(2 pi) memory) times. With the diffusion D of a quantity of the variance S^2 its memory is
+    S^2/D. A part of S that is constant in each machine has no share in D: then the formula is the mean over machines.
     """
-    ratio = swing / (deviation * rate) * (1.0 / math.pi)
-    return xp.sqrt(2.0 * xp.log(xp.maximum(ratio, math.exp(0.5 * LEAST_LEVEL * LEAST_LEVEL))))
+    share = xp.minimum(
+        0.5 * math.sqrt(2.0 * math.pi) * memory * rate, math.exp(-0.5 * LEAST_LEVEL * LEAST_LEVEL)
+    )
+    z = 5.0
+    for _ in range(_ROUNDS):
+        z = xp.sqrt(2.0 * xp.log(z / share))
+    return z
 
 
 _ERF = (0.254829592, -0.284496736, 1.421413741, -1.453152027, 1.061405429)
