@@ -298,15 +298,13 @@ def test_what_runs_cannot_tell_is_named(loaded, empty):
 
 
 def test_a_combination_has_the_deviation_that_is_stated(loaded):
-    """By the covariance with as good as nothing known beforehand, as a quadratic form of its coefficients. It is much
+    """By the covariance, as a quadratic form of its coefficients as they are written. It is much
     less than that of its first number."""
     problem = problem_of(without(loaded, "motor.count"), sought=WITH_MASSES)
     found = information(problem, propose=False)
     assert found.combinations
     fisher = normal(problem, problem.started()).fisher
-    spread = problem.spreads.copy()
-    spread[: len(WITH_MASSES)] *= 1e3
-    covariance = np.linalg.inv(fisher + np.diag(1.0 / spread**2))
+    covariance = np.linalg.inv(fisher + np.diag(1.0 / problem.spreads**2))
     for each in found.combinations:
         places = [problem.place[name] for name, _ in each.terms]
         weights = np.array([c for _, c in each.terms])

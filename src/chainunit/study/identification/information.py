@@ -54,7 +54,7 @@ class Outlook:
 @dataclass(frozen=True)
 class Combination:
     """A sum of sought numbers: `terms` are names with coefficients, the first of which is 1, and `deviation` is its
-    standard deviation by the runs alone, in the unit of the first term."""
+    standard deviation by runs and priors, in the unit of the first term."""
 
     terms: tuple[tuple[str, float], ...]
     unit: str
@@ -123,7 +123,7 @@ def _outlooks(problem: Problem, fisher: Any) -> tuple[Outlook, ...]:
 
 def _combinations(problem: Problem, fisher: Any) -> tuple[Combination, ...]:
     """For each number that is not told, the sum with the fewest others that is."""
-    covariance = _covariance(problem, fisher, WEAK)
+    covariance, both = (_covariance(problem, fisher, wider) for wider in (WEAK, 1.0))
     sought, found = problem.sought, dict[frozenset[str], Combination]()
     for first, unknown in enumerate(sought):
         if math.sqrt(covariance[first, first]) < TOLD * unknown.spread:
@@ -134,7 +134,7 @@ def _combinations(problem: Problem, fisher: Any) -> tuple[Combination, ...]:
             others.append(min(left, key=lambda k: _rest(covariance, first, [*others, k])))
             deviation = math.sqrt(_rest(covariance, first, others))
             if deviation < SHARP * unknown.spread:
-                factors, deviation = _factors(covariance, first, others)
+                factors, deviation = _factors(covariance, both, first, others)
                 names = [sought[k].name for k in others]
                 terms = ((unknown.name, 1.0), *zip(names, factors, strict=True))
                 found.setdefault(
@@ -144,21 +144,22 @@ def _combinations(problem: Problem, fisher: Any) -> tuple[Combination, ...]:
     return tuple(found.values())
 
 
-def _factors(covariance: Any, first: int, others: Sequence[int]) -> tuple[list[float], float]:
-    """The factors of the other numbers with which their sum with the first one has the least standard deviation, and
-    that deviation. They have so few digits that the sum as it is written has as good as the least one."""
-    best = -np.linalg.solve(covariance[np.ix_(others, others)], covariance[others, first])
-    least, own = (
-        math.sqrt(_rest(covariance, first, others)),
-        covariance[np.ix_([first, *others], [first, *others])],
-    )
+def _factors(alone: Any, both: Any, first: int, others: Sequence[int]) -> tuple[list[float], float]:
+    """The factors of the other numbers with which their sum with the first one has the least standard deviation by
+    the runs `alone`, and its deviation by `both` runs and priors, each a covariance. They have so few digits that the
+    sum as it is written is as good as that with all digits."""
+    best = -np.linalg.solve(alone[np.ix_(others, others)], alone[others, first])
+    own = both[np.ix_([first, *others], [first, *others])]
+
+    def deviation(factors: Sequence[float]) -> float:
+        weights = np.array([1.0, *factors])
+        return math.sqrt(float(weights @ own @ weights))
+
     for digits in range(2, 8):
         factors = [float(f"{x:.{digits}g}") for x in best]
-        weights = np.array([1.0, *factors])
-        deviation = math.sqrt(float(weights @ own @ weights))
-        if deviation < ROUNDING * least:
+        if deviation(factors) < ROUNDING * deviation(list(best)):
             break
-    return factors, deviation
+    return factors, deviation(factors)
 
 
 def _blind(problem: Problem, fisher: Any) -> tuple[Combination, ...]:

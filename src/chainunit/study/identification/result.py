@@ -127,7 +127,6 @@ def _combination(found: IdentifiedMachine, each: Combination) -> dict[str, Any]:
         "terms": dict(each.terms),
         "value": entry(value, each.unit),
         "deviation": entry(deviation, each.unit),
-        "by_runs": entry(each.deviation, each.unit),
     }
 
 
