@@ -16,6 +16,7 @@ from chainunit.study import config as study_files
 from chainunit.study.choice import choose
 from chainunit.study.identification.measurands import MEASURANDS
 from chainunit.study.identification.synthetic import HiddenRun, Logger, synthetic
+from chainunit.system import Profile
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 FILE = """
@@ -61,21 +62,23 @@ TRUTH = {
     "machine.left.web_mass": 24.5,
     "machine.joint_damping": 1.3,
 }
+MOTOR = ("motor.i", "motor.u", "motor.w")
 HEADS = {"motor.i": "I_A [mA]", "motor.w": "n [rev/min]"}
 FACTORS = {"motor.i": 1e3, "motor.w": 60.0 / (2.0 * math.pi)}
 
 
-def write(folder, name, *, empty=False, heads=HEADS, seed=3, **changes):
-    """Write a recording with a logger's own names and units; `changes` are functions of columns."""
+def write(folder, name, *, empty=False, heads=HEADS, seed=3, measured=MOTOR, of_run=None, w_ref=150.0, **changes):
+    """Write a recording with a logger's own names and units; `changes` are functions of columns, `of_run` is more of
+    the hidden run."""
     config = study_files.parse(FILE)
     drive = choose(config, folder, lambda *_: None).drive
     values = {key.replace("feed.", "machine."): x for key, x in TRUTH.items()}
-    values |= {f"machine.{side}.processing_force": 0.0 for side in ("left", "right")} | {"motor.w_ref": 150.0}
+    values |= {f"machine.{side}.processing_force": 0.0 for side in ("left", "right")} | {"motor.w_ref": w_ref}
     if empty:
         values |= {key: 0.0 for key in values if "material" in key}
-    run = HiddenRun(3.0, 12.0, values, angle=1.0, temperature=300.0)
+    run = HiddenRun(3.0, 12.0, values, angle=1.0, temperature=300.0, **(of_run or {}))
     logger = Logger(rate=200.0, offset={"motor.i": 0.03}, mark_angle=0.1)
-    recording = synthetic(drive, ["motor.i", "motor.u", "motor.w"], run, logger, np.random.default_rng(seed))
+    recording = synthetic(drive, measured, run, logger, np.random.default_rng(seed))
     columns = {"time": recording.time, **recording.columns}
     for key, change in changes.items():
         columns[key.replace("_", ".")] = change(columns[key.replace("_", ".")])
@@ -175,6 +178,42 @@ def test_one_run_does_not_tell_web_from_feed(tmp_path):
     numbers = found.numbers
     assert list(numbers.index) == list(TRUTH) and numbers["is_told"].sum() == 2
     assert math.isnan(numbers.loc["machine.left.web_mass", "value"])
+
+
+def found_within(done, folder, most=4.0):
+    """The numbers of a finished identification that are told, each within its deviations."""
+    result = json.loads((folder / "result.json").read_text("utf-8"))
+    assert done.returncode == 0, done.stdout + done.stderr
+    told = {name: own for name, own in result["numbers"].items() if own["told"]}
+    for name, own in told.items():
+        assert abs(own["value"]["value"] - TRUTH[name]) < most * own["deviation"]["value"], name
+    return told
+
+
+def test_a_shaken_run_that_is_switched_off(tmp_path):
+    """The speed reference changes at stated times, then the motor is switched off."""
+    reference = Profile(150.0, ((2.0, 1.0, 100.0), (4.0, 1.0, 170.0)))
+    write(tmp_path, "loaded.csv.gz", heads={}, w_ref=reference, of_run={"off": 9.0})
+    lines = 'speeds = [["2 s", "1 s", "2 rad/s"], [4, 1, 3.4]]\nswitched_off = "9 s"\n'
+    text = FILE.replace("[[identify.sensor]]", f"{lines}[[identify.sensor]]")
+    (tmp_path / "mine.toml").write_text(text, "utf-8")
+    done = chainunit("identify", "mine.toml", "-o", "out", cwd=tmp_path)
+    assert found_within(done, tmp_path / "out")
+    wrong = text.replace("[4, 1, 3.4]", "[2.5, 1, 3.4]")
+    (tmp_path / "mine.toml").write_text(wrong, "utf-8")
+    done = chainunit("identify", "mine.toml", "-o", "other", cwd=tmp_path)
+    assert done.returncode == 2 and "change 2 begins before the one before it ends" in done.stderr
+
+
+def test_a_measured_shaft_needs_no_motor(tmp_path):
+    """Torque and speed behind the gear, in a file without a motor."""
+    for name, empty in (("loaded.csv.gz", False), ("empty.csv", True)):
+        write(tmp_path, name, empty=empty, heads={}, measured=("crank.tau", "crank.w"))
+    begin, end = FILE.index("[motor]"), FILE.index("[run]")
+    sensor = FILE.index("[[identify.sensor]]")
+    (tmp_path / "mine.toml").write_text(FILE[:begin] + FILE[end:sensor] + EMPTY, "utf-8")
+    done = chainunit("identify", "mine.toml", "-o", "out", cwd=tmp_path)
+    assert len(found_within(done, tmp_path / "out")) >= 3
 
 
 @pytest.mark.parametrize(

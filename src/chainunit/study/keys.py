@@ -45,6 +45,7 @@ _FOLLOWS = {
     "identify.run.crank_speed": "run.crank_speed",
     "identify.run.begin": "the first row",
     "identify.run.end": "the last row",
+    "identify.run.switched_off": "never",
     "identify.sensor.noise": "identify.noise",
     "identify.sensor.gain": "identify.gain",
     "identify.sensor.offset": "5 % of the RMS of a current or torque, 0 of others",

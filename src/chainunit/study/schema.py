@@ -19,7 +19,7 @@ from .event import TYPES
 from .event_table import LONGEST_NAME, PLACED, RESERVED
 from .identification.measurands import MEASURANDS
 from .identification.table import MOST_PARAMETERS as MOST_SOUGHT
-from .identification.table import MOST_RUNS, MOST_SENSORS
+from .identification.table import MOST_RUNS, MOST_SENSORS, MOST_SPEEDS
 from .keys import ENTRIES, Key, KeyTable, key_tables
 from .parts import LONGEST_FILE
 from .schema_rules import OF_PARTS, rules
@@ -44,6 +44,10 @@ _FORMS: dict[str, dict[str, Any]] = {
     "identify.parameter.name": {"minLength": 1},
     "identify.run.name": {"pattern": r"^[a-z][a-z0-9_]{0,19}$"},
     "identify.run.file": {"minLength": 1},
+    "identify.run.speeds": {
+        "maxItems": MOST_SPEEDS,
+        "items": {"type": "array", "items": _VALUE, "minItems": 3, "maxItems": 3},
+    },
     "identify.sensor.column": {"enum": [name for name, each in MEASURANDS.items() if each.analog]},
     "sweep.parameter.values": {"items": _VALUE, "minItems": 1, "maxItems": MOST_VALUES},
     "event.name": _EVENT_NAME,

@@ -14,6 +14,7 @@ import numpy as np
 from ...drives.induction_motor import InductionMotor
 from ...errors import Faults, InputError
 from ...progress import Report
+from ...system import Profile
 from ..arrays import rms
 from ..choice import choose
 from ..config import Config
@@ -22,16 +23,19 @@ from .fit import MOST_ROUNDS, Fit, fit
 from .information import Combination, Information, information
 from .inspection import Expectation, inspect
 from .measurands import MEASURANDS
-from .plant import Plant
+from .plant import AnyPlant, Plant
 from .posterior import Posterior, posterior
 from .problem import Comparison, Problem, RecordedRun, Sensor
 from .reading import OFFSET_SHARE, WITH_OFFSET, IdentificationPlan, PlannedRun
 from .recording import Recording, read_recording
 from .residuals import ResidualCheck, check_residuals
+from .shaft import MeasuredShaft
 from .unknown import Unknown
 
 SIGNALS = ("motor.i", "motor.u", "motor.power", "crank.tau")
 """Quantities of which a recording must have one: they tell the torque."""
+OF_SHAFT = ("crank.tau", "crank.w", "motor.w", "motor.count")
+"""Quantities of a machine whose torque is measured behind its motor, of which nothing need be known."""
 WIDE, NEAR = 5.0, 1.2
 """Factors by which the RMS of a column may differ from the simulated one: of a current, power or torque, which depend
 on the sought numbers; and of a speed or a voltage under control."""
@@ -204,23 +208,35 @@ def _problem(
 ) -> Problem:
     sought = [replace(u, name=system_name(u.name)) for u in plan.sought]
     measured = dict.fromkeys(name for each in recordings.values() for name in each.columns if name != "mark")
-    plant = Plant(drive, list(measured), [u.name for u in sought])
+    at_shaft = all(name in OF_SHAFT for name in measured)
+    by = [u.name for u in sought]
+    plant: AnyPlant = (
+        MeasuredShaft(drive.machine, list(measured), by) if at_shaft else Plant(drive, list(measured), by)
+    )
     runs = [_run(config, drive, run, recordings[run.name]) for run in plan.runs]
     return Problem(plant, runs, sought, _sensors(plan, measured, recordings))
 
 
 def _run(config: Config, drive: Drive, run: PlannedRun, recording: Recording) -> RecordedRun:
-    values: dict[str, float] = {
-        name: float(x)
-        for name, x in drive.reference(run.crank_speed).items()
-        if not name.startswith("model.")
-    }
+    values: dict[str, Any] = {}
+    if "crank.tau" not in recording.columns:
+        reference = drive.reference(run.crank_speed)
+        values = {name: x for name, x in reference.items() if not name.startswith("model.")}
+    if run.speeds:
+        if "motor.w_ref" not in values:
+            raise InputError(
+                f"identify.run ({run.name}): speeds are those of a reference, which this motor does not follow; "
+                "leave them out",
+                "identify.run",
+            )
+        changes = ((begin, lasts, w * drive.ratio) for begin, lasts, w in run.speeds)
+        values["motor.w_ref"] = Profile(values["motor.w_ref"], tuple(changes))
     feed = drive.loads(config.feed) if run.has_feed else dict.fromkeys(drive.loads(config.feed), 0.0)
     sought = {system_name(u.name) for u in plan_of(config).sought}
     # a sought feed of a loaded run is free
-    values |= {name: float(x) for name, x in feed.items() if not (run.has_feed and name in sought)}
+    loads = {name: float(x) for name, x in feed.items() if not (run.has_feed and name in sought)}
     added = {system_name(name): x for name, x in run.added.items()}
-    return RecordedRun(run.name, recording, run.crank_speed, values, added, run.ambient)
+    return RecordedRun(run.name, recording, run.crank_speed, values | loads, added, run.ambient, run.off)
 
 
 def _sensors(
@@ -280,7 +296,8 @@ def remarks(found: IdentifiedMachine) -> Iterator[str]:
                 "course of the other columns, and machines that are alike in both halves of a turn may be taken for "
                 "each other"
             )
-    if config.motor_type.follows(config.motor) if config.motor is not None else False:
+    has_motor = bool(columns & set(SIGNALS[:3]))
+    if has_motor and config.motor is not None and config.motor_type.follows(config.motor):
         tuned = [f"motor.{name}" for name in CONTROL if f"motor.{name}" not in config.given]
         if tuned:
             names = ", ".join(tuned)

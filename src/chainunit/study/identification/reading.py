@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import Faults, InputError, near_name, shown
-from ...quantities import Quantity, Variable, named_values
+from ...quantities import Layout, Quantity, Variable, named_values
 from ...reading import given_values, instance, read_table, to_number
 from ...refusals import unit_behind
 from ...units import split
@@ -49,7 +49,8 @@ class SensorKnowledge:
 class PlannedRun:
     """A recording of the plan: its `file`, the heads of its `columns` by quantity, the speed of the crank [rad/s],
     the part that counts [s], the temperature of the surroundings [K], whether it has the `feed` that is sought, and
-    the amounts that were added to sought numbers by their full names."""
+    the amounts that were added to sought numbers by their full names; the changes of the crank speed (begin and
+    duration [s], speed after it [rad/s]), and the time at which the motor is switched off [s], or None."""
 
     name: str
     file: Path
@@ -60,6 +61,8 @@ class PlannedRun:
     ambient: float
     has_feed: bool
     added: Mapping[str, float]
+    speeds: tuple[tuple[float, float, float], ...] = ()
+    off: float | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -255,6 +258,9 @@ def _run(
                 raise InputError(f"{key}: no such number of the study{near_name(full, known)}", key)
             of = Quantity(known[full][0].unit, "amount that was added")
             added[full] = _number(key, value, Variable(key, of.description, of))
+    speeds: list[tuple[float, float, float]] = []
+    with faults.collected():
+        speeds = list(_speeds(given.get("speeds", []), f"{place}.speeds"))
     columns: dict[str, str] = {}
     for quantity, head in _leaves(given.get("columns", {})):
         key = f"{place}.columns.{quantity}"
@@ -276,7 +282,31 @@ def _run(
         float(given.get("ambient", usual.ambient)),
         given.get("feed", "same") == "same",
         added,
+        tuple(speeds),
+        float(given["switched_off"]) if "switched_off" in given else None,
     )
+
+
+def _speeds(entries: Sequence[Any], key: str) -> Iterator[tuple[float, float, float]]:
+    """The changes of the speed, in order."""
+    of = {v.name: v.quantity for v in Layout(RunTable).variables}
+    duration = Quantity("s", "duration of the change", low=0.0, open_low=True)
+    kinds = (of["begin"], duration, of["crank_speed"])
+    end = -math.inf
+    for k, entry in enumerate(entries, 1):
+        if not isinstance(entry, list) or len(entry) != len(kinds):
+            raise InputError(
+                f'{key} = {shown(entry)}: must be a list of begin, duration and crank speed, such as ["5 s", "1 s", '
+                '"2 rad/s"]',
+                key,
+            )
+        begin, lasts, speed = (
+            _number(key, x, Variable(key, q.description, q)) for x, q in zip(entry, kinds, strict=True)
+        )
+        if begin < end:
+            raise InputError(f"{key}: change {k} begins before the one before it ends, at {end:g} s", key)
+        end = begin + lasts
+        yield begin, lasts, speed
 
 
 def _leaves(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:

@@ -21,6 +21,8 @@ from .residuals import ResidualCheck
 CORRELATED = 0.8
 """Correlation from which a pair of numbers is named."""
 MOST_PAIRS = 12
+MOST_CHANGES = 4
+"""Most numbers whose changes without a trace are told one by one."""
 CLASSES = 90
 """Number of crank angles at which measured and simulated courses are compared."""
 LOUD = 1.5
@@ -137,7 +139,11 @@ def _blind(found: IdentifiedMachine, each: Combination) -> dict[str, Any]:
         f"{short_name(name)} {'up' if factor > 0.0 else 'down'} by {abs(factor):.3g}{unit_behind(units[name])}"
         for name, factor in each.terms
     ]
-    return {"text": " with ".join(changes), "terms": dict(each.terms)}
+    words = " with ".join(changes)
+    if len(changes) > MOST_CHANGES:
+        names = ", ".join(short_name(name) for name, _ in each.terms)
+        words = f"a change of {len(changes)} numbers together ({names})"
+    return {"text": words, "terms": dict(each.terms)}
 
 
 def _check(found: IdentifiedMachine, each: ResidualCheck) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from ..entry_values import Entered
 
 FEEDS = ("same", "none")
 """The feed of a run: that of all loaded runs, or none."""
-MOST_PARAMETERS, MOST_RUNS, MOST_SENSORS = 40, 12, 12
+MOST_PARAMETERS, MOST_RUNS, MOST_SENSORS, MOST_SPEEDS = 40, 12, 12, 200
 
 
 @declaration
@@ -72,6 +72,9 @@ class RunTable:
     )
     begin: Value = quantity("s", "time of the recording from which it counts", default=0.0, min=-1e9, max=1e9)
     end: Value = quantity("s", "time of the recording up to which it counts", default=0.0, min=-1e9, max=1e9)
+    switched_off: Value = quantity(
+        "s", "time of the recording at which the motor is switched off", default=0.0, min=-1e9, max=1e9
+    )
     ambient: Value = quantity("K", "temperature of the surroundings", default=293.15, min=230.0, max=340.0)
 
 
@@ -130,6 +133,15 @@ RUN_KEYS: Mapping[str, Any] = {
     "feed": (
         Literal[FEEDS],
         Field("same", description="feed of the machine: the one that is sought in all loaded runs, or none"),
+    ),
+    "speeds": (
+        list[Any],
+        Field(
+            [],
+            max_length=MOST_SPEEDS,
+            description="smooth changes of the speed reference, each a list of its time in the recording, its "
+            "duration, and the crank speed after it",
+        ),
     ),
     "columns": (
         dict[str, Any],
