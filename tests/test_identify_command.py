@@ -67,7 +67,9 @@ HEADS = {"motor.i": "I_A [mA]", "motor.w": "n [rev/min]"}
 FACTORS = {"motor.i": 1e3, "motor.w": 60.0 / (2.0 * math.pi)}
 
 
-def write(folder, name, *, empty=False, heads=HEADS, seed=3, measured=MOTOR, of_run=None, w_ref=150.0, **changes):
+def write(
+    folder, name, *, empty=False, heads=HEADS, seed=3, measured=MOTOR, of_run=None, w_ref=150.0, **changes
+):
     """Write a recording with a logger's own names and units; `changes` are functions of columns, `of_run` is more of
     the hidden run."""
     config = study_files.parse(FILE)

@@ -210,9 +210,10 @@ def _figures(s: b.Source, found: IdentifiedMachine) -> Iterator[b.Block]:
     for run, file in zip(found.plan.runs, pictures(found), strict=True):
         panels = []
         for name, course in s.result["courses"][run.name].items():
-            x, y = (course[key]["value"] for key in ("angle", "measured"))
-            simulated = course["simulated"]["value"]
-            angle = fig.Axis("crank angle", "rad", step=45.0)
+            y, simulated = (course[key]["value"] for key in ("measured", "simulated"))
+            steady = "angle" in course
+            x = course["angle" if steady else "time"]["value"]
+            angle = fig.Axis("crank angle", "rad", step=45.0) if steady else fig.Axis("time", "s")
             words = MEASURANDS[name].description.partition(":")[0]
             panels.append(
                 (
@@ -229,7 +230,9 @@ def _figures(s: b.Source, found: IdentifiedMachine) -> Iterator[b.Block]:
         yield fig.Figure(
             f"course-{run.name}",
             f"Run {run.name}: measured and simulated",
-            "Means in classes of the crank angle over all turns of the run.",
+            "Means in classes of the crank angle over all turns of the run."
+            if found.is_steady(run.name)
+            else "Means in classes of time.",
             tuple(panels),
             file=file,
         )

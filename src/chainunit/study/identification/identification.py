@@ -103,11 +103,20 @@ class IdentifiedMachine:
         """Whether the residuals may be noise."""
         return all(check.is_noise for check in self.checks)
 
-    def courses(self, comparison: Comparison) -> tuple[Any, Any]:
-        """A measured column and the simulated one, as its sensor would show it, each of shape (n,)."""
-        run = next(each for each in self.problem.runs if each.name == comparison.run)
-        measured = run.recording.columns[comparison.column]
-        return measured, measured - comparison.residuals * comparison.size
+    def courses(self, comparison: Comparison) -> tuple[Any, Any, Any]:
+        """The times of the rows that are compared [s], a measured column, and the simulated one as its sensor would
+        show it, each of shape (n,)."""
+        recording = self._run(comparison.run).recording
+        measured = recording.columns[comparison.column][comparison.rows]
+        return recording.time[comparison.rows], measured, measured - comparison.residuals * comparison.size
+
+    def is_steady(self, name: str) -> bool:
+        """Whether the turns of a run are alike."""
+        run = self._run(name)
+        return run.off is None and not any(hasattr(x, "changes") for x in run.values.values())
+
+    def _run(self, name: str) -> RecordedRun:
+        return next(each for each in self.problem.runs if each.name == name)
 
     def combined(self, combination: Combination) -> tuple[float, float]:
         """The value of a sum of sought numbers, and its standard deviation."""
@@ -283,7 +292,7 @@ def remarks(found: IdentifiedMachine) -> Iterator[str]:
         and "motor.i" in columns
         and "motor.power" not in columns
     ):
-        _, current = found.courses(next(each for each in found.best.comparisons if each.column == "motor.i"))
+        *_, current = found.courses(next(each for each in found.best.comparisons if each.column == "motor.i"))
         swing = np.ptp(current) / np.mean(current)
         yield (
             f"The recordings have no active power. The current of this induction motor changes by {100.0 * swing:.2g}"

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ...system import Profile
 from .fit import inverse, normal
 from .plant import CRANK
 from .problem import Problem, RecordedRun
@@ -31,6 +32,11 @@ WEAK = 1e3
 BLIND, PART = 1e-4, 0.05
 """Information on a direction, in parts of that of the prior, below which the runs are blind for it, and the least
 part of a number in it that is named."""
+REFERENCE = "motor.w_ref"
+OTHER_SPEEDS, SHAKEN = (0.5, 1.5), (0.7, 1.3)
+"""Speeds of runs that are proposed, in parts of that of the first run: steady ones, and those of a shaken run."""
+SHAKING, MOST_CHANGES = 4.0, 30
+"""Time between the changes of a shaken speed [s], and their largest number."""
 ADDED = 15.0
 """Mass to add to a part in a run that is proposed [kg]."""
 
@@ -224,29 +230,41 @@ def _proposals(
 def _candidates(problem: Problem) -> Iterator[tuple[str, RecordedRun]]:
     """Runs that an engineer can make, in words."""
     first = problem.runs[0]
-    own = replace(first, name="next", added={})
+    steady = {name: getattr(x, "start", x) for name, x in first.values.items()}
+    own = replace(first, name="next", added={}, values=steady, off=None)
     feed = [u.name for u in problem.sought if u.name.endswith(("material_mass", "processing_force"))]
     if feed and not any(set(feed) <= set(run.values) for run in problem.runs):
-        yield "empty", replace(own, values={**first.values, **dict.fromkeys(feed, 0.0)})
-    if "motor.w_ref" in first.values:
-        for share in (0.5, 1.5):
-            w_ref = share * first.values["motor.w_ref"]
-            if not any(
-                abs(run.values.get("motor.w_ref", 0.0) - w_ref) < 0.05 * w_ref for run in problem.runs
-            ):
-                yield (
-                    f"at {share:g} times the speed",
-                    replace(
-                        own,
-                        values={**first.values, "motor.w_ref": w_ref},
-                        crank_speed=share * first.crank_speed,
-                    ),
-                )
+        yield "empty", replace(own, values={**steady, **dict.fromkeys(feed, 0.0)})
+    if REFERENCE in steady:
+        yield from _other_speeds(problem, own)
+    begin, end = float(first.recording.time[0]), float(first.recording.time[-1])
+    if not any(run.off is not None for run in problem.runs):
+        yield "with the motor switched off after a quarter", replace(own, off=begin + 0.25 * (end - begin))
     for u in problem.sought:
         if u.name.endswith(("web_mass", "wall_mass")) and not any(
             u.name in run.added for run in problem.runs
         ):
             yield f"with {ADDED:g} kg added to {short_name(u.name)}", replace(own, added={u.name: ADDED})
+
+
+def _other_speeds(problem: Problem, own: RecordedRun) -> Iterator[tuple[str, RecordedRun]]:
+    """The run at other speeds, and at a speed that changes."""
+    w, references = float(own.values[REFERENCE]), [run.values.get(REFERENCE, 0.0) for run in problem.runs]
+    for share in OTHER_SPEEDS:
+        if not any(abs(getattr(x, "start", x) - share * w) < 0.05 * w for x in references):
+            values = {**own.values, REFERENCE: share * w}
+            yield (
+                f"at {share:g} times the speed",
+                replace(own, values=values, crank_speed=share * own.crank_speed),
+            )
+    if not any(hasattr(x, "changes") for x in references):
+        time = own.recording.time
+        begins = np.arange(float(time[0]), float(time[-1]), SHAKING)[:MOST_CHANGES]
+        changes = tuple((float(t), 0.5 * SHAKING, w * SHAKEN[k % 2]) for k, t in enumerate(begins))
+        words = (
+            f"at a speed that changes every {SHAKING:g} s between {SHAKEN[0]:g} and {SHAKEN[1]:g} times it"
+        )
+        yield words, replace(own, values={**own.values, REFERENCE: Profile(w, changes)})
 
 
 def _simulated(problem: Problem, run: RecordedRun, z: Any, workers: int) -> RecordedRun:

@@ -73,7 +73,8 @@ class RecordedRun:
 class Comparison:
     """Residuals of a column of a run, in standard deviations, shape (n,), and the derivatives of the simulated column
     by the unknowns at the `places`, shape (n, places). `angle` is the simulated crank angle at the rows [rad], shape
-    (n,), and `size` the standard deviation in the unit of the column."""
+    (n,), `size` the standard deviation in the unit of the column, and `rows` tells, of each row of the recording,
+    whether it is compared; None for marks."""
 
     run: str
     column: str
@@ -82,6 +83,7 @@ class Comparison:
     places: Sequence[int]
     angle: Any
     size: float
+    rows: Any = None
 
 
 class SimulatedRun:
@@ -345,17 +347,17 @@ class Problem:
                 own = {key: each[rows] for key, each in more.items()}
                 residuals = (y - x)[rows] / size
                 yield self._comparison(
-                    run, name, residuals, slopes[rows] / size, names, own, angle[rows], size
+                    run, name, residuals, slopes[rows] / size, names, own, angle[rows], size, rows
                 )
 
     def _comparison(
         self, run: RecordedRun, column: str, residuals: Any, slopes: Any, names: Sequence[str],
-        more: Mapping[str, Any], angle: Any, size: float,
+        more: Mapping[str, Any], angle: Any, size: float, rows: Any = None,
     ) -> Comparison:  # fmt: skip
         """The residuals with the derivatives by all unknowns."""
         columns = [slopes, *(np.reshape(x, (-1, 1)) / size for x in more.values())]
         places = [self.place[name] for name in (*names, *more)]
-        return Comparison(run.name, column, residuals, np.hstack(columns), places, angle, size)
+        return Comparison(run.name, column, residuals, np.hstack(columns), places, angle, size, rows)
 
 
 def _nuisance(name: str, unit: str, start: float, spread: float) -> Unknown:

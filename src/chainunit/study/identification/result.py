@@ -24,7 +24,9 @@ MOST_PAIRS = 12
 MOST_CHANGES = 4
 """Most numbers whose changes without a trace are told one by one."""
 CLASSES = 90
-"""Number of crank angles at which measured and simulated courses are compared."""
+"""Number of crank angles at which measured and simulated courses are shown."""
+CLASSES_OF_TIME = 600
+"""Number of times at which those of a run that is not steady are shown."""
 LOUD = 1.5
 """Noise in parts of the stated one from which a sentence names it."""
 
@@ -171,26 +173,27 @@ def _nuisances(found: IdentifiedMachine) -> Iterator[tuple[str, dict[str, Any]]]
 
 
 def _courses(found: IdentifiedMachine, run: str) -> dict[str, Any]:
-    """By analog column, the mean measured and simulated values in classes of the crank angle."""
+    """By analog column, the mean measured and simulated values in classes: of the crank angle over all turns of a
+    steady run, of the time of another one."""
     courses: dict[str, Any] = {}
-    edges = np.linspace(0.0, 2.0 * math.pi, CLASSES + 1)
+    steady = found.is_steady(run)
     for each in found.best.comparisons:
         if each.run != run or not MEASURANDS[each.column].analog:
             continue
-        measured, simulated = found.courses(each)
-        place = np.digitize(np.mod(each.angle, 2.0 * math.pi), edges[1:-1])
-        count = np.bincount(place, minlength=CLASSES)
+        time, measured, simulated = found.courses(each)
+        x = np.mod(each.angle, 2.0 * math.pi) if steady else time
+        ends = (0.0, 2.0 * math.pi) if steady else (time[0], time[-1])
+        edges = np.linspace(ends[0], ends[1], (CLASSES if steady else CLASSES_OF_TIME) + 1)
+        place, size = np.digitize(x, edges[1:-1]), len(edges) - 1
+        count = np.bincount(place, minlength=size)
         some = count > 0
-
-        def mean(x: Any, place: Any = place, count: Any = count, some: Any = some) -> Any:
-            return np.bincount(place, x, CLASSES)[some] / count[some]
-
+        means = [np.bincount(place, y, size)[some] / count[some] for y in (measured, simulated)]
         unit = MEASURANDS[each.column].unit
+        middle = 0.5 * (edges[1:] + edges[:-1])[some]
         courses[each.column] = {
-            "angle": array_entry(0.5 * (edges[1:] + edges[:-1])[some], "rad"),
-            "measured": array_entry(mean(measured), unit),
-            "simulated": array_entry(mean(simulated), unit),
-            "noise": array_entry(each.size / np.sqrt(count[some]), unit),
+            "angle" if steady else "time": array_entry(middle, "rad" if steady else "s"),
+            "measured": array_entry(means[0], unit),
+            "simulated": array_entry(means[1], unit),
         }
     return courses
 
