@@ -205,6 +205,9 @@ def test_a_shaken_run_that_is_switched_off(tmp_path):
     (tmp_path / "mine.toml").write_text(wrong, "utf-8")
     done = chainunit("identify", "mine.toml", "-o", "other", cwd=tmp_path)
     assert done.returncode == 2 and "change 2 begins before the one before it ends" in done.stderr
+    (tmp_path / "mine.toml").write_text(text.replace('"9 s"', '"30 s"'), "utf-8")
+    done = chainunit("identify", "mine.toml", "-o", "other", cwd=tmp_path)
+    assert done.returncode == 2 and "goes from 0 to 11.995 s; must lie within" in done.stderr
 
 
 def test_a_measured_shaft_needs_no_motor(tmp_path):

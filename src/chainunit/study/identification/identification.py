@@ -194,6 +194,13 @@ def _recordings(plan: IdentificationPlan) -> dict[str, Recording]:
                 raise InputError(
                     f"{run.file}: has no column that tells the torque; must have one of {', '.join(SIGNALS)}"
                 )
+            begin, end = recording.time[0], recording.time[-1]
+            if run.off is not None and not begin < run.off < end:
+                raise InputError(
+                    f"identify.run ({run.name}): switched_off = {run.off:g} s: {run.file} goes from {begin:g} to "
+                    f"{end:g} s; must lie within",
+                    "identify.run",
+                )
             recordings[run.name] = recording
     faults.refuse()
     return recordings

@@ -248,6 +248,11 @@ def _run(
     if "file" not in given:
         faults.add([InputError(f"{place}.file: must be given, the recording", f"{place}.file")])
     begin, end = given.get("begin", -math.inf), given.get("end", math.inf)
+    off = float(given["switched_off"]) if "switched_off" in given else None
+    if off is not None and not begin < off < end:
+        key = f"{place}.switched_off"
+        words = f"must lie between begin = {begin:g} s and end = {end:g} s"
+        faults.add([InputError(f"{key} = {off:g} s: {words}", key)])
     if not begin < end:
         faults.add([InputError(f"{place}.end = {end:g} s: must be > begin = {begin:g} s", f"{place}.end")])
     added: dict[str, float] = {}
@@ -283,7 +288,7 @@ def _run(
         given.get("feed", "same") == "same",
         added,
         tuple(speeds),
-        float(given["switched_off"]) if "switched_off" in given else None,
+        off,
     )
 
 
@@ -294,7 +299,7 @@ def _speeds(entries: Sequence[Any], key: str) -> Iterator[tuple[float, float, fl
     kinds = (of["begin"], duration, of["crank_speed"])
     end = -math.inf
     for k, entry in enumerate(entries, 1):
-        if not isinstance(entry, list) or len(entry) != len(kinds):
+        if len(entry) != len(kinds):
             raise InputError(
                 f'{key} = {shown(entry)}: must be a list of begin, duration and crank speed, such as ["5 s", "1 s", '
                 '"2 rad/s"]',

@@ -30,7 +30,7 @@ from ..drive import Drive
 from .measurands import COUNTS
 from .plant import ANGLE, CRANK, GUARD, Course, Nuisance, Overview, Response, SourcedLoop
 
-ORDERS, CHANGING = 24, 6
+ORDERS, CHANGING = 60, 6
 """Orders of the crank in its motion, and the orders that may change over the run, as a motor warms up."""
 RIPPLE, CHANGE = 0.3, 0.05
 """Standard deviation of the first order of the speed in parts of the mean speed, that of order k being 1/k^2 of it;

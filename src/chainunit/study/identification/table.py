@@ -135,7 +135,7 @@ RUN_KEYS: Mapping[str, Any] = {
         Field("same", description="feed of the machine: the one that is sought in all loaded runs, or none"),
     ),
     "speeds": (
-        list[Any],
+        list[list[Any]],
         Field(
             [],
             max_length=MOST_SPEEDS,
