@@ -19,7 +19,7 @@ from chainunit.study.identification.plant import Plant
 from chainunit.study.identification.posterior import posterior
 from chainunit.study.identification.problem import Comparison, Problem, RecordedRun, Sensor, Unknown
 from chainunit.study.identification.recording import Recording
-from chainunit.study.identification.residuals import check_residuals
+from chainunit.study.identification.residuals import check_residuals, strains
 from chainunit.study.identification.synthetic import HiddenRun, Logger, synthetic
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
@@ -173,6 +173,16 @@ def test_the_residuals_tell_a_wrong_machine(loaded, empty):
     wrong = problem_of(*recordings, empty=(1,), r=0.153)
     worst = max(check_residuals(fit(wrong)), key=lambda each: each.statistic)
     assert worst.column == "motor.i" and worst.statistic > 2.0 * worst.limit and not worst.is_noise
+
+
+def test_a_wrong_gear_strains_the_clock(loaded):
+    """With a mark on the crank and a speed of the motor, a gear that is off by 2 % looks as a clock that is."""
+    recording = without(loaded, "motor.count")
+    right = problem_of(recording)
+    assert strains(right, fit(right)) == []
+    wrong = problem_of(recording, ratio=51.0)
+    (drift,) = [each for each in strains(wrong, fit(wrong)) if each.name == "run0.drift"]
+    assert abs(drift.deviations) > 50.0 and drift.value == pytest.approx(5e-5 * drift.deviations)
 
 
 def test_the_statistic_of_noise_is_that_of_its_distribution():

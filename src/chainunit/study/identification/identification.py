@@ -28,7 +28,7 @@ from .posterior import Posterior, posterior
 from .problem import Comparison, Problem, RecordedRun, Sensor
 from .reading import OFFSET_SHARE, WITH_OFFSET, IdentificationPlan, PlannedRun
 from .recording import Recording, read_recording
-from .residuals import ResidualCheck, check_residuals
+from .residuals import ResidualCheck, Strain, check_residuals, strains
 from .shaft import MeasuredShaft
 from .unknown import Unknown
 
@@ -100,8 +100,13 @@ class IdentifiedMachine:
 
     @property
     def is_described(self) -> bool:
-        """Whether the residuals may be noise."""
-        return all(check.is_noise for check in self.checks)
+        """Whether the residuals may be noise, and clocks and sensors are as they are known."""
+        return all(check.is_noise for check in self.checks) and not self.strains
+
+    @property
+    def strains(self) -> list[Strain]:
+        """The numbers of clocks and sensors that are not as they are known."""
+        return strains(self.problem, self.best)
 
     def courses(self, comparison: Comparison) -> tuple[Any, Any, Any]:
         """The times of the rows that are compared [s], a measured column, and the simulated one as its sensor would

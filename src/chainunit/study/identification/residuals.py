@@ -1,4 +1,5 @@
-"""Whether the residuals of a fit are noise. A wrong model leaves orders of the crank in them."""
+"""Whether a fit describes the recordings. A wrong model leaves orders of the crank in the residuals, or strains
+clocks and sensors: a wrong gear is described by a clock that runs too fast."""
 
 from __future__ import annotations
 
@@ -10,13 +11,16 @@ import numpy as np
 from scipy.stats import chi2
 
 from .fit import Normal
-from .measurands import MEASURANDS
-from .problem import Comparison
+from .problem import Comparison, Problem
 
 ORDERS = 20
 """Highest order of the crank that is looked at."""
 FALSE_ALARMS = 0.01
 """Share of right models of which some column is taken for wrong."""
+
+
+STRAINED = 5.0
+"""Deviation from what is known of a clock or a sensor, in standard deviations, that is no chance."""
 
 
 @dataclass(frozen=True)
@@ -42,9 +46,27 @@ class ResidualCheck:
         return self.statistic <= self.limit
 
 
+@dataclass(frozen=True)
+class Strain:
+    """A number of a clock or a sensor whose best value is farther from what is known of it than chance explains, by
+    so many standard deviations."""
+
+    name: str
+    unit: str
+    value: float
+    deviations: float
+
+
+def strains(problem: Problem, best: Normal) -> list[Strain]:
+    """The strained numbers of clocks and sensors."""
+    numbers = zip(problem.unknowns, best.z, problem.simulated_with, strict=True)
+    own = [(u, float(x), (float(x) - u.start) / u.spread) for u, x, simulated in numbers if not simulated]
+    return [Strain(u.name, u.unit, x, far) for u, x, far in own if abs(far) > STRAINED]
+
+
 def check_residuals(best: Normal) -> list[ResidualCheck]:
-    """The checks of all analog columns of a fit."""
-    columns = [each for each in best.comparisons if MEASURANDS[each.column].analog]
+    """The checks of all columns of a fit that have a value in each row."""
+    columns = [each for each in best.comparisons if each.column != "mark"]
     limit = float(chi2.ppf((1.0 - FALSE_ALARMS) ** (1.0 / max(1, len(columns))), 2 * ORDERS))
     return [check(each, limit) for each in columns]
 

@@ -200,7 +200,12 @@ def _courses(found: IdentifiedMachine, run: str) -> dict[str, Any]:
 
 def sentences(found: IdentifiedMachine) -> list[str]:
     """Sentences that judge an identification."""
-    words = []
+    words = [
+        f"{each.name} = {each.value:.3g}{unit_behind(each.unit)} is {abs(each.deviations):.2g} standard deviations "
+        "beside what is known of clocks and sensors: the model does not describe the recordings; check the gear "
+        "ratio, the units of the columns and the data of the sensors"
+        for each in found.strains
+    ]
     for check in found.checks:
         unit = MEASURANDS[check.column].unit
         if not check.is_noise:

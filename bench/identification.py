@@ -1,0 +1,377 @@
+# %% [markdown]
+# Identification of hidden machines
+#
+# Random machines are recorded for a minute with their feed and for a minute without, synthetically, with noise of
+# 1 %, converters of 12 bits, jitter and drift of the clock; then they are identified. Drives are a DC motor with
+# speed control, a small induction motor, and a shaft whose torque is measured; a mark or an encoder tells the angle.
+# `python bench/identification.py` keeps each trial in a folder, and goes on where it ended before.
+#
+# - `bare`: of the machine nothing is known but the bounds from which it is drawn.
+# - `weighed`: masses are known to 5 %, gains of the sensors to 1 %.
+# - `wrong`: the recorded machine is another one than the fitted model.
+
+# %%
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from figures import parser, save
+from page import table
+
+from chainunit.drives.dc_motor import DcMotor
+from chainunit.drives.induction_motor import InductionMotor
+from chainunit.machines.chain_unit import ChamberForces
+from chainunit.study.config import parse
+from chainunit.study.drive import Drive
+from chainunit.study.identification.fit import fit
+from chainunit.study.identification.plant import Plant
+from chainunit.study.identification.posterior import posterior
+from chainunit.study.identification.problem import Problem, RecordedRun, Sensor
+from chainunit.study.identification.residuals import check_residuals, strains
+from chainunit.study.identification.shaft import MeasuredShaft
+from chainunit.study.identification.synthetic import HiddenRun, Logger, synthetic
+from chainunit.study.identification.unknown import Unknown
+from chainunit.study.sections import ChainOrgans
+
+RODS = [f"{side}.{rod}_mass" for side in ("left", "right") for rod in ("wall", "web")]
+BODIES = [f"{body}.{x}" for body in ("crank", "coupler", "rocker") for x in ("m", "I")]
+FEED = [f"{side}.{load}" for side in ("left", "right") for load in ("material_mass", "processing_force")]
+RANGES = {
+    "pin.friction": (0.05, 0.2),
+    "joint_damping": (0.2, 2.0),
+    **{name: (10.0, 60.0) if "mass" in name else (0.0, 200.0) for name in FEED},
+}
+"""Ranges in which numbers are drawn; the masses of rods are drawn within 40 % of those of the packaged machine, all
+other masses and inertias within 30 %."""
+WEIGHED, GAIN, NOISE, BITS, DURATION = 0.05, 0.01, 0.01, 12, 60.0
+INDUCTION = {
+    "stator.R": 25.0, "stator.C": 400.0, "stator.R_th": 0.4, "main.L": 1.1, "cage.R": 18.0, "cage.L": 0.14,
+    "rotor.J": 0.0012, "rotor.d": 0.0005,
+}  # fmt: skip
+"""A motor of 0.25 kW: a large one would not notice the machine."""
+FULL = {
+    "motor.i": 5.0, "motor.u": 250.0, "motor.w": 200.0, "motor.power": 1000.0, "crank.tau": 500.0, "crank.w": 5.0,
+}  # fmt: skip
+KINDS = ("dc", "im", "torque")
+SPEED = {"dc": 3.0, "im": 3.08, "torque": 3.0}
+WRONG: dict[str, dict[str, float]] = {
+    "friction grows with speed": {"machine.pin.w_smooth": 0.2},
+    "chains": {},
+    "gear 2 % larger": {},
+    "crank 2 % longer": {},
+    "friction without a smooth passage": {"machine.pin.w_smooth": 0.002},
+}
+"""Recorded machines that the model does not describe, with the values that differ from those of the model."""
+SHARP = 0.005
+"""Standard deviation in parts of the value from which on a number is told sharply."""
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """A machine to be found: its values by full name, and how it is recorded. `priors` are means and deviations."""
+
+    kind: str
+    rate: float
+    angle: str
+    seed: int
+    values: dict[str, float]
+    gain: dict[str, float] = field(default_factory=dict)
+    priors: dict[str, tuple[float, float]] = field(default_factory=dict)
+    wrong: str = ""
+
+
+@lru_cache(maxsize=1)
+def ranges() -> dict[str, tuple[float, float]]:
+    """The ranges of all sought numbers."""
+    packaged = parse("").machine.by_name
+    widths = dict.fromkeys(RODS, 0.4) | dict.fromkeys(BODIES, 0.3)
+    return {n: (packaged[n] * (1.0 - x), packaged[n] * (1.0 + x)) for n, x in widths.items()} | RANGES
+
+
+def hidden(trial: str, k: int) -> Hidden:
+    """The machine of this number."""
+    rng = np.random.default_rng([k, ("bare", "weighed", "wrong").index(trial)])
+    values = {f"machine.{name}": float(rng.uniform(*limits)) for name, limits in ranges().items()}
+    kind = KINDS[k % len(KINDS)]
+    angle = "mark" if kind == "torque" else ("mark", "motor.count")[k // len(KINDS) % 2]
+    own = Hidden(kind, 1000.0 if k % 4 == 0 else 200.0, angle, k, values)
+    if trial == "wrong":
+        if kind == "torque":
+            # the torque is measured behind the gear
+            own = replace(own, kind="dc")
+        return replace(own, wrong=list(WRONG)[k % len(WRONG)])
+    if trial == "bare":
+        return own
+    priors = {}
+    for name in (*RODS, *(name for name in BODIES if name.endswith(".m"))):
+        known = values[f"machine.{name}"] * (1.0 + WEIGHED * rng.standard_normal())
+        priors[f"machine.{name}"] = float(known), float(WEIGHED * known)
+    signals = [name for name in measured(kind, "mark") if not name.endswith(".w")]
+    gain = {name: float(1.0 + GAIN * rng.standard_normal()) for name in signals}
+    return replace(own, priors=priors, gain=gain)
+
+
+def measured(kind: str, angle: str) -> tuple[str, ...]:
+    """The analog columns."""
+    if kind == "torque":
+        return ("crank.tau", "crank.w")
+    speed = () if angle == "motor.count" else ("motor.w",)
+    return ("motor.i", {"dc": "motor.u", "im": "motor.power"}[kind], *speed)
+
+
+@lru_cache(maxsize=16)
+def drive(kind: str, wrong: str = "") -> Drive:
+    """A drive with the packaged machine, or with a wrong one."""
+    config, layout = parse(""), InductionMotor.parameter_layout
+    machine = config.machine
+    if wrong.startswith("gear"):
+        machine = machine.replace(ratio=1.02 * machine.ratio)
+    if wrong.startswith("crank"):
+        machine = machine.replace(r=1.02 * machine.by_name["r"])
+    induction = layout.from_names(INDUCTION, InductionMotor.Parameters())
+    chain = ChainOrgans() if wrong == "chains" else None
+    if kind == "im":
+        return Drive(InductionMotor, induction, machine, chain=chain)
+    return Drive(DcMotor, config.motor, machine, chain=chain)
+
+
+@lru_cache(maxsize=16)
+def plant(kind: str, angle: str) -> Plant | MeasuredShaft:
+    """The model by which all that is sought is fitted."""
+    by = [f"machine.{name}" for name in ranges()]
+    if kind == "torque":
+        return MeasuredShaft(drive(kind).machine, measured(kind, angle), by)
+    return Plant(drive(kind), [*measured(kind, angle), *([angle] if angle != "mark" else [])], by)
+
+
+def sought(of: Hidden) -> list[Unknown]:
+    """The unknowns: bounds, and for weighed masses a prior."""
+    layouts = ChamberForces.parameter_layout, ChamberForces.input_layout
+    units = {v.name: v.unit for layout in layouts for v in layout.variables}
+    unknowns = []
+    for name, limits in ranges().items():
+        if prior := of.priors.get(f"machine.{name}"):
+            bounds = 0.5 * prior[0], 1.5 * prior[0]
+            unknowns.append(Unknown(f"machine.{name}", units[name], prior[0], *bounds, prior[1]))
+        else:
+            unknowns.append(Unknown.within(f"machine.{name}", units[name], *limits))
+    return unknowns
+
+
+def problem(of: Hidden) -> Problem:
+    """The recordings of a loaded and an empty run, and what is sought."""
+    rng, speed = np.random.default_rng([of.seed, 7]), SPEED[of.kind]
+    known = {} if of.kind == "im" else {"motor.w_ref": 50.0 * speed}
+    columns, mark, runs = measured(of.kind, of.angle), float(rng.uniform(-0.35, 0.35)), []
+    offset = {"torque": "crank.tau"}.get(of.kind, "motor.i")
+    for name in ("loaded", "empty"):
+        none = dict.fromkeys((f"machine.{x}" for x in FEED), 0.0) if name == "empty" else {}
+        logger = Logger(
+            rate=of.rate, noise=NOISE, full=FULL, bits=BITS, angles=(of.angle,), mark_angle=mark,
+            offset={offset: float(0.004 * FULL[offset] * rng.standard_normal())}, gain=of.gain,
+            drift=float(rng.uniform(-5e-5, 5e-5)),
+        )  # fmt: skip
+        run = HiddenRun(
+            speed, DURATION, of.values | known | none | WRONG.get(of.wrong, {}),
+            float(rng.uniform(0.0, 2.0 * math.pi)), float(rng.uniform(293.15, 325.0)),
+        )  # fmt: skip
+        recording = synthetic(drive(of.kind, of.wrong), columns, run, logger, rng)
+        values = none if of.kind == "torque" else known | none
+        runs.append(RecordedRun(name, recording, speed, values))
+    sensors = {
+        name: Sensor(
+            NOISE,
+            2.0 * FULL[name] / 2**BITS,
+            GAIN if name in of.gain else 0.0,
+            0.02 * FULL[name] if name == offset else 0.0,
+        )
+        for name in columns
+    }
+    return Problem(plant(of.kind, of.angle), runs, sought(of), sensors)
+
+
+def result(trial: str, k: int) -> dict[str, Any]:
+    """The identification of the machine of this number."""
+    of = hidden(trial, k)
+    asked = problem(of)
+    began = time.perf_counter()
+    best = fit(asked)
+    figures = {
+        "kind": of.kind, "angle": of.angle, "rate": of.rate, "wrong": of.wrong, "rounds": best.rounds,
+        "checks": [
+            {"run": c.run, "column": c.column, "statistic": c.statistic, "noise": c.noise, "is_noise": c.is_noise}
+            for c in check_residuals(best)
+        ],
+        "strains": [each.name for each in strains(asked, best)],
+    }  # fmt: skip
+    if trial != "wrong":
+        figures["numbers"] = [
+            {
+                "name": m.name, "true": of.values[m.name], "value": m.value, "deviation": m.deviation, "low": m.low,
+                "high": m.high, "spread": m.spread, "fitted": float(x), "bound": float(s),
+            }
+            for m, x, s in zip(posterior(asked, best).marginals, best.z, best.deviations, strict=False)
+        ]  # fmt: skip
+    figures["seconds"] = time.perf_counter() - began
+    return figures
+
+
+# %% [markdown]
+# Of the numbers of all machines, `cover` is the share within their interval of 95 %, `error` the root mean square of
+# the errors in stated standard deviations, and `to_bound` that in the bounds by Cramer and Rao at the best fit.
+
+
+# %%
+def coverage(trials: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
+    """How well errors follow their stated standard deviations."""
+    numbers = [each for trial in trials for each in trial["numbers"]]
+    column = {key: np.array([each[key] for each in numbers]) for key in numbers[0] if key != "name"}
+    true, error = column["true"], column["value"] - column["true"]
+    scaled = error / column["deviation"]
+    figures = {
+        "numbers": len(numbers),
+        "cover": float(np.mean((column["low"] <= true) & (true <= column["high"]))),
+        "error": float(np.sqrt(np.mean(scaled**2))),
+        "mean": float(np.mean(scaled)),
+        "to_bound": float(np.sqrt(np.mean((error / column["bound"]) ** 2))),
+        "sharp": 0,
+    }
+    sharp = (column["bound"] <= SHARP * true) & (true > 0.0)
+    if np.any(sharp):
+        relative = np.abs(error / true)[sharp]
+        figures |= {
+            "sharp": int(np.sum(sharp)),
+            "sharp_worst": float(np.max(relative)),
+            "sharp_median": float(np.median(relative)),
+        }
+    return figures
+
+
+def is_wrong(trial: Mapping[str, Any]) -> bool:
+    """Whether the model is taken for a wrong one."""
+    return bool(trial["strains"]) or not all(check["is_noise"] for check in trial["checks"])
+
+
+def by_number(trials: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, float]]:
+    """By sought number: coverage, errors in stated deviations, and errors in parts of the value."""
+    table = {}
+    for k, first in enumerate(trials[0]["numbers"]):
+        rows = [each["numbers"][k] for each in trials]
+        relative = [abs(row["value"] / row["true"] - 1.0) for row in rows]
+        own = coverage([{"numbers": rows}])
+        table[first["name"].removeprefix("machine.")] = {
+            "cover": own["cover"], "error": own["error"], "to_bound": own["to_bound"],
+            "median": float(np.median(relative)), "p95": float(np.quantile(relative, 0.95)),
+            "worst": float(np.max(relative)),
+        }  # fmt: skip
+    return table
+
+
+def summary(trials: Mapping[str, Sequence[Mapping[str, Any]]]) -> dict[str, Any]:
+    """The figures of all kept trials."""
+    figures: dict[str, Any] = {}
+    for trial in ("bare", "weighed"):
+        own = trials[trial]
+        if own:
+            alarms = [is_wrong(each) for each in own]
+            figures[trial] = {
+                "machines": len(own),
+                **coverage(own),
+                "by_number": by_number(own),
+                "by_kind": {
+                    kind: coverage(some)
+                    for kind in KINDS
+                    if (some := [each for each in own if each["kind"] == kind])
+                },
+                "alarms": float(np.mean(alarms)),
+                "rounds": max(each["rounds"] for each in own),
+                "seconds": float(np.median([each["seconds"] for each in own])),
+            }
+    for name in WRONG:
+        own = [each for each in trials["wrong"] if each["wrong"] == name]
+        if own:
+            found = [is_wrong(each) for each in own]
+            figures.setdefault("wrong", {})[name] = {"machines": len(own), "found": float(np.mean(found))}
+    return figures
+
+
+def kept(folder: Path, trial: str, count: int) -> list[dict[str, Any]]:
+    """The kept trials of a kind."""
+    files = [folder / f"{trial}-{k}.json" for k in range(count)]
+    return [json.loads(file.read_text("utf-8")) for file in files if file.exists()]
+
+
+HEADS = {
+    "cover": "within 95 %", "error": "error / deviation", "to_bound": "error / bound", "median": "median error",
+    "p95": "95 % of the errors", "worst": "largest error",
+}  # fmt: skip
+
+
+def cell(key: str, x: float) -> str:
+    return f"{x:.2f}" if key in ("error", "to_bound") else f"{100.0 * x:.2g} %"
+
+
+def text(figures: Mapping[str, Any]) -> str:
+    """The tables of the trials in Markdown."""
+    parts = []
+    for trial in [trial for trial in ("bare", "weighed") if trial in figures]:
+        own = figures[trial]
+        rows = {"all numbers": own, **own["by_kind"], **own["by_number"]}
+        keys = list(HEADS)
+        cells = (
+            [name, *(cell(key, row[key]) if key in row else "" for key in keys)] for name, row in rows.items()
+        )
+        words = f"{own['machines']} machines, {trial}: at most {own['rounds']} rounds"
+        words += f", {own['seconds']:.0f} s (median)"
+        words += f"; {100.0 * own['alarms']:.2g} % taken for another machine"
+        if own["sharp"]:
+            words += (
+                f"; of {own['sharp']} numbers with a bound of at most {100.0 * SHARP:g} % the largest error is "
+                f"{100.0 * own['sharp_worst']:.2g} %, the median {100.0 * own['sharp_median']:.2g} %"
+            )
+        parts.append(words + ".\n\n" + table(["", *HEADS.values()], cells))
+    if "wrong" in figures:
+        cells = (
+            [name, str(row["machines"]), f"{100.0 * row['found']:.0f} %"]
+            for name, row in figures["wrong"].items()
+        )
+        parts.append(table(["recorded machine", "trials", "recognised"], cells))
+    return "\n".join(parts)
+
+
+def main() -> None:
+    options = parser()
+    options.add_argument(
+        "--folder", type=Path, default=Path("identification_trials"), help="where trials are kept"
+    )
+    options.add_argument("--bare", type=int, default=200, help="number of machines")
+    options.add_argument("--weighed", type=int, default=100)
+    options.add_argument("--wrong", type=int, default=100)
+    given = options.parse_args()
+    given.folder.mkdir(parents=True, exist_ok=True)
+    counts = {trial: getattr(given, trial) for trial in ("bare", "weighed", "wrong")}
+    for trial, count in counts.items():
+        for k in range(count):
+            file = given.folder / f"{trial}-{k}.json"
+            if not file.exists():
+                figures = result(trial, k)
+                file.write_text(json.dumps(figures) + "\n", "utf-8")
+                print(
+                    f"{trial} {k + 1} of {count}: {figures['rounds']} rounds, {figures['seconds']:.1f} s",
+                    flush=True,
+                )
+    figures = summary({trial: kept(given.folder, trial, count) for trial, count in counts.items()})
+    print(text(figures))
+    save(given.json, figures)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,59 @@
+"""Random hidden machines are identified: bench/identification.py in small."""
+
+from __future__ import annotations
+
+import importlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chainunit.native.compilers import compiler
+
+pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
+
+
+@pytest.fixture
+def bench(monkeypatch):
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[1] / "bench"))
+    return importlib.import_module("identification")
+
+
+def test_figures_of_errors_that_are_known(bench):
+    """Of numbers that are drawn as they are stated: they cover and scatter so; of others, they do not."""
+    rng = np.random.default_rng(3)
+
+    def trial(scatter):
+        numbers = []
+        for error in rng.standard_normal(16):
+            value = 10.0 + 0.04 * scatter * error
+            numbers.append(
+                {
+                    "name": "machine.x", "true": 10.0, "value": value, "deviation": 0.04, "low": value - 0.0784,
+                    "high": value + 0.0784, "spread": 1.0, "fitted": value, "bound": 0.02,
+                }
+            )  # fmt: skip
+        return {"numbers": numbers}
+
+    right = bench.coverage([trial(1.0) for _ in range(200)])
+    assert right["cover"] == pytest.approx(0.95, abs=0.015) and right["error"] == pytest.approx(1.0, abs=0.04)
+    assert right["to_bound"] == pytest.approx(2.0, abs=0.08)
+    assert right["sharp"] == 3200 and right["sharp_median"] == pytest.approx(0.0027, abs=2e-4)
+    assert bench.coverage([trial(2.0) for _ in range(200)])["cover"] < 0.7
+
+
+@pytest.mark.slow
+def test_twelve_hidden_machines(bench):
+    """Of 192 numbers 95 % lie within their intervals, but for chance, and errors scatter as is stated."""
+    trials = [bench.result("bare", k) for k in range(12)]
+    found = bench.coverage(trials)
+    assert 0.88 < found["cover"] <= 1.0 and 0.75 < found["error"] < 1.3
+    assert found["sharp"] > 20 and found["sharp_worst"] < 0.02 and found["sharp_median"] < 0.005
+    assert sum(bench.is_wrong(each) for each in trials) <= 1
+    assert max(each["rounds"] for each in trials) <= 15
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("k", [0, 1, 2])
+def test_another_friction_chains_and_another_gear_are_recognised(bench, k):
+    assert bench.is_wrong(bench.result("wrong", k))
