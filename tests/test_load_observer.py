@@ -361,6 +361,19 @@ def test_a_mirrored_machine_gives_a_mirrored_alarm(observer):
 
 
 @native
+def test_a_measured_speed_that_jumps_is_no_load(observer, quiet):
+    """An observer that starts at another speed finds the loads."""
+    rows = quiet.copy()
+    rows[1, 0] = 0.0
+    names = ["speed", *LOADS[:2], "alarm"]
+    result = observing.observe(observer, rows, observing.noise_of(quiet), names)
+    assert np.all(np.isfinite(result))
+    assert result[0, -1] == pytest.approx(rows[1, -1], rel=1e-2)
+    np.testing.assert_allclose(result[1:3, -1], 30.0, rtol=0.02)
+    assert not np.any(result[3])
+
+
+@native
 def test_covariances_stay_positive(observer, quiet):
     """Over long running, with precise sensors, with a jam, and at rest, where nothing is seen and no variance exceeds
     that of the spread."""

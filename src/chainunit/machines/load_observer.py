@@ -405,10 +405,13 @@ def _filter_rates(p: Any, u: Any, x: Any, b: Balance, jump: Any) -> list[Any]:
     followed = [first, *(q + more for q, more in zip(driven, jumps, strict=True))]
     disturbed = [first, *(q + more for q, more in zip(_disturbances(p), jumps, strict=True))]
     difference_of_speed = u.w - x.speed
-    correction = [k * size * (difference_of_speed / scale[0]) for k, size in zip(gain, scale, strict=True)]
+    share = _plausible(p, b, difference_of_speed)
+    correction = [
+        k * size * (share * difference_of_speed / scale[0]) for k, size in zip(gain, scale, strict=True)
+    ]
     speed, left_feed, right_feed, left_force, right_force, offset = correction
     return [
-        b.acceleration + speed,
+        b.acceleration + speed + (1.0 - share) * difference_of_speed * (2.0 / ONSET),
         left_feed,
         left_force,
         right_feed,
@@ -429,6 +432,16 @@ def _disturbances(p: Any) -> list[Any]:
     return [0.0, 0.0, force, force, offset * offset]
 
 
+def _plausible(p: Any, b: Balance, deviation: Any) -> Any:
+    """The share of a deviation of the speed [rad/s] from which loads are learned: less and less beyond the speed that
+    a jam takes within `ONSET`. A larger one is no load: the measured speed has jumped, as where the observer starts
+    with another speed."""
+    lever = p.r * p.e / (p.h * p.ratio)
+    most = GATE * p.noise.w + 2.0 * lever * p.force.spread / b.inertia * ONSET
+    square = (deviation / most) * (deviation / most)
+    return 1.0 / (1.0 + square * square)
+
+
 def _jump(xp: Any, p: Any, x: Any, b: Balance) -> Any:
     """The rate at which the variance of the forces grows while the speed is off, in parts of their spread squared."""
     noise = p.noise.w * p.noise.w / (2.0 * ONSET * p.noise.rate)
@@ -437,7 +450,8 @@ def _jump(xp: Any, p: Any, x: Any, b: Balance) -> Any:
     explained = [g * spread for g, spread in zip(b.gradient[1:5], spreads, strict=True)]
     # a part of the lever of B, so that the sum is not zero in a dead position
     lever = 0.2 * p.r * p.e / (p.h * p.ratio) * p.force.spread / b.inertia
-    return xp.minimum(beyond / (sum(e * e for e in explained) + lever * lever), 4.0) / ONSET
+    jump = xp.minimum(beyond / (sum(e * e for e in explained) + lever * lever), 4.0) / ONSET
+    return jump * _plausible(p, b, x.surprise)
 
 
 def _outputs(xp: Any, p: Any, u: Any, x: Any, b: Balance) -> Outputs:
