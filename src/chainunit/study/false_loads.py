@@ -11,8 +11,9 @@ import numpy as np
 
 from ..engines import casadi_
 from ..errors import InputError
+from ..machines.load_declarations import Inputs
 from ..machines.load_filter import UNKNOWNS
-from ..machines.load_observer import Inputs, LoadObserver, balance
+from ..machines.load_observer import LoadObserver, balance
 
 ANGLES = 360
 """Number of crank angles of a turn."""
