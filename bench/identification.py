@@ -37,6 +37,7 @@ from chainunit.study.identification.posterior import posterior
 from chainunit.study.identification.problem import Problem, RecordedRun, Sensor
 from chainunit.study.identification.residuals import check_residuals, strains
 from chainunit.study.identification.shaft import MeasuredShaft
+from chainunit.study.identification.suspicion import suspicions
 from chainunit.study.identification.synthetic import HiddenRun, Logger, synthetic
 from chainunit.study.identification.unknown import Unknown
 from chainunit.study.sections import ChainOrgans
@@ -204,6 +205,7 @@ def result(trial: str, k: int) -> dict[str, Any]:
     asked = problem(of)
     began = time.perf_counter()
     best = fit(asked)
+    suspects = suspicions(asked, best)
     figures = {
         "kind": of.kind, "angle": of.angle, "rate": of.rate, "wrong": of.wrong, "rounds": best.rounds,
         "checks": [
@@ -211,6 +213,8 @@ def result(trial: str, k: int) -> dict[str, Any]:
             for c in check_residuals(best)
         ],
         "strains": [each.name for each in strains(asked, best)],
+        "suspicions": {each.name: (each.change, each.deviation) for each in suspects},
+        "suspicious": [each.name for each in suspects if each.is_suspicious],
     }  # fmt: skip
     if trial != "wrong":
         figures["numbers"] = [
@@ -257,7 +261,9 @@ def coverage(trials: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
 
 def is_wrong(trial: Mapping[str, Any]) -> bool:
     """Whether the model is taken for a wrong one."""
-    return bool(trial["strains"]) or not all(check["is_noise"] for check in trial["checks"])
+    return bool(trial["strains"] or trial["suspicious"]) or not all(
+        check["is_noise"] for check in trial["checks"]
+    )
 
 
 def by_number(trials: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, float]]:

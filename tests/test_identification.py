@@ -20,6 +20,7 @@ from chainunit.study.identification.posterior import posterior
 from chainunit.study.identification.problem import Comparison, Problem, RecordedRun, Sensor, Unknown
 from chainunit.study.identification.recording import Recording
 from chainunit.study.identification.residuals import check_residuals, strains
+from chainunit.study.identification.suspicion import suspicions
 from chainunit.study.identification.synthetic import HiddenRun, Logger, synthetic
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
@@ -183,6 +184,20 @@ def test_a_wrong_gear_strains_the_clock(loaded):
     wrong = problem_of(recording, ratio=51.0)
     (drift,) = [each for each in strains(wrong, fit(wrong)) if each.name == "run0.drift"]
     assert abs(drift.deviations) > 50.0 and drift.value == pytest.approx(5e-5 * drift.deviations)
+
+
+def test_a_known_number_that_is_wrong_is_suspicious(loaded, empty):
+    """The crank that is 2 % longer is told from the right one, with its right length; the residuals of the right
+    machine agree with its numbers."""
+    recordings = [without(each, "motor.count") for each in (loaded, empty)]
+    right = problem_of(*recordings, empty=(1,))
+    found = suspicions(right, fit(right), names=("r", "z", "pin.w_smooth"))
+    assert [each.name for each in found] == ["machine.r", "machine.z", "machine.pin.w_smooth"]
+    assert not any(each.is_suspicious for each in found)
+    wrong = problem_of(*recordings, empty=(1,), r=0.153)
+    (own,) = suspicions(wrong, fit(wrong), names=("r",))
+    assert own.is_suspicious and own.known == 0.153
+    assert own.known + own.change == pytest.approx(0.15, abs=4.0 * own.deviation) and own.deviation < 5e-4
 
 
 def test_the_statistic_of_noise_is_that_of_its_distribution():

@@ -30,6 +30,7 @@ from .reading import OFFSET_SHARE, WITH_OFFSET, IdentificationPlan, PlannedRun
 from .recording import Recording, read_recording
 from .residuals import ResidualCheck, Strain, check_residuals, strains
 from .shaft import MeasuredShaft
+from .suspicion import Suspicion, suspicions
 from .unknown import Unknown
 
 SIGNALS = ("motor.i", "motor.u", "motor.power", "crank.tau")
@@ -65,7 +66,7 @@ class IdentifiedMachine:
 
     `before` is what the runs can tell at the start values, with further runs in order; `after` the same at the fitted
     values. `best` are the normal equations there, `posterior` is the distribution of the sought numbers around them,
-    and `checks` are those of the residuals.
+    `checks` are those of the residuals, and `suspicions` those of known numbers.
     """
 
     config: Config
@@ -76,6 +77,7 @@ class IdentifiedMachine:
     posterior: Posterior
     after: Information
     checks: tuple[ResidualCheck, ...]
+    suspicions: tuple[Suspicion, ...]
 
     @property
     def estimates(self) -> dict[str, FittedNumber]:
@@ -100,8 +102,9 @@ class IdentifiedMachine:
 
     @property
     def is_described(self) -> bool:
-        """Whether the residuals may be noise, and clocks and sensors are as they are known."""
-        return all(check.is_noise for check in self.checks) and not self.strains
+        """Whether the residuals may be noise, and clocks, sensors and known numbers are as they are known."""
+        suspicious = any(each.is_suspicious for each in self.suspicions)
+        return all(check.is_noise for check in self.checks) and not self.strains and not suspicious
 
     @property
     def strains(self) -> list[Strain]:
@@ -169,7 +172,8 @@ def identify(config: Config, report: Report = lambda *_: None) -> IdentifiedMach
     report("checks", 0.95, 1.0)
     after = information(problem, best.z, workers, propose=False)
     around = posterior(problem, best, workers, plan.seed)
-    return IdentifiedMachine(config, plan, problem, before, best, around, after, tuple(check_residuals(best)))
+    checks, suspects = tuple(check_residuals(best)), tuple(suspicions(problem, best, workers))
+    return IdentifiedMachine(config, plan, problem, before, best, around, after, checks, suspects)
 
 
 def plan_of(config: Config) -> IdentificationPlan:

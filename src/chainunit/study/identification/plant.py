@@ -15,6 +15,7 @@ import numpy as np
 
 from ...drives.free_rotor import FreeRotor
 from ...errors import InputError
+from ...machines.machine import Machine
 from ...system.compiled_simulation import CompiledSystem
 from ..drive import Drive
 from .loop import DirectedLoop, Piece
@@ -117,8 +118,15 @@ class AnyPlant(Protocol):
         """Turns of the motor in a turn of the crank."""
 
     @property
+    def machine(self) -> Machine:
+        """The machine."""
+
+    @property
     def slips(self) -> bool:
         """Whether a simulated machine may get ahead of the recorded one."""
+
+    def with_names(self, by: Sequence[str]) -> AnyPlant:
+        """The same plant, of which these parameters and inputs are sought."""
 
     def nuisances(self, run: Overview) -> Iterator[Nuisance]:
         """The numbers that it needs of a run beside the values of parameters and inputs."""
@@ -222,6 +230,7 @@ class Plant:
     def __init__(self, drive: Drive, measured: Sequence[str], by: Sequence[str]) -> None:
         self._loop = SourcedLoop(drive, measured, by)
         self._drive, self._by = drive, tuple(by)
+        self._measured = tuple(measured)
         self._moving = [name for name in measured if name in MOVING]
         self._temperature = f"motor.{drive.motor.temperature}"
 
@@ -229,6 +238,15 @@ class Plant:
     def ratio(self) -> float:
         """Turns of the motor in a turn of the crank."""
         return self._drive.ratio
+
+    @property
+    def machine(self) -> Machine:
+        """The machine behind the gear."""
+        return self._drive.machine
+
+    def with_names(self, by: Sequence[str]) -> Plant:
+        """See `AnyPlant.with_names`."""
+        return Plant(self._drive, self._measured, by)
 
     @cached_property
     def _free(self) -> SourcedLoop:

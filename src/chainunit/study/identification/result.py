@@ -206,6 +206,12 @@ def sentences(found: IdentifiedMachine) -> list[str]:
         "ratio, the units of the columns and the data of the sensors"
         for each in found.strains
     ]
+    words += [
+        f"{each.name} = {each.known:.4g}{unit_behind(each.unit)}: the recordings would prefer "
+        f"{each.known + each.change:.4g} +- {each.deviation:.2g}; check it, and what is near to it"
+        for each in found.suspicions
+        if each.is_suspicious
+    ]
     for check in found.checks:
         unit = MEASURANDS[check.column].unit
         if not check.is_noise:

@@ -93,6 +93,15 @@ class MeasuredShaft:
         """Turns of the motor in a turn of the crank."""
         return self._machine.ratio
 
+    @property
+    def machine(self) -> Machine:
+        """The machine behind the shaft."""
+        return self._machine
+
+    def with_names(self, by: Sequence[str]) -> MeasuredShaft:
+        """See `AnyPlant.with_names`."""
+        return MeasuredShaft(self._machine, self._measured, by)
+
     def nuisances(self, run: Overview) -> Iterator[Nuisance]:
         """The motion of a steady run; the state at which the motor is switched off, and what then turns with the
         machine, at the crank [kg m2], [N m s/rad]."""

@@ -1,0 +1,84 @@
+"""Known numbers of a machine that the recordings contradict.
+
+Each is let free alone, around the best fit: the derivatives of the columns by it tell how far it would move, and with
+which standard deviation (a score test). A wrong dimension or another law of friction, which the sought numbers make
+up for almost wholly, shows here before it shows in the sum of all orders of the residuals.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .fit import Normal, normal
+from .problem import Problem
+from .unknown import Unknown
+
+SUSPECTS = ("pin.w_smooth", "processing.v_smooth", "r", "l", "h", "e", "l1", "z", "web_share")
+"""Numbers of a chain unit that may be wrong: its law of friction, its dimensions, and where the material lies."""
+SUSPICIOUS = 4.0
+"""Change of a number, in standard deviations, from which it is suspicious."""
+BLIND = 1e-9
+"""Information on a number with all others free, in parts of that with all others known, that is rounding alone."""
+_CHANGE = 0.05
+"""Change for which the derivatives are integrated, in parts of the number."""
+
+
+@dataclass(frozen=True)
+class Suspicion:
+    """A number that is held for known: its `known` value, the `change` that the recordings would prefer, and the
+    standard deviation of that change, with all sought numbers free: infinite where no column depends on it."""
+
+    name: str
+    unit: str
+    known: float
+    change: float
+    deviation: float
+
+    @property
+    def is_suspicious(self) -> bool:
+        """Whether the recordings contradict the number."""
+        return abs(self.change) > SUSPICIOUS * self.deviation
+
+
+def suspicions(
+    problem: Problem, best: Normal, workers: int = 2, names: Sequence[str] = SUSPECTS
+) -> list[Suspicion]:
+    """The changes that the recordings would prefer of those of the `names` that the machine has and that are not
+    sought, at the best fit."""
+    machine, taken = problem.plant.machine, {u.name for u in problem.sought}
+    layout = machine.model.parameter_layout
+    units = {v.name: v.unit for v in layout.variables}
+    more = [
+        Unknown(f"machine.{name}", units[name], x, -math.inf, math.inf, abs(x) * _CHANGE)
+        for name in names
+        if name in units and f"machine.{name}" not in taken and (x := machine.by_name[name])
+    ]
+    if not more:
+        return []
+    sought = (*problem.sought, *more)
+    wider = Problem(problem.plant.with_names([u.name for u in sought]), problem.runs, sought, problem.sensors)
+    z = wider.starts
+    for name, place in problem.place.items():
+        z[wider.place[name]] = best.z[place]
+    at = normal(wider, z, workers, {key: 1.0 / weight for key, weight in best.weights.items()})
+    return [_suspicion(each, wider, at, {u.name for u in more}) for each in more]
+
+
+def _suspicion(of: Unknown, problem: Problem, at: Normal, more: set[str]) -> Suspicion:
+    """The step of one number with all others but the further ones free."""
+    place = problem.place[of.name]
+    free = [k for name, k in problem.place.items() if name not in more]
+    scale = 1.0 / np.sqrt(np.diag(at.matrix)[free])
+    cross = scale * at.fisher[free, place]
+    own: Any = np.linalg.solve(at.matrix[np.ix_(free, free)] * np.outer(scale, scale), cross)
+    alone = float(at.fisher[place, place])
+    information = alone - float(cross @ own)
+    if information <= BLIND * alone:
+        return Suspicion(of.name, of.unit, of.start, 0.0, math.inf)
+    change = float(at.gradient[place] - own @ (scale * at.gradient[free])) / information
+    return Suspicion(of.name, of.unit, of.start, change, 1.0 / math.sqrt(information))
