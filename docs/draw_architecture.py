@@ -30,6 +30,7 @@ HOMES = {
     "identify_command": "cli",
     "reported": "cli",
     "sweep_command": "cli",
+    "watch_command": "cli",
     "sweeps": "cli",
     "models": "system",
     "native": "core",

@@ -88,6 +88,8 @@ def _one_key(table, key):
             "identify.sensor": "[[identify.sensor]]\ncolumn = 'motor.i'\n",
         }
         return "".join(text + (own if name == table.name else "") for name, text in needed.items())
+    if table.name == "watch":
+        return f"[watch]\nfile = 'a.csv'\n{key.name} = {key.left_out}\n"
     if table.name == "optimize":
         return f"[optimize]\n{key.name} = {key.left_out}\n[optimize.free]\nr = {{ min = 0.1, max = 0.2 }}\n"
     if table.name in ("gear", "starter"):
@@ -216,7 +218,7 @@ def test_the_commands(tmp_path):
     ("asked", "tables", "keys"),
     [
         ("run.crank_speed", ["[run]"], ["crank_speed"]),
-        ("crank_speed", ["[run]", "[[identify.run]]"], ["crank_speed"]),
+        ("crank_speed", ["[run]", "[watch]", "[[identify.run]]"], ["crank_speed"]),
         ("machine.r", ["[machine] of ChamberForces", "[machine] of KnifeDrive"], ["r"]),
         ("KnifeDrive.knife.c", ["[machine] of KnifeDrive"], ["knife.c.x", "knife.c.y"]),
         ("event.rise", [f"[[event]] of {name}" for name in ("jam", "lumps", "overload", "surge")], ["rise"]),

@@ -22,11 +22,12 @@ __all__ = [
     "Study",
     "StudyResult",
     "SweepResult",
+    "WatchResult",
     "__version__",
 ]
 
 if TYPE_CHECKING:
-    from .identifications import IdentificationResult
+    from .identifications import IdentificationResult, WatchResult
     from .machines.api import EMPTY, ChainUnitMachine
     from .machines.chain_unit import ChamberForces, SideLoads
     from .studies import BestResult, Study, StudyResult
@@ -45,6 +46,7 @@ else:
         "Study": ".studies",
         "StudyResult": ".studies",
         "SweepResult": ".sweeps",
+        "WatchResult": ".identifications",
     }
 
     def __getattr__(name):

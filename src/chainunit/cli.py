@@ -21,6 +21,7 @@ from .errors import InputError, InterruptedRunError, RunError, printable
 from .files import claim, clear, full
 from .identify_command import identify
 from .sweep_command import sweep
+from .watch_command import watch
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -222,6 +223,7 @@ def _stopped_early(failure: RunError, output: Path, errors: Console) -> None:
 
 app.command()(sweep)
 app.command()(identify)
+app.command()(watch)
 
 
 @app.command()

@@ -34,6 +34,7 @@ RESULTS: Mapping[str, _Kind] = {
     "sweep": _Kind("a sweep", "result.json", "best_by"),
     "optimize": _Kind("a search for the best machine", "result.json", "objectives"),
     "identify": _Kind("an identification", "result.json", "proposals"),
+    "watch": _Kind("a watched recording", "result.json", "learned"),
     "compare": _Kind("a comparison", "comparison.json"),
     "linkage": _Kind("a linkage", "linkage.json"),
     "reproduce": _Kind("the papers", "reproduction.json"),

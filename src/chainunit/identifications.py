@@ -1,4 +1,4 @@
-"""`IdentificationResult`: an identified machine from Python."""
+"""`IdentificationResult` and `WatchResult`: an identified machine, and a watched recording, from Python."""
 
 from __future__ import annotations
 
@@ -9,9 +9,12 @@ from typing import TYPE_CHECKING
 from .files import claim
 from .progress import Report as Progress
 from .report import identification as contents
+from .report import watch as watching
 from .reported import ReportedResult
 from .study.config import Config
 from .study.identification.identification import IdentifiedMachine, identify
+from .study.identification.watch import Alarm, WatchedRecording
+from .study.identification.watch import watch as watched_by
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -67,6 +70,39 @@ def make_identification(
         return IdentificationResult(identify(config, report))
     with claim(folder, "identify") as place:
         result = IdentificationResult(identify(config, report))
+        result._clear(place)
+        result._write(place)
+    return result
+
+
+class WatchResult(ReportedResult):
+    """A watched recording. Its `repr` shows the alarms; `watched` has the outputs of the observer at all rows."""
+
+    _command = "watch"
+
+    def __init__(self, watched: WatchedRecording) -> None:
+        self.watched = watched
+        self._report = watching.watch_report(watched)
+
+    @property
+    def alarms(self) -> tuple[Alarm, ...]:
+        """The alarms in order: side, begin, end and ground of each."""
+        return self.watched.alarms
+
+    def _clear(self, folder: Path) -> None:
+        watching.prepare(folder)
+
+    def _writers(self, folder: Path) -> list[Callable[[], list[Path]]]:
+        return watching.writers(self._report, folder)
+
+
+def make_watch(config: Config, folder: Path | None, progress: Progress | None = None) -> WatchResult:
+    """Watch the recording of a study, see `chainunit.Study.watch`."""
+    report = progress or (lambda *_: None)
+    if folder is None:
+        return WatchResult(watched_by(config, report))
+    with claim(folder, "watch") as place:
+        result = WatchResult(watched_by(config, report))
         result._clear(place)
         result._write(place)
     return result

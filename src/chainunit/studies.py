@@ -18,7 +18,7 @@ from .ending import in_temporary_folder
 from .errors import InputError, RunError, WriteError, near_name, shown
 from .files import claim, clear, write_all
 from .fmu.backends import Backend
-from .identifications import IdentificationResult, make_identification
+from .identifications import IdentificationResult, WatchResult, make_identification, make_watch
 from .machines.machine import Machine
 from .places import lines_of
 from .progress import Report as Progress
@@ -260,6 +260,13 @@ class Study:
             for a file that cannot be written; the others are written.
         """
         return make_identification(self.config, None if folder is None else Path(folder), progress)
+
+    def watch(self, folder: str | Path | None = None, progress: Progress | None = None) -> WatchResult:
+        """Run the load observer over the recording of the table [watch].
+
+        Parameters and errors are those of `identify`, without RunError.
+        """
+        return make_watch(self.config, None if folder is None else Path(folder), progress)
 
     def sweep(
         self,

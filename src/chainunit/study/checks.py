@@ -89,16 +89,19 @@ def _company(data: Mapping[str, Any], parts: Parts) -> Iterator[tuple[str, str]]
             yield ("optimize", _NEEDS_MODEL)
         if data.get("organ") == "chain":
             yield ("optimize", _TWO_BARS)
-    if "identify" in data:
-        yield from _identify_company(data, foreign)
+    for name in ("identify", "watch"):
+        if name in data:
+            yield from ((name, words) for words in _unfit_for_recordings(data, foreign))
+    if "watch" in data and not parts.machine.sides:
+        yield ("watch", f"is of the chain unit, and the machine is {parts.machine.name}; leave it out")
     if "torsion" in data and "driveline" not in data:
         yield ("torsion", "is of a driveline; add [driveline], or leave it out")
     if "chain" in data and data.get("organ") != "chain":
         yield ("chain", 'is of organs that are chains; add organ = "chain", or leave it out')
 
 
-def _identify_company(data: Mapping[str, Any], foreign: Mapping[str, bool]) -> Iterator[tuple[str, str]]:
-    """The same of a study with an identification."""
+def _unfit_for_recordings(data: Mapping[str, Any], foreign: Mapping[str, bool]) -> Iterator[str]:
+    """Reasons why the drive of a study cannot be compared with recordings."""
     unfit = {
         "machine": foreign["machine"] and "machine is an FMU",
         "motor": foreign["motor"] and "motor is an FMU",
@@ -107,7 +110,7 @@ def _identify_company(data: Mapping[str, Any], foreign: Mapping[str, bool]) -> I
         "organ": data.get("organ") == "chain" and "organs are chains",
     }
     for words in filter(None, unfit.values()):
-        yield ("identify", f"needs a motor and a machine of two-bar organs as models, and here the {words}")
+        yield f"needs a motor and a machine of two-bar organs as models, and here the {words}"
 
 
 def _sweep_company(data: Mapping[str, Any], foreign: Mapping[str, bool]) -> Iterator[tuple[str, str]]:

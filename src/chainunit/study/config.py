@@ -27,7 +27,7 @@ from .event_table import RandomEvent, read_events, read_random_event
 from .events import OneSidedFeed
 from .first_checks import check_values, independent, plate_of, without
 from .foreign_machine import ForeignMachine, ForeignModel
-from .identification.reading import IdentificationPlan, read_identification
+from .identification.reading import IdentificationPlan, WatchPlan, read_identification, read_watch
 from .optimum.table import read_wishes
 from .optimum.wishes import Wishes
 from .parts import Parts, beside, example, over_example, with_linkage
@@ -102,6 +102,8 @@ class Config:
     """the table of a search for the best machine; a study makes none"""
     identify: IdentificationPlan | None
     """the table of an identification; a study makes none"""
+    watch: WatchPlan | None
+    """the recording that is watched; a study has none"""
     foreign: ForeignMotor | None
     """the motor, if it is a foreign FMU; `motor` then has no meaning"""
     sweep: SweepPlan | None
@@ -314,6 +316,9 @@ def _config(
             of_study["optimize"] = read_wishes(*given, machine, loads, run.crank_speed, by_motor)
     with faults.collected():
         of_study["identify"] = _identification(data, checked, parts, machine, values, source)
+    with faults.collected():
+        if "watch" in data:
+            of_study["watch"] = read_watch(checked.watch, values["run"].crank_speed, source)
     faults.refuse()
     config = Config(
         title=checked.title,

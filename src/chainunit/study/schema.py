@@ -44,6 +44,7 @@ _FORMS: dict[str, dict[str, Any]] = {
     "identify.parameter.name": {"minLength": 1},
     "identify.run.name": {"pattern": r"^[a-z][a-z0-9_]{0,19}$"},
     "identify.run.file": {"minLength": 1},
+    "watch.file": {"minLength": 1},
     "identify.run.speeds": {
         "maxItems": MOST_SPEEDS,
         "items": {"type": "array", "items": _VALUE, "minItems": 3, "maxItems": 3},

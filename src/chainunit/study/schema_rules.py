@@ -153,12 +153,14 @@ def _of_foreign_parts() -> Iterator[Rule]:
     needs_model = [
         _equal("feed_forward", {"const": True}),
         _equal("monte_carlo.runs", {"type": "number", "exclusiveMinimum": 0}),
-        *map(_given, ("ratios", "chain", "organ", "sweep", "optimize", "identify")),
+        *map(_given, ("ratios", "chain", "organ", "sweep", "optimize", "identify", "watch")),
     ]
     yield _where(_equal("system.machine", _FMU), _not(_any(*needs_model)))
-    yield _where(_equal("organ", {"const": "chain"}), _without("optimize", "identify"))
-    yield _where(_equal("system.motor", _FMU), _without("identify"))
-    yield _where(_given("identify"), _without("driveline", "sizing"))
+    yield _where(_equal("organ", {"const": "chain"}), _without("optimize", "identify", "watch"))
+    yield _where(_equal("system.motor", _FMU), _without("identify", "watch"))
+    for name in ("identify", "watch"):
+        yield _where(_given(name), _without("driveline", "sizing"))
+    yield _where(_given("watch"), {"properties": {"watch": {"required": ["file"]}}})
     needed = {"required": ["parameter", "run"]}
     yield _where(_given("identify"), {"properties": {"identify": needed}})
 

@@ -454,6 +454,14 @@ SECTIONS: Mapping[str, FileSection] = {
         is_used=lambda config: False,
         apart=True,
     ),
+    "watch": FileSection(
+        identify_table.WatchTable,
+        optional=True,
+        keys=identify_table.WATCH_KEYS,
+        title="Recording that is watched",
+        is_used=lambda config: False,
+        apart=True,
+    ),
     "sweep": FileSection(
         SweepTable, optional=True, whole=WHOLE, keys=FIELDS, title="Sweep", is_used=lambda config: False
     ),

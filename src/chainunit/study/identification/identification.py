@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -152,10 +152,10 @@ def identify(config: Config, report: Report = lambda *_: None) -> IdentifiedMach
     workers = min(2, os.cpu_count() or 1)
     report("reading recordings", 0.0, 1.0)
     recordings = _recordings(plan)
-    drive = _drive(config, recordings)
+    drive = drive_of(config, recordings)
     report("simulating", 0.1, 1.0)
     problem = _problem(config, plan, drive, recordings)
-    _inspect(problem, drive, workers)
+    inspect_runs(problem, workers)
     report("what the recordings can tell", 0.15, 1.0)
     start = problem.started(workers)
     before = information(problem, start, workers)
@@ -215,7 +215,7 @@ def _recordings(plan: IdentificationPlan) -> dict[str, Recording]:
     return recordings
 
 
-def _drive(config: Config, recordings: Mapping[str, Recording]) -> Drive:
+def drive_of(config: Config, recordings: Mapping[str, Recording]) -> Drive:
     """The drive of the study, tuned where the file does not give the gains of its control."""
     of_motor = sorted({name for each in recordings.values() for name in each.columns if name in SIGNALS[:3]})
     if of_motor and not (config.gives("motor") or config.plate is not None):
@@ -233,13 +233,20 @@ def _problem(
 ) -> Problem:
     sought = [replace(u, name=system_name(u.name)) for u in plan.sought]
     measured = dict.fromkeys(name for each in recordings.values() for name in each.columns if name != "mark")
-    at_shaft = all(name in OF_SHAFT for name in measured)
-    by = [u.name for u in sought]
-    plant: AnyPlant = (
-        MeasuredShaft(drive.machine, list(measured), by) if at_shaft else Plant(drive, list(measured), by)
-    )
+    plant = plant_for(drive, measured, [u.name for u in sought])
     runs = [_run(config, drive, run, recordings[run.name]) for run in plan.runs]
     return Problem(plant, runs, sought, _sensors(plan, measured, recordings))
+
+
+def is_of_shaft(columns: Collection[str]) -> bool:
+    """Whether the columns are those of a machine whose motor is not recorded."""
+    return all(name in (*OF_SHAFT, "mark") for name in columns)
+
+
+def plant_for(drive: Drive, columns: Collection[str], by: list[str]) -> AnyPlant:
+    """The plant that has these columns, with derivatives by these parameters and inputs of the system."""
+    measured = [name for name in columns if name != "mark"]
+    return MeasuredShaft(drive.machine, measured, by) if is_of_shaft(columns) else Plant(drive, measured, by)
 
 
 def _run(config: Config, drive: Drive, run: PlannedRun, recording: Recording) -> RecordedRun:
@@ -280,7 +287,7 @@ def _sensors(
     return sensors
 
 
-def _inspect(problem: Problem, drive: Drive, workers: int) -> None:
+def inspect_runs(problem: Problem, workers: int) -> None:
     """Refuse recordings with faults; the sizes to expect are those of the drive at the start values."""
     faults = Faults()
     for run in problem.runs:
@@ -295,7 +302,7 @@ def _inspect(problem: Problem, drive: Drive, workers: int) -> None:
                     f"{1.0 / factor:.2g} to {factor:g} times the simulated one",
                     True,
                 )
-        faults.add(inspect(run.recording, expected, run.crank_speed, drive.ratio))
+        faults.add(inspect(run.recording, expected, run.crank_speed, problem.plant.ratio))
     faults.refuse()
 
 

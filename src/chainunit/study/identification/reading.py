@@ -22,6 +22,7 @@ from .table import (
     ParameterEntry,
     RunTable,
     SensorTable,
+    WatchTable,
     entry_form,
 )
 from .unknown import Unknown
@@ -63,6 +64,25 @@ class PlannedRun:
     added: Mapping[str, float]
     speeds: tuple[tuple[float, float, float], ...] = ()
     off: float | None = None
+
+
+@dataclasses.dataclass(frozen=True)
+class WatchPlan:
+    """A recording that is watched: its `file`, the heads of its `columns` by quantity, the speed of the crank
+    [rad/s], the part that counts [s], the temperature of the surroundings [K]; the time of its begin in which is
+    learned [s], the standard deviation of the feed as a share, the noise of the sensors in parts of the RMS of their
+    columns, and the result of an identification, if there is one."""
+
+    file: Path
+    columns: Mapping[str, str]
+    crank_speed: float
+    begin: float
+    end: float
+    ambient: float
+    learning: float
+    feed_deviation: float
+    noise: float
+    identification: Path | None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -151,6 +171,67 @@ def read_identification(
         int(table.starts),
         int(table.seed),
     )
+
+
+def read_watch(form: Any, crank_speed: float, source: str) -> WatchPlan:
+    """The plan of a checked table [watch], its `form` with what the file gives.
+
+    Parameters
+    ----------
+    crank_speed : the speed where the table does not give its own [rad/s]
+    source : the study file; other files are named relative to it
+
+    Raises
+    ------
+    InputError
+        with a line for each fault.
+    """
+    given, usual, faults = given_values(form), instance(WatchTable, {}), Faults()
+    if not given.get("file"):
+        faults.add([InputError("watch.file: must be given, the recording", "watch.file")])
+    begin, end = _part(given, "watch", faults)
+    columns: dict[str, str] = {}
+    with faults.collected():
+        columns = _columns(given, "watch")
+    faults.refuse()
+    folder, identification = Path(source).parent, given.get("identification")
+    numbers = {name: float(given.get(name, getattr(usual, name))) for name in _OF_WATCH}
+    return WatchPlan(
+        file=folder / given["file"],
+        columns=columns,
+        crank_speed=float(given.get("crank_speed", crank_speed)),
+        begin=begin,
+        end=end,
+        identification=folder / identification if identification else None,
+        **numbers,
+    )
+
+
+_OF_WATCH = ("ambient", "learning", "feed_deviation", "noise")
+
+
+def _part(given: Mapping[str, Any], place: str, faults: Faults) -> tuple[float, float]:
+    """Begin and end of the part that counts [s]."""
+    begin, end = given.get("begin", -math.inf), given.get("end", math.inf)
+    if not begin < end:
+        faults.add([InputError(f"{place}.end = {end:g} s: must be > begin = {begin:g} s", f"{place}.end")])
+    return begin, end
+
+
+def _columns(given: Mapping[str, Any], place: str) -> dict[str, str]:
+    """The heads of columns by quantity."""
+    columns, faults = dict[str, str](), Faults()
+    for quantity, head in _leaves(given.get("columns", {})):
+        key = f"{place}.columns.{quantity}"
+        if quantity not in MEASURANDS:
+            hint = near_name(quantity, MEASURANDS) or f"; there are {', '.join(MEASURANDS)}"
+            faults.add([InputError(f"{key}: no such quantity{hint}", key)])
+        elif not isinstance(head, str):
+            faults.add([InputError(f"{key} = {shown(head)}: must be the head of its column", key)])
+        else:
+            columns[quantity] = head
+    faults.refuse()
+    return columns
 
 
 def _checked(entry: Any, form: Any, place: str) -> dict[str, Any]:
@@ -247,14 +328,12 @@ def _run(
         faults.add([InputError(f"{key} = {shown(name)}: {words}", key)])
     if "file" not in given:
         faults.add([InputError(f"{place}.file: must be given, the recording", f"{place}.file")])
-    begin, end = given.get("begin", -math.inf), given.get("end", math.inf)
+    begin, end = _part(given, place, faults)
     off = float(given["switched_off"]) if "switched_off" in given else None
     if off is not None and not begin < off < end:
         key = f"{place}.switched_off"
         words = f"must lie between begin = {begin:g} s and end = {end:g} s"
         faults.add([InputError(f"{key} = {off:g} s: {words}", key)])
-    if not begin < end:
-        faults.add([InputError(f"{place}.end = {end:g} s: must be > begin = {begin:g} s", f"{place}.end")])
     added: dict[str, float] = {}
     for full, value in _leaves(given.get("added", {})):
         key = f"{place}.added.{full}"
@@ -267,15 +346,8 @@ def _run(
     with faults.collected():
         speeds = list(_speeds(given.get("speeds", []), f"{place}.speeds"))
     columns: dict[str, str] = {}
-    for quantity, head in _leaves(given.get("columns", {})):
-        key = f"{place}.columns.{quantity}"
-        if quantity not in MEASURANDS:
-            hint = near_name(quantity, MEASURANDS) or f"; there are {', '.join(MEASURANDS)}"
-            faults.add([InputError(f"{key}: no such quantity{hint}", key)])
-        elif not isinstance(head, str):
-            faults.add([InputError(f"{key} = {shown(head)}: must be the head of its column", key)])
-        else:
-            columns[quantity] = head
+    with faults.collected():
+        columns = _columns(given, place)
     faults.refuse()
     return PlannedRun(
         name,

@@ -64,18 +64,53 @@ FIELDS: Mapping[str, Any] = {
 
 
 @declaration
-class RunTable:
-    """A recorded run."""
+class RecordingTable:
+    """A recording."""
 
     crank_speed: Value = quantity(
         "rad/s", "speed of the crank in this run", default=3.0, min=0.01, max=1000.0, kind="speed"
     )
     begin: Value = quantity("s", "time of the recording from which it counts", default=0.0, min=-1e9, max=1e9)
     end: Value = quantity("s", "time of the recording up to which it counts", default=0.0, min=-1e9, max=1e9)
+    ambient: Value = quantity("K", "temperature of the surroundings", default=293.15, min=230.0, max=340.0)
+
+
+@declaration
+class RunTable(RecordingTable):
+    """A recorded run."""
+
     switched_off: Value = quantity(
         "s", "time of the recording at which the motor is switched off", default=0.0, min=-1e9, max=1e9
     )
-    ambient: Value = quantity("K", "temperature of the surroundings", default=293.15, min=230.0, max=340.0)
+
+
+@declaration
+class WatchTable(RecordingTable):
+    """The recording that is watched."""
+
+    learning: Value = quantity(
+        "s",
+        "time from its begin in which the angle of the crank, the zero of the signal and the forces are learned",
+        default=20.0,
+        above=0.0,
+        max=1e5,
+    )
+    feed_deviation: Value = quantity(
+        "1",
+        "standard deviation of the study's feed from that at the begin, as a share",
+        default=0.05,
+        above=0.0,
+        max=1.0,
+        kind="percent",
+    )
+    noise: Value = quantity(
+        "1",
+        "standard deviation of the noise of a sensor, in parts of the RMS of its column",
+        default=0.01,
+        min=1e-6,
+        max=1.0,
+        kind="percent",
+    )
 
 
 @declaration
@@ -124,12 +159,30 @@ SENSOR_KEYS: Mapping[str, Any] = {
     ),
     "resolution": (Entered, Field(None, description="step of its converter, in the unit of the quantity")),
 }
+_FILE: Any = (
+    str,
+    Field("", min_length=1, description="recording (CSV, or CSV.gz), relative to the study file"),
+)
+_COLUMNS: Any = (
+    dict[str, Any],
+    Field({}, description="by quantity, the head of its column, where that is not the quantity's name"),
+)
+WATCH_KEYS: Mapping[str, Any] = {
+    "file": _FILE,
+    "columns": _COLUMNS,
+    "identification": (
+        str,
+        Field(
+            "",
+            description="result.json of chainunit identify, whose covariance widens the thresholds; relative to the "
+            "study file",
+        ),
+    ),
+}
+"""Keys of the table [watch] that are no quantities."""
 RUN_KEYS: Mapping[str, Any] = {
     "name": (str, Field("", min_length=1, description="name of the run, in small letters, digits and _")),
-    "file": (
-        str,
-        Field("", min_length=1, description="recording (CSV, or CSV.gz), relative to the study file"),
-    ),
+    "file": _FILE,
     "feed": (
         Literal[FEEDS],
         Field("same", description="feed of the machine: the one that is sought in all loaded runs, or none"),
@@ -143,10 +196,7 @@ RUN_KEYS: Mapping[str, Any] = {
             "duration, and the crank speed after it",
         ),
     ),
-    "columns": (
-        dict[str, Any],
-        Field({}, description="by quantity, the head of its column, where that is not the quantity's name"),
-    ),
+    "columns": _COLUMNS,
     "added": (
         dict[str, Any],
         Field(

@@ -1,0 +1,226 @@
+"""The report on a watched recording: loads of both sides over time, and the alarms with their grounds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..files import clear
+from ..study.identification.watch import WatchedRecording
+from ..study.identification.watch_result import as_dict
+from ..text import shown_in
+from . import blocks as b
+from . import figure as fig
+from . import files
+from .lines import Name, line
+
+NAME, PICTURES = "result", ("loads.png", "imbalance.png")
+_USUAL = {
+    "left.material_mass": "feed, left",
+    "right.material_mass": "feed, right",
+    "imbalance.feed": "imbalance of the feed",
+    "left.processing_force": "processing force, left",
+    "right.processing_force": "processing force, right",
+    "imbalance.force": "imbalance of the forces",
+    "rocker.tau": "rocker torque",
+    "left.web_pull": "least pull in the web, left",
+    "right.web_pull": "least pull in the web, right",
+}
+"""The rows of the table of usual values."""
+
+
+def watch_report(watched: WatchedRecording) -> b.Report:
+    """The report on a watched recording."""
+    result = as_dict(watched)
+    s = b.Source(result)
+    with shown_in(watched.config.units):
+        return b.Report(
+            watched.config.title or "Watched recording",
+            "Watch for one-sided overload",
+            result,
+            tuple(_opening(s)),
+            (
+                b.Section("loads", "Loads of both sides", tuple(_loads(s))),
+                b.Section("alarms", "Alarms and their grounds", tuple(_alarms(s))),
+                b.Section("basis", "Basis of the numbers", tuple(_basis(s))),
+            ),
+            source=s.line("Study file: {source} · chainunit {chainunit}"),
+            units=watched.config.units,
+            opening_title="The answer",
+            status="alarm" if result["alarms"] else "no alarm",
+        )
+
+
+def prepare(folder: Path) -> None:
+    """Remove the files of an earlier report."""
+    clear(folder, *files.names(NAME, PICTURES))
+
+
+def writers(report: b.Report, folder: Path) -> list[Callable[[], list[Path]]]:
+    """The functions that write the files of the report."""
+    return files.writers(report, folder, NAME)
+
+
+def _opening(s: b.Source) -> Iterator[b.Block]:
+    if not s.result["alarms"]:
+        yield b.Judgement("good", s.line("No alarm in {turns:3} turns ({duration:3})."))
+    for k in range(len(s.result["alarms"])):
+        path = f"alarms.{k}"
+        yield b.Judgement(
+            "alarm",
+            s.line(
+                f"Overload of the {{{path}.side}} side from {{{path}.begin:4}} on, by the {{{path}.ground}}."
+            ),
+        )
+    yield b.Text(
+        s.line(
+            "An imbalance of the feed beyond {threshold:3}, or of the processing forces beyond {force_threshold:3}, "
+            "gives an alarm; these thresholds follow from {=tuning.alarm.rate} permitted false alarms in a million "
+            "turns."
+        )
+    )
+    if s.result["identification"] is not None:
+        yield b.Text(
+            s.line(
+                "The machine's parameters are those of an identification. Their errors make a false imbalance of "
+                "{uncertainty:2} (standard deviation), and the threshold is wider by the factor {widening:3}."
+            )
+        )
+
+
+def _series(s: b.Source, name: str) -> Any:
+    return np.array([np.nan if x is None else x for x in s.result["course"][name]["value"]])
+
+
+def _loads(s: b.Source) -> Iterator[b.Block]:
+    rows = [
+        b.TableRow(
+            (
+                words,
+                *(s.number(f"usual.{name}.{key}", digits=3) for key in ("value", "deviation", "threshold")),
+            )
+        )
+        for name, words in _USUAL.items()
+    ]
+    yield b.Table(
+        tuple(rows),
+        b.heads("quantity", "median", "standard deviation", "threshold of an alarm"),
+        title="Estimates before the first alarm",
+    )
+    time, axis = _series(s, "time"), fig.Axis("time", "s")
+    panels = []
+    for name, words, unit in (("material_mass", "feed", "kg"), ("processing_force", "processing force", "N")):
+        courses = {side: _series(s, f"{side}.{name}") for side in ("left", "right")}
+        low, high = _span(time, list(courses.values()))
+        items = [fig.Curve(side, time, x, look) for look, (side, x) in enumerate(courses.items())]
+        y = fig.Axis(words, unit, low=low, high=high)
+        panels.append((fig.Panel(axis, y, (*items, *_marks(s))),))
+    yield fig.Figure(
+        "loads",
+        "Estimated loads",
+        "Feed and processing force of both sides over the recording, with the alarms.",
+        tuple(panels),
+        file=PICTURES[0],
+    )
+    panels = []
+    for name, words, unit in (("feed", "left less right, feed", "kg"), ("force", "force", "N")):
+        x, limit = _series(s, f"imbalance.{name}"), _series(s, f"imbalance.{name}_threshold")
+        low, high = _span(time, [x, limit, -limit])
+        items = [
+            fig.Curve("imbalance", time, x, 0),
+            fig.Curve("threshold", time, limit, 1),
+            fig.Curve("threshold below", time, -limit, 1, in_legend=False),
+        ]
+        y = fig.Axis(words, unit, low=low, high=high)
+        panels.append((fig.Panel(axis, y, (*items, *_marks(s))),))
+    yield fig.Figure(
+        "imbalance",
+        "Imbalance and thresholds",
+        "The imbalance of feed and forces, and the thresholds of an alarm.",
+        tuple(panels),
+        file=PICTURES[1],
+    )
+
+
+def _span(time: Any, courses: list[Any]) -> tuple[float, float]:
+    """The ends of an axis: of the values after the first tenth of the time, in which the observer settles."""
+    settled = time > time[0] + 0.1 * (time[-1] - time[0])
+    values = np.concatenate([x[settled] for x in courses])
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    wide = 0.1 * (high - low) or 1.0
+    return low - wide, high + wide
+
+
+def _marks(s: b.Source) -> Iterator[fig.Mark]:
+    for each in s.result["alarms"]:
+        yield fig.Mark(each["begin"]["value"], words=f"alarm {each['side']}", upright=True)
+
+
+def _alarms(s: b.Source) -> Iterator[b.Block]:
+    rows = []
+    for k in range(len(s.result["alarms"])):
+        path, values = f"alarms.{k}", f"alarms.{k}.values"
+        rows.append(
+            b.TableRow(
+                (
+                    s.words(f"{path}.side"),
+                    s.number(f"{path}.begin", digits=5),
+                    s.number(f"{path}.end", digits=5),
+                    s.words(f"{path}.ground"),
+                    s.number(f"{values}.imbalance.feed", digits=3),
+                    s.number(f"{values}.imbalance.feed_threshold", digits=3),
+                    s.number(f"{values}.imbalance.force", digits=3),
+                    s.number(f"{values}.imbalance.force_threshold", digits=3),
+                    s.number(f"{values}.rocker.tau", digits=3),
+                )
+            )
+        )
+    if not rows:
+        yield b.Text("There is none.")
+        return
+    columns = (
+        b.Column("side"),
+        b.Column("from"),
+        b.Column("to"),
+        b.Column("ground"),
+        b.Column("imbalance of the feed", "feed"),
+        b.Column("threshold"),
+        b.Column("imbalance of the forces", "forces", form="long"),
+        b.Column("threshold", form="long"),
+        b.Column("rocker torque", form="long"),
+    )
+    yield b.Table(
+        tuple(rows), columns, title="Alarms; values at the largest imbalance in parts of its threshold"
+    )
+
+
+def _basis(s: b.Source) -> Iterator[b.Block]:
+    rows = [
+        b.TableRow(
+            (
+                Name(name),
+                s.number(f"learned.{name}.value", digits=4),
+                s.number(f"learned.{name}.deviation", digits=2),
+            )
+        )
+        for name in s.result["learned"]
+    ]
+    yield b.Text(
+        s.line(
+            "Angle, zero and loads were learned in the first {=learning}; an overload that is there from the begin "
+            "is learned as the usual state where the study's feed allows it."
+        ),
+        "note",
+    )
+    yield b.Table(
+        tuple(rows),
+        b.heads("learned number", "value", "standard deviation"),
+        title="Learned from the begin",
+        form="long",
+    )
+    rows = [b.TableRow((Name(name), s.number(f"tuning.{name}", digits=4))) for name in s.result["tuning"]]
+    yield b.Table(tuple(rows), b.heads("parameter", "value"), title="Tuning of the observer", form="long")
+    yield b.Text(line("Recording: ", s.words("file")), "fine", "long")

@@ -1,0 +1,343 @@
+"""The load observer over a recording: the learning of angle and zero, the run of the observer, and its alarms."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import os
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...drives.dc_motor import DcMotor
+from ...drives.induction_motor import InductionMotor
+from ...errors import InputError
+from ...fmu.backends import export
+from ...machines.load_observer import LoadObserver
+from ...progress import Report
+from ...quantities import Layout
+from ...system.instance import Fmu, Instance
+from ..arrays import rms, stretches
+from ..config import Config
+from ..drive import Drive
+from ..false_loads import false_loads
+from .crank_motion import crank_motion
+from .fit import Fit, fit
+from .identification import SIGNALS, drive_of, inspect_runs, is_of_shaft, plant_for
+from .problem import Problem, RecordedRun, Sensor
+from .reading import OFFSET_SHARE, WITH_OFFSET, WatchPlan
+from .recording import Recording, read_recording
+from .unknown import Unknown
+
+RUN = "watch"
+FORCE_SPREAD, MOST_FORCE = 200.0, 2000.0
+"""Standard deviation and bound of a processing force that is learned [N]."""
+OUTPUTS = (
+    "left.material_mass",
+    "right.material_mass",
+    "left.material_mass_deviation",
+    "right.material_mass_deviation",
+    "left.processing_force",
+    "right.processing_force",
+    "left.processing_force_deviation",
+    "right.processing_force_deviation",
+    "left.web_pull",
+    "right.web_pull",
+    "left.overload",
+    "right.overload",
+    "imbalance.feed",
+    "imbalance.feed_deviation",
+    "imbalance.feed_threshold",
+    "imbalance.force",
+    "imbalance.force_deviation",
+    "imbalance.force_threshold",
+    "rocker.tau",
+    "grounds.feed",
+    "grounds.force",
+    "alarm",
+)
+"""Outputs of the observer that are kept."""
+LULL = 2.0
+"""Alarms of one side that are nearer than this many turns are one."""
+_LIGHT = 1e-3
+
+
+@dataclass(frozen=True)
+class Alarm:
+    """An alarm: its side, from when to when [s], on what it rests ("feed" or "force"), and the outputs of the
+    observer at the time `at` of its largest statistic."""
+
+    side: str
+    begin: float
+    end: float
+    ground: str
+    at: float
+    values: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class WatchedRecording:
+    """A recording with the outputs of the observer at its rows.
+
+    `learned` is the fit over its begin, `parameters` are those of the observer by name, and `uncertainty` is the
+    false imbalance by errors of the machine's parameters: of the feed [kg] and of the forces [N]. With these errors
+    the threshold of the feed is wider by the factor `widening`.
+    """
+
+    config: Config
+    plan: WatchPlan
+    recording: Recording
+    drive: Drive
+    problem: Problem
+    learned: Fit
+    parameters: Mapping[str, float]
+    uncertainty: tuple[float, float]
+    widening: float
+    outputs: Mapping[str, Any]
+    alarms: tuple[Alarm, ...]
+
+    @property
+    def turn(self) -> float:
+        """Time of a turn of the crank [s]."""
+        return 2.0 * math.pi / self.plan.crank_speed
+
+    def of_learning(self, name: str) -> tuple[float, float]:
+        """A learned number and its standard deviation, by its name in the fit."""
+        k = self.problem.place[name]
+        return float(self.learned.z[k]), float(self.learned.deviations[k])
+
+
+def watch_plan_of(config: Config) -> WatchPlan:
+    """The plan of a study.
+
+    Raises
+    ------
+    InputError
+        for a study without the table [watch].
+    """
+    if config.watch is None:
+        raise InputError("watch: is missing; add [watch] with the recording (file)", key="watch")
+    return config.watch
+
+
+def watch(config: Config, report: Report = lambda *_: None) -> WatchedRecording:
+    """Run the load observer over the recording of the table [watch].
+
+    Raises
+    ------
+    InputError
+        for a study without that table, another machine than the chain unit, and with a line for each fault of the
+        recording.
+    """
+    plan = watch_plan_of(config)
+    workers = min(2, os.cpu_count() or 1)
+    report("reading the recording", 0.0, 1.0)
+    recording = read_recording(plan.file, plan.columns).part(plan.begin, plan.end)
+    if not recording.columns.keys() & set(SIGNALS):
+        raise InputError(
+            f"{plan.file}: has no column that tells the torque; must have one of {', '.join(SIGNALS)}"
+        )
+    drive = drive_of(config, {RUN: recording})
+    problem = _problem(config, plan, drive, recording)
+    inspect_runs(problem, workers)
+    report("learning angle, zero and forces", 0.1, 1.0)
+    learned = fit(problem, None, workers)
+    found = {u.name: float(x) for u, x in zip(problem.unknowns, learned.z, strict=True)}
+    shaft = is_of_shaft(recording.columns)
+    ratio = 1.0 if shaft else drive.ratio
+    angle = next(each.angle[0] for each in learned.comparisons if each.rows is not None)
+    angle = float(angle) if "motor.count" in recording.columns else found.get("mark.angle", 0.0)
+    phi, w = crank_motion(recording, angle, drive.ratio)
+    values = _parameters(config, plan, drive, recording, found, ratio)
+    uncertainty = _uncertainty(plan, values)
+    values |= {"imbalance.uncertainty": uncertainty[0], "imbalance.force_uncertainty": uncertainty[1]}
+    signals = {"phi": phi * ratio, "w": w * ratio} | {
+        name: recording.columns[column] for name, column in _signals(recording).items()
+    }
+    report("watching", 0.5, 1.0)
+    outputs, widening = observe(recording.time, signals, values), 1.0
+    if any(uncertainty):
+        right = values | {"imbalance.uncertainty": 0.0, "imbalance.force_uncertainty": 0.0}
+        name = "imbalance.feed_threshold"
+        widening = float(np.median(outputs[name] / observe(recording.time, signals, right)[name]))
+    alarms = tuple(_alarms(recording.time, outputs, 2.0 * math.pi / plan.crank_speed))
+    return WatchedRecording(
+        config, plan, recording, drive, problem, learned, values, uncertainty, widening, outputs, alarms
+    )
+
+
+def _problem(config: Config, plan: WatchPlan, drive: Drive, recording: Recording) -> Problem:
+    """The begin of the recording, in which feed and forces are constant."""
+    feed = Layout(type(config.feed)).by_name(config.feed)
+    sought = []
+    for name, value in feed.items():
+        full = f"machine.{name}"
+        if name.endswith("material_mass"):
+            spread = max(plan.feed_deviation * value, 1e-3)
+            sought.append(Unknown(full, "kg", value, 0.0, value + 20.0 * spread, spread))
+        else:
+            sought.append(Unknown(full, "N", value, 0.0, MOST_FORCE, FORCE_SPREAD))
+    sensors = {
+        name: Sensor(plan.noise, offset=OFFSET_SHARE * rms(x) if name in WITH_OFFSET else 0.0)
+        for name, x in recording.columns.items()
+    }
+    values = {} if is_of_shaft(recording.columns) else drive.reference(plan.crank_speed)
+    first = recording.part(end=float(recording.time[0]) + plan.learning)
+    run = RecordedRun(RUN, first, plan.crank_speed, values, ambient=plan.ambient)
+    return Problem(plant_for(drive, recording.columns, [u.name for u in sought]), [run], sought, sensors)
+
+
+def _signals(recording: Recording) -> dict[str, str]:
+    """By input of the observer, the column that feeds it."""
+    if is_of_shaft(recording.columns):
+        return {"torque": "crank.tau"}
+    of_motor = {"current": "motor.i", "power": "motor.power"}
+    return {name: column for name, column in of_motor.items() if column in recording.columns}
+
+
+def _parameters(
+    config: Config,
+    plan: WatchPlan,
+    drive: Drive,
+    recording: Recording,
+    found: Mapping[str, float],
+    ratio: float,
+) -> dict[str, float]:
+    """The parameters of the observer by name."""
+    columns = recording.columns
+    own = Layout(type(drive.machine.p)).by_name(drive.machine.p) | {"ratio": ratio}
+    size = {name: plan.noise * rms(x) for name, x in columns.items()}
+    p, motor = drive.fmu_parameters, drive.motor
+    if is_of_shaft(columns):
+        # the observer wants a rotor: at the crank its inertia and that of the crank are one
+        own |= {
+            "crank.I": _LIGHT * own["crank.I"],
+            "rotor.J": (1.0 - _LIGHT) * own["crank.I"],
+            "rotor.d": 0.0,
+        }
+        own |= {"signal.torque": 1.0, "signal.current": 0.0, "signal.zero": found[f"{RUN}.offset(crank.tau)"]}
+        torque = size["crank.tau"]
+    else:
+        own |= {"rotor.J": p.rotor.J, "rotor.d": p.rotor.d}
+        if issubclass(motor, DcMotor):
+            k = p.armature.k
+            own |= {"signal.current": k, "signal.zero": k * found[f"{RUN}.offset(motor.i)"]}
+            torque = k * size["motor.i"]
+        elif issubclass(motor, InductionMotor) and "motor.power" in columns:
+            speed = 2.0 * math.pi * p.supply.f / p.pole_pairs
+            warm = 1.0 + p.stator.alpha * (found[f"{RUN}.temperature"] - 293.15)
+            own |= {
+                "signal.current": 0.0,
+                "signal.power": 1.0 / speed,
+                "signal.resistance": 3.0 * p.stator.R * warm,
+            }
+            torque = size["motor.power"] / speed
+        else:
+            raise InputError(
+                f"{recording.source}: the load of a {motor.name} is watched by motor.power; record the active power"
+            )
+    feeds, forces = (
+        [x for name, x in found.items() if name.startswith("machine.") and name.endswith(end)]
+        for end in ("material_mass", "processing_force")
+    )
+    feed = float(np.mean(feeds))
+    speed_noise = size.get("motor.w", size.get("crank.w", 0.0))
+    return (
+        own
+        | {
+            "noise.torque": torque,
+            "noise.w": speed_noise,
+            "noise.rate": 1.0 / recording.step,
+            "feed.expected": feed,
+            "force.expected": float(np.mean(forces)),
+        }
+        | tuning(config, feed, torque)
+    )
+
+
+def tuning(config: Config, feed: float, torque: float) -> dict[str, float]:
+    """The tuning of the observer."""
+    return {"feed.spread": 0.5 * feed}
+
+
+def _uncertainty(plan: WatchPlan, values: Mapping[str, float]) -> tuple[float, float]:
+    """The false imbalance by errors of an identified machine."""
+    if plan.identification is None:
+        return 0.0, 0.0
+    names, covariance = _covariance(plan.identification)
+    p = LoadObserver.parameter_layout.from_names(dict(values))
+    known = [k for k, name in enumerate(names) if name in LoadObserver.parameter_layout.names]
+    found = false_loads(p, [names[k] for k in known], covariance[np.ix_(known, known)], plan.crank_speed)
+    return found.imbalance, found.force_imbalance
+
+
+def _covariance(file: Path) -> tuple[list[str], Any]:
+    """Names of the machine's parameters and their covariance, from the result of an identification."""
+    try:
+        table = json.loads(file.read_text("utf-8"))["covariance"]
+        names, matrix = list(table["names"]), np.array(table["matrix"], float)
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(
+            f"watch.identification = {file}: is no result.json of chainunit identify", "watch.identification"
+        ) from error
+    rows = [k for k, name in enumerate(names) if name.startswith("machine.")]
+    return [names[k].removeprefix("machine.") for k in rows], matrix[np.ix_(rows, rows)]
+
+
+def observe(time: Any, signals: Mapping[str, Any], values: Mapping[str, float]) -> dict[str, Any]:
+    """The outputs of the observer's FMU, by name, each of shape (rows,).
+
+    Parameters
+    ----------
+    time : of the rows [s], shape (rows,)
+    signals : inputs of the observer by name, each of shape (rows,)
+    values : parameters of the observer by name
+    """
+    table = np.stack(list(signals.values()))
+    result = np.zeros((len(OUTPUTS), len(time)))
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / f"{LoadObserver.name}.fmu"
+        export(LoadObserver, file, dict(values))
+        with contextlib.closing(Fmu(file)) as fmu, contextlib.closing(Instance(fmu, "observer")) as unit:
+            unit.initialize(
+                {**values, **dict(zip(signals, map(float, table[:, 0]), strict=True))}, float(time[0])
+            )
+            unit.finish_initialization()
+            inputs, outputs = unit.handle(list(signals)), unit.handle(list(OUTPUTS))
+            steps = np.diff(time, append=2.0 * time[-1] - time[-2])
+            rows = zip(table.T.tolist(), time.tolist(), steps.tolist(), strict=True)
+            for k, (row, t, step) in enumerate(rows):
+                unit.write(inputs, row)
+                result[:, k] = unit.read(outputs)
+                unit.step(t, step)
+    return dict(zip(OUTPUTS, result, strict=True))
+
+
+def _alarms(time: Any, outputs: Mapping[str, Any], turn: float) -> list[Alarm]:
+    """The alarms in order; those of one side with a short lull between them are one."""
+    found: list[Alarm] = []
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        on = outputs["alarm"] == sign
+        ends = [(a, z) for a, z in stretches(on)]
+        joined: list[tuple[int, int]] = []
+        for first, last in ends:
+            if joined and time[first] - time[joined[-1][1] - 1] < LULL * turn:
+                joined[-1] = joined[-1][0], last
+            else:
+                joined.append((first, last))
+        for first, last in joined:
+            rows = slice(first, last)
+            shares = {name: sign * outputs[f"grounds.{name}"][rows] for name in ("feed", "force")}
+            ground = max(shares, key=lambda name: float(np.max(shares[name])))
+            at = first + int(np.argmax(shares[ground]))
+            values = {name: float(x[at]) for name, x in outputs.items()}
+            begin, end = float(time[first]), float(time[last - 1])
+            # an alarm begins on the ground that is beyond its threshold first
+            first_ground = max(shares, key=lambda name: float(shares[name][0]))
+            found.append(Alarm(side, begin, end, first_ground, float(time[at]), values))
+    return sorted(found, key=lambda alarm: alarm.begin)

@@ -1,0 +1,122 @@
+"""The result of a watched recording as data: the content of result.json."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from ... import __version__
+from ...machines.load_observer import LoadObserver
+from ...text import array_entry, entry, shown_in
+from .watch import OUTPUTS, Alarm, WatchedRecording
+
+ROWS = 1500
+"""Most rows of a course in the result."""
+GROUNDS = {"feed": "imbalance of the feed", "force": "imbalance of the processing forces"}
+
+
+def as_dict(watched: WatchedRecording) -> dict[str, Any]:
+    """All results, ready for JSON, each number with its unit."""
+    with shown_in(watched.config.units):
+        return _as_dict(watched)
+
+
+def _as_dict(watched: WatchedRecording) -> dict[str, Any]:
+    config, plan, recording = watched.config, watched.plan, watched.recording
+    p = watched.parameters
+    return {
+        "chainunit": __version__,
+        "title": config.title,
+        "source": config.source,
+        "report": dict(config.labels),
+        "file": str(plan.file),
+        "columns": list(recording.columns),
+        "duration": entry(float(recording.time[-1] - recording.time[0]), "s"),
+        "turns": entry(float(recording.time[-1] - recording.time[0]) / watched.turn, "1"),
+        "crank_speed": entry(plan.crank_speed, "rad/s", "speed"),
+        "learning": entry(plan.learning, "s"),
+        "learned": dict(_learned(watched)),
+        "alarms": [_alarm(watched, each) for each in watched.alarms],
+        "threshold": entry(float(np.median(watched.outputs["imbalance.feed_threshold"])), "kg"),
+        "force_threshold": entry(float(np.median(watched.outputs["imbalance.force_threshold"])), "N"),
+        "uncertainty": entry(watched.uncertainty[0], "kg"),
+        "force_uncertainty": entry(watched.uncertainty[1], "N"),
+        "widening": entry(watched.widening, "1"),
+        "identification": None if plan.identification is None else str(plan.identification),
+        "tuning": {
+            v.name: entry(p.get(v.name, v.quantity.start), v.unit, v.kind)
+            for v in LoadObserver.parameter_layout.variables
+            if v.name.split(".")[0] in ("noise", "feed", "force", "offset", "imbalance", "alarm")
+        },
+        "usual": dict(_usual(watched)),
+        "course": _course(watched),
+    }
+
+
+def _learned(watched: WatchedRecording) -> Iterator[tuple[str, dict[str, Any]]]:
+    """The numbers that were learned from the begin of the recording, without the orders of a motion."""
+    for unknown in watched.problem.unknowns:
+        if ".order." in unknown.name:
+            continue
+        value, deviation = watched.of_learning(unknown.name)
+        kelvin = unknown.unit == "K"
+        yield (
+            unknown.name,
+            {
+                "value": entry(value, unknown.unit, "temperature" if kelvin else ""),
+                "deviation": entry(deviation, unknown.unit, "difference" if kelvin else ""),
+            },
+        )
+
+
+def _alarm(watched: WatchedRecording, each: Alarm) -> dict[str, Any]:
+    units = _units()
+    start = float(watched.recording.time[0])
+    return {
+        "side": each.side,
+        "ground": GROUNDS[each.ground],
+        "begin": entry(each.begin, "s"),
+        "end": entry(each.end, "s"),
+        "turn": entry((each.begin - start) / watched.turn, "1"),
+        "at": entry(each.at, "s"),
+        "values": {name: entry(x, units[name]) for name, x in each.values.items()},
+    }
+
+
+def _usual(watched: WatchedRecording) -> Iterator[tuple[str, dict[str, Any]]]:
+    """The medians of the outputs after the time of learning and before the first alarm, with those of their standard
+    deviations and thresholds."""
+    time, units = watched.recording.time, _units()
+    end = watched.alarms[0].begin if watched.alarms else float(time[-1])
+    rows = (time > time[0] + min(watched.plan.learning, 0.5 * (end - time[0]))) & (time <= end)
+
+    def median(name: str) -> float | None:
+        return float(np.median(watched.outputs[name][rows])) if name in watched.outputs else None
+
+    for name in OUTPUTS:
+        if not name.endswith(("_deviation", "_threshold")):
+            yield (
+                name,
+                {
+                    "value": entry(median(name), units[name]),
+                    "deviation": entry(median(f"{name}_deviation"), units[name]),
+                    "threshold": entry(median(f"{name}_threshold"), units[name]),
+                },
+            )
+
+
+def _course(watched: WatchedRecording) -> dict[str, Any]:
+    """The outputs of the observer over time, at a part of the rows."""
+    every = max(1, -(-len(watched.recording.time) // ROWS))
+    units = _units()
+    return {"time": array_entry(watched.recording.time[::every], "s")} | {
+        name: array_entry(watched.outputs[name][::every], units[name]) for name in OUTPUTS
+    }
+
+
+def _units() -> dict[str, str]:
+    """The units of the outputs and states of the observer."""
+    layouts = [*(part.layout for part in LoadObserver.parts), LoadObserver.state_layout]
+    return {v.name: v.unit for layout in layouts if layout is not None for v in layout.variables}

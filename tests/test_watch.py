@@ -1,0 +1,162 @@
+"""``chainunit watch``: the load observer over recordings in files."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command import chainunit
+
+from chainunit import InputError, Study
+from chainunit.native.compilers import compiler
+from chainunit.study.identification.crank_motion import crank_motion
+from chainunit.study.identification.recording import Recording, read_recording
+
+pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
+EXAMPLES = Path(__file__).parents[1] / "examples" / "identification"
+TRUTH = json.loads((EXAMPLES / "truth.json").read_text("utf-8"))
+TURN = 2.0 * math.pi / TRUTH["crank_speed"]
+
+
+def study_text(machine, **watch):
+    """A study file of the example's machine with a recording to watch."""
+    lines = [f"{name} = {value}" for name, value in machine.items()]
+    keys = {"file": EXAMPLES / "watch.csv.gz"} | watch
+    return "\n".join(
+        [
+            'title = "A mill"',
+            "[machine]",
+            *lines,
+            "[motor]",
+            *(f"{name} = {x}" for name, x in GAINS.items()),
+            "[run]",
+            f"crank_speed = {TRUTH['crank_speed']}",
+            "[feed]",
+            *(f"{side}.material_mass = 30" for side in ("left", "right")),
+            *(f"{side}.processing_force = 40" for side in ("left", "right")),
+            "[watch]",
+            *(f"{name} = {json.dumps(str(x) if isinstance(x, Path) else x)}" for name, x in keys.items()),
+        ]
+    )
+
+
+GAINS = {
+    "speed_control.kp": 0.1017,
+    "speed_control.ki": 0.6102,
+    "current_control.kp": 33,
+    "current_control.ki": 2850,
+}
+
+
+@pytest.fixture(scope="module")
+def watched(tmp_path_factory):
+    """The folder of a watched recording, and what the command printed."""
+    folder = tmp_path_factory.mktemp("watch")
+    (folder / "mine.toml").write_text(study_text(TRUTH["machine"]), "utf-8")
+    done = chainunit("watch", "mine.toml", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    return folder / "watched", " ".join(done.stdout.split())
+
+
+def test_a_shift_of_a_fifth_is_found_within_a_turn(watched):
+    """With the right side, on the ground of the feed, and no alarm before; the page and the pictures are there."""
+    folder, printed = watched
+    result = json.loads((folder / "result.json").read_text("utf-8"))
+    assert {each["side"] for each in result["alarms"]} == {"left"}
+    first = result["alarms"][0]
+    assert first["ground"] == "imbalance of the feed"
+    assert 70.0 < first["begin"]["value"] < 70.5 + TURN
+    assert "Overload of the left side from" in printed
+    assert {each.name for each in folder.iterdir()} >= {
+        "report.html",
+        "result.md",
+        "loads.png",
+        "imbalance.png",
+    }
+    # what is shown before the alarm is the hidden feed
+    usual = result["usual"]
+    for side in ("left", "right"):
+        assert usual[f"{side}.material_mass"]["value"]["value"] == pytest.approx(30.0, abs=1.0)
+        assert usual[f"{side}.processing_force"]["value"]["value"] == pytest.approx(50.0, abs=5.0)
+    assert usual["imbalance.feed"]["threshold"]["value"] == pytest.approx(
+        result["threshold"]["value"], rel=0.1
+    )
+    time, after = result["course"]["time"]["value"], result["course"]["imbalance.feed"]["value"]
+    late = [x for t, x in zip(time, after, strict=True) if t > 80.0]
+    assert np.mean(late) == pytest.approx(12.0, abs=1.0)
+    assert result["learned"]["mark.angle"]["value"]["value"] == pytest.approx(-0.13, abs=0.01)
+
+
+def test_errors_of_an_identified_machine_widen_the_threshold(tmp_path):
+    """By the factor that the page states; a file that is no identification is refused."""
+    covariance = {
+        "names": ["machine.left.web_mass", "feed.left.material_mass"],
+        "matrix": [[1.0, 0.0], [0.0, 9.0]],
+    }
+    (tmp_path / "result.json").write_text(json.dumps({"covariance": covariance}), "utf-8")
+    thresholds, results = [], []
+    for more in ({}, {"identification": "result.json"}):
+        (tmp_path / "mine.toml").write_text(study_text(TRUTH["machine"], end=60, **more), "utf-8")
+        found = Study.from_file(tmp_path / "mine.toml").watch()
+        results.append(json.loads(found.to_json()))
+        thresholds.append(np.median(found.watched.outputs["imbalance.feed_threshold"]))
+    assert results[0]["widening"]["value"] == 1.0
+    # a web that is heavier by 1 kg is as good as feed
+    assert results[1]["uncertainty"]["value"] == pytest.approx(1.0, abs=0.1)
+    assert results[1]["widening"]["value"] == pytest.approx(thresholds[1] / thresholds[0], rel=0.01) > 1.02
+    assert not results[0]["alarms"] and not results[1]["alarms"]
+    (tmp_path / "result.json").write_text("{}", "utf-8")
+    with pytest.raises(InputError, match=r"is no result\.json of chainunit identify"):
+        Study.from_file(tmp_path / "mine.toml").watch()
+
+
+def test_refusals(tmp_path):
+    with pytest.raises(InputError, match="watch: is missing"):
+        Study().watch()
+    (tmp_path / "mine.toml").write_text(
+        "[watch]\nbegin = 3\nend = 2\ncolumns = { 'motor.v' = 'U' }\n", "utf-8"
+    )
+    done = chainunit("watch", "mine.toml", cwd=tmp_path)
+    assert done.returncode == 2
+    for words in (
+        "watch.file: must be given",
+        "watch.end = 2 s: must be > begin",
+        "watch.columns.motor.v: no such",
+    ):
+        assert words in done.stderr
+    knife = "[system]\nmachine = 'KnifeDrive'\n[watch]\nfile = 'a.csv'\n"
+    (tmp_path / "mine.toml").write_text(knife, "utf-8")
+    done = chainunit("watch", "mine.toml", cwd=tmp_path)
+    assert done.returncode == 2 and "watch: is of the chain unit" in done.stderr
+
+
+def test_the_angle_between_marks():
+    """Of a crank whose speed changes within the turn, with a noisy speed and a gap: within 2 mrad of the true one."""
+    rng = np.random.default_rng(3)
+    time = np.arange(0.0, 40.0, 0.002)
+    phi = 3.0 * time + 0.2 * np.sin(3.0 * time) + 0.7
+    speed = 3.0 + 0.6 * np.cos(3.0 * time)
+    mark = np.append(0.0, np.diff(np.floor((phi - 0.1) / (2.0 * math.pi))))
+    columns = {"motor.w": 50.0 * speed * (1.0 + 0.01 * rng.standard_normal(len(time))), "mark": mark}
+    kept = (time < 11.0) | (time > 11.3)
+    recording = Recording("r.csv", time[kept], {k: x[kept] for k, x in columns.items()}, {})
+    angle, w = crank_motion(recording, 0.1, 50.0)
+    off = angle - phi[kept]
+    off -= 2.0 * math.pi * np.round(np.mean(off) / (2.0 * math.pi))
+    outside = (recording.time < 10.0) | (recording.time > 12.5)
+    assert np.max(np.abs(off[outside])) < 0.004 and np.max(np.abs(w - speed[kept])) < 0.3
+    counted = Recording(
+        "r.csv", time, {"motor.count": np.floor((phi - phi[0]) * 50.0 * 4096 / (2.0 * math.pi))}, {}
+    )
+    angle, w = crank_motion(counted, 0.7, 50.0)
+    assert np.max(np.abs(angle - phi)) < 1e-4 and np.max(np.abs(w - speed)[10:-10]) < 0.02
+    with pytest.raises(InputError, match="the angle of the crank is not known"):
+        crank_motion(Recording("r.csv", time, {"motor.i": time}, {}), 0.0, 50.0)
+
+
+def test_the_recording_is_that_of_the_examples():
+    recording = read_recording(EXAMPLES / "watch.csv.gz")
+    assert set(recording.columns) == {"motor.i", "motor.u", "motor.w", "mark"}
