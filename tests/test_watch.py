@@ -106,7 +106,8 @@ def test_errors_of_an_identified_machine_widen_the_threshold(tmp_path):
     assert results[0]["widening"]["value"] == 1.0
     # a web that is heavier by 1 kg is as good as feed
     assert results[1]["uncertainty"]["value"] == pytest.approx(1.0, abs=0.1)
-    assert results[1]["widening"]["value"] == pytest.approx(thresholds[1] / thresholds[0], rel=0.01) > 1.02
+    assert results[1]["widening"]["value"] == pytest.approx(thresholds[1] / thresholds[0], rel=0.01)
+    assert results[1]["widening"]["value"] > 1.02
     assert not results[0]["alarms"] and not results[1]["alarms"]
     (tmp_path / "result.json").write_text("{}", "utf-8")
     with pytest.raises(InputError, match=r"is no result\.json of chainunit identify"):
@@ -134,7 +135,8 @@ def test_refusals(tmp_path):
 
 
 def test_the_angle_between_marks():
-    """Of a crank whose speed changes within the turn, with a noisy speed and a gap: within 2 mrad of the true one."""
+    """Of a crank whose speed changes within the turn, with a noisy speed: within 6 mrad of the true one,
+    a third of which is the distance of rows, and twice that at a gap."""
     rng = np.random.default_rng(3)
     time = np.arange(0.0, 40.0, 0.002)
     phi = 3.0 * time + 0.2 * np.sin(3.0 * time) + 0.7
@@ -147,7 +149,8 @@ def test_the_angle_between_marks():
     off = angle - phi[kept]
     off -= 2.0 * math.pi * np.round(np.mean(off) / (2.0 * math.pi))
     outside = (recording.time < 10.0) | (recording.time > 12.5)
-    assert np.max(np.abs(off[outside])) < 0.004 and np.max(np.abs(w - speed[kept])) < 0.3
+    assert np.max(np.abs(off[outside])) < 0.006 and np.max(np.abs(off)) < 0.012
+    assert np.max(np.abs(w - speed[kept])) < 0.3
     counted = Recording(
         "r.csv", time, {"motor.count": np.floor((phi - phi[0]) * 50.0 * 4096 / (2.0 * math.pi))}, {}
     )
