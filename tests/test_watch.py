@@ -66,6 +66,7 @@ def test_a_shift_of_a_fifth_is_found_within_a_turn(watched):
     folder, printed = watched
     result = json.loads((folder / "result.json").read_text("utf-8"))
     assert {each["side"] for each in result["alarms"]} == {"left"}
+    assert result["is_described"] and "does not describe" not in printed
     first = result["alarms"][0]
     assert first["ground"] == "imbalance of the feed"
     assert 70.0 < first["begin"]["value"] < 70.5 + TURN
@@ -88,6 +89,15 @@ def test_a_shift_of_a_fifth_is_found_within_a_turn(watched):
     late = [x for t, x in zip(time, after, strict=True) if t > 80.0]
     assert np.mean(late) == pytest.approx(12.0, abs=1.0)
     assert result["learned"]["mark.angle"]["value"]["value"] == pytest.approx(-0.13, abs=0.01)
+
+
+def test_a_machine_that_does_not_describe_the_begin(tmp_path):
+    """One whose crank is longer by 3 % is named, with the columns that tell."""
+    wrong = TRUTH["machine"] | {"r": 0.1545}
+    (tmp_path / "mine.toml").write_text(study_text(wrong, end=40), "utf-8")
+    found = Study.from_file(tmp_path / "mine.toml").watch()
+    assert not found.watched.is_described
+    assert "does not describe the begin of the recording" in " ".join(repr(found).split())
 
 
 def test_errors_of_an_identified_machine_widen_the_threshold(tmp_path):

@@ -41,8 +41,9 @@ def changed_tables(config: Config, values: Mapping[str, float], title: str, fold
         inner = tables.get(table, {}) if table else tables
         if isinstance(inner.get(key), str) and inner[key].lower().endswith((".toml", ".fmu", ".csv")):
             inner[key] = _from(folder, Path(config.source).parent / inner[key])
-    for run in tables.get("identify", {}).get("run", ()):
-        run["file"] = _from(folder, Path(config.source).parent / run["file"])
+    for recording in (*tables.get("identify", {}).get("run", ()), tables.get("watch", {})):
+        for key in [key for key in ("file", "identification") if key in recording]:
+            recording[key] = _from(folder, Path(config.source).parent / recording[key])
     return tables
 
 

@@ -71,7 +71,7 @@ class WatchPlan:
     """A recording that is watched: its `file`, the heads of its `columns` by quantity, the speed of the crank
     [rad/s], the part that counts [s], the temperature of the surroundings [K]; the time of its begin in which is
     learned [s], the standard deviation of the feed as a share, the noise of the sensors in parts of the RMS of their
-    columns, and the result of an identification, if there is one."""
+    columns, the standard deviation of their gains, and the result of an identification, if there is one."""
 
     file: Path
     columns: Mapping[str, str]
@@ -82,6 +82,7 @@ class WatchPlan:
     learning: float
     feed_deviation: float
     noise: float
+    gain: float
     identification: Path | None
 
 
@@ -207,7 +208,7 @@ def read_watch(form: Any, crank_speed: float, source: str) -> WatchPlan:
     )
 
 
-_OF_WATCH = ("ambient", "learning", "feed_deviation", "noise")
+_OF_WATCH = ("ambient", "learning", "feed_deviation", "noise", "gain")
 
 
 def _part(given: Mapping[str, Any], place: str, faults: Faults) -> tuple[float, float]:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2
 
+from ...refusals import unit_behind
 from .fit import Normal
 from .problem import Comparison, Problem
 
@@ -55,6 +56,12 @@ class Strain:
     unit: str
     value: float
     deviations: float
+
+    def __str__(self) -> str:
+        return (
+            f"{self.name} = {self.value:.3g}{unit_behind(self.unit)} is {abs(self.deviations):.2g} standard "
+            "deviations beside what is known of clocks and sensors"
+        )
 
 
 def strains(problem: Problem, best: Normal) -> list[Strain]:

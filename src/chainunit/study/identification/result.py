@@ -18,6 +18,8 @@ from .information import Combination, short_name
 from .measurands import MEASURANDS
 from .residuals import ResidualCheck
 
+RESULT = "result.json"
+"""Name of the file with the result."""
 CORRELATED = 0.8
 """Correlation from which a pair of numbers is named."""
 MOST_PAIRS = 12
@@ -201,9 +203,8 @@ def _courses(found: IdentifiedMachine, run: str) -> dict[str, Any]:
 def sentences(found: IdentifiedMachine) -> list[str]:
     """Sentences that judge an identification."""
     words = [
-        f"{each.name} = {each.value:.3g}{unit_behind(each.unit)} is {abs(each.deviations):.2g} standard deviations "
-        "beside what is known of clocks and sensors: the model does not describe the recordings; check the gear "
-        "ratio, the units of the columns and the data of the sensors"
+        f"{each}: the model does not describe the recordings; check the gear ratio, the units of the columns and the "
+        "data of the sensors"
         for each in found.strains
     ]
     words += [
@@ -229,9 +230,12 @@ def sentences(found: IdentifiedMachine) -> list[str]:
 
 
 def identified_tables(found: IdentifiedMachine, folder: Path) -> dict[str, Any]:
-    """The tables of the study with the fitted values, as a file in `folder` has them. A number that the recordings do
+    """The tables of the study with the fitted values, as a file in `folder` has them, beside the result of the
+    identification, by which a recording is watched. A number that the recordings do
     not tell has its fitted value, too: only all of them together give the measured courses."""
     values = {name: each.fitted for name, each in found.estimates.items()}
     tables = changed_tables(found.config, values, "identified", folder)
     tables.pop("identify", None)
+    if "watch" in tables:
+        tables["watch"]["identification"] = RESULT
     return tables

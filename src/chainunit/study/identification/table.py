@@ -111,6 +111,9 @@ class WatchTable(RecordingTable):
         max=1.0,
         kind="percent",
     )
+    gain: Value = quantity(
+        "1", "standard deviation of the gain of a sensor", default=0.01, min=0.0, max=1.0, kind="percent"
+    )
 
 
 @declaration

@@ -29,9 +29,11 @@ from ..false_loads import false_loads
 from .crank_motion import crank_motion
 from .fit import Fit, fit
 from .identification import SIGNALS, drive_of, inspect_runs, is_of_shaft, plant_for
+from .measurands import MEASURANDS
 from .problem import Problem, RecordedRun, Sensor
 from .reading import OFFSET_SHARE, WITH_OFFSET, WatchPlan
 from .recording import Recording, read_recording
+from .residuals import ResidualCheck, Strain, check_residuals, strains
 from .unknown import Unknown
 
 RUN = "watch"
@@ -84,9 +86,9 @@ class Alarm:
 class WatchedRecording:
     """A recording with the outputs of the observer at its rows.
 
-    `learned` is the fit over its begin, `parameters` are those of the observer by name, and `uncertainty` is the
-    false imbalance by errors of the machine's parameters: of the feed [kg] and of the forces [N]. With these errors
-    the threshold of the feed is wider by the factor `widening`.
+    `learned` is the fit over its begin, `checks` are those of its residuals, `parameters` are those of the observer
+    by name, and `uncertainty` is the false imbalance by errors of the machine's parameters: of the feed [kg] and of
+    the forces [N]. With these errors the threshold of the feed is wider by the factor `widening`.
     """
 
     config: Config
@@ -95,11 +97,22 @@ class WatchedRecording:
     drive: Drive
     problem: Problem
     learned: Fit
+    checks: tuple[ResidualCheck, ...]
     parameters: Mapping[str, float]
     uncertainty: tuple[float, float]
     widening: float
     outputs: Mapping[str, Any]
     alarms: tuple[Alarm, ...]
+
+    @property
+    def is_described(self) -> bool:
+        """Whether the machine of the study describes the begin of the recording."""
+        return all(check.is_noise for check in self.checks) and not self.strains
+
+    @property
+    def strains(self) -> list[Strain]:
+        """The numbers of clock and sensors that are not as they are known."""
+        return strains(self.problem, self.learned)
 
     @property
     def turn(self) -> float:
@@ -156,9 +169,12 @@ def watch(config: Config, report: Report = lambda *_: None) -> WatchedRecording:
     values = _parameters(config, plan, drive, recording, found, ratio)
     uncertainty = _uncertainty(plan, values)
     values |= {"imbalance.uncertainty": uncertainty[0], "imbalance.force_uncertainty": uncertainty[1]}
-    signals = {"phi": phi * ratio, "w": w * ratio} | {
-        name: recording.columns[column] for name, column in _signals(recording).items()
+    gain = {name: found.get(f"gain({name})", 1.0) for name in recording.columns}
+    of_speed = next((gain[name] for name in ("crank.w", "motor.w") if name in gain), 1.0)
+    signals = {"phi": phi * ratio, "w": w * ratio / of_speed} | {
+        name: recording.columns[column] / gain[column] for name, column in _signals(recording).items()
     }
+    checks = tuple(check_residuals(learned))
     report("watching", 0.5, 1.0)
     outputs, widening = observe(recording.time, signals, values), 1.0
     if any(uncertainty):
@@ -167,7 +183,18 @@ def watch(config: Config, report: Report = lambda *_: None) -> WatchedRecording:
         widening = float(np.median(outputs[name] / observe(recording.time, signals, right)[name]))
     alarms = tuple(_alarms(recording.time, outputs, 2.0 * math.pi / plan.crank_speed))
     return WatchedRecording(
-        config, plan, recording, drive, problem, learned, values, uncertainty, widening, outputs, alarms
+        config,
+        plan,
+        recording,
+        drive,
+        problem,
+        learned,
+        checks,
+        values,
+        uncertainty,
+        widening,
+        outputs,
+        alarms,
     )
 
 
@@ -183,8 +210,9 @@ def _problem(config: Config, plan: WatchPlan, drive: Drive, recording: Recording
         else:
             sought.append(Unknown(full, "N", value, 0.0, MOST_FORCE, FORCE_SPREAD))
     sensors = {
-        name: Sensor(plan.noise, offset=OFFSET_SHARE * rms(x) if name in WITH_OFFSET else 0.0)
+        name: Sensor(plan.noise, gain=plan.gain, offset=OFFSET_SHARE * rms(x) if name in WITH_OFFSET else 0.0)
         for name, x in recording.columns.items()
+        if MEASURANDS[name].analog
     }
     values = {} if is_of_shaft(recording.columns) else drive.reference(plan.crank_speed)
     first = recording.part(end=float(recording.time[0]) + plan.learning)
@@ -220,13 +248,20 @@ def _parameters(
             "rotor.J": (1.0 - _LIGHT) * own["crank.I"],
             "rotor.d": 0.0,
         }
-        own |= {"signal.torque": 1.0, "signal.current": 0.0, "signal.zero": found[f"{RUN}.offset(crank.tau)"]}
+        own |= {
+            "signal.torque": 1.0,
+            "signal.current": 0.0,
+            "signal.zero": found[f"{RUN}.offset(crank.tau)"] / found.get("gain(crank.tau)", 1.0),
+        }
         torque = size["crank.tau"]
     else:
         own |= {"rotor.J": p.rotor.J, "rotor.d": p.rotor.d}
         if issubclass(motor, DcMotor):
             k = p.armature.k
-            own |= {"signal.current": k, "signal.zero": k * found[f"{RUN}.offset(motor.i)"]}
+            own |= {
+                "signal.current": k,
+                "signal.zero": k * found[f"{RUN}.offset(motor.i)"] / found.get("gain(motor.i)", 1.0),
+            }
             torque = k * size["motor.i"]
         elif issubclass(motor, InductionMotor) and "motor.power" in columns:
             speed = 2.0 * math.pi * p.supply.f / p.pole_pairs

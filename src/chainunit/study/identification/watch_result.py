@@ -38,6 +38,24 @@ def _as_dict(watched: WatchedRecording) -> dict[str, Any]:
         "crank_speed": entry(plan.crank_speed, "rad/s", "speed"),
         "learning": entry(plan.learning, "s"),
         "learned": dict(_learned(watched)),
+        "is_described": watched.is_described,
+        "residuals": [
+            {
+                "column": each.column,
+                "is_noise": each.is_noise,
+                "statistic": entry(each.statistic, "1"),
+                "limit": entry(each.limit, "1"),
+            }
+            for each in watched.checks
+        ],
+        "doubts": [
+            *(
+                f"order {each.orders[0][0]} of the crank remains in {each.column}"
+                for each in watched.checks
+                if not each.is_noise
+            ),
+            *map(str, watched.strains),
+        ],
         "alarms": [_alarm(watched, each) for each in watched.alarms],
         "threshold": entry(float(np.median(watched.outputs["imbalance.feed_threshold"])), "kg"),
         "force_threshold": entry(float(np.median(watched.outputs["imbalance.force_threshold"])), "N"),
