@@ -92,12 +92,15 @@ def test_a_shift_of_a_fifth_is_found_within_a_turn(watched):
 
 
 def test_a_machine_that_does_not_describe_the_begin(tmp_path):
-    """One whose crank is longer by 3 % is named, with the columns that tell."""
-    wrong = TRUTH["machine"] | {"r": 0.1545}
+    """One whose left wall is heavier by a third is named, with the column and the feed that tell."""
+    wrong = TRUTH["machine"] | {"left.wall_mass": 81.0}
     (tmp_path / "mine.toml").write_text(study_text(wrong, end=40), "utf-8")
     found = Study.from_file(tmp_path / "mine.toml").watch()
     assert not found.watched.is_described
     assert "does not describe the begin of the recording" in " ".join(repr(found).split())
+    doubts = json.loads(found.to_json())["doubts"]
+    assert any("remains in motor.i" in each for each in doubts)
+    assert any(each.startswith("machine.left.material_mass") for each in doubts)
 
 
 def test_errors_of_an_identified_machine_widen_the_threshold(tmp_path):

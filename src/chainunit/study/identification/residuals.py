@@ -60,7 +60,7 @@ class Strain:
     def __str__(self) -> str:
         return (
             f"{self.name} = {self.value:.3g}{unit_behind(self.unit)} is {abs(self.deviations):.2g} standard "
-            "deviations beside what is known of clocks and sensors"
+            "deviations beside the known value"
         )
 
 

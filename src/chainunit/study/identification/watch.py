@@ -33,7 +33,7 @@ from .measurands import MEASURANDS
 from .problem import Problem, RecordedRun, Sensor
 from .reading import OFFSET_SHARE, WITH_OFFSET, WatchPlan
 from .recording import Recording, read_recording
-from .residuals import ResidualCheck, Strain, check_residuals, strains
+from .residuals import STRAINED, ResidualCheck, Strain, check_residuals, strains
 from .unknown import Unknown
 
 RUN = "watch"
@@ -111,8 +111,15 @@ class WatchedRecording:
 
     @property
     def strains(self) -> list[Strain]:
-        """The numbers of clock and sensors that are not as they are known."""
-        return strains(self.problem, self.learned)
+        """The numbers of clock and sensors that are not as they are known, and feeds that are not as stated."""
+        feeds = [
+            Strain(u.name, u.unit, float(x), (float(x) - u.start) / u.spread)
+            for u, x in zip(self.problem.sought, self.learned.z, strict=False)
+        ]
+        return [
+            *strains(self.problem, self.learned),
+            *(each for each in feeds if abs(each.deviations) > STRAINED),
+        ]
 
     @property
     def turn(self) -> float:
