@@ -67,7 +67,7 @@ def writers(report: b.Report, folder: Path) -> list[Callable[[], list[Path]]]:
 def _opening(s: b.Source) -> Iterator[b.Block]:
     if not s.result["is_described"]:
         yield b.Judgement(
-            "warning",
+            "bad",
             "The machine of this study does not describe the begin of the recording: its alarms may be those of a "
             "wrong machine. Identify the machine first (chainunit identify).",
             items=tuple(s.lines("doubts")),
