@@ -15,7 +15,7 @@ from ..text import shown_in
 from . import blocks as b
 from . import figure as fig
 from . import files
-from .lines import Name, line
+from .lines import Name, join, line
 
 NAME, PICTURES = "result", ("loads.png", "imbalance.png")
 _USUAL = {
@@ -68,9 +68,11 @@ def _opening(s: b.Source) -> Iterator[b.Block]:
     if not s.result["is_described"]:
         yield b.Judgement(
             "bad",
-            "The machine of this study does not describe the begin of the recording: its alarms may be those of a "
-            "wrong machine. Identify the machine first (chainunit identify).",
-            items=tuple(s.lines("doubts")),
+            line(
+                "The machine of this study does not describe the begin of the recording (",
+                join(s.lines("doubts"), "; "),
+                "): its alarms may be those of a wrong machine. Identify the machine first (chainunit identify).",
+            ),
         )
     if not s.result["alarms"]:
         yield b.Judgement("good", s.line("No alarm in {turns:3} turns ({duration:3})."))
