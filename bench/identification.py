@@ -322,7 +322,9 @@ HEADS = {
 
 
 def cell(key: str, x: float) -> str:
-    return f"{x:.2f}" if key in ("error", "to_bound") else f"{100.0 * x:.2g} %"
+    if key in ("error", "to_bound"):
+        return f"{x:.2f}"
+    return f"{100.0 * x:.1f} %" if key == "cover" else f"{100.0 * x:.2g} %"
 
 
 def text(figures: Mapping[str, Any]) -> str:

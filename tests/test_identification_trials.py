@@ -54,6 +54,16 @@ def test_twelve_hidden_machines(bench):
 
 
 @pytest.mark.slow
+def test_a_machine_at_its_bounds(bench):
+    """A wall and an inertia are at the ends of their ranges, which hold the best fit: the residuals that this leaves
+    are no reason for a distribution elsewhere."""
+    numbers = bench.result("bare", 34)["numbers"]
+    limits = [bench.ranges()[each["name"].removeprefix("machine.")] for each in numbers]
+    assert any(each["fitted"] in ends for each, ends in zip(numbers, limits, strict=True))
+    assert all(abs(each["value"] - each["true"]) < 3.0 * each["deviation"] for each in numbers)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("k", [0, 1, 2])
 def test_another_friction_chains_and_another_gear_are_recognised(bench, k):
     assert bench.is_wrong(bench.result("wrong", k))

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from .fit import Normal, inverse
-from .problem import Problem
+from .problem import OUTLIER, Problem
 
 WIDE = 0.02
 """Standard deviation of a direction, in parts of that known beforehand, from which on it counts as wide."""
@@ -134,8 +134,15 @@ class _Bent:
                 # half of the second derivative; of a mixed one, the mean of both
                 table[:, 1 + wide + n] = 0.5 * (own[i][:, j] + (own[j][:, i] if i != j else 0.0))
             # in the thinned columns, the sizes of the noise are others by a trifle
-            factor = best.weights[here.run, here.column] * here.size / full.size
-            total += factor**2 * len(full.residuals) / len(here.residuals) * (table.T @ table)
+            table *= best.weights[here.run, here.column] * here.size / full.size
+            edges = np.linspace(0, len(full.residuals), len(table) + 1).round().astype(int)
+            rows = np.diff(edges)
+            # where a bound holds a number, the residuals have a part along the second derivatives
+            left = np.add.reduceat(np.clip(full.residuals, -OUTLIER, OUTLIER), edges[:-1])
+            total[0] -= best.weights[here.run, here.column] * (left @ table)
+            total += np.mean(rows) * (table.T @ table)
+        # those along the first derivatives are in the gradient
+        total[1:, 0] = total[0, 1:]
         return total
 
     def _terms(self, a: Any) -> Any:
