@@ -66,6 +66,9 @@ DIFFUSION = 0.3
 """Diffusion of an estimated imbalance that makes alarms, in parts of the square of the `change` of a load. The whole
 square is that of the innovations; as they come in bursts at some angles of the crank, and a second alarm within a
 turn is not counted, a third of it still overestimates the rate (bench/observer.py)."""
+FARTHEST = 20.0
+"""Largest deviation of an estimated load from the usual one, in spreads. A torque that no load explains, such as that
+of a stop of the rocker, would drive the estimates beyond all bounds."""
 FIRST_FORCE = 0.01
 """Variance of the forces at the start, in parts of their spread squared: a machine starts without a jam."""
 _LEAST = 1e-12
@@ -182,7 +185,14 @@ def _entries(covariance: Any) -> list[Any]:
     return [getattr(covariance, name) for name in ENTRIES]
 
 
-def _filter_rates(p: Any, u: Any, x: Any, b: Balance, jump: Any) -> list[Any]:
+def _bounded(xp: Any, rate: Any, estimate: Any, of: Any) -> Any:
+    """The rate of an estimated load, limited so that the estimate reaches its bounds in no less than `ONSET`; `of` is
+    what is known of the load."""
+    deviation, farthest = estimate - of.expected, FARTHEST * of.spread
+    return xp.maximum(xp.minimum(rate, (farthest - deviation) / ONSET), (-farthest - deviation) / ONSET)
+
+
+def _filter_rates(xp: Any, p: Any, u: Any, x: Any, b: Balance, jump: Any) -> list[Any]:
     """Rates of the states; `jump` is the rate at which the variance of the forces grows by a jump, in parts of their
     spread squared."""
     scale, rate = sizes(p), p.noise.rate
@@ -204,10 +214,10 @@ def _filter_rates(p: Any, u: Any, x: Any, b: Balance, jump: Any) -> list[Any]:
     speed, left_feed, right_feed, left_force, right_force, offset = correction
     return [
         b.acceleration + speed + (1.0 - share) * difference_of_speed * (2.0 / ONSET),
-        left_feed,
-        left_force,
-        right_feed,
-        right_force,
+        _bounded(xp, left_feed, x.left.material_mass, p.feed),
+        _bounded(xp, left_force, x.left.processing_force, p.force),
+        _bounded(xp, right_feed, x.right.material_mass, p.feed),
+        _bounded(xp, right_force, x.right.processing_force, p.force),
         offset,
         (difference_of_speed - x.surprise) / ONSET,
         *covariance_rates(P, gradient, decay, followed, rate),
@@ -329,7 +339,7 @@ class LoadObserver(Model):
     def derivatives(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
         """Time derivatives of the states, in declared order."""
         b = balance(xp, p, u, x)
-        return _filter_rates(p, u, x, b, _jump(xp, p, x, b))
+        return _filter_rates(xp, p, u, x, b, _jump(xp, p, x, b))
 
     @classmethod
     def start_states(cls, xp: Any, p: Any, u: Any, z: list[Any]) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from .analysis import Analysis
 from .blade import BladeAnalysis
 from .flywheels import FlywheelAnalysis
+from .notices import ObserverAnalysis
 from .organs import OrganAnalysis
 from .torsion_findings import TorsionAnalysis
 from .turn import TurnAnalysis
@@ -15,4 +16,5 @@ ANALYSES: tuple[type[Analysis], ...] = (
     BladeAnalysis,
     FlywheelAnalysis,
     TorsionAnalysis,
+    ObserverAnalysis,
 )

@@ -94,6 +94,8 @@ def _company(data: Mapping[str, Any], parts: Parts) -> Iterator[tuple[str, str]]
             yield from ((name, words) for words in _unfit_for_recordings(data, foreign))
     if "watch" in data and not parts.machine.sides:
         yield ("watch", f"is of the chain unit, and the machine is {parts.machine.name}; leave it out")
+    if "observer" in data:
+        yield from (("observer", words) for words in _unfit_for_observer(data, parts, foreign))
     if "torsion" in data and "driveline" not in data:
         yield ("torsion", "is of a driveline; add [driveline], or leave it out")
     if "chain" in data and data.get("organ") != "chain":
@@ -111,6 +113,17 @@ def _unfit_for_recordings(data: Mapping[str, Any], foreign: Mapping[str, bool]) 
     }
     for words in filter(None, unfit.values()):
         yield f"needs a motor and a machine of two-bar organs as models, and here the {words}"
+
+
+def _unfit_for_observer(data: Mapping[str, Any], parts: Parts, foreign: Mapping[str, bool]) -> Iterator[str]:
+    """Reasons why an observer cannot know the drive of a study."""
+    if not parts.machine.sides:
+        machine = "an FMU" if foreign["machine"] else parts.machine.name
+        yield f"knows the chain unit, and the machine is {machine}; leave it out"
+    if foreign["motor"]:
+        yield "needs a model of the motor, which is an FMU; leave it out"
+    if "driveline" in data:
+        yield "takes the shaft between motor and machine for rigid; leave out [driveline], or leave it out"
 
 
 def _sweep_company(data: Mapping[str, Any], foreign: Mapping[str, bool]) -> Iterator[tuple[str, str]]:

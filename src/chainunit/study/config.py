@@ -28,10 +28,11 @@ from .events import OneSidedFeed
 from .first_checks import check_values, independent, plate_of, without
 from .foreign_machine import ForeignMachine, ForeignModel
 from .identification.reading import IdentificationPlan, WatchPlan, read_identification, read_watch
+from .observer_table import ObserverTable
 from .optimum.table import read_wishes
 from .optimum.wishes import Wishes
 from .parts import Parts, beside, example, over_example, with_linkage
-from .run_checks import endless, loads_beyond
+from .run_checks import endless, loads_beyond, without_feed
 from .sections import (
     CHOICES,
     ChainOrgans,
@@ -102,6 +103,8 @@ class Config:
     """the table of a search for the best machine; a study makes none"""
     identify: IdentificationPlan | None
     """the table of an identification; a study makes none"""
+    observer: ObserverTable | None
+    """the load observer beside the motor"""
     watch: WatchPlan | None
     """the recording that is watched; a study has none"""
     foreign: ForeignMotor | None
@@ -352,6 +355,7 @@ def _config(
         **of_study,
     )
     faults.add(loads_beyond(config))
+    faults.add(without_feed(config))
     faults.add(endless(config))
     faults.refuse()
     return config

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -37,6 +37,7 @@ from ..system import (
     shaft_torque,
     through,
 )
+from ..system.graph import Connection
 from .arrays import peak
 from .foreign_machine import ForeignMachine
 
@@ -78,6 +79,11 @@ class Drive:
     gear_inertia: float = 0.0
     gear_friction: float = 0.0
     """inertia [kg m2] and friction [N m s/rad] of the gear of a catalogue motor, at the motor's shaft"""
+
+    observer: ModelComponent | None = None
+    """a load observer, which takes signals of the motor"""
+    observed: Mapping[str, str] = field(default_factory=dict)
+    """by input of the observer, the output of the motor that it takes"""
 
     foreign: FmuComponent | None = None
     """the motor, if it is a foreign FMU; then `motor` is `Motor` itself, of which only the terminals are
@@ -215,7 +221,7 @@ class Drive:
     @cached_property
     def graph(self) -> System:
         """The system of the models, each before the part that drives it. With feed-forward it also has the
-        second machine, `model`, that the control uses."""
+        second machine, `model`, that the control uses; and it has the `observer`, if the drive has one."""
         outsider = self.outsider
         between: dict[str, Component] = {}
         if self.gear != 1.0 or (outsider and self.line is not None and not outsider.model.has_gear()):
@@ -229,12 +235,16 @@ class Drive:
                 "motor": self.foreign or ModelComponent(self.motor, self.fmu_parameters),
             }
         )
-        if not self.feed_forward:
-            return system
-        # the second machine turns with the motor's shaft, before the driveline
-        model = ModelComponent(*self.load_model(self.machine))
-        wires = [("motor.phi", "model.phi"), ("motor.w", "model.w"), ("model.tau", "motor.tau_ff")]
-        return replace(system, components={**system.components, "model": model}, wires=wires)
+        beside: dict[str, Component] = {}
+        wires: list[Connection] = []
+        if self.feed_forward:
+            # the second machine turns with the motor's shaft, before the driveline
+            beside["model"] = ModelComponent(*self.load_model(self.machine))
+            wires += [("motor.phi", "model.phi"), ("motor.w", "model.w"), ("model.tau", "motor.tau_ff")]
+        if self.observer is not None:
+            beside["observer"] = self.observer
+            wires += [(f"motor.{output}", f"observer.{name}") for name, output in self.observed.items()]
+        return replace(system, components={**system.components, **beside}, wires=wires) if beside else system
 
     @property
     def gear(self) -> float:

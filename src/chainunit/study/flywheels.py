@@ -164,7 +164,7 @@ def _own(study: StudyRecord, findings: FlywheelFindings) -> Wheel:
 def _run(study: StudyRecord, rig: Rig, findings: FlywheelFindings, flywheel: float) -> Wheel:
     """The start-up and steady running of the study with another flywheel [kg m2], without its safety coupling."""
     config = study.config
-    drive, _ = tune(config, replace(study.drive, flywheel=flywheel))
+    drive, _ = tune(config, replace(study.drive, flywheel=flywheel, observer=None))
     findings.is_retuned = findings.is_retuned or drive.parameters != study.drive.parameters
     sides = drive.machine.loaded_sides(config.feed)
     rig = replace(rig, drive=drive, fed_from=None)

@@ -27,6 +27,7 @@ from ..system.ssp import export
 from .choice import choose
 from .config import Config
 from .drive import Drive
+from .observation import with_observer
 from .sections import ChainOrgans
 
 
@@ -198,7 +199,7 @@ def _drive(config: Config, backend: Backend | None, report: Callable[[str], None
         choice = choose(config, Path(scratch), lambda what, done, todo: report(what), backend)
     if choice.sizing is not None and choice.sizing.chosen_candidate is None:
         raise RunError(f"[sizing]: {choice.sizing.answer}")
-    return choice.drive
+    return with_observer(config, choice.drive)
 
 
 def export_study(

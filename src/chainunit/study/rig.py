@@ -112,8 +112,9 @@ class Rig:
 
     @property
     def plain(self) -> Rig:
-        """The same rig without feed-forward."""
-        return replace(self, twin=partial(without, names=("model",)))
+        """The same rig without feed-forward, and without an observer."""
+        beside = [name for name in ("model", "observer") if name in self.graph.components]
+        return replace(self, twin=partial(without, names=beside))
 
     @property
     def guards(self) -> dict[str, float]:

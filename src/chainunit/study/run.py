@@ -28,6 +28,7 @@ from .event import Event
 from .measures import read_answers, read_measure
 from .monte_carlo import Task
 from .monte_carlo import run as run_monte_carlo
+from .observation import with_observer
 from .record import Spread, StudyRecord
 from .remarks import conclude
 from .rig import Rig, Transient
@@ -77,7 +78,7 @@ def _run_study(
 ) -> StudyRecord:
     """See `run_study`."""
     choice = choose(config, folder / "fmu", report, backend)
-    drive = choice.drive
+    drive = with_observer(config, choice.drive)
     if check and drive.outsiders:
         titles = " and ".join(drive.outsiders)
         raise InputError(f"--check: the equations of {titles} are not known; leave --check out")
@@ -96,7 +97,7 @@ def _run_study(
     try:
         runner.run(check, lambda: drive.coasting(folder / "fmu", backend))
         if config.monte_carlo.runs:
-            task = Task(config, drive, files, runner.stop, runner.rig.fed_from)
+            task = Task(config, replace(drive, observer=None), files, runner.stop, runner.rig.fed_from)
             study.monte_carlo = run_monte_carlo(task, folder, report, scheduler=scheduler)
         _analyse(study, runner.rig, report, needs_runs=True)
     except RunError as error:

@@ -111,7 +111,7 @@ def _of_machine(name: str) -> Rule:
     tables["event"] = {"items": {"properties": {"type": {"enum": events}}}}
     rule: Rule = {"properties": tables}
     if not model.sides:
-        rule |= _without("ratios", "chain", "organ", "sizing.one_sided_share")
+        rule |= _without("ratios", "chain", "organ", "observer", "sizing.one_sided_share")
     return rule
 
 
@@ -153,13 +153,14 @@ def _of_foreign_parts() -> Iterator[Rule]:
     needs_model = [
         _equal("feed_forward", {"const": True}),
         _equal("monte_carlo.runs", {"type": "number", "exclusiveMinimum": 0}),
-        *map(_given, ("ratios", "chain", "organ", "sweep", "optimize", "identify", "watch")),
+        *map(_given, ("ratios", "chain", "organ", "sweep", "optimize", "identify", "watch", "observer")),
     ]
     yield _where(_equal("system.machine", _FMU), _not(_any(*needs_model)))
     yield _where(_equal("organ", {"const": "chain"}), _without("optimize", "identify", "watch"))
-    yield _where(_equal("system.motor", _FMU), _without("identify", "watch"))
+    yield _where(_equal("system.motor", _FMU), _without("identify", "watch", "observer"))
     for name in ("identify", "watch"):
         yield _where(_given(name), _without("driveline", "sizing"))
+    yield _where(_given("observer"), _without("driveline"))
     yield _where(_given("watch"), {"properties": {"watch": {"required": ["file"]}}})
     needed = {"required": ["parameter", "run"]}
     yield _where(_given("identify"), {"properties": {"identify": needed}})

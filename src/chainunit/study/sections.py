@@ -21,6 +21,7 @@ from ..quantities import Value, declaration, group, quantity, variables
 from ..reading import given_values, schema, to_number
 from ..system import NAMES
 from .identification import table as identify_table
+from .observer_table import ObserverTable
 from .optimum import table as optimize_table
 from .sweep_table import FIELDS, WHOLE, SweepTable
 
@@ -462,6 +463,7 @@ SECTIONS: Mapping[str, FileSection] = {
         is_used=lambda config: False,
         apart=True,
     ),
+    "observer": FileSection(ObserverTable, optional=True, title="Load observer", apart=True),
     "sweep": FileSection(
         SweepTable, optional=True, whole=WHOLE, keys=FIELDS, title="Sweep", is_used=lambda config: False
     ),
