@@ -81,6 +81,30 @@ def test_the_jam_trips_the_coupling(result):
     assert all(reason["topic"] != "energy" for reason in numbers["verdict"]["model"]["reasons"])
 
 
+def test_the_observer_notices_what_the_coupling_does_not(result):
+    """The table of docs/identification.md has these numbers."""
+    numbers, message, folder = result("observer_beside_coupling")
+    found = numbers["observer"]
+    times = {
+        run: [of[device]["time"]["value"] for device in ("safety_coupling", "current_limit", "observer")]
+        for run, of in found["notices"].items()
+    }
+    assert times == {
+        "feed_left": [None, None, pytest.approx(0.358, abs=5e-4)],
+        "jam_right": [None, None, pytest.approx(0.245, abs=5e-4)],
+        "hard_lump": [pytest.approx(0.013, abs=5e-4), None, None],
+    }
+    assert [sides["named"] for sides in found["sides"].values()] == ["left", "right", None]
+    for run, device, carried in (
+        ("feed_left", "observer", 1.64),
+        ("feed_left", "safety_coupling", 1.67),
+        ("jam_right", "observer", 10.2),
+        ("hard_lump", "safety_coupling", 28.0),
+    ):
+        assert found["notices"][run][device]["carried"]["value"] == pytest.approx(carried, rel=5e-3)
+    assert "Who notices" in message and (folder / "observer.png").exists()
+
+
 def test_a_lump_swings_the_cardan_shaft(result):
     numbers, message, folder = result("jam_with_driveline")
     jam = numbers["shaft"]["jam_left"]
