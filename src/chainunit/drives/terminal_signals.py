@@ -23,13 +23,15 @@ class TerminalSignals:
     resistance: float = 0.0
 
 
-def terminal_signals(motor: type[Motor], p: Any, w: float, torque: float) -> TerminalSignals:
+def terminal_signals(
+    motor: type[Motor], p: Any, w: float, torque: float, T: float | None = None
+) -> TerminalSignals:
     """The signals of a motor with the parameters `p` in running at the reference `w` [rad/s] with the mean `torque`
     on its rotor [N m].
 
     The current of an armature is proportional to the torque. The active power of an induction motor, without the heat
-    in the stator at the temperature of the surroundings, is the torque times the synchronous speed; on an inverter
-    this is the speed at the mean torque.
+    in the stator at the temperature `T` [K], by default that of the surroundings, is the torque times the synchronous
+    speed; on an inverter this is the speed at the mean torque.
 
     Raises
     ------
@@ -42,7 +44,7 @@ def terminal_signals(motor: type[Motor], p: Any, w: float, torque: float) -> Ter
         f = p.supply.f
         if motor.follows(p):
             f = p.pole_pairs * w / (2.0 * math.pi) + p.inverter.slip * torque
-        warm = 1.0 + p.stator.alpha * (p.ambient.T - T_RATED)
+        warm = 1.0 + p.stator.alpha * ((p.ambient.T if T is None else T) - T_RATED)
         return TerminalSignals(
             {"current": "i", "power": "supply_power"},
             per_power=p.pole_pairs / (2.0 * math.pi * f),

@@ -91,13 +91,12 @@ def _opening(s: b.Source) -> Iterator[b.Block]:
             "turns."
         )
     )
-    if s.result["identification"] is not None:
-        yield b.Text(
-            s.line(
-                "The machine's parameters are those of an identification. Their errors make a false imbalance of "
-                "{uncertainty:2} (standard deviation), and the threshold is wider by the factor {widening:3}."
-            )
-        )
+    if s.value("uncertainty"):
+        words = "Errors of the machine's parameters make"
+        if s.result["identification"] is not None:
+            words = "The machine's parameters are those of an identification. Their errors make"
+        more = "a false imbalance of {uncertainty:2} (standard deviation), and the threshold is wider by the factor"
+        yield b.Text(s.line(f"{words} {more} {{widening:3}}."))
 
 
 def _series(s: b.Source, name: str) -> Any:

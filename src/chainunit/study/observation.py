@@ -33,13 +33,14 @@ def with_observer(config: Config, drive: Drive) -> Drive:
     torque = np.asarray(turn.crank_torque) / drive.ratio + p.rotor.d * speed
     signals = terminal_signals(drive.motor, p, speed, float(np.mean(torque)))
     values = drive.machine.by_name | {"rotor.J": p.rotor.J, "rotor.d": p.rotor.d}
-    values |= _of_signals(signals) | tuning(config.observer, config.feed, speed, rms(torque))
+    values |= weights(signals) | tuning(config.observer, config.feed, speed, rms(torque))
     component = ModelComponent(LoadObserver, LoadObserver.parameter_layout.from_names(values))
     wires = {"phi": "phi", "w": "w", **signals.outputs}
     return replace(drive, observer=component, observed=wires)
 
 
-def _of_signals(signals: TerminalSignals) -> dict[str, float]:
+def weights(signals: TerminalSignals) -> dict[str, float]:
+    """The parameters of the observer that give the torque from signals at the terminals."""
     return {
         "signal.current": signals.per_current,
         "signal.power": signals.per_power,

@@ -8,24 +8,26 @@ import math
 import os
 import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...drives.dc_motor import DcMotor
-from ...drives.induction_motor import InductionMotor
+from ...drives.terminal_signals import terminal_signals
 from ...errors import InputError
 from ...fmu.backends import export
 from ...machines.load_observer import LoadObserver
 from ...progress import Report
 from ...quantities import Layout
+from ...reading import instance
 from ...system.instance import Fmu, Instance
 from ..arrays import rms, stretches
 from ..config import Config
 from ..drive import Drive
 from ..false_loads import false_loads
+from ..observation import tuning, weights
+from ..observer_table import ObserverTable
 from .crank_motion import crank_motion
 from .fit import Fit, fit
 from .identification import SIGNALS, drive_of, inspect_runs, is_of_shaft, plant_for
@@ -37,8 +39,11 @@ from .residuals import STRAINED, ResidualCheck, Strain, check_residuals, strains
 from .unknown import Unknown
 
 RUN = "watch"
+OF_TERMINALS = {"current": "motor.i", "power": "motor.power"}
+"""By signal at the terminals of a motor, its column."""
 FORCE_SPREAD, MOST_FORCE = 200.0, 2000.0
 """Standard deviation and bound of a processing force that is learned [N]."""
+UNCERTAINTIES = ("imbalance.uncertainty", "imbalance.force_uncertainty")
 OUTPUTS = (
     "left.material_mass",
     "right.material_mass",
@@ -175,7 +180,7 @@ def watch(config: Config, report: Report = lambda *_: None) -> WatchedRecording:
     phi, w = crank_motion(recording, angle, drive.ratio)
     values = _parameters(config, plan, drive, recording, found, ratio)
     uncertainty = _uncertainty(plan, values)
-    values |= {"imbalance.uncertainty": uncertainty[0], "imbalance.force_uncertainty": uncertainty[1]}
+    values |= dict(zip(UNCERTAINTIES, uncertainty, strict=True))
     gain = {name: found.get(f"gain({name})", 1.0) for name in recording.columns}
     of_speed = next((gain[name] for name in ("crank.w", "motor.w") if name in gain), 1.0)
     signals = {"phi": phi * ratio, "w": w * ratio / of_speed} | {
@@ -185,7 +190,7 @@ def watch(config: Config, report: Report = lambda *_: None) -> WatchedRecording:
     report("watching", 0.5, 1.0)
     outputs, widening = observe(recording.time, signals, values), 1.0
     if any(uncertainty):
-        right = values | {"imbalance.uncertainty": 0.0, "imbalance.force_uncertainty": 0.0}
+        right = values | dict.fromkeys(UNCERTAINTIES, 0.0)
         name = "imbalance.feed_threshold"
         widening = float(np.median(outputs[name] / observe(recording.time, signals, right)[name]))
     alarms = tuple(_alarms(recording.time, outputs, 2.0 * math.pi / plan.crank_speed))
@@ -231,8 +236,7 @@ def _signals(recording: Recording) -> dict[str, str]:
     """By input of the observer, the column that feeds it."""
     if is_of_shaft(recording.columns):
         return {"torque": "crank.tau"}
-    of_motor = {"current": "motor.i", "power": "motor.power"}
-    return {name: column for name, column in of_motor.items() if column in recording.columns}
+    return {name: column for name, column in OF_TERMINALS.items() if column in recording.columns}
 
 
 def _parameters(
@@ -245,72 +249,50 @@ def _parameters(
 ) -> dict[str, float]:
     """The parameters of the observer by name."""
     columns = recording.columns
-    own = Layout(type(drive.machine.p)).by_name(drive.machine.p) | {"ratio": ratio}
-    size = {name: plan.noise * rms(x) for name, x in columns.items()}
-    p, motor = drive.fmu_parameters, drive.motor
+    own = drive.machine.by_name | {"ratio": ratio}
     if is_of_shaft(columns):
         # the observer wants a rotor: at the crank its inertia and that of the crank are one
         own |= {
-            "crank.I": _LIGHT * own["crank.I"],
             "rotor.J": (1.0 - _LIGHT) * own["crank.I"],
+            "crank.I": _LIGHT * own["crank.I"],
             "rotor.d": 0.0,
         }
-        own |= {
-            "signal.torque": 1.0,
-            "signal.current": 0.0,
-            "signal.zero": found[f"{RUN}.offset(crank.tau)"] / found.get("gain(crank.tau)", 1.0),
-        }
-        torque = size["crank.tau"]
+        own |= {"signal.torque": 1.0, "signal.current": 0.0, "signal.zero": _zero(found, "crank.tau")}
+        torque = rms(columns["crank.tau"])
     else:
-        own |= {"rotor.J": p.rotor.J, "rotor.d": p.rotor.d}
-        if issubclass(motor, DcMotor):
-            k = p.armature.k
-            own |= {
-                "signal.current": k,
-                "signal.zero": k * found[f"{RUN}.offset(motor.i)"] / found.get("gain(motor.i)", 1.0),
-            }
-            torque = k * size["motor.i"]
-        elif issubclass(motor, InductionMotor) and "motor.power" in columns:
-            speed = 2.0 * math.pi * p.supply.f / p.pole_pairs
-            warm = 1.0 + p.stator.alpha * (found[f"{RUN}.temperature"] - 293.15)
-            own |= {
-                "signal.current": 0.0,
-                "signal.power": 1.0 / speed,
-                "signal.resistance": 3.0 * p.stator.R * warm,
-            }
-            torque = size["motor.power"] / speed
-        else:
+        p, w = drive.fmu_parameters, plan.crank_speed * drive.ratio
+        mean = float(np.mean(columns["motor.power"])) / w if "motor.power" in columns else 0.0
+        signals = terminal_signals(drive.motor, p, w, mean, found[f"{RUN}.temperature"])
+        missing = [OF_TERMINALS[name] for name in signals.outputs if OF_TERMINALS[name] not in columns]
+        if missing:
             raise InputError(
-                f"{recording.source}: the load of a {motor.name} is watched by motor.power; record the active power"
+                f"{recording.source}: the load of this motor is watched by {' and '.join(missing)}, too; record it"
             )
-    feeds, forces = (
-        [x for name, x in found.items() if name.startswith("machine.") and name.endswith(end)]
-        for end in ("material_mass", "processing_force")
+        own |= {"rotor.J": p.rotor.J, "rotor.d": p.rotor.d} | weights(signals)
+        own |= {"signal.zero": signals.per_current * _zero(found, "motor.i")}
+        torque = signals.per_current * rms(columns["motor.i"])
+        torque += signals.per_power * rms(columns["motor.power"]) if signals.per_power else 0.0
+    layout = drive.machine.model.feed_layout
+    feed = layout.from_names({name: found[f"machine.{name}"] for name in layout.names})
+    table = replace(
+        config.observer or instance(ObserverTable, {}),
+        signal_noise=plan.noise,
+        speed_noise=plan.noise,
+        rate=1.0 / recording.step,
     )
-    feed = float(np.mean(feeds))
-    speed_noise = size.get("motor.w", size.get("crank.w", 0.0))
-    return (
-        own
-        | {
-            "noise.torque": torque,
-            "noise.w": speed_noise,
-            "noise.rate": 1.0 / recording.step,
-            "feed.expected": feed,
-            "force.expected": float(np.mean(forces)),
-        }
-        | tuning(config, feed, torque)
-    )
+    return own | tuning(table, feed, plan.crank_speed * ratio, torque)
 
 
-def tuning(config: Config, feed: float, torque: float) -> dict[str, float]:
-    """The tuning of the observer."""
-    return {"feed.spread": 0.5 * feed}
+def _zero(found: Mapping[str, float], column: str) -> float:
+    """The value of a column where its sensor shows 0, as the true quantity."""
+    return found[f"{RUN}.offset({column})"] / found.get(f"gain({column})", 1.0)
 
 
 def _uncertainty(plan: WatchPlan, values: Mapping[str, float]) -> tuple[float, float]:
-    """The false imbalance by errors of an identified machine."""
+    """The false imbalance by errors of the machine: of an identified one, or as the table [observer] has it."""
     if plan.identification is None:
-        return 0.0, 0.0
+        feed, force = (values[name] for name in UNCERTAINTIES)
+        return feed, force
     names, covariance = _covariance(plan.identification)
     p = LoadObserver.parameter_layout.from_names(dict(values))
     known = [k for k, name in enumerate(names) if name in LoadObserver.parameter_layout.names]
