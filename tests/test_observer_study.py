@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fmpy.ssp.ssd import read_ssd
 from reports import page_of, said_of
 
 from chainunit import InputError
@@ -20,7 +21,7 @@ from chainunit.native.compilers import compiler
 from chainunit.study import config
 from chainunit.study.choice import choose
 from chainunit.study.observation import with_observer
-from chainunit.study.package import study_system
+from chainunit.study.package import export_study, study_system
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
 from chainunit.system import CompiledSimulation, CoSimulation
@@ -170,6 +171,17 @@ def test_the_system_of_a_package_has_the_observer(tmp_path):
     }
     both = drive_of("feed_forward = true\n[observer]", tmp_path).graph
     assert {("model.tau", "motor.tau_ff"), ("motor.w", "observer.w")} <= set(both.connections)
+
+
+def test_the_package_has_its_fmu(tmp_path):
+    text = f"[observer]\n{RUN}"
+    export_study(config.parse(text), tmp_path / "observed.ssp", backend="python")
+    elements = read_ssd(str(tmp_path / "observed.ssp")).system.elements
+    assert [(e.name, e.source) for e in elements] == [
+        ("machine", "resources/ChamberForces.fmu"),
+        ("motor", "resources/DcMotor.fmu"),
+        ("observer", "resources/LoadObserver.fmu"),
+    ]
 
 
 def test_what_the_observer_knows_is_that_of_the_study(tmp_path):
