@@ -83,7 +83,7 @@ def test_a_shift_of_a_fifth_is_found_within_a_turn(watched):
         assert usual[f"{side}.material_mass"]["value"]["value"] == pytest.approx(30.0, abs=1.0)
         assert usual[f"{side}.processing_force"]["value"]["value"] == pytest.approx(50.0, abs=5.0)
     assert usual["imbalance.feed"]["threshold"]["value"] == pytest.approx(
-        result["threshold"]["value"], rel=0.1
+        result["feed_threshold_least"]["value"], rel=0.1
     )
     time, after = result["course"]["time"]["value"], result["course"]["imbalance.feed"]["value"]
     late = [x for t, x in zip(time, after, strict=True) if t > 80.0]
@@ -100,7 +100,7 @@ def test_a_machine_that_does_not_describe_the_begin(tmp_path):
     assert "does not describe the begin of the recording" in " ".join(repr(found).split())
     doubts = json.loads(found.to_json())["doubts"]
     assert any("remains in motor.i" in each for each in doubts)
-    assert any(each.startswith("machine.left.material_mass") for each in doubts)
+    assert any(each.startswith("feed.left.material_mass") for each in doubts)
 
 
 def test_errors_of_an_identified_machine_widen_the_threshold(tmp_path):
@@ -130,6 +130,13 @@ def test_errors_of_an_identified_machine_widen_the_threshold(tmp_path):
 def test_refusals(tmp_path):
     with pytest.raises(InputError, match="watch: is missing"):
         Study().watch()
+    for more, words in (
+        ({"begin": 300}, "has 0 rows from begin = 300 s"),
+        ({"learning": 500}, "must be < 120 s, the duration"),
+    ):
+        (tmp_path / "mine.toml").write_text(study_text(TRUTH["machine"], **more), "utf-8")
+        with pytest.raises(InputError, match=words):
+            Study.from_file(tmp_path / "mine.toml").watch()
     (tmp_path / "mine.toml").write_text(
         "[watch]\nbegin = 3\nend = 2\ncolumns = { 'motor.v' = 'U' }\n", "utf-8"
     )

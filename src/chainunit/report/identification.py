@@ -70,7 +70,7 @@ def writers(found: IdentifiedMachine, report: b.Report, folder: Path) -> list[Ca
 
 
 def _opening(s: b.Source, found: IdentifiedMachine) -> Iterator[b.Block]:
-    words = s.line("These recordings tell {=told} of {=sought} numbers.")
+    words = s.line("These recordings determine {=told} of {=sought} numbers.")
     if found.is_described:
         yield b.Judgement(
             "good", line("The model describes the recordings: their residuals are noise. ", words)
@@ -87,7 +87,7 @@ def _numbers(s: b.Source) -> Iterator[b.Block]:
     rows = []
     for name, each in s.result["numbers"].items():
         path = f"numbers.{name}"
-        told: tuple[Line, ...] = ("not told", "")
+        told: tuple[Line, ...] = ("not determined", "")
         if each["told"]:
             told = s.number(f"{path}.value", digits=4), s.number(f"{path}.deviation", digits=2)
         ends = (s.number(f"{path}.{end}", digits=4) for end in ("from", "to"))
@@ -105,9 +105,9 @@ def _numbers(s: b.Source) -> Iterator[b.Block]:
     )
     yield b.Table(tuple(rows), columns)
     yield b.Text(
-        "A number is told where the recordings alone give it with less than half the standard deviation that was "
-        "known before. The interval of 95 % of a number that is not told is that of bounds, weighing and recordings "
-        "together.",
+        "A number is determined where the recordings alone give it with less than half the standard deviation that "
+        "was known before. The interval of 95 % of a number that is not determined is that of bounds, weighing and "
+        "recordings together: it stands or falls with the weighing.",
         "note",
     )
     rows = [
@@ -151,7 +151,7 @@ def _limits(s: b.Source) -> Iterator[b.Block]:
         yield b.Table(
             tuple(rows),
             b.heads("sum", "value", "standard deviation"),
-            title="Sums that are told, of numbers that are not",
+            title="Sums that are determined, of numbers that are not",
         )
     rows = [
         b.TableRow(
@@ -166,8 +166,8 @@ def _limits(s: b.Source) -> Iterator[b.Block]:
     if rows:
         yield b.Table(
             tuple(rows),
-            b.heads("further run", "deviations fall by the factor", "numbers told"),
-            title=s.line("Further runs, the best first; today {=told} numbers are told"),
+            b.heads("further run", "deviations fall by the factor", "numbers determined"),
+            title=s.line("Further runs, the best first; today {=told} numbers are determined"),
         )
 
 

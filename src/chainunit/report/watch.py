@@ -76,8 +76,15 @@ def _opening(s: b.Source) -> Iterator[b.Block]:
         )
     if not s.result["alarms"]:
         yield b.Judgement("good", s.line("No alarm in {turns:3} turns ({duration:3})."))
-    for k in range(len(s.result["alarms"])):
+    for k, each in enumerate(s.result["alarms"]):
         path = f"alarms.{k}"
+        if each["in_learning"]:
+            yield b.Text(
+                s.line(
+                    "This alarm is within the time of learning: the recording may begin in an overload, or the "
+                    "study's feed is not that of its begin."
+                )
+            )
         yield b.Judgement(
             "alarm",
             s.line(
@@ -86,12 +93,18 @@ def _opening(s: b.Source) -> Iterator[b.Block]:
         )
     yield b.Text(
         s.line(
-            "An imbalance of the feed beyond {threshold:3}, or of the processing forces beyond {force_threshold:3}, "
-            "gives an alarm; these thresholds follow from {=tuning.alarm.rate} permitted false alarms in a million "
-            "turns."
+            "The thresholds of an alarm follow from the permitted false alarms in a million turns "
+            "({=tuning.alarm.rate}). According to the angle of the crank, that of the imbalance of the feed is "
+            "{feed_threshold_least:3} to {feed_threshold_most:3}, that of the processing forces "
+            "{force_threshold_least:3} to {force_threshold_most:3}."
         )
     )
-    if s.value("uncertainty"):
+    if not s.value("uncertainty"):
+        yield b.Text(
+            "The thresholds take the numbers of the machine for exact. Name the result of an identification "
+            "(identification) to have their errors in the thresholds.",
+        )
+    else:
         words = "Errors of the machine's parameters make"
         if s.result["identification"] is not None:
             words = "The machine's parameters are those of an identification. Their errors make"
@@ -112,12 +125,14 @@ def _loads(s: b.Source) -> Iterator[b.Block]:
             )
         )
         for name, words in _USUAL.items()
+        if name in s.result["usual"]
     ]
-    yield b.Table(
-        tuple(rows),
-        b.heads("quantity", "median", "standard deviation", "threshold of an alarm"),
-        title="Estimates before the first alarm",
-    )
+    if rows:
+        yield b.Table(
+            tuple(rows),
+            b.heads("quantity", "median", "standard deviation", "threshold of an alarm"),
+            title="Estimates after the time of learning and before the first alarm",
+        )
     time, axis = _series(s, "time"), fig.Axis("time", "s")
     panels = []
     for name, words, unit in (("material_mass", "feed", "kg"), ("processing_force", "processing force", "N")):
@@ -176,8 +191,9 @@ def _alarms(s: b.Source) -> Iterator[b.Block]:
                 (
                     s.words(f"{path}.side"),
                     s.number(f"{path}.begin", digits=5),
-                    s.number(f"{path}.end", digits=5),
+                    "the end" if s.result["alarms"][k]["lasts"] else s.number(f"{path}.end", digits=5),
                     s.words(f"{path}.ground"),
+                    s.number(f"{path}.at", digits=5),
                     s.number(f"{values}.imbalance.feed", digits=3),
                     s.number(f"{values}.imbalance.feed_threshold", digits=3),
                     s.number(f"{values}.imbalance.force", digits=3),
@@ -194,14 +210,17 @@ def _alarms(s: b.Source) -> Iterator[b.Block]:
         b.Column("from"),
         b.Column("to"),
         b.Column("ground"),
-        b.Column("imbalance of the feed", "feed"),
+        b.Column("largest at", form="long"),
+        b.Column("imbalance of the feed", "imbalance"),
         b.Column("threshold"),
         b.Column("imbalance of the forces", "forces", form="long"),
         b.Column("threshold", form="long"),
         b.Column("rocker torque", form="long"),
     )
     yield b.Table(
-        tuple(rows), columns, title="Alarms; values at the largest imbalance in parts of its threshold"
+        tuple(rows),
+        columns,
+        title="Alarms, with the values at the largest imbalance in parts of its threshold",
     )
 
 
@@ -218,14 +237,14 @@ def _basis(s: b.Source) -> Iterator[b.Block]:
     ]
     yield b.Text(
         s.line(
-            "Angle, zero and loads were learned in the first {=learning}; an overload that is there from the begin "
-            "is learned as the usual state where the study's feed allows it."
+            "Angle, zero and loads were learned in the first {=learning}. Alarms of one side with less than two "
+            "turns between them are one."
         ),
         "note",
     )
     yield b.Table(
         tuple(rows),
-        b.heads("learned number", "value", "standard deviation"),
+        b.heads("learned number", "value", "standard deviation by noise"),
         title="Learned from the begin",
         form="long",
     )

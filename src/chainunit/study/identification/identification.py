@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import tempfile
 from collections.abc import Collection, Iterator, Mapping
@@ -27,8 +28,8 @@ from .plant import AnyPlant, Plant
 from .posterior import Posterior, posterior
 from .problem import Comparison, Problem, RecordedRun, Sensor
 from .reading import OFFSET_SHARE, WITH_OFFSET, IdentificationPlan, PlannedRun
-from .recording import Recording, read_recording
-from .residuals import ResidualCheck, Strain, check_residuals, strains
+from .recording import Recording, read_part
+from .residuals import STRAINED, ResidualCheck, Strain, check_residuals, strains
 from .shaft import MeasuredShaft
 from .suspicion import Suspicion, suspicions
 from .unknown import Unknown
@@ -42,6 +43,9 @@ WIDE, NEAR = 5.0, 1.2
 on the sought numbers; and of a speed or a voltage under control."""
 CONTROL = ("speed_control.kp", "speed_control.ki", "current_control.kp", "current_control.ki")
 """Gains of the control of a motor, of which the course of its current depends."""
+AT_BOUND = 0.02
+"""Distance from a bound, in parts of the standard deviation of an even distribution, within which a value lies at
+it."""
 _STEADY = ("motor.w", "crank.w", "motor.u")
 
 
@@ -58,6 +62,8 @@ class FittedNumber:
     low: float
     high: float
     is_told: bool
+    at_bound: str = ""
+    """the bound at which the fit ended, "from" or "to"; such a number is not told"""
 
 
 @dataclass(frozen=True)
@@ -85,7 +91,14 @@ class IdentifiedMachine:
         told = {each.name: each.is_told for each in self.after.outlooks}
         return {
             own.name: FittedNumber(
-                own, float(x), each.value, each.deviation, each.low, each.high, told[each.name]
+                own,
+                float(x),
+                each.value,
+                each.deviation,
+                each.low,
+                each.high,
+                told[each.name] and not _bound(own, float(x)),
+                _bound(own, float(x)),
             )
             for own, x, each in zip(
                 self.plan.sought,
@@ -108,8 +121,17 @@ class IdentifiedMachine:
 
     @property
     def strains(self) -> list[Strain]:
-        """The numbers of clocks and sensors that are not as they are known."""
-        return strains(self.problem, self.best)
+        """The numbers of clocks and sensors, and sought ones with a stated deviation, that are not as they are
+        known."""
+        far = [
+            Strain(own.name, own.unit, float(x), (float(x) - own.start) / own.spread, own.start)
+            for own, x in zip(self.plan.sought, self.best.z, strict=False)
+            if not own.is_even
+        ]
+        return [
+            *strains(self.problem, self.best),
+            *(each for each in far if abs(each.deviations) > STRAINED),
+        ]
 
     def courses(self, comparison: Comparison) -> tuple[Any, Any, Any]:
         """The times of the rows that are compared [s], a measured column, and the simulated one as its sensor would
@@ -131,6 +153,14 @@ class IdentifiedMachine:
         places = [self.problem.place[name] for name, _ in combination.terms]
         sums = self.posterior.samples[:, places] @ [factor for _, factor in combination.terms]
         return float(np.mean(sums)), float(np.std(sums))
+
+
+def _bound(own: Unknown, x: float) -> str:
+    """The bound at which a fitted value lies, "from" or "to"; empty between them."""
+    near = AT_BOUND * own.spread
+    if math.isfinite(own.low) and own.is_even and x <= own.low + near:
+        return "from"
+    return "to" if math.isfinite(own.high) and own.is_even and x >= own.high - near else ""
 
 
 def system_name(name: str) -> str:
@@ -198,7 +228,7 @@ def _recordings(plan: IdentificationPlan) -> dict[str, Recording]:
     faults, recordings = Faults(), dict[str, Recording]()
     for run in plan.runs:
         with faults.collected():
-            recording = read_recording(run.file, run.columns).part(run.begin, run.end)
+            recording = read_part(run.file, run.columns, run.begin, run.end)
             if not recording.columns.keys() & set(SIGNALS):
                 raise InputError(
                     f"{run.file}: has no column that tells the torque; must have one of {', '.join(SIGNALS)}"
@@ -322,6 +352,10 @@ def remarks(found: IdentifiedMachine) -> Iterator[str]:
             " % within a turn, as most of it magnetises the motor: record the power, too, which tells far more"
         )
     for run in runs:
+        for name in sorted(
+            each for each in columns - run.recording.columns.keys() if MEASURANDS[each].analog
+        ):
+            yield f"{run.recording.source} has no {name}, which another recording has: it tells less without it"
         if not {"mark", "motor.count"} & run.recording.columns.keys():
             yield (
                 f"{run.recording.source} has neither a mark nor an encoder: the angle of the crank follows from the "

@@ -27,6 +27,8 @@ CLIPPED = 2e-3
 STANDS = 0.05
 """Mean speed, in parts of the expected one, below which the machine stands."""
 _ROWS_STUCK = 20
+OF_SPEED = ("motor.w", "crank.w", "motor.u")
+"""Quantities whose sizes follow from the speed."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,7 @@ def inspect(
         first, second = swapped
         faults.append(
             _fault(recording, first, f"RMS of {_size(first, sizes[first])} and of {recording.heads[second]} "
-                   f"{_size(second, sizes[second])}: the two columns are swapped; exchange their heads")
+                   f"{_size(second, sizes[second])}: the two columns look swapped; exchange their heads")
         )  # fmt: skip
     for name, x in recording.columns.items():
         if name not in expected or (swapped and name in swapped):
@@ -163,7 +165,8 @@ def _scale_words(name: str, size: float, expected: Expectation) -> str:
             return (
                 f"{words}; {limit}: the values look like {prefix}{unit}; write [{prefix}{unit}] into its head"
             )
-    return f"{words}; {limit}: check the sensor, and the unit in its head"
+    more = ", crank_speed and machine.ratio" if name in OF_SPEED else ""
+    return f"{words}; {limit}: check the sensor, the unit in its head{more}"
 
 
 def _swapped(sizes: Mapping[str, float], expected: Mapping[str, Expectation]) -> tuple[str, str] | None:
@@ -197,7 +200,7 @@ def _extremes(x: Any) -> tuple[str, float, int]:
 
 
 def _size(name: str, x: float) -> str:
-    return f"{x:.3g}{unit_behind(MEASURANDS[name].unit)}"
+    return f"{x:.4g}{unit_behind(MEASURANDS[name].unit)}"
 
 
 def _fault(recording: Recording, name: str, words: str) -> InputError:

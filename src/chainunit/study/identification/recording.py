@@ -75,6 +75,8 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
         fit, a cell that is no number, times that do not rise.
     """
     lines = _text(file).splitlines()
+    if not lines:
+        raise InputError(f"{file}: is empty; must have a head and >= {FEWEST} rows")
     if len(lines) < 1 + FEWEST:
         raise InputError(f"{file}: has {max(0, len(lines) - 1)} rows behind its head; must have >= {FEWEST}")
     mark = ";" if lines[0].count(";") > lines[0].count(",") else ","
@@ -119,6 +121,24 @@ def write_recording(recording: Recording, file: Path) -> None:
     with whole(file) as part:
         # without a time in its head, the same recording gives the same file
         part.write_bytes(gzip.compress(content, mtime=0) if file.suffix == ".gz" else content)
+
+
+def read_part(file: Path, names: Mapping[str, str], begin: float, end: float) -> Recording:
+    """The rows of a recording from `begin` to `end` [s]; see `read_recording`.
+
+    Raises
+    ------
+    InputError
+        also where these are fewer than `FEWEST`.
+    """
+    whole = read_recording(file, names)
+    part = whole.part(begin, end)
+    if len(part.time) < FEWEST:
+        raise InputError(
+            f"{file}: has {len(part.time)} rows from begin = {begin:g} s to end = {end:g} s, and goes from "
+            f"{whole.time[0]:.5g} s to {whole.time[-1]:.5g} s; must have >= {FEWEST} rows in this part"
+        )
+    return part
 
 
 def _text(file: Path) -> str:
@@ -185,7 +205,7 @@ def _numbers(file: Path, lines: list[str], mark: str, places: list[int]) -> Any:
                     raise ValueError
             except ValueError:
                 raise InputError(
-                    f"{file}, line {number}, column {place + 1}: {printable(cell) or 'nothing'} is no number; leave "
-                    "out rows without measurement"
+                    f"{file}, line {number}, column {place + 1}: {printable(cell) or 'an empty cell'} is no number; "
+                    "leave out rows without measurement"
                 ) from None
     raise InputError(f"{file}: is no table of numbers")

@@ -56,11 +56,13 @@ class Strain:
     unit: str
     value: float
     deviations: float
+    known: float | None = None
 
     def __str__(self) -> str:
         return (
-            f"{self.name} = {self.value:.3g}{unit_behind(self.unit)} is {abs(self.deviations):.2g} standard "
+            f"{self.name} = {self.value:.4g}{unit_behind(self.unit)} is {abs(self.deviations):.2g} standard "
             "deviations beside the known value"
+            + ("" if self.known is None else f", {self.known:.4g}{unit_behind(self.unit)}")
         )
 
 

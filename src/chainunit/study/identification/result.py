@@ -16,6 +16,7 @@ from ..study_file import changed_tables
 from .identification import FittedNumber, IdentifiedMachine, remarks, system_name
 from .information import Combination, short_name
 from .measurands import MEASURANDS
+from .plant import ANGLE
 from .residuals import ResidualCheck
 
 RESULT = "result.json"
@@ -170,6 +171,11 @@ def _nuisances(found: IdentifiedMachine) -> Iterator[tuple[str, dict[str, Any]]]
     for unknown, x, s in zip(found.problem.unknowns, best.z, best.deviations, strict=True):
         if unknown.is_nuisance:
             kind = "difference" if unknown.unit == "K" else ""
+            x = (
+                float(x) % (2.0 * math.pi)
+                if unknown.name.endswith(f".{ANGLE}") and "mark" not in unknown.name
+                else x
+            )
             value = entry(float(x), unknown.unit, "temperature" if unknown.unit == "K" else "")
             yield unknown.name, {"value": value, "deviation": entry(float(s), unknown.unit, kind)}
 
@@ -208,10 +214,17 @@ def sentences(found: IdentifiedMachine) -> list[str]:
         for each in found.strains
     ]
     words += [
+        f"{name} = {each.fitted:.4g}{unit_behind(each.unknown.unit)} lies at its bound {each.at_bound}: widen the "
+        "bound, or check what else is held for known"
+        for name, each in found.estimates.items()
+        if each.at_bound
+    ]
+    words += [
         f"{each.name} = {each.known:.4g}{unit_behind(each.unit)}: the recordings would prefer "
-        f"{each.known + each.change:.4g} +- {each.deviation:.2g}; check it, and what is near to it"
+        f"{each.known + each.change:.4g}{unit_behind(each.unit)} (standard deviation {each.deviation:.2g}) if it "
+        "alone were wrong"
         for each in found.suspicions
-        if each.is_suspicious
+        if each.is_suspicious and each.known * (each.known + each.change) > 0.0
     ]
     for check in found.checks:
         unit = MEASURANDS[check.column].unit
@@ -233,7 +246,7 @@ def identified_tables(found: IdentifiedMachine, folder: Path) -> dict[str, Any]:
     """The tables of the study with the fitted values, as a file in `folder` has them, beside the result of the
     identification, by which a recording is watched. A number that the recordings do
     not tell has its fitted value, too: only all of them together give the measured courses."""
-    values = {name: each.fitted for name, each in found.estimates.items()}
+    values = {name: float(f"{each.fitted:.6g}") for name, each in found.estimates.items()}
     tables = changed_tables(found.config, values, "identified", folder)
     tables.pop("identify", None)
     if "watch" in tables:

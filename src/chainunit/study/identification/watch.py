@@ -34,7 +34,7 @@ from .identification import SIGNALS, drive_of, inspect_runs, is_of_shaft, plant_
 from .measurands import MEASURANDS
 from .problem import Problem, RecordedRun, Sensor
 from .reading import OFFSET_SHARE, WITH_OFFSET, WatchPlan
-from .recording import Recording, read_recording
+from .recording import Recording, read_part
 from .residuals import STRAINED, ResidualCheck, Strain, check_residuals, strains
 from .unknown import Unknown
 
@@ -76,13 +76,14 @@ _LIGHT = 1e-3
 
 @dataclass(frozen=True)
 class Alarm:
-    """An alarm: its side, from when to when [s], on what it rests ("feed" or "force"), and the outputs of the
-    observer at the time `at` of its largest statistic."""
+    """An alarm: its side, from when to when [s], on what it rests ("feed" or "force"), whether it `lasts` up to the
+    end of the recording, and the outputs of the observer at the time `at` of its largest statistic."""
 
     side: str
     begin: float
     end: float
     ground: str
+    lasts: bool
     at: float
     values: Mapping[str, float]
 
@@ -118,7 +119,7 @@ class WatchedRecording:
     def strains(self) -> list[Strain]:
         """The numbers of clock and sensors that are not as they are known, and feeds that are not as stated."""
         feeds = [
-            Strain(u.name, u.unit, float(x), (float(x) - u.start) / u.spread)
+            Strain(file_name(u.name), u.unit, float(x), (float(x) - u.start) / u.spread, u.start)
             for u, x in zip(self.problem.sought, self.learned.z, strict=False)
         ]
         return [
@@ -135,6 +136,11 @@ class WatchedRecording:
         """A learned number and its standard deviation, by its name in the fit."""
         k = self.problem.place[name]
         return float(self.learned.z[k]), float(self.learned.deviations[k])
+
+
+def file_name(name: str) -> str:
+    """The name in the study file of a load that is learned."""
+    return name.replace("machine.", "feed.", 1)
 
 
 def watch_plan_of(config: Config) -> WatchPlan:
@@ -162,10 +168,16 @@ def watch(config: Config, report: Report = lambda *_: None) -> WatchedRecording:
     plan = watch_plan_of(config)
     workers = min(2, os.cpu_count() or 1)
     report("reading the recording", 0.0, 1.0)
-    recording = read_recording(plan.file, plan.columns).part(plan.begin, plan.end)
+    recording = read_part(plan.file, plan.columns, plan.begin, plan.end)
     if not recording.columns.keys() & set(SIGNALS):
         raise InputError(
             f"{plan.file}: has no column that tells the torque; must have one of {', '.join(SIGNALS)}"
+        )
+    duration = float(recording.time[-1] - recording.time[0])
+    if not plan.learning < duration:
+        raise InputError(
+            f"watch.learning = {plan.learning:g} s: must be < {duration:.4g} s, the duration of {plan.file}",
+            "watch.learning",
         )
     drive = drive_of(config, {RUN: recording})
     problem = _problem(config, plan, drive, recording)
@@ -363,5 +375,6 @@ def _alarms(time: Any, outputs: Mapping[str, Any], turn: float) -> list[Alarm]:
             begin, end = float(time[first]), float(time[last - 1])
             # an alarm begins on the ground that is beyond its threshold first
             first_ground = max(shares, key=lambda name: float(shares[name][0]))
-            found.append(Alarm(side, begin, end, first_ground, float(time[at]), values))
+            lasts = float(time[-1]) - end < LULL * turn
+            found.append(Alarm(side, begin, end, first_ground, lasts, float(time[at]), values))
     return sorted(found, key=lambda alarm: alarm.begin)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -10,7 +11,8 @@ import numpy as np
 from ... import __version__
 from ...machines.load_observer import LoadObserver
 from ...text import array_entry, entry, shown_in
-from .watch import OUTPUTS, Alarm, WatchedRecording
+from .plant import ANGLE
+from .watch import OUTPUTS, Alarm, WatchedRecording, file_name
 
 ROWS = 1500
 """Most rows of a course in the result."""
@@ -57,8 +59,7 @@ def _as_dict(watched: WatchedRecording) -> dict[str, Any]:
             *map(str, watched.strains),
         ],
         "alarms": [_alarm(watched, each) for each in watched.alarms],
-        "threshold": entry(float(np.median(watched.outputs["imbalance.feed_threshold"])), "kg"),
-        "force_threshold": entry(float(np.median(watched.outputs["imbalance.force_threshold"])), "N"),
+        **_thresholds(watched),
         "uncertainty": entry(watched.uncertainty[0], "kg"),
         "force_uncertainty": entry(watched.uncertainty[1], "N"),
         "widening": entry(watched.widening, "1"),
@@ -79,14 +80,30 @@ def _learned(watched: WatchedRecording) -> Iterator[tuple[str, dict[str, Any]]]:
         if ".order." in unknown.name:
             continue
         value, deviation = watched.of_learning(unknown.name)
+        if unknown.name.endswith(f".{ANGLE}") and unknown.name != "mark.angle":
+            value %= 2.0 * math.pi
         kelvin = unknown.unit == "K"
         yield (
-            unknown.name,
+            file_name(unknown.name),
             {
                 "value": entry(value, unknown.unit, "temperature" if kelvin else ""),
                 "deviation": entry(deviation, unknown.unit, "difference" if kelvin else ""),
             },
         )
+
+
+def _thresholds(watched: WatchedRecording) -> dict[str, Any]:
+    """The range of the thresholds over the crank angle, after the time of learning."""
+    time = watched.recording.time
+    rows = time > time[0] + watched.plan.learning
+    ranges = dict[str, Any]()
+    for name, unit in (("feed", "kg"), ("force", "N")):
+        ends = np.percentile(watched.outputs[f"imbalance.{name}_threshold"][rows], [2.0, 98.0])
+        ranges |= {
+            f"{name}_threshold_{end}": entry(float(x), unit)
+            for end, x in zip(("least", "most"), ends, strict=True)
+        }
+    return ranges
 
 
 def _alarm(watched: WatchedRecording, each: Alarm) -> dict[str, Any]:
@@ -97,6 +114,8 @@ def _alarm(watched: WatchedRecording, each: Alarm) -> dict[str, Any]:
         "ground": GROUNDS[each.ground],
         "begin": entry(each.begin, "s"),
         "end": entry(each.end, "s"),
+        "lasts": each.lasts,
+        "in_learning": each.begin - start < watched.plan.learning,
         "turn": entry((each.begin - start) / watched.turn, "1"),
         "at": entry(each.at, "s"),
         "values": {name: entry(x, units[name]) for name, x in each.values.items()},
@@ -108,7 +127,9 @@ def _usual(watched: WatchedRecording) -> Iterator[tuple[str, dict[str, Any]]]:
     deviations and thresholds."""
     time, units = watched.recording.time, _units()
     end = watched.alarms[0].begin if watched.alarms else float(time[-1])
-    rows = (time > time[0] + min(watched.plan.learning, 0.5 * (end - time[0]))) & (time <= end)
+    rows = (time > time[0] + watched.plan.learning) & (time <= end)
+    if not rows.any():
+        return
 
     def median(name: str) -> float | None:
         return float(np.median(watched.outputs[name][rows])) if name in watched.outputs else None
