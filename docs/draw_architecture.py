@@ -29,6 +29,8 @@ HOMES = {
     "identifications": "cli",
     "identify_command": "cli",
     "reported": "cli",
+    "command_options": "cli",
+    "export_command": "cli",
     "sweep_command": "cli",
     "watch_command": "cli",
     "sweeps": "cli",

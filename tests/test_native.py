@@ -892,14 +892,18 @@ def test_what_an_fmu_carries(native, fmus):
             t.get("name"): {m.get("memberName"): m.get("variableName") for m in t}
             for t in root.iter("Terminal")
         }
-        assert set(members["flange"]) == {"phi", "w", "a", "tau"}
-        assert members["flange_a"] == {"phi": "phi", "tau": "tau"}
-        kinds = {t.get("name"): t.get("terminalKind") for t in root.iter("Terminal")}
-        assert kinds.pop("flange_a") == "Modelica.Mechanics.Rotational.Interfaces.Flange_a"
-        assert all(kind.startswith("org.chainunit.") for kind in kinds.values())
-        assert all(set(result.values()) <= known for result in members.values())
-        if model.name != "ChainUnit":
-            assert len(members["load"]) == 7
+        if model.terminals:
+            assert set(members["flange"]) == {"phi", "w", "a", "tau"}
+            assert members["flange_a"] == {"phi": "phi", "tau": "tau"}
+            kinds = {t.get("name"): t.get("terminalKind") for t in root.iter("Terminal")}
+            assert kinds.pop("flange_a") == "Modelica.Mechanics.Rotational.Interfaces.Flange_a"
+            assert all(kind.startswith("org.chainunit.") for kind in kinds.values())
+            assert all(set(result.values()) <= known for result in members.values())
+            if model.name != "ChainUnit":
+                assert len(members["load"]) == 7
+        else:
+            # an observer hangs on single variables
+            assert name == "LoadObserver" and not members
         for fmi in (2, 3):
             variables = fmpy.read_model_description(str(native[name, fmi][0])).modelVariables
             for v in variables:

@@ -68,6 +68,7 @@ def test_study_writes_numbers_series_plots_and_fmus(done):
         "stability.png",
         "resonance.png",
         "ratio.png",
+        "observer.png",
     }
     for name in ("ChamberForces", "DcMotor"):
         assert validate_fmu(str(folder / "fmu" / f"{name}.fmu")) == []

@@ -66,6 +66,7 @@ TYPES: dict[str, str] = {
     "N.m2.s/rad": "TorsionalDampingLength",
     "N.m/rad2": "TorsionalStiffnessSlope",
     "N.m/A": "TorqueConstant",
+    "s/rad": "TorquePerPower",
     "J": "Energy",
     "J/kg": "SpecificEnergy",
     "W": "Power",

@@ -420,6 +420,8 @@ def terminals(interface: Interface) -> Element:
     box = {"x1": "-100", "y1": "-100", "x2": "100", "y2": "100"}
     SubElement(graphics, "CoordinateSystem", box, suggestedScalingFactorTo_mm="0.1")
     SubElement(graphics, "Icon", box)
+    if not interface.model.terminals:
+        return root
     group = SubElement(root, "Terminals")
     for terminal in interface.model.terminals:
         node = SubElement(

@@ -310,18 +310,7 @@ def _config(
             parts.motor.check(values["motor"])
     with faults.collected(), refusal_prefix("", "monte_carlo.event"):
         random = read_random_event(checked.monte_carlo.event, "monte_carlo.event")
-    with faults.collected():
-        of_study["sweep"] = _sweep(data, checked, parts, machine, of_study, events)
-    with faults.collected():
-        if "optimize" in data:
-            loads, run, by_motor = values["feed"], values["run"], bool(parts.designation or "sizing" in data)
-            given = values["optimize"], checked.optimize, parts.machine
-            of_study["optimize"] = read_wishes(*given, machine, loads, run.crank_speed, by_motor)
-    with faults.collected():
-        of_study["identify"] = _identification(data, checked, parts, machine, values, source)
-    with faults.collected():
-        if "watch" in data:
-            of_study["watch"] = read_watch(checked.watch, values["run"].crank_speed, source)
+    of_study |= _tasks(data, checked, parts, machine, values, events, source, faults)
     faults.refuse()
     config = Config(
         title=checked.title,
@@ -359,6 +348,33 @@ def _config(
     faults.add(endless(config))
     faults.refuse()
     return config
+
+
+def _tasks(
+    data: Mapping[str, Any],
+    checked: Any,
+    parts: Parts,
+    machine: Machine | None,
+    values: Mapping[str, Any],
+    events: Mapping[str, Event],
+    source: str,
+    faults: Faults,
+) -> dict[str, Any]:
+    """What commands beside `study` are to do: the plans of their tables, by name; their refusals go to `faults`."""
+    plans: dict[str, Any] = dict.fromkeys(("sweep", "optimize", "identify", "watch"))
+    with faults.collected():
+        plans["sweep"] = _sweep(data, checked, parts, machine, values, events)
+    with faults.collected():
+        if "optimize" in data:
+            loads, run, by_motor = values["feed"], values["run"], bool(parts.designation or "sizing" in data)
+            given = values["optimize"], checked.optimize, parts.machine
+            plans["optimize"] = read_wishes(*given, machine, loads, run.crank_speed, by_motor)
+    with faults.collected():
+        plans["identify"] = _identification(data, checked, parts, machine, values, source)
+    with faults.collected():
+        if "watch" in data:
+            plans["watch"] = read_watch(checked.watch, values["run"].crank_speed, source)
+    return plans
 
 
 def _sweep(

@@ -23,7 +23,7 @@ ROUGH = 1e-3
 ALIKE = 1.005
 """Sums of squares that differ by less than this factor are those of the same point."""
 DAMPING = 1e-2
-"""Damping of the first step, in parts of what is known beforehand."""
+"""Damping of the first step, in parts of the information of the priors."""
 STATED = 100.0
 """Number of rows that would tell the noise of a column as well as its sensor's data sheet does."""
 SETTLINGS = 5

@@ -1,4 +1,4 @@
-"""Values of what is sought with their intervals: the distribution that recordings and what is known beforehand leave.
+"""Values of the sought numbers with their intervals: the distribution that recordings and priors leave.
 
 Near the best fit the simulated columns are taken as quadratic along the directions in which the distribution is wide,
 and as linear along all others. A number of which only the bounds are known is evenly distributed within them
@@ -19,7 +19,7 @@ from .fit import Normal, inverse
 from .problem import OUTLIER, Problem
 
 WIDE = 0.02
-"""Standard deviation of a direction, in parts of that known beforehand, from which on it counts as wide."""
+"""Standard deviation of a direction, in parts of that of its prior, from which on it counts as wide."""
 MOST_WIDE = 6
 STEP = 5e-3
 """Time between the rows that are taken for second derivatives [s]."""
@@ -32,7 +32,7 @@ LEVEL = 0.95
 @dataclass(frozen=True)
 class Marginal:
     """A sought number: its mean `value`, its standard `deviation`, the interval from `low` to `high` that contains it
-    with a probability of 95 %, and the standard deviation `spread` that was known beforehand."""
+    with a probability of 95 %, and the standard deviation `spread` of its prior."""
 
     name: str
     unit: str

@@ -1,0 +1,123 @@
+"""The commands that write FMUs and SSP packages."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+import typer.core
+
+from .command_options import BackendOption
+from .console import study_file, terminal_console
+from .errors import InputError
+
+
+class ExportCommand(typer.core.TyperCommand):
+    """The command that writes a model; its help names all models."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Show the help with the names of all models."""
+        # a module of `machines` adds its own machine: the names are known once all modules are imported
+        from .models import MODELS
+
+        (name,) = (each for each in self.params if each.name == "name")
+        name.help = f"A study file or a linkage file (.toml), or one of {', '.join(MODELS)}."  # type: ignore[attr-defined]
+        super().format_help(ctx, formatter)
+
+
+def export(
+    name: Annotated[str, typer.Argument(help="The model, a linkage file or a study file (.toml).")],
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="FMU file; by default NAME.fmu, of the model's name."),
+    ] = None,
+    config: Annotated[
+        Path | None,
+        typer.Option("--config", help="Study file whose machine, feed or motor gives the start values."),
+    ] = None,
+    backend: BackendOption = None,
+    fmi: Annotated[int, typer.Option("--fmi", help="Version of FMI: 2, or 3 (native only).")] = 2,
+    platforms: Annotated[
+        str | None,
+        typer.Option(
+            "--platforms",
+            help="Comma-separated, of linux64, win64, darwin64, aarch64-linux, or all; this machine's by default.",
+        ),
+    ] = None,
+    rods: Annotated[
+        int | None,
+        typer.Option(
+            "--rods", help="Rods of an organ of ChainUnitFlexible, 2 to 24; 8, or the study's, by default."
+        ),
+    ] = None,
+    direct: Annotated[
+        bool, typer.Option("--direct", help="Of a linkage file: torque in and motion out.")
+    ] = False,
+) -> None:
+    """Write a model as an FMU; of a study file its whole system, from control to machine, as one FMU."""
+    from .fmu.backends import export as write
+    from .study.package import is_study_file, left_out, model_and_start
+
+    file = output
+    if file and file.suffix != ".fmu":
+        raise InputError(f"-o {file}: must be a file name that ends in .fmu")
+    whole = is_study_file(name)
+    if whole and (config or direct):
+        given = f"--config {config}" if config else "--direct"
+        raise InputError(
+            f"{given}: is not of a study file, which has its own values; leave it out for {name}"
+        )
+    if rods is not None and name != "ChainUnitFlexible":
+        raise InputError(f"--rods {rods}: is of ChainUnitFlexible; leave it out for {name}")
+    study_path = Path(name) if whole else config
+    loaded = study_file(study_path) if study_path else None
+    kind: Any = backend.value if backend else None
+    with terminal_console(stderr=True).status("exporting") as status:
+        model, start = model_and_start(name, loaded, rods, direct=direct, backend=kind, report=status.update)
+        file = file or Path(f"{model.name}.fmu")
+        made = write(
+            model,
+            file,
+            start,
+            backend=kind,
+            fmi=fmi,
+            platforms=_platforms(platforms, fmi),
+            report=status.update,
+        )
+    print(f"{file}: {model.name}, {made}")
+    if whole and loaded and (words := left_out(loaded)):
+        print(words)
+
+
+def export_ssp(
+    config: Annotated[
+        Path | None, typer.Argument(help="Study file (TOML); without one, the packaged example.")
+    ] = None,
+    output: Annotated[Path, typer.Option("-o", "--output", help="SSP file.")] = Path("ChainUnitDrive.ssp"),
+    backend: BackendOption = None,
+) -> None:
+    """Write motor and machine, connected, with their parameter sets, as an SSP 1.0 package of FMUs 2.0."""
+    from .study.package import export_study, left_out
+
+    if output.suffix != ".ssp":
+        raise InputError(f"-o {output}: must be a file name that ends in .ssp")
+    loaded = study_file(config)
+    with terminal_console(stderr=True).status("exporting") as status:
+        made = export_study(loaded, output, backend=backend.value if backend else None, report=status.update)
+    print(f"{output}: {made}")
+    if words := left_out(loaded):
+        print(words)
+
+
+def _platforms(choice: str | None, fmi: int) -> list[str]:
+    from .fmu.native.platforms import PLATFORMS
+
+    if choice == "all":
+        return [name for name, platform in PLATFORMS.items() if fmi in platform.folders]
+    if choice is None:
+        return []
+    names = [name.strip() for name in choice.split(",") if name.strip()]
+    if not names:
+        raise InputError(f"--platforms: name at least one of {', '.join(PLATFORMS)}, or all")
+    return names
