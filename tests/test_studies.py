@@ -80,7 +80,7 @@ def test_answers_are_a_table_with_units(result):
     assert table.loc["start_time", "start_up"] == numbers["start_up"]["start_time"]["value"]
     # of a start, a ripple says nothing; no row has nothing to say
     assert np.isnan(table.loc["speed_ripple", "start_up"]) and "coupling_trip_time" not in table.index
-    assert all(kind is np.dtype(float) for kind in table.dtypes.iloc[1:])
+    assert set(table.dtypes.iloc[1:]) == {np.dtype(float)}
 
 
 def test_runs_are_the_tree_in_the_file(result, command):

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .files import claim
 from .progress import Report as Progress
 from .report import identification as contents
 from .report import watch as watching
-from .reported import ReportedResult
+from .report.blocks import Report
+from .reported import WrittenResult
 from .study.config import Config
 from .study.identification.identification import IdentifiedMachine, identify
 from .study.identification.watch import Alarm, WatchedRecording
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-class IdentificationResult(ReportedResult):
+class IdentificationResult(WrittenResult):
     """An identified machine. Its `repr` shows the numbers and the limits of the recordings; `found` is all that the
     fit found."""
 
@@ -28,7 +29,10 @@ class IdentificationResult(ReportedResult):
 
     def __init__(self, found: IdentifiedMachine) -> None:
         self.found = found
-        self._report = contents.identification_report(found)
+
+    @cached_property
+    def _report(self) -> Report:
+        return contents.identification_report(self.found)
 
     @property
     def is_described(self) -> bool:
@@ -62,27 +66,24 @@ class IdentificationResult(ReportedResult):
 
 
 def make_identification(
-    config: Config, folder: Path | None, progress: Progress | None = None
+    config: Config, folder: str | Path | None, progress: Progress | None = None
 ) -> IdentificationResult:
     """Identify the machine of a study, see `chainunit.Study.identify`."""
     report = progress or (lambda *_: None)
-    if folder is None:
-        return IdentificationResult(identify(config, report))
-    with claim(folder, "identify") as place:
-        result = IdentificationResult(identify(config, report))
-        result._clear(place)
-        result._write(place)
-    return result
+    return IdentificationResult._made(lambda: IdentificationResult(identify(config, report)), folder)
 
 
-class WatchResult(ReportedResult):
+class WatchResult(WrittenResult):
     """A watched recording. Its `repr` shows the alarms; `watched` has the outputs of the observer at all rows."""
 
     _command = "watch"
 
     def __init__(self, watched: WatchedRecording) -> None:
         self.watched = watched
-        self._report = watching.watch_report(watched)
+
+    @cached_property
+    def _report(self) -> Report:
+        return watching.watch_report(self.watched)
 
     @property
     def alarms(self) -> tuple[Alarm, ...]:
@@ -96,13 +97,7 @@ class WatchResult(ReportedResult):
         return watching.writers(self._report, folder)
 
 
-def make_watch(config: Config, folder: Path | None, progress: Progress | None = None) -> WatchResult:
+def make_watch(config: Config, folder: str | Path | None, progress: Progress | None = None) -> WatchResult:
     """Watch the recording of a study, see `chainunit.Study.watch`."""
     report = progress or (lambda *_: None)
-    if folder is None:
-        return WatchResult(watched_by(config, report))
-    with claim(folder, "watch") as place:
-        result = WatchResult(watched_by(config, report))
-        result._clear(place)
-        result._write(place)
-    return result
+    return WatchResult._made(lambda: WatchResult(watched_by(config, report)), folder)

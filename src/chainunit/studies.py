@@ -28,7 +28,7 @@ from .report import files, html, optimum, results, series, terminal
 from .report import study as contents
 from .report.blocks import Report
 from .report.drawing import drawing
-from .reported import ReportedResult
+from .reported import WrittenResult
 from .study import config as study_files
 from .study.config import Config
 from .study.foreign_machine import ForeignMachine
@@ -259,14 +259,14 @@ class Study:
         WriteError
             for a file that cannot be written; the others are written.
         """
-        return make_identification(self.config, None if folder is None else Path(folder), progress)
+        return make_identification(self.config, folder, progress)
 
     def watch(self, folder: str | Path | None = None, progress: Progress | None = None) -> WatchResult:
         """Run the load observer over the recording of the table [watch].
 
         Parameters and errors are those of `identify`, without RunError.
         """
-        return make_watch(self.config, None if folder is None else Path(folder), progress)
+        return make_watch(self.config, folder, progress)
 
     def sweep(
         self,
@@ -418,7 +418,7 @@ class StudyResult:
         return html.fragment(self._summary)
 
 
-class BestResult(ReportedResult):
+class BestResult(WrittenResult):
     """The result of a search for the best machine. Its `repr` shows the answer, the parameters and what binds."""
 
     _command = "optimize"
@@ -427,7 +427,10 @@ class BestResult(ReportedResult):
         self.config = config
         self.best = best
         """all that the search found"""
-        self._report = optimum.optimum_report(best, config)
+
+    @cached_property
+    def _report(self) -> Report:
+        return optimum.optimum_report(self.best, self.config)
 
     @property
     def met(self) -> bool:

@@ -11,9 +11,9 @@ from .ending import in_temporary_folder
 from .errors import InputError, WriteError, shown
 from .files import claim, write_all
 from .progress import Report as Progress
-from .report import files, html, terminal
 from .report import sweep as contents
 from .report.blocks import Report
+from .reported import ReportedResult
 from .study.config import Config
 from .study.sweep_summary import SweepSummary
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-class SweepResult:
+class SweepResult(ReportedResult):
     """The results of a sweep. Its `repr` shows the size of the sweep, the best points and the extremes."""
 
     def __init__(self, summary: SweepSummary) -> None:
@@ -53,17 +53,6 @@ class SweepResult:
     @cached_property
     def _report(self) -> Report:
         return contents.report(self.summary)
-
-    def to_json(self) -> str:
-        """The numbers of the report with their units, as the text of result.json."""
-        return files.numbers_text(self._report)
-
-    def __repr__(self) -> str:
-        return terminal.plain(self._report)
-
-    def _repr_html_(self) -> str:
-        """The summary as HTML, for notebooks."""
-        return html.fragment(self._report)
 
 
 def make_sweep(

@@ -167,7 +167,9 @@ def _limits(s: b.Source) -> Iterator[b.Block]:
         yield b.Table(
             tuple(rows),
             b.heads("further run", "deviations fall by the factor", "numbers determined"),
-            title=s.line("Further runs, the best first; today {=told} numbers are determined"),
+            title=s.line(
+                "Further runs, the best first; without one {=told_at_start} numbers can be determined"
+            ),
         )
 
 

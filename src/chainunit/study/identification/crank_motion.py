@@ -9,7 +9,7 @@ import numpy as np
 
 from ...errors import InputError
 from .measurands import COUNTS
-from .problem import mark_times
+from .problem import crank_speed, mark_times
 from .recording import Recording
 
 NEIGHBOURS = 4
@@ -38,8 +38,9 @@ def crank_motion(recording: Recording, angle: float, ratio: float) -> tuple[Any,
     if "motor.count" in columns:
         # the count is rounded down
         phi = angle + (columns["motor.count"] + 0.5) * (2.0 * math.pi / COUNTS) / ratio
-        return phi, _speed(recording, phi, ratio)
-    w, passed = _speed(recording, None, ratio), mark_times(recording)
+        w = crank_speed(recording, ratio)
+        return phi, _counted_speed(recording, phi) if w is None else w
+    w, passed = crank_speed(recording, ratio), mark_times(recording)
     if w is None or len(passed) < 3:
         raise InputError(
             f"{recording.source}: the angle of the crank is not known; must have a column motor.count, or mark with "
@@ -60,14 +61,8 @@ def _turns(passed: Any) -> Any:
     return np.concatenate([[0.0], np.cumsum(np.round(gaps / np.median(gaps)))])
 
 
-def _speed(recording: Recording, phi: Any, ratio: float) -> Any:
-    columns = recording.columns
-    if "crank.w" in columns:
-        return columns["crank.w"]
-    if "motor.w" in columns:
-        return columns["motor.w"] / ratio
-    if phi is None:
-        return None
+def _counted_speed(recording: Recording, phi: Any) -> Any:
+    """The speed that an encoder gives with these angles."""
     half = max(1, round(0.5 * WINDOW / recording.step))
     last = len(phi) - 1
     later, sooner = (np.clip(np.arange(last + 1) + sign * half, 0, last) for sign in (1, -1))

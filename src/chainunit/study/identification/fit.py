@@ -76,12 +76,13 @@ Scales = Mapping[tuple[str, str], float]
 
 def normal(problem: Problem, z: Any, workers: int = 2, scales: Scales | None = None) -> Normal:
     """The normal equations at these values of the unknowns. A residual that is an outlier counts less (Huber)."""
-    return _normal(problem, z, tuple(problem.comparisons(z, workers)), scales)
+    return normal_of(problem, z, tuple(problem.comparisons(z, workers)), scales)
 
 
-def _normal(
+def normal_of(
     problem: Problem, z: Any, comparisons: tuple[Comparison, ...], scales: Scales | None = None
 ) -> Normal:
+    """The same from the `comparisons` at these values."""
     spread = problem.spreads
     size = len(spread)
     fisher, gradient = np.zeros((size, size)), (problem.starts - z) / spread**2
@@ -215,14 +216,14 @@ class _Rounds:
 
     def scaled(self, at: Normal, scales: Scales | None) -> Normal:
         """The same point, with columns that count otherwise."""
-        return _normal(self._problem, at.z, at.comparisons, scales)
+        return normal_of(self._problem, at.z, at.comparisons, scales)
 
     def at(self, z: Any, scales: Scales | None) -> Normal:
         """The normal equations at these values; those of clocks and sensors are the best."""
         self._count += 1
         simulations = self._problem.simulations(z, self._workers)
         z = _settled(self._problem, simulations, z, scales)
-        found = _normal(self._problem, z, tuple(self._problem.compared(simulations, z)), scales)
+        found = normal_of(self._problem, z, tuple(self._problem.compared(simulations, z)), scales)
         self._report(found.cost)
         return found
 
@@ -264,7 +265,7 @@ def _settled(problem: Problem, simulations: Sequence[SimulatedRun], z: Any, scal
     own = ~problem.simulated_with
     best = None
     for _ in range(SETTLINGS):
-        at = _normal(problem, z, tuple(problem.compared(simulations, z, with_slopes=False)), scales)
+        at = normal_of(problem, z, tuple(problem.compared(simulations, z, with_slopes=False)), scales)
         if best is not None and at.cost >= best.cost:
             break
         best, step = at, np.zeros(len(z))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import tempfile
 from collections.abc import Collection, Iterator, Mapping
@@ -22,22 +21,20 @@ from ..config import Config
 from ..drive import Drive
 from .fit import MOST_ROUNDS, Fit, fit
 from .information import Combination, Information, information
-from .inspection import Expectation, inspect
+from .inspection import OF_SPEED, Expectation, inspect
 from .measurands import MEASURANDS
 from .plant import AnyPlant, Plant
 from .posterior import Posterior, posterior
 from .problem import Comparison, Problem, RecordedRun, Sensor
-from .reading import OFFSET_SHARE, WITH_OFFSET, IdentificationPlan, PlannedRun
+from .reading import OFFSET_SHARE, WITH_OFFSET, IdentificationPlan, PlannedRun, WatchPlan
 from .recording import Recording, read_part
-from .residuals import STRAINED, ResidualCheck, Strain, check_residuals, strains
-from .shaft import MeasuredShaft
+from .residuals import ResidualCheck, Strain, check_residuals, strained_priors, strains
+from .shaft import MEASURED, MeasuredShaft
 from .suspicion import Suspicion, suspicions
 from .unknown import Unknown
 
 SIGNALS = ("motor.i", "motor.u", "motor.power", "crank.tau")
 """Quantities of which a recording must have one: they tell the torque."""
-OF_SHAFT = ("crank.tau", "crank.w", "motor.w", "motor.count")
-"""Quantities of a machine whose torque is measured behind its motor, of which nothing need be known."""
 WIDE, NEAR = 5.0, 1.2
 """Factors by which the RMS of a column may differ from the simulated one: of a current, power or torque, which depend
 on the sought numbers; and of a speed or a voltage under control."""
@@ -46,7 +43,6 @@ CONTROL = ("speed_control.kp", "speed_control.ki", "current_control.kp", "curren
 AT_BOUND = 0.02
 """Distance from a bound, in parts of the standard deviation of an even distribution, within which a value lies at
 it."""
-_STEADY = ("motor.w", "crank.w", "motor.u")
 
 
 @dataclass(frozen=True)
@@ -62,8 +58,11 @@ class FittedNumber:
     low: float
     high: float
     is_told: bool
-    at_bound: str = ""
-    """the bound at which the fit ended, "from" or "to"; such a number is not told"""
+
+    @property
+    def at_bound(self) -> str:
+        """The bound at which the fit ended, "from" or "to"; such a number is not told."""
+        return _bound(self.unknown, self.fitted)
 
 
 @dataclass(frozen=True)
@@ -98,7 +97,6 @@ class IdentifiedMachine:
                 each.low,
                 each.high,
                 told[each.name] and not _bound(own, float(x)),
-                _bound(own, float(x)),
             )
             for own, x, each in zip(
                 self.plan.sought,
@@ -123,15 +121,7 @@ class IdentifiedMachine:
     def strains(self) -> list[Strain]:
         """The numbers of clocks and sensors, and sought ones with a stated deviation, that are not as they are
         known."""
-        far = [
-            Strain(own.name, own.unit, float(x), (float(x) - own.start) / own.spread, own.start)
-            for own, x in zip(self.plan.sought, self.best.z, strict=False)
-            if not own.is_even
-        ]
-        return [
-            *strains(self.problem, self.best),
-            *(each for each in far if abs(each.deviations) > STRAINED),
-        ]
+        return [*strains(self.problem, self.best), *strained_priors(self.plan.sought, self.best)]
 
     def courses(self, comparison: Comparison) -> tuple[Any, Any, Any]:
         """The times of the rows that are compared [s], a measured column, and the simulated one as its sensor would
@@ -158,9 +148,9 @@ class IdentifiedMachine:
 def _bound(own: Unknown, x: float) -> str:
     """The bound at which a fitted value lies, "from" or "to"; empty between them."""
     near = AT_BOUND * own.spread
-    if math.isfinite(own.low) and own.is_even and x <= own.low + near:
-        return "from"
-    return "to" if math.isfinite(own.high) and own.is_even and x >= own.high - near else ""
+    if not own.is_even:
+        return ""
+    return "from" if x <= own.low + near else "to" if x >= own.high - near else ""
 
 
 def system_name(name: str) -> str:
@@ -200,7 +190,7 @@ def identify(config: Config, report: Report = lambda *_: None) -> IdentifiedMach
         seed=plan.seed,
     )
     report("checks", 0.95, 1.0)
-    after = information(problem, best.z, workers, propose=False)
+    after = information(problem, best.z, workers, propose=False, comparisons=best.comparisons)
     around = posterior(problem, best, workers, plan.seed)
     checks, suspects = tuple(check_residuals(best)), tuple(suspicions(problem, best, workers))
     return IdentifiedMachine(config, plan, problem, before, best, around, after, checks, suspects)
@@ -223,16 +213,28 @@ def plan_of(config: Config) -> IdentificationPlan:
     return config.identify
 
 
+def read_signal(of: PlannedRun | WatchPlan) -> Recording:
+    """The part of a recording that counts.
+
+    Raises
+    ------
+    InputError
+        see `read_part`; and where no column tells the torque.
+    """
+    recording = read_part(of.file, of.columns, of.begin, of.end)
+    if not recording.columns.keys() & set(SIGNALS):
+        raise InputError(
+            f"{of.file}: has no column that tells the torque; must have one of {', '.join(SIGNALS)}"
+        )
+    return recording
+
+
 def _recordings(plan: IdentificationPlan) -> dict[str, Recording]:
     """The recordings by the names of the runs, each with the part that counts."""
     faults, recordings = Faults(), dict[str, Recording]()
     for run in plan.runs:
         with faults.collected():
-            recording = read_part(run.file, run.columns, run.begin, run.end)
-            if not recording.columns.keys() & set(SIGNALS):
-                raise InputError(
-                    f"{run.file}: has no column that tells the torque; must have one of {', '.join(SIGNALS)}"
-                )
+            recording = read_signal(run)
             begin, end = recording.time[0], recording.time[-1]
             if run.off is not None and not begin < run.off < end:
                 raise InputError(
@@ -270,7 +272,7 @@ def _problem(
 
 def is_of_shaft(columns: Collection[str]) -> bool:
     """Whether the columns are those of a machine whose motor is not recorded."""
-    return all(name in (*OF_SHAFT, "mark") for name in columns)
+    return all(name in (*MEASURED, "mark") for name in columns)
 
 
 def plant_for(drive: Drive, columns: Collection[str], by: list[str]) -> AnyPlant:
@@ -325,7 +327,7 @@ def inspect_runs(problem: Problem, workers: int) -> None:
         expected = {}
         for name in run.recording.columns:
             if MEASURANDS[name].analog:
-                size, factor = rms(response.values[name]), NEAR if name in _STEADY else WIDE
+                size, factor = rms(response.values[name]), NEAR if name in OF_SPEED else WIDE
                 expected[name] = Expectation(
                     size / factor,
                     size * factor,

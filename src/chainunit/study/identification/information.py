@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from ...system import Profile
-from .fit import inverse, normal
+from .fit import inverse, normal, normal_of
 from .plant import CRANK
-from .problem import Problem, RecordedRun
+from .problem import Comparison, Problem, RecordedRun
 from .recording import Recording
 
 TOLD = 0.5
@@ -98,14 +98,21 @@ class Information:
     proposals: tuple[Proposal, ...]
 
 
-def information(problem: Problem, z: Any = None, workers: int = 2, propose: bool = True) -> Information:
+def information(
+    problem: Problem,
+    z: Any = None,
+    workers: int = 2,
+    propose: bool = True,
+    comparisons: tuple[Comparison, ...] | None = None,
+) -> Information:
     """What the runs of a problem can tell at the values `z` of the unknowns, by default the start values.
 
     Of the recordings the columns, the times of the rows and the sizes of the noise count. With `propose` further runs
-    are ranked, each of which is simulated.
+    are ranked, each of which is simulated. Without the `comparisons` at these values the runs are simulated, too.
     """
     z = problem.started(workers) if z is None else z
-    fisher = normal(problem, z, workers).fisher
+    at = normal(problem, z, workers) if comparisons is None else normal_of(problem, z, comparisons)
+    fisher = at.fisher
     outlooks, told = _outlooks(problem, fisher), _combinations(problem, fisher)
     proposals = _proposals(problem, z, fisher, outlooks, workers) if propose else ()
     return Information(outlooks, told, _blind(problem, fisher), tuple(proposals))

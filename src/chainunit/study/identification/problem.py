@@ -35,6 +35,8 @@ AHEAD = 0.04
 STANDING, SMOOTHED = 0.1, 0.1
 """Share of the crank speed of a run below which the machine stands, and the time over which its speed is averaged for
 that [s]."""
+MARK_ANGLE = "mark.angle"
+"""Name of the crank angle at the mark among the unknowns."""
 _CHANGE = 0.2
 """Change of an unknown for which the derivatives are integrated, in parts of its spread."""
 
@@ -162,7 +164,7 @@ class Problem:
                 yield _nuisance(f"gain({name})", "1", 1.0, sensor.gain)
         if "mark" in self.sensors:
             # the mark is near the crank angle 0, at most a twentieth of a turn beside it
-            yield _nuisance("mark.angle", "rad", 0.0, 0.2)
+            yield _nuisance(MARK_ANGLE, "rad", 0.0, 0.2)
 
     def _of_run(self, run: RecordedRun) -> Iterator[Unknown]:
         columns = run.recording.columns
@@ -320,8 +322,8 @@ class Problem:
                 at, sooner = self._clock(run, passed, value)
                 x, slopes, rate = simulation.sampled(CRANK, at, with_slopes)
                 size = speed_of(run, self.plant.ratio) * recording.step / math.sqrt(12.0)
-                off = (x - value["mark.angle"] + math.pi) % (2.0 * math.pi) - math.pi
-                more = {key: rate * each for key, each in sooner.items()} | {"mark.angle": -np.ones(len(x))}
+                off = (x - value[MARK_ANGLE] + math.pi) % (2.0 * math.pi) - math.pi
+                more = {key: rate * each for key, each in sooner.items()} | {MARK_ANGLE: -np.ones(len(x))}
                 yield self._comparison(run, name, -off / size, slopes / size, names, more, x, size)
                 continue
             x, slopes, rate = simulation.sampled(name, time, with_slopes)
@@ -371,17 +373,23 @@ def mark_times(recording: Recording) -> Any:
     return recording.time[recording.columns["mark"] > 0.5] - 0.5 * recording.step
 
 
+def crank_speed(recording: Recording, ratio: float) -> Any:
+    """The speed of the crank at the rows [rad/s], shape (n,), by a column of it or of the motor's speed; None without
+    one."""
+    columns = recording.columns
+    if "crank.w" in columns:
+        return columns["crank.w"]
+    return columns["motor.w"] / ratio if "motor.w" in columns else None
+
+
 def until_rest(run: RecordedRun, ratio: float) -> RecordedRun:
     """A run whose motor is switched off, until the machine has come to rest: friction that is smoothed lets it creep,
     where a real one sticks. A run without a column of the speed or an encoder stays as it is."""
     recording, columns = run.recording, run.recording.columns
     if run.off is None or not {"crank.w", "motor.w", "motor.count"} & columns.keys():
         return run
-    if "crank.w" in columns:
-        speed = columns["crank.w"]
-    elif "motor.w" in columns:
-        speed = columns["motor.w"] / ratio
-    else:
+    speed = crank_speed(recording, ratio)
+    if speed is None:
         speed = np.gradient(columns["motor.count"], recording.time) * (2.0 * math.pi / COUNTS / ratio)
     smooth = uniform_filter1d(speed, max(1, round(SMOOTHED / recording.step)))
     swings = recording.time[np.abs(smooth) > STANDING * run.crank_speed]
@@ -401,6 +409,5 @@ def speed_of(run: RecordedRun, ratio: float) -> float:
     if "motor.count" in columns:
         turns = np.ptp(columns["motor.count"]) / (COUNTS * ratio)
         return float(2.0 * math.pi * turns / np.ptp(recording.time))
-    if "crank.w" in columns:
-        return float(np.mean(columns["crank.w"]))
-    return float(np.mean(columns["motor.w"])) / ratio if "motor.w" in columns else run.crank_speed
+    speed = crank_speed(recording, ratio)
+    return run.crank_speed if speed is None else float(np.mean(speed))

@@ -3,7 +3,7 @@ clocks and sensors: a wrong gear is described by a clock that runs too fast."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +13,7 @@ from scipy.stats import chi2
 from ...refusals import unit_behind
 from .fit import Normal
 from .problem import Comparison, Problem
+from .unknown import Unknown
 
 ORDERS = 20
 """Highest order of the crank that is looked at."""
@@ -71,6 +72,13 @@ def strains(problem: Problem, best: Normal) -> list[Strain]:
     numbers = zip(problem.unknowns, best.z, problem.simulated_with, strict=True)
     own = [(u, float(x), (float(x) - u.start) / u.spread) for u, x, simulated in numbers if not simulated]
     return [Strain(u.name, u.unit, x, far) for u, x, far in own if abs(far) > STRAINED]
+
+
+def strained_priors(sought: Sequence[Unknown], best: Normal) -> list[Strain]:
+    """The `sought` numbers with a stated deviation, in the order of the problem, that are not as they are known."""
+    known = [(u, float(x)) for u, x in zip(sought, best.z, strict=False) if not u.is_even]
+    priors = [Strain(u.name, u.unit, x, (x - u.start) / u.spread, u.start) for u, x in known]
+    return [each for each in priors if abs(each.deviations) > STRAINED]
 
 
 def check_residuals(best: Normal) -> list[ResidualCheck]:

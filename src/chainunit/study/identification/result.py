@@ -13,11 +13,14 @@ from ... import __version__
 from ...refusals import unit_behind
 from ...text import array_entry, entry, shown_in
 from ..study_file import changed_tables
+from .fit import Normal
 from .identification import FittedNumber, IdentifiedMachine, remarks, system_name
 from .information import Combination, short_name
 from .measurands import MEASURANDS
 from .plant import ANGLE
+from .problem import MARK_ANGLE, Problem
 from .residuals import ResidualCheck
+from .unknown import Unknown
 
 RESULT = "result.json"
 """Name of the file with the result."""
@@ -63,12 +66,15 @@ def _as_dict(found: IdentifiedMachine) -> dict[str, Any]:
         "correlations": list(_correlations(found)),
         "combinations": [_combination(found, each) for each in found.after.combinations],
         "blind": [_blind(found, each) for each in found.after.blind],
+        "told_at_start": entry(float(sum(each.is_told for each in found.before.outlooks)), "1"),
         "proposals": [
             {"text": each.words, "factor": entry(each.factor, "1"), "told": entry(float(each.told), "1")}
             for each in found.before.proposals
         ],
         "residuals": [_check(found, each) for each in found.checks],
-        "sensors": dict(_nuisances(found)),
+        "sensors": {
+            unknown.name: each for unknown, each in fitted_entries(found.problem, best) if unknown.is_nuisance
+        },
         "fit": {
             "rounds": entry(float(best.rounds), "1"),
             "starts": entry(float(best.starts), "1"),
@@ -166,18 +172,20 @@ def _check(found: IdentifiedMachine, each: ResidualCheck) -> dict[str, Any]:
     }
 
 
-def _nuisances(found: IdentifiedMachine) -> Iterator[tuple[str, dict[str, Any]]]:
-    best = found.best
-    for unknown, x, s in zip(found.problem.unknowns, best.z, best.deviations, strict=True):
-        if unknown.is_nuisance:
-            kind = "difference" if unknown.unit == "K" else ""
-            x = (
-                float(x) % (2.0 * math.pi)
-                if unknown.name.endswith(f".{ANGLE}") and "mark" not in unknown.name
-                else x
-            )
-            value = entry(float(x), unknown.unit, "temperature" if unknown.unit == "K" else "")
-            yield unknown.name, {"value": value, "deviation": entry(float(s), unknown.unit, kind)}
+def fitted_entries(problem: Problem, best: Normal) -> Iterator[tuple[Unknown, dict[str, Any]]]:
+    """Each unknown of a fit with its value and standard deviation as entries of a result. The angle of a run is
+    within a turn; that of the mark lies on both sides of 0."""
+    for unknown, x, s in zip(problem.unknowns, best.z, best.deviations, strict=True):
+        value, kelvin = float(x), unknown.unit == "K"
+        if unknown.is_nuisance and unknown.name.endswith(f".{ANGLE}") and unknown.name != MARK_ANGLE:
+            value %= 2.0 * math.pi
+        yield (
+            unknown,
+            {
+                "value": entry(value, unknown.unit, "temperature" if kelvin else ""),
+                "deviation": entry(float(s), unknown.unit, "difference" if kelvin else ""),
+            },
+        )
 
 
 def _courses(found: IdentifiedMachine, run: str) -> dict[str, Any]:
@@ -219,13 +227,7 @@ def sentences(found: IdentifiedMachine) -> list[str]:
         for name, each in found.estimates.items()
         if each.at_bound
     ]
-    words += [
-        f"{each.name} = {each.known:.4g}{unit_behind(each.unit)}: the recordings would prefer "
-        f"{each.known + each.change:.4g}{unit_behind(each.unit)} (standard deviation {each.deviation:.2g}) if it "
-        "alone were wrong"
-        for each in found.suspicions
-        if each.is_suspicious and each.known * (each.known + each.change) > 0.0
-    ]
+    words += [str(each) for each in found.suspicions if each.is_suspicious]
     for check in found.checks:
         unit = MEASURANDS[check.column].unit
         if not check.is_noise:

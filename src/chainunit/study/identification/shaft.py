@@ -30,6 +30,8 @@ from ..drive import Drive
 from .measurands import COUNTS
 from .plant import ANGLE, CRANK, GUARD, Course, Nuisance, Overview, Response, SourcedLoop
 
+MEASURED = ("crank.tau", "crank.w", "motor.w", "motor.count")
+"""Quantities of a machine whose torque is measured behind its motor, of which nothing need be known."""
 ORDERS, CHANGING = 60, 6
 """Orders of the crank in its motion, and the orders that may change over the run, as a motor warms up."""
 RIPPLE, CHANGE = 0.3, 0.05
@@ -61,7 +63,7 @@ class MeasuredShaft:
     Parameters
     ----------
     machine : the machine, with the ratio of its gear
-    measured : of "crank.tau", "crank.w", "motor.w" and "motor.count"
+    measured : of `MEASURED`
     by : full names of the parameters and inputs of the machine that are sought, as in a drive: "machine.r"
 
     Raises
@@ -73,11 +75,10 @@ class MeasuredShaft:
     slips = False
 
     def __init__(self, machine: Machine, measured: Sequence[str], by: Sequence[str]) -> None:
-        known = ("crank.tau", "crank.w", "motor.w", "motor.count")
         for name in measured:
-            if name not in known:
+            if name not in MEASURED:
                 raise InputError(
-                    f"{name}: is not measured at a shaft without motor data; there are {', '.join(known)}"
+                    f"{name}: is not measured at a shaft without motor data; there are {', '.join(MEASURED)}"
                 )
         model = machine.model
         arguments = {*model.parameter_layout.names, *model.input_layout.names}

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ...refusals import unit_behind
 from .fit import Normal, normal
 from .problem import Problem
 from .unknown import Unknown
@@ -38,6 +39,16 @@ class Suspicion:
     known: float
     change: float
     deviation: float
+
+    def __str__(self) -> str:
+        unit, preferred = unit_behind(self.unit), self.known + self.change
+        words = f"{self.name} = {self.known:.4g}{unit}: "
+        if self.known * preferred <= 0.0:
+            return words + "the recordings contradict it, and no value of its sign would mend that alone"
+        return (
+            f"{words}the recordings would prefer {preferred:.4g}{unit} (standard deviation {self.deviation:.2g}) if "
+            "it alone were wrong"
+        )
 
     @property
     def is_suspicious(self) -> bool:

@@ -30,12 +30,12 @@ from ..observation import tuning, weights
 from ..observer_table import ObserverTable
 from .crank_motion import crank_motion
 from .fit import Fit, fit
-from .identification import SIGNALS, drive_of, inspect_runs, is_of_shaft, plant_for
+from .identification import drive_of, inspect_runs, is_of_shaft, plant_for, read_signal
 from .measurands import MEASURANDS
-from .problem import Problem, RecordedRun, Sensor
+from .problem import MARK_ANGLE, Problem, RecordedRun, Sensor
 from .reading import OFFSET_SHARE, WITH_OFFSET, WatchPlan
-from .recording import Recording, read_part
-from .residuals import STRAINED, ResidualCheck, Strain, check_residuals, strains
+from .recording import Recording
+from .residuals import ResidualCheck, Strain, check_residuals, strained_priors, strains
 from .unknown import Unknown
 
 RUN = "watch"
@@ -118,24 +118,14 @@ class WatchedRecording:
     @property
     def strains(self) -> list[Strain]:
         """The numbers of clock and sensors that are not as they are known, and feeds that are not as stated."""
-        feeds = [
-            Strain(file_name(u.name), u.unit, float(x), (float(x) - u.start) / u.spread, u.start)
-            for u, x in zip(self.problem.sought, self.learned.z, strict=False)
-        ]
-        return [
-            *strains(self.problem, self.learned),
-            *(each for each in feeds if abs(each.deviations) > STRAINED),
-        ]
+        loads = strained_priors(self.problem.sought, self.learned)
+        named = (replace(each, name=file_name(each.name)) for each in loads)
+        return [*strains(self.problem, self.learned), *named]
 
     @property
     def turn(self) -> float:
         """Time of a turn of the crank [s]."""
         return 2.0 * math.pi / self.plan.crank_speed
-
-    def of_learning(self, name: str) -> tuple[float, float]:
-        """A learned number and its standard deviation, by its name in the fit."""
-        k = self.problem.place[name]
-        return float(self.learned.z[k]), float(self.learned.deviations[k])
 
 
 def file_name(name: str) -> str:
@@ -168,11 +158,7 @@ def watch(config: Config, report: Report = lambda *_: None) -> WatchedRecording:
     plan = watch_plan_of(config)
     workers = min(2, os.cpu_count() or 1)
     report("reading the recording", 0.0, 1.0)
-    recording = read_part(plan.file, plan.columns, plan.begin, plan.end)
-    if not recording.columns.keys() & set(SIGNALS):
-        raise InputError(
-            f"{plan.file}: has no column that tells the torque; must have one of {', '.join(SIGNALS)}"
-        )
+    recording = read_signal(plan)
     duration = float(recording.time[-1] - recording.time[0])
     if not plan.learning < duration:
         raise InputError(
@@ -188,7 +174,7 @@ def watch(config: Config, report: Report = lambda *_: None) -> WatchedRecording:
     shaft = is_of_shaft(recording.columns)
     ratio = 1.0 if shaft else drive.ratio
     angle = next(each.angle[0] for each in learned.comparisons if each.rows is not None)
-    angle = float(angle) if "motor.count" in recording.columns else found.get("mark.angle", 0.0)
+    angle = float(angle) if "motor.count" in recording.columns else found.get(MARK_ANGLE, 0.0)
     phi, w = crank_motion(recording, angle, drive.ratio)
     values = _parameters(config, plan, drive, recording, found, ratio)
     uncertainty = _uncertainty(plan, values)
@@ -358,10 +344,8 @@ def _alarms(time: Any, outputs: Mapping[str, Any], turn: float) -> list[Alarm]:
     """The alarms in order; those of one side with a short lull between them are one."""
     found: list[Alarm] = []
     for side, sign in (("left", 1.0), ("right", -1.0)):
-        on = outputs["alarm"] == sign
-        ends = [(a, z) for a, z in stretches(on)]
         joined: list[tuple[int, int]] = []
-        for first, last in ends:
+        for first, last in stretches(outputs["alarm"] == sign):
             if joined and time[first] - time[joined[-1][1] - 1] < LULL * turn:
                 joined[-1] = joined[-1][0], last
             else:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -11,7 +10,7 @@ import numpy as np
 from ... import __version__
 from ...machines.load_observer import LoadObserver
 from ...text import array_entry, entry, shown_in
-from .plant import ANGLE
+from .result import fitted_entries
 from .watch import OUTPUTS, Alarm, WatchedRecording, file_name
 
 ROWS = 1500
@@ -76,20 +75,9 @@ def _as_dict(watched: WatchedRecording) -> dict[str, Any]:
 
 def _learned(watched: WatchedRecording) -> Iterator[tuple[str, dict[str, Any]]]:
     """The numbers that were learned from the begin of the recording, without the orders of a motion."""
-    for unknown in watched.problem.unknowns:
-        if ".order." in unknown.name:
-            continue
-        value, deviation = watched.of_learning(unknown.name)
-        if unknown.name.endswith(f".{ANGLE}") and unknown.name != "mark.angle":
-            value %= 2.0 * math.pi
-        kelvin = unknown.unit == "K"
-        yield (
-            file_name(unknown.name),
-            {
-                "value": entry(value, unknown.unit, "temperature" if kelvin else ""),
-                "deviation": entry(deviation, unknown.unit, "difference" if kelvin else ""),
-            },
-        )
+    for unknown, each in fitted_entries(watched.problem, watched.learned):
+        if ".order." not in unknown.name:
+            yield file_name(unknown.name), each
 
 
 def _thresholds(watched: WatchedRecording) -> dict[str, Any]:
