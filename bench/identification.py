@@ -9,6 +9,7 @@
 # - `bare`: of the machine nothing is known but the bounds from which it is drawn.
 # - `weighed`: masses are known to 5 %, gains of the sensors to 1 %.
 # - `wrong`: the recorded machine is another one than the fitted model.
+# - `slight`: it is another one, too, but moves the torque by no more than some percent, or at standstill alone.
 
 # %%
 from __future__ import annotations
@@ -67,10 +68,16 @@ WRONG: dict[str, dict[str, float]] = {
     "friction grows with speed": {"machine.pin.w_smooth": 0.2},
     "chains": {},
     "gear 2 % larger": {},
+}
+"""Recorded machines that the model does not describe, with the values that differ from those of the model."""
+SLIGHT: dict[str, dict[str, float]] = {
     "crank 2 % longer": {},
     "friction without a smooth passage": {"machine.pin.w_smooth": 0.002},
 }
-"""Recorded machines that the model does not describe, with the values that differ from those of the model."""
+"""The same with little difference."""
+OTHERS = {"wrong": WRONG, "slight": SLIGHT}
+TRIALS = {"bare": 200, "weighed": 100, "wrong": 102, "slight": 20}
+"""Number of machines of each kind of trial."""
 SHARP = 0.005
 """Standard deviation in parts of the value from which on a number is told sharply."""
 
@@ -99,16 +106,14 @@ def ranges() -> dict[str, tuple[float, float]]:
 
 def hidden(trial: str, k: int) -> Hidden:
     """The machine of this number."""
-    rng = np.random.default_rng([k, ("bare", "weighed", "wrong").index(trial)])
+    rng = np.random.default_rng([k, list(TRIALS).index(trial)])
     values = {f"machine.{name}": float(rng.uniform(*limits)) for name, limits in ranges().items()}
     kind = KINDS[k % len(KINDS)]
     angle = "mark" if kind == "torque" else ("mark", "motor.count")[k // len(KINDS) % 2]
     own = Hidden(kind, 1000.0 if k % 4 == 0 else 200.0, angle, k, values)
-    if trial == "wrong":
-        if kind == "torque":
-            # the torque is measured behind the gear
-            own = replace(own, kind="dc")
-        return replace(own, wrong=list(WRONG)[k % len(WRONG)])
+    if trial in OTHERS:
+        kinds, wrong = ("dc", "im"), list(OTHERS[trial])  # a torque is measured behind the gear
+        return replace(own, kind=kinds[k // (2 * len(wrong)) % 2], wrong=wrong[k % len(wrong)])
     if trial == "bare":
         return own
     priors = {}
@@ -181,7 +186,7 @@ def problem(of: Hidden) -> Problem:
             drift=float(rng.uniform(-5e-5, 5e-5)),
         )  # fmt: skip
         run = HiddenRun(
-            speed, DURATION, of.values | known | none | WRONG.get(of.wrong, {}),
+            speed, DURATION, of.values | known | none | (WRONG | SLIGHT).get(of.wrong, {}),
             float(rng.uniform(0.0, 2.0 * math.pi)), float(rng.uniform(293.15, 325.0)),
         )  # fmt: skip
         recording = synthetic(drive(of.kind, of.wrong), columns, run, logger, rng)
@@ -216,7 +221,7 @@ def result(trial: str, k: int) -> dict[str, Any]:
         "suspicions": {each.name: (each.change, each.deviation) for each in suspects},
         "suspicious": [each.name for each in suspects if each.is_suspicious],
     }  # fmt: skip
-    if trial != "wrong":
+    if trial not in OTHERS:
         figures["numbers"] = [
             {
                 "name": m.name, "true": of.values[m.name], "value": m.value, "deviation": m.deviation, "low": m.low,
@@ -301,11 +306,11 @@ def summary(trials: Mapping[str, Sequence[Mapping[str, Any]]]) -> dict[str, Any]
                 "rounds": max(each["rounds"] for each in own),
                 "seconds": float(np.median([each["seconds"] for each in own])),
             }
-    for name in WRONG:
-        own = [each for each in trials["wrong"] if each["wrong"] == name]
-        if own:
-            found = [is_wrong(each) for each in own]
-            figures.setdefault("wrong", {})[name] = {"machines": len(own), "found": float(np.mean(found))}
+    for trial, others in OTHERS.items():
+        for name in others:
+            if own := [each for each in trials[trial] if each["wrong"] == name]:
+                found = float(np.mean([is_wrong(each) for each in own]))
+                figures.setdefault(trial, {})[name] = {"machines": len(own), "found": found}
     return figures
 
 
@@ -346,10 +351,9 @@ def text(figures: Mapping[str, Any]) -> str:
                 f"{100.0 * own['sharp_worst']:.2g} %, the median {100.0 * own['sharp_median']:.2g} %"
             )
         parts.append(words + ".\n\n" + table(["", *HEADS.values()], cells))
-    if "wrong" in figures:
+    if others := {name: row for trial in OTHERS for name, row in figures.get(trial, {}).items()}:
         cells = (
-            [name, str(row["machines"]), f"{100.0 * row['found']:.0f} %"]
-            for name, row in figures["wrong"].items()
+            [name, str(row["machines"]), f"{100.0 * row['found']:.0f} %"] for name, row in others.items()
         )
         parts.append(table(["recorded machine", "trials", "recognised"], cells))
     return "\n".join(parts)
@@ -360,12 +364,11 @@ def main() -> None:
     options.add_argument(
         "--folder", type=Path, default=Path("identification_trials"), help="where trials are kept"
     )
-    options.add_argument("--bare", type=int, default=200, help="number of machines")
-    options.add_argument("--weighed", type=int, default=100)
-    options.add_argument("--wrong", type=int, default=100)
+    for trial, count in TRIALS.items():
+        options.add_argument(f"--{trial}", type=int, default=count, help="number of machines")
     given = options.parse_args()
     given.folder.mkdir(parents=True, exist_ok=True)
-    counts = {trial: getattr(given, trial) for trial in ("bare", "weighed", "wrong")}
+    counts = {trial: getattr(given, trial) for trial in TRIALS}
     for trial, count in counts.items():
         for k in range(count):
             file = given.folder / f"{trial}-{k}.json"
