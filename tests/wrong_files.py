@@ -243,6 +243,15 @@ FILES = [
             (32, "identify.sensor.2.offset", "a number in A"),
         ],
     ),
+    (
+        "[[identify.parameter]]\nname = 'machine.left.web_mass'\nfrom = 1\nto = 2\n"
+        "[[identify.run]]\nfile = 'a.csv'\nname = 'mark'\n"
+        "[[identify.run]]\nfile = 'a.csv'\nname = 'b'\n[[identify.run]]\nfile = 'b.csv'\nname = 'b'\n",
+        [
+            (7, "identify.run.1.name", "stands for the mark of a turn"),
+            (13, "identify.run.3.name", "is the name of another run"),
+        ],
+    ),
     ("organ = 'chain'\n[identify]\n[driveline]", [
         (2, "identify", "driveline stands between"), (2, "identify", "organs are chains")]),
     ("[sweep]\n[sizing]", [(1, "sweep", "leave out one of the two")]),
