@@ -1,11 +1,11 @@
-"""What the benches share: least times, and their figures as JSON for the page of docs/performance.md."""
+"""What the benches share: least times, tables, and figures as JSON for docs/performance.md and docs/trials.md."""
 
 from __future__ import annotations
 
 import argparse
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -39,3 +39,9 @@ def save(file: Path | None, figures: Any) -> None:
     """Write the figures, if there is a file for them."""
     if file is not None:
         file.write_text(json.dumps(figures, indent=1) + "\n", "utf-8")
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table in Markdown."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"

@@ -24,8 +24,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from figures import parser, save
-from page import table
+from figures import parser, save, table
 
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor
@@ -332,31 +331,44 @@ def cell(key: str, x: float) -> str:
     return f"{100.0 * x:.1f} %" if key == "cover" else f"{100.0 * x:.2g} %"
 
 
-def text(figures: Mapping[str, Any]) -> str:
-    """The tables of the trials in Markdown."""
-    parts = []
-    for trial in [trial for trial in ("bare", "weighed") if trial in figures]:
-        own = figures[trial]
-        rows = {"all numbers": own, **own["by_kind"], **own["by_number"]}
-        keys = list(HEADS)
-        cells = (
-            [name, *(cell(key, row[key]) if key in row else "" for key in keys)] for name, row in rows.items()
-        )
-        words = f"{own['machines']} machines, {trial}: at most {own['rounds']} rounds"
-        words += f", {own['seconds']:.0f} s (median)"
-        words += f"; {100.0 * own['alarms']:.2g} % taken for another machine"
-        if own["sharp"]:
-            words += (
-                f"; of {own['sharp']} numbers with a bound of at most {100.0 * SHARP:g} % the largest error is "
-                f"{100.0 * own['sharp_worst']:.2g} %, the median {100.0 * own['sharp_median']:.2g} %"
-            )
-        parts.append(words + ".\n\n" + table(["", *HEADS.values()], cells))
-    if others := {name: row for trial in OTHERS for name, row in figures.get(trial, {}).items()}:
-        cells = (
-            [name, str(row["machines"]), f"{100.0 * row['found']:.0f} %"] for name, row in others.items()
-        )
-        parts.append(table(["recorded machine", "trials", "recognised"], cells))
-    return "\n".join(parts)
+def coverage_table(figures: Mapping[str, Any]) -> str:
+    """How errors follow their stated deviations, over all numbers, by drive and by number."""
+    rows = {"all numbers": figures, **figures["by_kind"], **figures["by_number"]}
+    keys = list(HEADS)
+    cells = (
+        [name, *(cell(key, row[key]) if key in row else "" for key in keys)] for name, row in rows.items()
+    )
+    return table(["", *HEADS.values()], cells)
+
+
+def words(figures: Mapping[str, Any]) -> str:
+    """The rest of the figures of `bare` or `weighed`."""
+    f = figures
+    return (
+        f"{f['machines']} machines, {f['numbers']:,} numbers. Errors over stated deviations have the mean "
+        f"{f['mean']:.2f} and the root mean square {f['error']:.2f}; the spread is {f['to_bound']:.2f} of the "
+        f"bound. Of {f['sharp']} numbers with a bound of at most {100.0 * SHARP:g} % the largest error is "
+        f"{100.0 * f['sharp_worst']:.2g} %, the median {100.0 * f['sharp_median']:.2g} %. A fit takes at "
+        f"most {f['rounds']} rounds and {f['seconds']:.0f} s (median). {100.0 * f['alarms']:.2g} % of the "
+        "machines are taken for another one."
+    )
+
+
+def recognised(figures: Mapping[str, Any]) -> str:
+    """How many wrong models are recognised."""
+    others = {name: row for trial in OTHERS for name, row in figures.get(trial, {}).items()}
+    cells = ([name, str(row["machines"]), f"{100.0 * row['found']:.0f} %"] for name, row in others.items())
+    return table(["recorded machine", "trials", "recognised"], cells)
+
+
+def tables(figures: Mapping[str, Any]) -> dict[str, str]:
+    """The tables and sentences of the figures in Markdown, by name."""
+    own = [trial for trial in ("bare", "weighed") if trial in figures]
+    return {
+        **{trial: coverage_table(figures[trial]) for trial in own},
+        **{f"{trial}_words": words(figures[trial]) for trial in own},
+        "recognised": recognised(figures),
+    }
 
 
 def main() -> None:
@@ -380,7 +392,7 @@ def main() -> None:
                     flush=True,
                 )
     figures = summary({trial: kept(given.folder, trial, count) for trial, count in counts.items()})
-    print(text(figures))
+    print(*tables(figures).values(), sep="\n\n")
     save(given.json, figures)
 
 

@@ -20,9 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from figures import parser, save
-from rich.console import Console
-from rich.table import Table
+from figures import parser, save, table
 
 from chainunit import engines
 from chainunit.fmu.native.export import export
@@ -39,6 +37,10 @@ TURN, RATIO = 2.1, 50.0
 """Time of a turn [s], a whole number of samples, and motor turns per crank turn."""
 RUN_IN = 60.0
 """Time after which course and covariance repeat with each turn [s]."""
+PERMITTED = ((1000.0, 10_000, 20), (1.0, 10_000, 200))
+"""Permitted false alarms in a million turns, with the numbers of machines and of turns in which they are counted."""
+SPEEDS = np.arange(1.0, 4.01, 0.25)
+"""Speeds of the crank on chains [rad/s]."""
 RESONANCE = 1.8
 """Lowest resonance of a chain in parts of sqrt(g/l1)."""
 
@@ -227,40 +229,89 @@ def chains(file, speeds, rods=(3, 1)):
     return rows
 
 
+def measured(folder, permitted=PERMITTED, speeds=SPEEDS):
+    """All figures: false alarms for `permitted` rates in a million turns with so many machines and turns of each,
+    and the false imbalance on chains at crank `speeds`."""
+    file = export(MODELS["LoadObserver"], Path(folder) / "observer.fmu")
+    alarms = []
+    for rate, machines, turns in permitted:
+        counts, _, periodic = false_alarms(file, rate, machines, turns)
+        total, levels = machines * turns, periodic.thresholds / periodic.stationary()
+        alarms.append(
+            {
+                "permitted": rate, "turns": total, "by_feed": int(counts[0]), "by_force": int(counts[1]),
+                "found": 1e6 * int(counts.sum()) / total,
+                "levels": [[float(level.min()), float(level.max())] for level in levels.T],
+            }
+        )  # fmt: skip
+        print(f"{alarms[-1]['found']:g} of {rate:g} permitted false alarms in 1e6 turns", flush=True)
+    resonance = RESONANCE * math.sqrt(9.81 / 1.35)
+    return {
+        "false_alarms": alarms,
+        "step": cost(file, course(MODELS["ChamberForces"], 3.0, 15.0)),
+        "chains": [
+            {
+                "speed": float(speed),
+                "share": float(speed / resonance),
+                "mean": mean,
+                "most": most,
+                "bars": bars,
+            }
+            for speed, mean, most, bars in chains(file, speeds)
+        ],
+    }
+
+
+def share_below(figures, imbalance):
+    """The largest speed in parts of the resonance up to which the false imbalance stays below this one."""
+    share = 0.0
+    for row in figures["chains"]:
+        if row["most"] >= imbalance:
+            break
+        share = row["share"]
+    return share
+
+
+def tables(figures):
+    """The tables and numbers of the figures in Markdown, by name."""
+    alarms = (
+        [
+            f"{row['permitted']:g}", f"{row['turns']:,}", str(row["by_feed"]), str(row["by_force"]),
+            f"{row['found']:.3g}", *(f"{low:.2f} to {high:.2f}" for low, high in row["levels"]),
+        ]
+        for row in figures["false_alarms"]
+    )  # fmt: skip
+    chains = (
+        [
+            f"{row['speed']:.2f}",
+            f"{row['share']:.2f}",
+            *(f"{100.0 * row[x]:.1f} %" for x in ("mean", "most", "bars")),
+        ]
+        for row in figures["chains"]
+    )
+    return {
+        "alarms": table(
+            ["permitted in 1e6 turns", "turns", "by the feed", "by the force", "found in 1e6 turns",
+             "threshold of the feed / deviation", "threshold of the force / deviation"], alarms,
+        ),
+        "chains": table(
+            ["crank speed [rad/s]", "in parts of the resonance", "mean", "largest in a turn", "mean on bars"], chains
+        ),
+        "step": f"{figures['step']:.1f}",
+        "share_5": f"{share_below(figures, 0.05):.2f}",
+        "share_20": f"{share_below(figures, 0.2):.2f}",
+    }  # fmt: skip
+
+
 def main() -> None:
     options = parser().parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        file = export(MODELS["LoadObserver"], Path(folder) / "observer.fmu")
-        results = {}
-        table = Table(title="False alarms", title_justify="left")
-        for name in ("permitted in 1e6 turns", "turns", "by feed", "by force", "found in 1e6 turns"):
-            table.add_column(name, justify="right")
-        for rate, machines, turns in ((1000.0, 10_000, 20), (1.0, 10_000, 200)):
-            counts, _, periodic = false_alarms(file, rate, machines, turns)
-            total = machines * turns
-            found = 1e6 * int(counts.sum()) / total
-            table.add_row(f"{rate:g}", f"{total:,}", *map(str, counts), f"{found:.3g}")
-            results[f"false alarms at {rate:g}"] = found
-            spread = periodic.stationary()
-            quotient = periodic.thresholds / spread
-            print(
-                f"Thresholds in standard deviations of the estimates: feed {quotient[:, 0].min():.2f} to "
-                f"{quotient[:, 0].max():.2f}, force {quotient[:, 1].min():.2f} to {quotient[:, 1].max():.2f}"
-            )
-        Console(width=110).print(table)
-        results["us a step"] = cost(file, course(MODELS["ChamberForces"], 3.0, 15.0))
-        print(f"A step of 1 ms through fmpy, with inputs and alarm, takes {results['us a step']:.2f} us.")
-        resonance = RESONANCE * math.sqrt(9.81 / 1.35)
-        table = Table(title="Equal feed on chains", title_justify="left")
-        for name in ("crank speed [rad/s]", "in parts of the resonance", "mean", "largest in a turn", "bars"):
-            table.add_column(name, justify="right")
-        for speed, mean, most, bars in chains(file, np.arange(1.0, 4.01, 0.25)):
-            table.add_row(
-                f"{speed:.2f}", f"{speed / resonance:.2f}", *(f"{100 * x:.1f} %" for x in (mean, most, bars))
-            )
-            results[f"false imbalance at {speed:.2f} rad/s"] = most
-        Console(width=110).print(table)
-    save(options.json, results)
+        figures = measured(folder)
+    shown = tables(figures)
+    print(
+        shown["alarms"], shown["chains"], f"A step of 1 ms through fmpy takes {shown['step']} us.", sep="\n"
+    )
+    save(options.json, figures)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
-"""Writes docs/performance.md from bench/figures.json, the figures that the benches print.
+"""Writes docs/performance.md and docs/trials.md from bench/figures.json, the figures that the benches print.
 
-`python bench/page.py` writes the page. `python bench/page.py --measure` runs all benches before that, and
-`--measure states accuracy` those that are named; the figures of the others stay.
+`python bench/page.py` writes the pages. `python bench/page.py --measure` runs all benches before that but for the
+identification, which takes two hours, and `--measure states accuracy` those that are named; the figures of the others
+stay.
 """
 
 from __future__ import annotations
@@ -11,13 +12,17 @@ import json
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import identification
+import observer
+from figures import table
+
 HERE = Path(__file__).parent
 FIGURES = HERE / "figures.json"
-PAGE = HERE.parent / "docs" / "performance.md"
+DOCS = HERE.parent / "docs"
 BENCHES = (
     "states",
     "step_cost",
@@ -27,13 +32,10 @@ BENCHES = (
     "monte_carlo",
     "sweep_time",
     "cosim_memory",
+    "observer",
 )
-
-
-def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table in Markdown."""
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
+LONG = ("identification",)
+"""Benches that run only where they are named."""
 
 
 def millions(x: float) -> str:
@@ -277,8 +279,8 @@ def memory(f: Any) -> str:
     return table(["way", "rows", "variables", "largest memory of the process, MB"], rows)
 
 
-def text(f: Any) -> str:
-    """The page."""
+def performance(f: Any) -> str:
+    """The page of speed, memory and accuracy."""
     s, us = f["states"], f["step_cost"]["us"]
     faster = (
         us["python FMU through fmpy, set + step + get all outputs"]
@@ -307,6 +309,17 @@ def text(f: Any) -> str:
     )  # fmt: skip
 
 
+def trials(f: Any) -> str:
+    """The page of the trials of identification and observer."""
+    found, watched = f["identification"], f["observer"]
+    return (HERE / "trials.md").read_text("utf-8").format(
+        **identification.tables(found), **observer.tables(watched),
+    )  # fmt: skip
+
+
+PAGES = {"performance.md": performance, "trials.md": trials}
+
+
 def measure(names: Sequence[str], file: Path) -> None:
     """Run these benches, and put their figures into the file."""
     own = json.loads(file.read_text("utf-8")) if file.exists() else {}
@@ -316,7 +329,7 @@ def measure(names: Sequence[str], file: Path) -> None:
             made = Path(folder) / f"{name}.json"
             subprocess.run([sys.executable, HERE / f"{name}.py", "--json", made], check=True)
             own[name] = json.loads(made.read_text("utf-8"))
-    ordered = {name: own[name] for name in BENCHES if name in own}
+    ordered = {name: own[name] for name in (*BENCHES, *LONG) if name in own}
     file.write_text(json.dumps(ordered, indent=1) + "\n", "utf-8")
 
 
@@ -324,13 +337,17 @@ def main() -> None:
     options = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    options.add_argument("--measure", nargs="*", choices=BENCHES, metavar="BENCH", help="run benches before")
+    options.add_argument(
+        "--measure", nargs="*", choices=(*BENCHES, *LONG), metavar="BENCH", help="run benches before"
+    )
     options.add_argument("--figures", type=Path, default=FIGURES, help="file of the figures")
-    options.add_argument("--page", type=Path, default=PAGE, help="the page")
+    options.add_argument("--docs", type=Path, default=DOCS, help="folder of the pages")
     given = options.parse_args()
     if given.measure is not None:
         measure(given.measure or BENCHES, given.figures)
-    given.page.write_text(text(json.loads(given.figures.read_text("utf-8"))), "utf-8")
+    figures = json.loads(given.figures.read_text("utf-8"))
+    for name, page in PAGES.items():
+        (given.docs / name).write_text(page(figures), "utf-8")
 
 
 if __name__ == "__main__":

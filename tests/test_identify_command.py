@@ -155,7 +155,7 @@ def test_the_courses_are_means_of_the_recordings(folder):
 def test_one_run_does_not_tell_web_from_feed(tmp_path):
     """It says so, shows no bare number, and proposes an empty run; from Python the same."""
     write(tmp_path, "loaded.csv.gz", heads={})
-    text = FILE.replace('deviation = "20 %"', "from = 12\nto = 32")
+    text = FILE.replace('deviation = "20 %"', "from = 12\nto = 32") + "[observer]\nfalse_alarms = 3\n"
     (tmp_path / "mine.toml").write_text(text, "utf-8")
     done = chainunit("identify", "mine.toml", "-o", "out", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
@@ -168,6 +168,13 @@ def test_one_run_does_not_tell_web_from_feed(tmp_path):
         not own["told"] and own["value"]["value"] is None and own["from"]["value"] < 24.5 < own["to"]["value"]
     )
     assert result["proposals"][0]["text"] == "empty"
+    file = (tmp_path / "out" / "identified.toml").read_text("utf-8")
+    low, high = (f"{own[end]['value']:.4g}" for end in ("from", "to"))
+    assert f"# machine.left.web_mass: not determined, 95 % from {low} to {high} kg" in file
+    # an error of the web is one of the feed on it; the observer does not know the damping of the joints
+    observer = tomllib.loads(file)["observer"]
+    assert observer["false_alarms"] == 3
+    assert observer["uncertainty"] == pytest.approx(own["deviation"]["value"], rel=0.02)
     (total,) = result["combinations"]
     true = sum(
         factor * TRUTH[name.replace("machine.left.material", "feed.left.material")]

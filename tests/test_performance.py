@@ -33,8 +33,9 @@ def figures(bench):
 def test_the_page_is_made_from_the_figures(bench, figures):
     """Else run `python bench/page.py`."""
     page = bench("page")
-    assert page.PAGE.read_text("utf-8") == page.text(figures)
-    assert set(figures) == set(page.BENCHES)
+    for name, text in page.PAGES.items():
+        assert (page.DOCS / name).read_text("utf-8") == text(figures)
+    assert set(figures) == {*page.BENCHES, *page.LONG}
 
 
 def test_each_goal_stands_there_with_its_measured_value(bench, figures):
@@ -42,7 +43,7 @@ def test_each_goal_stands_there_with_its_measured_value(bench, figures):
     rows = [line.strip("| \n").split(" | ") for line in page.goals(figures).splitlines()[2:]]
     goals = figures["states"]["goals"]
     assert [row[0] for row in rows] == [each["goal"] for each in goals] and len(goals) >= 5
-    text = page.PAGE.read_text("utf-8")
+    text = (page.DOCS / "performance.md").read_text("utf-8")
     for row, each in zip(rows, goals, strict=True):
         assert "| " + " | ".join(row) + " |" in text
         for cell, value in zip(row[1:3], (each["demanded"], each["measured"]), strict=True):

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from ..files import clear, whole
 from ..study.config import Config
 from ..study.identification.identification import IdentifiedMachine
 from ..study.identification.measurands import MEASURANDS
-from ..study.identification.result import as_dict, identified_tables, sentences
+from ..study.identification.result import as_dict, identified_notes, identified_tables, sentences
 from ..study.study_file import toml_text
 from ..text import shown_in
 from . import blocks as b
@@ -63,7 +63,7 @@ def writers(found: IdentifiedMachine, report: b.Report, folder: Path) -> list[Ca
 
     def study_file() -> list[Path]:
         with whole(folder / FILE) as part:
-            part.write_text(toml_text(identified_tables(found, folder)), "utf-8")
+            part.write_text(toml_text(identified_tables(found, folder), identified_notes(found)), "utf-8")
         return [folder / FILE]
 
     return [study_file, *files.writers(report, folder, NAME)]
@@ -171,6 +171,10 @@ def _limits(s: b.Source) -> Iterator[b.Block]:
                 "Further runs, the best first; without one {=told_at_start} numbers can be determined"
             ),
         )
+        if all(each["told"]["value"] <= s.result["told_at_start"]["value"] for each in s.result["proposals"]):
+            yield b.Text(
+                "None of these runs determines one more number: weigh a part, or know a gain.", "note"
+            )
 
 
 def _residuals(s: b.Source) -> Iterator[b.Block]:
@@ -240,6 +244,11 @@ def _figures(s: b.Source, found: IdentifiedMachine) -> Iterator[b.Block]:
         )
 
 
+def _listed(names: Sequence[str]) -> list[Line]:
+    """Names with commas between them."""
+    return [part for k, name in enumerate(names) for part in (", " if k else "", Name(name))]
+
+
 def _runs(s: b.Source) -> Iterator[b.Block]:
     rows = [
         b.TableRow(
@@ -250,13 +259,14 @@ def _runs(s: b.Source) -> Iterator[b.Block]:
                 s.number(f"runs.{name}.rate", digits=4),
                 s.number(f"runs.{name}.crank_speed", as_given=True),
                 s.words(f"runs.{name}.feed"),
+                line(*_listed(s.result["runs"][name]["columns"])),
             )
         )
         for name in s.result["runs"]
     ]
     yield b.Table(
         tuple(rows),
-        b.heads("run", "file", "duration", "rows a second", "crank speed", "feed"),
+        b.heads("run", "file", "duration", "rows a second", "crank speed", "feed", "columns"),
         title="Recordings",
         numeric=False,
         form="long",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -14,6 +15,7 @@ from .arrays import rms
 from .config import Config
 from .cycle import cycle
 from .drive import Drive
+from .false_loads import false_loads
 from .observer_table import ObserverTable
 
 FEED_SPREAD = 0.5
@@ -83,3 +85,23 @@ def tuning(table: ObserverTable, feed: Any, speed: float, torque: float) -> dict
         "imbalance.force_overload": table.force_overload,
         "alarm.rate": table.false_alarms,
     }
+
+
+def false_imbalance(
+    values: Mapping[str, float], names: Sequence[str], covariance: Any, crank_speed: float
+) -> dict[str, float]:
+    """The keys of the table [observer] with the false imbalance that errors of the machine make.
+
+    Parameters
+    ----------
+    values : parameters of the observer by name; others are those of the declaration
+    names : numbers of which the `covariance`, shape (names, names), is known; those that the observer does not know
+        count as right
+    crank_speed : mean speed of the crank [rad/s]
+    """
+    layout = LoadObserver.parameter_layout
+    known = [k for k, name in enumerate(names) if name in layout.names]
+    own = layout.from_names({name: x for name, x in values.items() if name in layout.names})
+    sigma = np.asarray(covariance)[np.ix_(known, known)]
+    found = false_loads(own, [names[k] for k in known], sigma, crank_speed)
+    return {"uncertainty": found.imbalance, "force_uncertainty": found.force_imbalance}

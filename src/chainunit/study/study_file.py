@@ -62,12 +62,12 @@ def _from(folder: Path, file: Path) -> str:
         return file.resolve().as_posix()
 
 
-def toml_text(tables: Mapping[str, Any]) -> str:
-    """Tables as a TOML text, which reads as these tables again."""
-    return "\n".join(_lines(tables, "")).strip() + "\n"
+def toml_text(tables: Mapping[str, Any], notes: Mapping[str, str] | None = None) -> str:
+    """Tables as a TOML text, which reads as these tables again, with `notes` on values by full name as comments."""
+    return "\n".join(_lines(tables, "", notes or {})).strip() + "\n"
 
 
-def _lines(table: Mapping[str, Any], prefix: str) -> Iterator[str]:
+def _lines(table: Mapping[str, Any], prefix: str, notes: Mapping[str, str]) -> Iterator[str]:
     """The keys of a table, then the tables in it; a table of plain values stands in one line of the table above,
     except at the top."""
     later: list[tuple[str, Any]] = []
@@ -79,13 +79,17 @@ def _lines(table: Mapping[str, Any], prefix: str) -> Iterator[str]:
         if nested or (many and not prefix):
             later.append((name, value))
         else:
+            own = f"{prefix}{_key(name)}"
+            yield from (
+                f"# {full}: {note}" for full, note in notes.items() if f"{full}.".startswith(f"{own}.")
+            )
             yield f"{_key(name)} = {_value(value)}"
     for name, value in later:
         full = f"{prefix}{_key(name)}"
         for each in value if isinstance(value, list) else [value]:
             yield ""
             yield f"[[{full}]]" if isinstance(value, list) else f"[{full}]"
-            yield from _lines(each, f"{full}.")
+            yield from _lines(each, f"{full}.", notes)
 
 
 def _key(name: str) -> str:

@@ -151,7 +151,9 @@ def read_identification(
                     f"{key} = {shown(run.name)}: is the name of another run; give it another", key
                 )
             if run.name == "mark":
-                raise InputError(f"{key} = {shown(run.name)}: stands for the mark of a turn; give it another", key)
+                raise InputError(
+                    f"{key} = {shown(run.name)}: stands for the mark of a turn; give it another", key
+                )
             for name in run.added.keys() - sought.keys() if not faults.errors else ():
                 key = f"identify.run.{k}.added.{name}"
                 raise InputError(f"{key}: is not sought; add [[identify.parameter]] with this name", key)

@@ -12,6 +12,7 @@ import numpy as np
 from ... import __version__
 from ...refusals import unit_behind
 from ...text import array_entry, entry, shown_in
+from ..observation import false_imbalance
 from ..study_file import changed_tables
 from .fit import Normal
 from .identification import FittedNumber, IdentifiedMachine, remarks, system_name
@@ -60,7 +61,6 @@ def _as_dict(found: IdentifiedMachine) -> dict[str, Any]:
         "covariance": {
             "names": list(estimates),
             "units": [each.unknown.unit for each in estimates.values()],
-            "values": [each.value for each in estimates.values()],
             "matrix": found.covariance.tolist(),
         },
         "correlations": list(_correlations(found)),
@@ -247,10 +247,31 @@ def sentences(found: IdentifiedMachine) -> list[str]:
 def identified_tables(found: IdentifiedMachine, folder: Path) -> dict[str, Any]:
     """The tables of the study with the fitted values, as a file in `folder` has them, beside the result of the
     identification, by which a recording is watched. A number that the recordings do
-    not tell has its fitted value, too: only all of them together give the measured courses."""
+    not tell has its fitted value, too: only all of them together give the measured courses. A table [observer] has
+    the false imbalance that errors of the machine make."""
     values = {name: float(f"{each.fitted:.6g}") for name, each in found.estimates.items()}
     tables = changed_tables(found.config, values, "identified", folder)
     tables.pop("identify", None)
     if "watch" in tables:
         tables["watch"]["identification"] = RESULT
+    if "observer" in tables:
+        config = found.config
+        own = {name.removeprefix("machine."): x for name, x in values.items()}
+        machine = config.machine.by_name | {
+            name: x for name, x in own.items() if name in config.machine.by_name
+        }
+        names = [name.removeprefix("machine.") for name in found.estimates]
+        false = false_imbalance(machine, names, found.covariance, config.run.crank_speed)
+        tables["observer"] |= {name: float(f"{x:.4g}") for name, x in false.items()}
     return tables
+
+
+def identified_notes(found: IdentifiedMachine) -> dict[str, str]:
+    """By full name, a sentence on each number of the study file that the recordings do not determine."""
+    notes = {}
+    for name, each in found.estimates.items():
+        if not each.is_told:
+            unit = unit_behind(each.unknown.unit)
+            ends = f"95 % from {each.low:.4g} to {each.high:.4g}{unit}"
+            notes[name] = f"not determined, {ends}; it holds only together with the other fitted values"
+    return notes

@@ -25,8 +25,7 @@ from ...system.instance import Fmu, Instance
 from ..arrays import rms, stretches
 from ..config import Config
 from ..drive import Drive
-from ..false_loads import false_loads
-from ..observation import tuning, weights
+from ..observation import false_imbalance, tuning, weights
 from ..observer_table import ObserverTable
 from .crank_motion import crank_motion
 from .fit import Fit, fit
@@ -292,10 +291,8 @@ def _uncertainty(plan: WatchPlan, values: Mapping[str, float]) -> tuple[float, f
         feed, force = (values[name] for name in UNCERTAINTIES)
         return feed, force
     names, covariance = _covariance(plan.identification)
-    p = LoadObserver.parameter_layout.from_names(dict(values))
-    known = [k for k, name in enumerate(names) if name in LoadObserver.parameter_layout.names]
-    found = false_loads(p, [names[k] for k in known], covariance[np.ix_(known, known)], plan.crank_speed)
-    return found.imbalance, found.force_imbalance
+    feed, force = false_imbalance(values, names, covariance, plan.crank_speed).values()
+    return feed, force
 
 
 def _covariance(file: Path) -> tuple[list[str], Any]:
