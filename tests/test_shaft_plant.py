@@ -113,7 +113,8 @@ def test_an_encoder_or_nothing_tells_the_angle(angles):
 
 
 def test_derivatives_of_residuals():
-    """By every unknown, of every column, against differences, at a motion that is far from even."""
+    """By every unknown, and of 60 orders by ten, of every column, against differences, at a motion that is far from
+    even."""
     measured = ("crank.tau", "crank.w", "motor.w")
     recording = recorded(5, ("mark", "motor.count"), measured, rate=300.0).part(0.0, 5.0)
     problem = problem_of(
@@ -125,7 +126,8 @@ def test_derivatives_of_residuals():
         place = problem.place[name]
         z[place] += 0.1 * rng.standard_normal() * problem.spreads[place]
     # that by the drift is the rate of a spline through the rows
-    check_derivatives(problem, z, 5e-3)
+    left_out = {f"run.{name}" for name, k, *_ in WAVES if k not in (*range(1, 9), 30, 60)}
+    check_derivatives(problem, z, 5e-3, lambda name: name not in left_out)
 
 
 def test_what_such_a_shaft_does_not_have():

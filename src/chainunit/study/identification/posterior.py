@@ -108,9 +108,13 @@ class _Bent:
         matrix[0, linear] = matrix[linear, 0] = -basis.T @ (best.gradient - np.where(even, pull, 0.0))
         places = slice(0, 1 + wide + pairs), slice(1 + wide + pairs, None)
         inner = matrix[places[1], places[1]]
-        self._mean = -np.linalg.solve(inner, matrix[places[1], places[0]])
-        self._form = matrix[places[0], places[0]] + matrix[places[0], places[1]] @ self._mean
-        self._root = np.linalg.cholesky(inverse(inner))
+        mean = -np.linalg.solve(inner, matrix[places[1], places[0]])
+        self._form = matrix[places[0], places[0]] + matrix[places[0], places[1]] @ mean
+        # of `b`, only the share in the sought numbers is sampled
+        own = self._along[: len(problem.sought)]
+        self._mean = own @ mean
+        root: Any = np.linalg.qr((own @ np.linalg.cholesky(inverse(inner))).T, mode="r")
+        self._root = root.T
 
     def _squares(self, best: Normal, workers: int, linear: Any) -> Any:
         """The products of the derivatives of all columns, of first order and of second order by pairs."""
@@ -154,8 +158,8 @@ class _Bent:
         """The logarithm of the density at `a`, shape (chains,), and sought numbers, shape (chains, numbers)."""
         problem, terms = self._problem, self._terms(a)
         count = len(problem.sought)
-        b = terms @ self._mean.T + rng.standard_normal((len(a), self._along.shape[1])) @ self._root.T
-        z = self._z[:count] + a @ self._across[:count].T + b @ self._along[:count].T
+        z = self._z[:count] + a @ self._across[:count].T + terms @ self._mean.T
+        z += rng.standard_normal((len(a), self._root.shape[1])) @ self._root.T
         low, high = (bound[:count] for bound in problem.bounds)
         beyond = np.sum(np.maximum(np.maximum(low - z, z - high), 0.0) / problem.spreads[:count], axis=1)
         density = -0.5 * np.einsum("ni,ij,nj->n", terms, self._form, terms)

@@ -130,8 +130,7 @@ class MeasuredShaft:
             return self._switched_off(course, course.off, changes, workers)
         time = course.rows
         motion = CrankSeries(course.nuisances, time, (course.begin, course.end))
-        by = [name for name, _ in changes if name in self._by]
-        torque, slopes_of = self._torque(course.values, motion.rows, by, workers)
+        torque, slopes_of = self._torque(course.values, motion.rows, workers)
         angle, speed = motion.rows[:2]
         count = self.ratio * COUNTS / (2.0 * math.pi)
         rows = {"crank.tau": torque, "crank.w": speed, "motor.w": self.ratio * speed, CRANK: angle}
@@ -152,11 +151,10 @@ class MeasuredShaft:
         kept = (*self._measured, CRANK)
         return Response(time, {name: rows[name] for name in kept}, {name: slopes[name] for name in kept})
 
-    def _torque(
-        self, values: Mapping[str, Any], motion: Any, by: Sequence[str], workers: int
-    ) -> tuple[Any, dict[str, Any]]:
+    def _torque(self, values: Mapping[str, Any], motion: Any, workers: int) -> tuple[Any, dict[str, Any]]:
         """The torque at the crank along a motion of the crank (angle, speed, acceleration), shape (3, rows), and its
-        derivatives by the quantities `by` and by the motion."""
+        derivatives by all sought quantities and by the motion: with those that a run does not need, all runs share
+        compiled code."""
         model, ratio = self._machine.model, self.ratio
         own = {name.removeprefix("machine."): x for name, x in values.items() if name.startswith("machine.")}
         p = self._machine.replace({k: x for k, x in own.items() if k in model.parameter_layout.names}).p
@@ -165,14 +163,14 @@ class MeasuredShaft:
             k: x for k, x in own.items() if k in model.input_layout.names
         }
         along = {name: xr.DataArray(ratio * x, dims="row") for name, x in zip(_MOTION, motion, strict=True)}
-        names = [name.removeprefix("machine.") for name in by]
+        names = [name.removeprefix("machine.") for name in self._by]
         result = evaluate(model, given | along, ["tau"], by=[*names, *_MOTION], workers=workers)
         if np.any(result["reason"].values):
             reasons = result["reason"].attrs["reasons"]
             raise RunError(f"the machine has no torque at a row of the run: {reasons}")
         slopes = {
             name: ratio * _rows(result, f"d(tau)/d({own})", motion)
-            for name, own in zip(by, names, strict=True)
+            for name, own in zip(self._by, names, strict=True)
         }
         slopes |= {name: ratio * ratio * _rows(result, f"d(tau)/d({name})", motion) for name in _MOTION}
         return ratio * result["tau"].values, slopes
