@@ -270,7 +270,7 @@ def test_what_was_known_and_is_contradicted(tmp_path):
     words = " ".join(sentences(Study.from_file(tmp_path / "mine.toml").identify().found))
     result = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))
     assert "machine.left.web_mass = " in words and "deviations beside the known value, 21.6 kg" in words
-    assert "machine.joint_damping = 1.1 N m s/rad lies at its bound to" in words
+    assert "machine.joint_damping = 1.1 N m s/rad lies at its upper bound" in words
     assert not result["numbers"]["machine.joint_damping"]["told"]
 
 

@@ -109,7 +109,8 @@ def test_errors_of_an_identified_machine_widen_the_threshold(tmp_path):
         "names": ["machine.left.web_mass", "feed.left.material_mass"],
         "matrix": [[1.0, 0.0], [0.0, 9.0]],
     }
-    (tmp_path / "result.json").write_text(json.dumps({"covariance": covariance}), "utf-8")
+    result = {"status": "complete", "covariance": covariance}
+    (tmp_path / "result.json").write_text(json.dumps(result), "utf-8")
     thresholds, results = [], []
     for more in ({}, {"identification": "result.json"}):
         (tmp_path / "mine.toml").write_text(study_text(TRUTH["machine"], end=60, **more), "utf-8")
@@ -132,7 +133,8 @@ def test_refusals(tmp_path):
         Study().watch()
     for more, words in (
         ({"begin": 300}, "has 0 rows from begin = 300 s"),
-        ({"learning": 500}, "must be < 120 s, the duration"),
+        ({"learning": 500}, "and < 120 s, the duration"),
+        ({"learning": 5}, r"watch\.learning = 5 s: must be >= 6\.283 s, 3 turns"),
     ):
         (tmp_path / "mine.toml").write_text(study_text(TRUTH["machine"], **more), "utf-8")
         with pytest.raises(InputError, match=words):

@@ -17,16 +17,19 @@ def identify(
 ) -> None:
     """Identify masses, friction and feed of a real machine from recordings of its motor.
 
-    Writes identified.toml, report.html, result.json, result.md and pictures into the output folder. The exit status
-    is 1 where the model does not describe the recordings.
+    Says what the recordings can tell before anything is fitted. Writes identified.toml, report.html, result.json,
+    result.md and pictures into the output folder. The exit status is 1 where the model does not describe the
+    recordings.
     """
     loaded = study_file(config)
     from .report import identification as contents
     from .study.identification.identification import identify as identified
+    from .study.identification.result import outlook
 
+    console = terminal_console(stderr=True)
     with claim(output, "identify"):
-        with progress_bar(terminal_console(stderr=True)) as progress:
-            found = identified(loaded, progress)
+        with progress_bar(console) as progress:
+            found = identified(loaded, progress, lambda *told: console.print(outlook(*told), soft_wrap=True))
         contents.prepare(output)
         report = contents.identification_report(found)
         unwritten = leave(report, contents.writers(found, report, output))

@@ -152,7 +152,7 @@ ENTRIES = tuple(f"{UNKNOWNS[i]}_{UNKNOWNS[j]}" for i, j in TRIANGLE)
 Covariance = declared_class(
     "Covariance",
     (),
-    [(name, Value, quantity("1", "entry in parts of the sizes")) for name in ENTRIES],
+    [(name, Value, quantity("1", "entry, in parts of noise.w and of the spreads")) for name in ENTRIES],
 )
 """The stored entries of a covariance."""
 
@@ -188,12 +188,12 @@ class SideJudgement:
 
 @declaration
 class Imbalance:
-    """Left minus right, with the thresholds of the alarm."""
+    """Left less right, with the thresholds of the alarm."""
 
-    feed: Value = quantity("kg", "imbalance of the feed")
+    feed: Value = quantity("kg", "imbalance of the feed, left less right")
     feed_deviation: Value = quantity("kg", "standard deviation of the imbalance of the feed")
     feed_threshold: Value = quantity("kg", "imbalance of the feed from which there is an alarm")
-    force: Value = quantity("N", "imbalance of the processing forces", nominal=100.0)
+    force: Value = quantity("N", "imbalance of the processing forces, left less right", nominal=100.0)
     force_deviation: Value = quantity("N", "standard deviation of the imbalance of the forces", nominal=100.0)
     force_threshold: Value = quantity(
         "N", "imbalance of the forces from which there is an alarm", nominal=100.0

@@ -81,9 +81,9 @@ def difference(matrix: Matrix, i: int, j: int) -> Any:
     return matrix[i][i] + matrix[j][j] - 2.0 * matrix[i][j]
 
 
-LEAST_LEVEL = 3.0
+LEAST_LEVEL = 3.4
 """Least level of an alarm in standard deviations. A permanent error beyond the level is no matter of rates: at this
-level three machines of a thousand have one."""
+level 0.7 machines of a thousand have one."""
 
 
 _ROUNDS = 4
@@ -98,7 +98,8 @@ def level(xp: Any, memory: Any, rate: Any) -> Any:
     S^2/D. A part of S that is constant in each machine has no share in D: then the formula is the mean over machines.
     """
     share = xp.minimum(
-        0.5 * math.sqrt(2.0 * math.pi) * memory * rate, math.exp(-0.5 * LEAST_LEVEL * LEAST_LEVEL)
+        0.5 * math.sqrt(2.0 * math.pi) * memory * rate,
+        LEAST_LEVEL * math.exp(-0.5 * LEAST_LEVEL * LEAST_LEVEL),
     )
     z = 5.0
     for _ in range(_ROUNDS):

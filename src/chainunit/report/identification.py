@@ -18,6 +18,7 @@ from . import files
 from .lines import Line, Name, line
 
 NAME = "result"
+WRONG = "The model does not describe the recordings: these are not the numbers of the machine."
 FILE = "identified.toml"
 """The study file with the identified values."""
 
@@ -63,7 +64,9 @@ def writers(found: IdentifiedMachine, report: b.Report, folder: Path) -> list[Ca
 
     def study_file() -> list[Path]:
         with whole(folder / FILE) as part:
-            part.write_text(toml_text(identified_tables(found, folder), identified_notes(found)), "utf-8")
+            head = "" if found.is_described else WRONG
+            text = toml_text(identified_tables(found, folder), identified_notes(found), head)
+            part.write_text(text, "utf-8")
         return [folder / FILE]
 
     return [study_file, *files.writers(report, folder, NAME)]
@@ -107,7 +110,9 @@ def _numbers(s: b.Source) -> Iterator[b.Block]:
     yield b.Text(
         "A number is determined where the recordings alone give it with less than half the standard deviation that "
         "was known before. The interval of 95 % of a number that is not determined is that of bounds, weighing and "
-        "recordings together: it stands or falls with the weighing.",
+        "recordings together: it stands or falls with the weighing. Before the fit, a number is at its start, such "
+        "as the middle of its bounds, and the noise is as stated: so the expected deviation may differ from the "
+        "reached one.",
         "note",
     )
     rows = [

@@ -46,7 +46,14 @@ LOOKS: dict[str, dict[str, Any]] = {
 }
 """Looks of lines that have one meaning in every plot."""
 INK = "#1b1b1b"
-FILLS = {"pale": "#ececec", "dark": "#a9a9a9", "band": "#c8c8c8", "hatched": "#e4e4e4"}
+FILLS = {
+    "pale": "#ececec",
+    "dark": "#a9a9a9",
+    "band": "#c8c8c8",
+    "hatched": "#e4e4e4",
+    "left alarm": "#f3d9cd",
+    "right alarm": "#cfe0ee",
+}
 CLASSES = ("#ffffff", "#d4d4d4", "#9a9a9a", "#4d4d4d")
 """Shades of the classes of a map."""
 SEQUENCE = ("#f7fbff", "#dbe9f6", "#bad6eb", "#89bedc", "#539ecd", "#2b7bba", "#0b559f", "#08306b")

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..files import clear
+from ..study.identification.result import LOUD
 from ..study.identification.watch import WatchedRecording
 from ..study.identification.watch_result import as_dict
 from ..text import shown_in
@@ -71,9 +72,31 @@ def _opening(s: b.Source) -> Iterator[b.Block]:
             line(
                 "The machine of this study does not describe the begin of the recording (",
                 join(s.lines("doubts"), "; "),
-                "): its alarms may be those of a wrong machine. Identify the machine first (chainunit identify).",
+                "): its alarms may be those of a wrong machine. ",
+                "If the feed was another one, state it ([feed]), or widen its deviation (watch.feed_deviation)."
+                if s.result["of_feed_alone"]
+                else "Identify the machine first (chainunit identify).",
             ),
         )
+    if s.result["failed_identification"]:
+        yield b.Judgement(
+            "warning",
+            s.line(
+                "The identification of this machine failed: {failed_identification}. Its errors are not bounded by "
+                "those of {identification}."
+            ),
+        )
+    if (s.value("noise") or 0.0) > LOUD:
+        yield b.Judgement(
+            "warning",
+            s.line(
+                "The noise at the begin of the recording is {=noise:2} times the stated one (watch.noise): the "
+                "thresholds are those of the measured noise."
+            ),
+        )
+    for k in range(len(s.result["gaps"])):
+        words = f"No rows from {{gaps.{k}.from:4}} to {{gaps.{k}.to:4}}: the observer starts anew behind this gap."
+        yield b.Judgement("remark", s.line(words))
     if not s.result["alarms"]:
         yield b.Judgement("good", s.line("No alarm in {turns:3} turns ({duration:3})."))
     for k, each in enumerate(s.result["alarms"]):
@@ -99,17 +122,23 @@ def _opening(s: b.Source) -> Iterator[b.Block]:
             "{force_threshold_least:3} to {force_threshold_most:3}."
         )
     )
-    if not s.value("uncertainty"):
-        yield b.Text(
-            "The thresholds take the numbers of the machine for exact. Name the result of an identification "
-            "(identification) to have their errors in the thresholds.",
+    named = s.result["identification"] is not None
+    if not s.value("uncertainty") and not s.value("force_uncertainty"):
+        remedy = (
+            "The identification sought no number of the machine that the observer knows."
+            if named
+            else "Name the result of an identification (identification) to have their errors in the thresholds."
         )
+        yield b.Text(f"The thresholds take the numbers of the machine for exact. {remedy}")
     else:
         words = "Errors of the machine's parameters make"
-        if s.result["identification"] is not None:
+        if named:
             words = "The machine's parameters are those of an identification. Their errors make"
-        more = "a false imbalance of {uncertainty:2} (standard deviation), and the threshold is wider by the factor"
-        yield b.Text(s.line(f"{words} {more} {{widening:3}}."))
+        more = (
+            "a false imbalance of {uncertainty:2} and {force_uncertainty:2} (standard deviations); the thresholds of "
+            "feed and forces are wider by the factors {widening:3} and {force_widening:3}."
+        )
+        yield b.Text(s.line(f"{words} {more}"))
 
 
 def _series(s: b.Source, name: str) -> Any:
@@ -130,8 +159,13 @@ def _loads(s: b.Source) -> Iterator[b.Block]:
     if rows:
         yield b.Table(
             tuple(rows),
-            b.heads("quantity", "median", "standard deviation", "threshold of an alarm"),
+            b.heads("quantity", "median", "deviation of the filter", "threshold of an alarm"),
             title="Estimates after the time of learning and before the first alarm",
+        )
+        yield b.Text(
+            "The deviation of the filter is that of loads that change as fast as it follows (observer.change). "
+            "Normal running scatters less; the threshold follows from that smaller deviation.",
+            "note",
         )
     time, axis = _series(s, "time"), fig.Axis("time", "s")
     panels = []
@@ -140,7 +174,7 @@ def _loads(s: b.Source) -> Iterator[b.Block]:
         low, high = _span(time, list(courses.values()))
         items = [fig.Curve(side, time, x, look) for look, (side, x) in enumerate(courses.items())]
         y = fig.Axis(words, unit, low=low, high=high)
-        panels.append((fig.Panel(axis, y, (*items, *_marks(s))),))
+        panels.append((fig.Panel(axis, y, (*_marks(s), *items)),))
     yield fig.Figure(
         "loads",
         "Estimated loads",
@@ -152,13 +186,9 @@ def _loads(s: b.Source) -> Iterator[b.Block]:
     for name, words, unit in (("feed", "left less right, feed", "kg"), ("force", "force", "N")):
         x, limit = _series(s, f"imbalance.{name}"), _series(s, f"imbalance.{name}_threshold")
         low, high = _span(time, [x, limit, -limit])
-        items = [
-            fig.Curve("imbalance", time, x, 0),
-            fig.Curve("threshold", time, limit, 1),
-            fig.Curve("threshold below", time, -limit, 1, in_legend=False),
-        ]
+        band = fig.Between("below the threshold", time, -limit, limit, "band")
         y = fig.Axis(words, unit, low=low, high=high)
-        panels.append((fig.Panel(axis, y, (*items, *_marks(s))),))
+        panels.append((fig.Panel(axis, y, (*_marks(s), band, fig.Curve("imbalance", time, x, 0))),))
     yield fig.Figure(
         "imbalance",
         "Imbalance and thresholds",
@@ -177,9 +207,14 @@ def _span(time: Any, courses: list[Any]) -> tuple[float, float]:
     return low - wide, high + wide
 
 
-def _marks(s: b.Source) -> Iterator[fig.Mark]:
+def _marks(s: b.Source) -> Iterator[fig.Shade]:
+    """The times of the alarms."""
+    named = set[str]()
     for each in s.result["alarms"]:
-        yield fig.Mark(each["begin"]["value"], words=f"alarm {each['side']}", upright=True)
+        name = f"alarm, {each['side']}"
+        ends = each["begin"]["value"], each["end"]["value"]
+        yield fig.Shade(*ends, "" if name in named else name, look=f"{each['side']} alarm")
+        named.add(name)
 
 
 def _alarms(s: b.Source) -> Iterator[b.Block]:

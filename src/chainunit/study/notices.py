@@ -48,7 +48,7 @@ class Notice:
 
 @declaration
 class Observed:
-    """The estimates of the observer in the steady turns. An imbalance is left minus right."""
+    """The estimates of the observer in the steady turns. An imbalance is left less right."""
 
     imbalance: Value = quantity("kg", "estimated imbalance of the feed, mean")
     error: Value = quantity("kg", "error of the estimated imbalance of the feed, largest")

@@ -67,14 +67,16 @@ def loads_beyond(config: Any) -> Iterator[InputError]:
 
 def without_feed(config: Any) -> Iterator[InputError]:
     """The refusal of an observer of a feed that is zero, in a `Config`."""
-    if config.observer is not None and config.machine.model.sides:
+    asked = [table for table in ("observer", "watch") if getattr(config, table) is not None]
+    if asked and config.machine.model.sides:
         feed = config.feed
         if not feed.left.material_mass + feed.right.material_mass > 0.0:
-            yield InputError(
-                "observer: watches for a feed that moves to one side, and feed.left.material_mass and "
-                "feed.right.material_mass are 0 kg; give the feed of normal running, or leave [observer] out",
-                key="observer",
-            )
+            for table in asked:
+                yield InputError(
+                    f"{table}: watches for a feed that moves to one side, and feed.left.material_mass and "
+                    f"feed.right.material_mass are 0 kg; give the feed of normal running, or leave [{table}] out",
+                    key=table,
+                )
 
 
 def endless(config: Any) -> Iterator[InputError]:

@@ -26,6 +26,8 @@ DAMPING = 1e-2
 """Damping of the first step, in parts of the information of the priors."""
 STATED = 100.0
 """Number of rows that would tell the noise of a column as well as its sensor's data sheet does."""
+_MEDIAN = 0.455
+"""Median of the square of a standard normal number."""
 SETTLINGS = 5
 """Most steps of the unknowns of clocks and sensors without simulation."""
 NEAR = 1.5
@@ -197,14 +199,15 @@ def _scales(at: Normal) -> dict[tuple[str, str], float]:
 
 
 def _noises(at: Normal) -> dict[tuple[str, str], float]:
-    """The measured noise of each column in parts of the stated one, which counts as some rows."""
-    return {
-        (each.run, each.column): math.sqrt(
-            (STATED + float(np.sum(np.minimum(each.residuals**2, OUTLIER**2))))
-            / (STATED + len(each.residuals))
-        )
-        for each in at.comparisons
-    }
+    """The measured noise of each column in parts of the stated one, which counts as some rows. Outliers are those
+    of noise of the median size."""
+    noises = {}
+    for each in at.comparisons:
+        squares = each.residuals**2
+        outlier = OUTLIER**2 * max(1.0, float(np.median(squares)) / _MEDIAN)
+        total = STATED + float(np.sum(np.minimum(squares, outlier)))
+        noises[each.run, each.column] = math.sqrt(total / (STATED + len(squares)))
+    return noises
 
 
 class _Rounds:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -61,7 +61,7 @@ class FittedNumber:
 
     @property
     def at_bound(self) -> str:
-        """The bound at which the fit ended, "from" or "to"; such a number is not told."""
+        """The bound at which the fit ended, "lower" or "upper"; such a number is not told."""
         return _bound(self.unknown, self.fitted)
 
 
@@ -113,9 +113,10 @@ class IdentifiedMachine:
 
     @property
     def is_described(self) -> bool:
-        """Whether the residuals may be noise, and clocks, sensors and known numbers are as they are known."""
-        suspicious = any(each.is_suspicious for each in self.suspicions)
-        return all(check.is_noise for check in self.checks) and not self.strains and not suspicious
+        """Whether the residuals may be noise, clocks, sensors and known numbers are as they are known, and no number
+        is held by a bound."""
+        doubts = self.strains or self.posterior.held or any(each.is_suspicious for each in self.suspicions)
+        return all(check.is_noise for check in self.checks) and not doubts
 
     @property
     def strains(self) -> list[Strain]:
@@ -146,11 +147,9 @@ class IdentifiedMachine:
 
 
 def _bound(own: Unknown, x: float) -> str:
-    """The bound at which a fitted value lies, "from" or "to"; empty between them."""
+    """The bound at which a fitted value lies, "lower" or "upper"; empty between them."""
     near = AT_BOUND * own.spread
-    if not own.is_even:
-        return ""
-    return "from" if x <= own.low + near else "to" if x >= own.high - near else ""
+    return "lower" if x <= own.low + near else "upper" if x >= own.high - near else ""
 
 
 def system_name(name: str) -> str:
@@ -158,8 +157,16 @@ def system_name(name: str) -> str:
     return name.replace("feed.", "machine.", 1) if name.startswith("feed.") else name
 
 
-def identify(config: Config, report: Report = lambda *_: None) -> IdentifiedMachine:
+def identify(
+    config: Config,
+    report: Report = lambda *_: None,
+    told: Callable[[IdentificationPlan, Information], None] = lambda *_: None,
+) -> IdentifiedMachine:
     """Identify the machine of a study from the recordings of its table [identify].
+
+    Parameters
+    ----------
+    told : gets what the recordings can tell, before anything is fitted
 
     Raises
     ------
@@ -179,6 +186,7 @@ def identify(config: Config, report: Report = lambda *_: None) -> IdentifiedMach
     report("what the recordings can tell", 0.15, 1.0)
     start = problem.started(workers)
     before = information(problem, start, workers)
+    told(plan, before)
     best = fit(
         problem,
         start,
@@ -190,7 +198,7 @@ def identify(config: Config, report: Report = lambda *_: None) -> IdentifiedMach
         seed=plan.seed,
     )
     report("checks", 0.95, 1.0)
-    after = information(problem, best.z, workers, propose=False, comparisons=best.comparisons)
+    after = information(problem, best.z, workers, propose=False, at=best)
     around = posterior(problem, best, workers, plan.seed)
     checks, suspects = tuple(check_residuals(best)), tuple(suspicions(problem, best, workers))
     return IdentifiedMachine(config, plan, problem, before, best, around, after, checks, suspects)
@@ -266,7 +274,8 @@ def _problem(
     sought = [replace(u, name=system_name(u.name)) for u in plan.sought]
     measured = dict.fromkeys(name for each in recordings.values() for name in each.columns if name != "mark")
     plant = plant_for(drive, measured, [u.name for u in sought])
-    runs = [_run(config, drive, run, recordings[run.name]) for run in plan.runs]
+    of_shaft = is_of_shaft(measured)
+    runs = [_run(config, drive, run, recordings[run.name], of_shaft) for run in plan.runs]
     return Problem(plant, runs, sought, _sensors(plan, measured, recordings))
 
 
@@ -281,9 +290,9 @@ def plant_for(drive: Drive, columns: Collection[str], by: list[str]) -> AnyPlant
     return MeasuredShaft(drive.machine, measured, by) if is_of_shaft(columns) else Plant(drive, measured, by)
 
 
-def _run(config: Config, drive: Drive, run: PlannedRun, recording: Recording) -> RecordedRun:
+def _run(config: Config, drive: Drive, run: PlannedRun, recording: Recording, of_shaft: bool) -> RecordedRun:
     values: dict[str, Any] = {}
-    if "crank.tau" not in recording.columns:
+    if not of_shaft:
         reference = drive.reference(run.crank_speed)
         values = {name: x for name, x in reference.items() if not name.startswith("model.")}
     if run.speeds:
@@ -347,8 +356,11 @@ def remarks(found: IdentifiedMachine) -> Iterator[str]:
         and "motor.i" in columns
         and "motor.power" not in columns
     ):
-        *_, current = found.courses(next(each for each in found.best.comparisons if each.column == "motor.i"))
-        swing = np.ptp(current) / np.mean(current)
+        of_current = next(each for each in found.best.comparisons if each.column == "motor.i")
+        time, _, current = found.courses(of_current)
+        speed = next(run.crank_speed for run in runs if run.name == of_current.run)
+        turn = current[time > time[-1] - 2.0 * np.pi / speed]
+        swing = np.ptp(turn) / np.mean(turn)
         yield (
             f"The recordings have no active power. The current of this induction motor changes by {100.0 * swing:.2g}"
             " % within a turn, as most of it magnetises the motor: record the power, too, which tells far more"
@@ -358,11 +370,10 @@ def remarks(found: IdentifiedMachine) -> Iterator[str]:
             each for each in columns - run.recording.columns.keys() if MEASURANDS[each].analog
         ):
             yield f"{run.recording.source} has no {name}, which another recording has: it tells less without it"
-        if not {"mark", "motor.count"} & run.recording.columns.keys():
+        if "mark" not in run.recording.columns:
             yield (
-                f"{run.recording.source} has neither a mark nor an encoder: the angle of the crank follows from the "
-                "course of the other columns, and machines that are alike in both halves of a turn may be taken for "
-                "each other"
+                f"{run.recording.source} has no mark: the angle of the crank follows from the course of the other "
+                "columns, and machines that are alike in both halves of a turn may be taken for each other"
             )
     has_motor = bool(columns & set(SIGNALS[:3]))
     if has_motor and config.motor is not None and config.motor_type.follows(config.motor):

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from ...system import Profile
-from .fit import inverse, normal, normal_of
+from .fit import Normal, inverse, normal
 from .plant import CRANK
-from .problem import Comparison, Problem, RecordedRun
+from .problem import Problem, RecordedRun
 from .recording import Recording
 
 TOLD = 0.5
@@ -32,6 +32,8 @@ WEAK = 1e3
 BLIND, PART = 1e-4, 0.05
 """Information on a direction, in parts of that of the prior, below which the runs are blind for it, and the least
 part of a number in it that is named."""
+FURTHER = "further run"
+"""Name of a run that is proposed; no run of a file has a space in its name."""
 REFERENCE = "motor.w_ref"
 OTHER_SPEEDS, SHAKEN = (0.5, 1.5), (0.7, 1.3)
 """Speeds of runs that are proposed, in parts of that of the first run: steady ones, and those of a shaken run."""
@@ -103,16 +105,16 @@ def information(
     z: Any = None,
     workers: int = 2,
     propose: bool = True,
-    comparisons: tuple[Comparison, ...] | None = None,
+    at: Normal | None = None,
 ) -> Information:
     """What the runs of a problem can tell at the values `z` of the unknowns, by default the start values.
 
     Of the recordings the columns, the times of the rows and the sizes of the noise count. With `propose` further runs
-    are ranked, each of which is simulated. Without the `comparisons` at these values the runs are simulated, too.
+    are ranked, each of which is simulated. `at` are the normal equations there, where they are known, with the
+    measured sizes of the noise.
     """
     z = problem.started(workers) if z is None else z
-    at = normal(problem, z, workers) if comparisons is None else normal_of(problem, z, comparisons)
-    fisher = at.fisher
+    fisher = (at or normal(problem, z, workers)).fisher
     outlooks, told = _outlooks(problem, fisher), _combinations(problem, fisher)
     proposals = _proposals(problem, z, fisher, outlooks, workers) if propose else ()
     return Information(outlooks, told, _blind(problem, fisher), tuple(proposals))
@@ -144,6 +146,8 @@ def _combinations(problem: Problem, fisher: Any) -> tuple[Combination, ...]:
         others: list[int] = []
         while len(others) < MOST_TERMS - 1:
             left = set(range(len(sought))) - {first, *others}
+            if not left:
+                break
             others.append(min(left, key=lambda k: _rest(covariance, first, [*others, k])))
             deviation = math.sqrt(_rest(covariance, first, others))
             if deviation < SHARP * unknown.spread:
@@ -235,11 +239,11 @@ def _proposals(
 
 
 def _candidates(problem: Problem) -> Iterator[tuple[str, RecordedRun]]:
-    """Runs that an engineer can make, in words."""
-    first = problem.runs[0]
-    steady = {name: getattr(x, "start", x) for name, x in first.values.items()}
-    own = replace(first, name="next", added={}, values=steady, off=None)
+    """Runs that an engineer can make, in words: like the first one with feed."""
     feed = [u.name for u in problem.sought if u.name.endswith(("material_mass", "processing_force"))]
+    first = next((run for run in problem.runs if not set(feed) & set(run.values)), problem.runs[0])
+    steady = {name: getattr(x, "start", x) for name, x in first.values.items()}
+    own = replace(first, name=FURTHER, added={}, values=steady, off=None)
     if feed and not any(set(feed) <= set(run.values) for run in problem.runs):
         yield "empty", replace(own, values={**steady, **dict.fromkeys(feed, 0.0)})
     if REFERENCE in steady:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,8 +26,12 @@ STEP = 5e-3
 """Time between the rows that are taken for second derivatives [s]."""
 CHAINS, STEPS, KEPT = 300, 1200, 10
 """Number of chains, their steps, of which the second half counts, and states that are kept of each."""
+_STIFF = 1e4
 LEVEL = 0.95
 """Probability of an interval."""
+PRESSED = 3.0
+"""Standard deviations by which the best fit without a bound would lie beyond it, from which on the number is held
+there: the recordings contradict the bound."""
 
 
 @dataclass(frozen=True)
@@ -45,10 +50,12 @@ class Marginal:
 
 @dataclass(frozen=True)
 class Posterior:
-    """The distributions of all sought numbers, and `samples` of them, shape (samples, numbers)."""
+    """The distributions of all sought numbers, and `samples` of them, shape (samples, numbers). Those that are `held`
+    at a bound lie beyond it by the recordings."""
 
     marginals: tuple[Marginal, ...]
     samples: Any
+    held: tuple[str, ...] = ()
 
     @property
     def covariance(self) -> Any:
@@ -59,8 +66,12 @@ class Posterior:
 def posterior(problem: Problem, best: Normal, workers: int = 2, seed: int = 0) -> Posterior:
     """The distribution of the sought numbers around the best fit."""
     rng = np.random.default_rng(seed)
-    bent = _Bent(problem, best, workers)
+    held = _held(problem, best)
+    bent = _Bent(problem, best, workers, held)
     samples = bent.sampled(rng)
+    for k, pull in held.items():
+        # the density falls by the gradient behind the bound
+        samples[:, k] = best.z[k] - np.sign(pull) * rng.exponential(1.0 / abs(pull), len(samples))
     edges = np.quantile(samples, [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL], axis=0)
     means, deviations = np.mean(samples, axis=0), np.std(samples, axis=0, ddof=1)
     rows = np.stack([means, deviations, *edges], axis=1)
@@ -68,18 +79,40 @@ def posterior(problem: Problem, best: Normal, workers: int = 2, seed: int = 0) -
         Marginal(u.name, u.unit, float(x), float(s), float(low), float(high), u.spread)
         for u, (x, s, low, high) in zip(problem.sought, rows, strict=True)
     )
-    return Posterior(marginals, samples)
+    return Posterior(marginals, samples, tuple(problem.sought[k].name for k in held))
+
+
+def _pull(problem: Problem, best: Normal) -> Any:
+    """The gradient of the logarithm of the density at the best fit: where there are bounds alone, of the recordings
+    alone."""
+    even = np.array([u.is_even for u in problem.unknowns])
+    return best.gradient - np.where(even, (problem.starts - best.z) / problem.spreads**2, 0.0)
+
+
+def _held(problem: Problem, best: Normal) -> dict[int, float]:
+    """The places of the sought numbers that their bound holds, with the gradient towards it."""
+    count, (low, high), pull = len(problem.sought), problem.bounds, _pull(problem, best)
+    near = 1e-6 * problem.spreads
+    at = np.where(best.z <= low + near, pull < 0.0, (best.z >= high - near) & (pull > 0.0))
+    held: dict[int, float] = {}
+    covariance = best.covariance
+    for k in np.flatnonzero(at[:count]):
+        if abs(pull[k]) * math.sqrt(covariance[k, k]) > PRESSED:
+            held[int(k)] = float(pull[k])
+    return held
 
 
 class _Bent:
     """The distribution near the best fit. The change of all unknowns is `across` @ a + `along` @ b, with the places
     `a` in the wide directions and `b` in all others. Given `a`, `b` is normal."""
 
-    def __init__(self, problem: Problem, best: Normal, workers: int) -> None:
-        self._problem, self._z = problem, best.z
+    def __init__(self, problem: Problem, best: Normal, workers: int, held: Collection[int]) -> None:
+        self._problem, self._z, self._held = problem, best.z, list(held)
         count, size = len(problem.sought), len(best.z)
         spread = problem.spreads
-        covariance = best.covariance
+        stiff = np.zeros(size)
+        stiff[self._held] = (_STIFF / spread[self._held]) ** 2
+        covariance = inverse(best.matrix + np.diag(stiff))
         own = covariance[:count, :count] / np.outer(spread[:count], spread[:count])
         sizes, directions = np.linalg.eigh(own)
         wide = np.flatnonzero(np.sqrt(sizes) > WIDE)[-MOST_WIDE:]
@@ -90,13 +123,14 @@ class _Bent:
         rest = [k for k in range(count) if k not in wide]
         self._along = np.hstack([ridges[:, rest], np.eye(size)[:, count:] * spread[count:]])
         self._pairs = list(itertools.combinations_with_replacement(range(len(wide)), 2))
-        self._reduce(best, workers)
+        self._reduce(best, workers, stiff)
 
-    def _reduce(self, best: Normal, workers: int) -> None:
-        """The sum of squares as a quadratic form of (1, a, products of a, b), reduced by the best b."""
+    def _reduce(self, best: Normal, workers: int, stiff: Any) -> None:
+        """The sum of squares as a quadratic form of (1, a, products of a, b), reduced by the best b. Numbers that are
+        held have a further, `stiff` information."""
         problem = self._problem
         even = np.array([u.is_even for u in problem.unknowns])
-        known = np.where(even, 0.0, 1.0 / problem.spreads**2)
+        known = np.where(even, 0.0, 1.0 / problem.spreads**2) + stiff
         wide, pairs = self._across.shape[1], len(self._pairs)
         basis = np.hstack([self._across, self._along])
         linear = 1 + np.r_[0:wide, wide + pairs : wide + pairs + self._along.shape[1]]
@@ -104,8 +138,7 @@ class _Bent:
         matrix += self._squares(best, workers, linear)
         matrix[np.ix_(linear, linear)] += basis.T @ (known[:, None] * basis)
         # the gradient is that of all rows; without the pull of a prior where there are bounds alone
-        pull = (problem.starts - best.z) / problem.spreads**2
-        matrix[0, linear] = matrix[linear, 0] = -basis.T @ (best.gradient - np.where(even, pull, 0.0))
+        matrix[0, linear] = matrix[linear, 0] = -basis.T @ np.where(stiff > 0.0, 0.0, _pull(problem, best))
         places = slice(0, 1 + wide + pairs), slice(1 + wide + pairs, None)
         inner = matrix[places[1], places[1]]
         mean = -np.linalg.solve(inner, matrix[places[1], places[0]])
@@ -161,7 +194,9 @@ class _Bent:
         z = self._z[:count] + a @ self._across[:count].T + terms @ self._mean.T
         z += rng.standard_normal((len(a), self._root.shape[1])) @ self._root.T
         low, high = (bound[:count] for bound in problem.bounds)
-        beyond = np.sum(np.maximum(np.maximum(low - z, z - high), 0.0) / problem.spreads[:count], axis=1)
+        outside = np.maximum(low - z, z - high) / problem.spreads[:count]
+        outside[:, self._held] = 0.0
+        beyond = np.sum(np.maximum(outside, 0.0), axis=1)
         density = -0.5 * np.einsum("ni,ij,nj->n", terms, self._form, terms)
         # beyond the bounds there is nothing; the steep slope leads chains back that began there
         return density - np.where(beyond > 0.0, 1e3 * (1.0 + beyond), 0.0), z

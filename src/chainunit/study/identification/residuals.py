@@ -17,6 +17,8 @@ from .unknown import Unknown
 
 ORDERS = 20
 """Highest order of the crank that is looked at."""
+LEAST_ROWS = 10 * ORDERS
+"""Least number of rows whose orders can be checked."""
 FALSE_ALARMS = 0.01
 """Share of right models of which some column is taken for wrong."""
 
@@ -82,8 +84,10 @@ def strained_priors(sought: Sequence[Unknown], best: Normal) -> list[Strain]:
 
 
 def check_residuals(best: Normal) -> list[ResidualCheck]:
-    """The checks of all columns of a fit that have a value in each row."""
-    columns = [each for each in best.comparisons if each.column != "mark"]
+    """The checks of all columns of a fit that have a value in each row, and enough rows."""
+    columns = [
+        each for each in best.comparisons if each.column != "mark" and len(each.residuals) >= LEAST_ROWS
+    ]
     limit = float(chi2.ppf((1.0 - FALSE_ALARMS) ** (1.0 / max(1, len(columns))), 2 * ORDERS))
     return [check(each, limit) for each in columns]
 

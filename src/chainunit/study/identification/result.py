@@ -16,10 +16,11 @@ from ..observation import false_imbalance
 from ..study_file import changed_tables
 from .fit import Normal
 from .identification import FittedNumber, IdentifiedMachine, remarks, system_name
-from .information import Combination, short_name
+from .information import Combination, Information, short_name
 from .measurands import MEASURANDS
 from .plant import ANGLE
 from .problem import MARK_ANGLE, Problem
+from .reading import IdentificationPlan
 from .residuals import ResidualCheck
 from .unknown import Unknown
 
@@ -105,20 +106,21 @@ def _number(found: IdentifiedMachine, each: FittedNumber) -> dict[str, Any]:
     variable = found.plan.variables[each.unknown.name]
     before = next(one for one in found.before.outlooks if one.name == system_name(each.unknown.name))
     own, unit, kind = each.unknown, variable.unit, variable.kind
+    difference = "difference" if unit == "K" else ""
     return {
         "title": variable.description,
         "told": each.is_told,
         "value": entry(each.value if each.is_told else None, unit, kind),
         "fitted": entry(each.fitted if each.is_told else None, unit, kind),
-        "deviation": entry(each.deviation, unit, "difference" if unit == "K" else ""),
+        "deviation": entry(each.deviation, unit, difference),
         "from": entry(each.low, unit, kind),
         "to": entry(each.high, unit, kind),
         "given": entry(own.start, unit, kind),
-        "given_deviation": entry(own.spread, unit),
+        "given_deviation": entry(own.spread, unit, difference),
         "least": entry(own.low, unit, kind),
         "most": entry(own.high, unit, kind),
-        "expected": entry(before.by_both, unit),
-        "by_runs": entry(before.by_runs, unit),
+        "expected": entry(before.by_both, unit, difference),
+        "by_runs": entry(before.by_runs, unit, difference),
     }
 
 
@@ -135,11 +137,13 @@ def _correlations(found: IdentifiedMachine) -> Iterator[dict[str, Any]]:
 
 def _combination(found: IdentifiedMachine, each: Combination) -> dict[str, Any]:
     value, deviation = found.combined(each)
+    difference = "difference" if each.unit == "K" else ""
     return {
         "text": str(each),
         "terms": dict(each.terms),
-        "value": entry(value, each.unit),
-        "deviation": entry(deviation, each.unit),
+        # of temperatures, a sum is no temperature
+        "value": entry(value, each.unit, difference),
+        "deviation": entry(deviation, each.unit, difference),
     }
 
 
@@ -214,6 +218,20 @@ def _courses(found: IdentifiedMachine, run: str) -> dict[str, Any]:
     return courses
 
 
+def outlook(plan: IdentificationPlan, before: Information) -> str:
+    """What the recordings can tell, in words: with the standard deviations to expect."""
+    names = {system_name(u.name): u.name for u in plan.sought}
+    told = [each for each in before.outlooks if each.is_told]
+    words = f"Before the fit: these recordings can determine {len(told)} of {len(before.outlooks)} numbers"
+    if told:
+        listed = (f"{names[each.name]} to {each.by_both:.2g}{unit_behind(each.unit)}" for each in told)
+        words += f" ({', '.join(listed)})"
+    if before.proposals and len(told) < len(before.outlooks):
+        best = before.proposals[0]
+        words += f". Of further runs, this one would tell most: {best.words} (then {best.told} numbers)"
+    return f"{words}."
+
+
 def sentences(found: IdentifiedMachine) -> list[str]:
     """Sentences that judge an identification."""
     words = [
@@ -222,8 +240,9 @@ def sentences(found: IdentifiedMachine) -> list[str]:
         for each in found.strains
     ]
     words += [
-        f"{name} = {each.fitted:.4g}{unit_behind(each.unknown.unit)} lies at its bound {each.at_bound}: widen the "
-        "bound, or check what else is held for known"
+        f"{name} = {each.fitted:.4g}{unit_behind(each.unknown.unit)} lies at its {each.at_bound} bound"
+        + (", and the recordings contradict this bound" if system_name(name) in found.posterior.held else "")
+        + ": widen it, or check what else is held for known"
         for name, each in found.estimates.items()
         if each.at_bound
     ]

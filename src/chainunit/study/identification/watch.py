@@ -7,7 +7,7 @@ import json
 import math
 import os
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -30,6 +30,7 @@ from ..observer_table import ObserverTable
 from .crank_motion import crank_motion
 from .fit import Fit, fit
 from .identification import drive_of, inspect_runs, is_of_shaft, plant_for, read_signal
+from .inspection import FEWEST_TURNS
 from .measurands import MEASURANDS
 from .problem import MARK_ANGLE, Problem, RecordedRun, Sensor
 from .reading import OFFSET_SHARE, WITH_OFFSET, WatchPlan
@@ -68,6 +69,9 @@ OUTPUTS = (
     "alarm",
 )
 """Outputs of the observer that are kept."""
+THRESHOLDS = ("imbalance.feed_threshold", "imbalance.force_threshold")
+GAP = 0.05
+"""Time without rows, in parts of a turn, behind which the observer starts anew."""
 LULL = 2.0
 """Alarms of one side that are nearer than this many turns are one."""
 _LIGHT = 1e-3
@@ -93,7 +97,8 @@ class WatchedRecording:
 
     `learned` is the fit over its begin, `checks` are those of its residuals, `parameters` are those of the observer
     by name, and `uncertainty` is the false imbalance by errors of the machine's parameters: of the feed [kg] and of
-    the forces [N]. With these errors the threshold of the feed is wider by the factor `widening`.
+    the forces [N]. With these errors the thresholds are wider by the factors `widening`. `failed` is the status of an
+    identification whose model did not describe its recordings.
     """
 
     config: Config
@@ -105,7 +110,8 @@ class WatchedRecording:
     checks: tuple[ResidualCheck, ...]
     parameters: Mapping[str, float]
     uncertainty: tuple[float, float]
-    widening: float
+    widening: tuple[float, float]
+    failed: str
     outputs: Mapping[str, Any]
     alarms: tuple[Alarm, ...]
 
@@ -120,6 +126,12 @@ class WatchedRecording:
         loads = strained_priors(self.problem.sought, self.learned)
         named = (replace(each, name=file_name(each.name)) for each in loads)
         return [*strains(self.problem, self.learned), *named]
+
+    @property
+    def is_of_feed(self) -> bool:
+        """Whether nothing but a feed that is not as stated speaks against the machine of the study."""
+        own = strains(self.problem, self.learned)
+        return not self.is_described and not own and all(check.is_noise for check in self.checks)
 
     @property
     def turn(self) -> float:
@@ -159,9 +171,11 @@ def watch(config: Config, report: Report = lambda *_: None) -> WatchedRecording:
     report("reading the recording", 0.0, 1.0)
     recording = read_signal(plan)
     duration = float(recording.time[-1] - recording.time[0])
-    if not plan.learning < duration:
+    least = FEWEST_TURNS * 2.0 * math.pi / plan.crank_speed
+    if not least <= plan.learning < duration:
         raise InputError(
-            f"watch.learning = {plan.learning:g} s: must be < {duration:.4g} s, the duration of {plan.file}",
+            f"watch.learning = {plan.learning:g} s: must be >= {least:.4g} s, {FEWEST_TURNS:g} turns of the crank, "
+            f"and < {duration:.4g} s, the duration of {plan.file}",
             "watch.learning",
         )
     drive = drive_of(config, {RUN: recording})
@@ -175,21 +189,21 @@ def watch(config: Config, report: Report = lambda *_: None) -> WatchedRecording:
     angle = next(each.angle[0] for each in learned.comparisons if each.rows is not None)
     angle = float(angle) if "motor.count" in recording.columns else found.get(MARK_ANGLE, 0.0)
     phi, w = crank_motion(recording, angle, drive.ratio)
-    values = _parameters(config, plan, drive, recording, found, ratio)
-    uncertainty = _uncertainty(plan, values)
+    checks = tuple(check_residuals(learned))
+    values = _parameters(
+        config, replace(plan, noise=plan.noise * noise_of(checks)), drive, recording, found, ratio
+    )
+    uncertainty, failed = _uncertainty(plan, values)
     values |= dict(zip(UNCERTAINTIES, uncertainty, strict=True))
     gain = {name: found.get(f"gain({name})", 1.0) for name in recording.columns}
     of_speed = next((gain[name] for name in ("crank.w", "motor.w") if name in gain), 1.0)
     signals = {"phi": phi * ratio, "w": w * ratio / of_speed} | {
         name: recording.columns[column] / gain[column] for name, column in _signals(recording).items()
     }
-    checks = tuple(check_residuals(learned))
     report("watching", 0.5, 1.0)
-    outputs, widening = observe(recording.time, signals, values), 1.0
-    if any(uncertainty):
-        right = values | dict.fromkeys(UNCERTAINTIES, 0.0)
-        name = "imbalance.feed_threshold"
-        widening = float(np.median(outputs[name] / observe(recording.time, signals, right)[name]))
+    tunings = [values, values | dict.fromkeys(UNCERTAINTIES, 0.0)]
+    outputs, right = observe(recording, signals, tunings, GAP * 2.0 * math.pi / plan.crank_speed)
+    widening = [float(np.median(outputs[name] / right[name])) for name in THRESHOLDS]
     alarms = tuple(_alarms(recording.time, outputs, 2.0 * math.pi / plan.crank_speed))
     return WatchedRecording(
         config,
@@ -201,7 +215,8 @@ def watch(config: Config, report: Report = lambda *_: None) -> WatchedRecording:
         checks,
         values,
         uncertainty,
-        widening,
+        (widening[0], widening[1]),
+        failed,
         outputs,
         alarms,
     )
@@ -285,56 +300,85 @@ def _zero(found: Mapping[str, float], column: str) -> float:
     return found[f"{RUN}.offset({column})"] / found.get(f"gain({column})", 1.0)
 
 
-def _uncertainty(plan: WatchPlan, values: Mapping[str, float]) -> tuple[float, float]:
-    """The false imbalance by errors of the machine: of an identified one, or as the table [observer] has it."""
+def noise_of(checks: Sequence[ResidualCheck]) -> float:
+    """The noise at the begin of the recording, in parts of the stated one, where it is larger: that of the column
+    with the most."""
+    return max([1.0, *(check.noise for check in checks)])
+
+
+def _uncertainty(plan: WatchPlan, values: Mapping[str, float]) -> tuple[tuple[float, float], str]:
+    """The false imbalance by errors of the machine: of an identified one, or as the table [observer] has it; and the
+    status of an identification that failed."""
     if plan.identification is None:
         feed, force = (values[name] for name in UNCERTAINTIES)
-        return feed, force
-    names, covariance = _covariance(plan.identification)
+        return (feed, force), ""
+    names, covariance, failed = _covariance(plan.identification)
     feed, force = false_imbalance(values, names, covariance, plan.crank_speed).values()
-    return feed, force
+    return (feed, force), failed
 
 
-def _covariance(file: Path) -> tuple[list[str], Any]:
-    """Names of the machine's parameters and their covariance, from the result of an identification."""
+def _covariance(file: Path) -> tuple[list[str], Any, str]:
+    """Names of the machine's parameters, their covariance, and the status if it is not "complete", from the result of
+    an identification."""
     try:
-        table = json.loads(file.read_text("utf-8"))["covariance"]
+        result = json.loads(file.read_text("utf-8"))
+        table, status = result["covariance"], str(result["status"])
         names, matrix = list(table["names"]), np.array(table["matrix"], float)
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(
             f"watch.identification = {file}: is no result.json of chainunit identify", "watch.identification"
         ) from error
     rows = [k for k, name in enumerate(names) if name.startswith("machine.")]
-    return [names[k].removeprefix("machine.") for k in rows], matrix[np.ix_(rows, rows)]
+    names = [names[k].removeprefix("machine.") for k in rows]
+    return names, matrix[np.ix_(rows, rows)], "" if status == "complete" else status
 
 
-def observe(time: Any, signals: Mapping[str, Any], values: Mapping[str, float]) -> dict[str, Any]:
-    """The outputs of the observer's FMU, by name, each of shape (rows,).
+def observe(
+    recording: Recording, signals: Mapping[str, Any], tunings: Sequence[Mapping[str, float]], gap: float
+) -> list[dict[str, Any]]:
+    """The outputs of the observer's FMU, by name, each of shape (rows,), for each tuning.
 
     Parameters
     ----------
-    time : of the rows [s], shape (rows,)
     signals : inputs of the observer by name, each of shape (rows,)
-    values : parameters of the observer by name
+    tunings : parameters of the observer by name
+    gap : time without rows behind which the observer starts anew [s]; over a shorter one the inputs go straight
     """
-    table = np.stack(list(signals.values()))
-    result = np.zeros((len(OUTPUTS), len(time)))
+    table, time = np.stack(list(signals.values())), recording.time
+    results = [np.zeros((len(OUTPUTS), len(time))) for _ in tunings]
+    pieces = np.split(np.arange(len(time)), np.flatnonzero(np.diff(time) > gap) + 1)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / f"{LoadObserver.name}.fmu"
-        export(LoadObserver, file, dict(values))
-        with contextlib.closing(Fmu(file)) as fmu, contextlib.closing(Instance(fmu, "observer")) as unit:
-            unit.initialize(
-                {**values, **dict(zip(signals, map(float, table[:, 0]), strict=True))}, float(time[0])
-            )
-            unit.finish_initialization()
-            inputs, outputs = unit.handle(list(signals)), unit.handle(list(OUTPUTS))
-            steps = np.diff(time, append=2.0 * time[-1] - time[-2])
-            rows = zip(table.T.tolist(), time.tolist(), steps.tolist(), strict=True)
-            for k, (row, t, step) in enumerate(rows):
-                unit.write(inputs, row)
-                result[:, k] = unit.read(outputs)
-                unit.step(t, step)
-    return dict(zip(OUTPUTS, result, strict=True))
+        export(LoadObserver, file, dict(tunings[0]))
+        with contextlib.closing(Fmu(file)) as fmu:
+            for result, values in zip(results, tunings, strict=True):
+                for rows in pieces:
+                    first = dict(zip(signals, map(float, table[:, rows[0]]), strict=True))
+                    with contextlib.closing(Instance(fmu, "observer")) as unit:
+                        unit.initialize({**values, **first}, float(time[rows[0]]))
+                        unit.finish_initialization()
+                        result[:, rows] = _outputs(
+                            unit, list(signals), table[:, rows], time[rows], recording.step
+                        )
+    return [dict(zip(OUTPUTS, result, strict=True)) for result in results]
+
+
+def _outputs(unit: Instance, signals: list[str], table: Any, time: Any, usual: float) -> Any:
+    """The outputs of an instance along the inputs `table`, shape (signals, rows), in steps near the `usual` one."""
+    result = np.zeros((len(OUTPUTS), len(time)))
+    inputs, outputs = unit.handle(signals), unit.handle(list(OUTPUTS))
+    for k, (t, row) in enumerate(zip(time.tolist(), table.T, strict=True)):
+        unit.write(inputs, row.tolist())
+        result[:, k] = unit.read(outputs)
+        if k + 1 == len(time):
+            break
+        step = float(time[k + 1]) - t
+        parts = max(1, round(step / usual))
+        for part in range(parts):
+            if part:
+                unit.write(inputs, (row + (table[:, k + 1] - row) * part / parts).tolist())
+            unit.step(t + step * part / parts, step / parts)
+    return result
 
 
 def _alarms(time: Any, outputs: Mapping[str, Any], turn: float) -> list[Alarm]:
@@ -356,6 +400,6 @@ def _alarms(time: Any, outputs: Mapping[str, Any], turn: float) -> list[Alarm]:
             begin, end = float(time[first]), float(time[last - 1])
             # an alarm begins on the ground that is beyond its threshold first
             first_ground = max(shares, key=lambda name: float(shares[name][0]))
-            lasts = float(time[-1]) - end < LULL * turn
+            lasts = last == len(time)
             found.append(Alarm(side, begin, end, first_ground, lasts, float(time[at]), values))
     return sorted(found, key=lambda alarm: alarm.begin)

@@ -11,7 +11,7 @@ from ... import __version__
 from ...machines.load_observer import LoadObserver
 from ...text import array_entry, entry, shown_in
 from .result import fitted_entries
-from .watch import OUTPUTS, Alarm, WatchedRecording, file_name
+from .watch import GAP, OUTPUTS, Alarm, WatchedRecording, file_name, noise_of
 
 ROWS = 1500
 """Most rows of a course in the result."""
@@ -57,11 +57,20 @@ def _as_dict(watched: WatchedRecording) -> dict[str, Any]:
             ),
             *map(str, watched.strains),
         ],
+        "of_feed_alone": watched.is_of_feed,
         "alarms": [_alarm(watched, each) for each in watched.alarms],
         **_thresholds(watched),
         "uncertainty": entry(watched.uncertainty[0], "kg"),
         "force_uncertainty": entry(watched.uncertainty[1], "N"),
-        "widening": entry(watched.widening, "1"),
+        "widening": entry(watched.widening[0], "1"),
+        "force_widening": entry(watched.widening[1], "1"),
+        "noise": entry(noise_of(watched.checks), "1"),
+        "gaps": [
+            {"from": entry(begin, "s"), "to": entry(end, "s")}
+            for begin, end in recording.gaps
+            if end - begin > GAP * watched.turn
+        ],
+        "failed_identification": watched.failed,
         "identification": None if plan.identification is None else str(plan.identification),
         "tuning": {
             v.name: entry(p.get(v.name, v.quantity.start), v.unit, v.kind)
