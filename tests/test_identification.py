@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from derivatives import check_derivatives
@@ -12,6 +14,8 @@ from chainunit.drives.induction_motor import InductionMotor
 from chainunit.native.compilers import compiler
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
+from chainunit.study.identification import fit as fitting
+from chainunit.study.identification import information as what_runs_tell
 from chainunit.study.identification import residuals
 from chainunit.study.identification.fit import fit, normal
 from chainunit.study.identification.information import information
@@ -275,6 +279,63 @@ def test_a_product_bends_the_distribution():
     deviation = np.sqrt(np.sum((a - mean) ** 2 * density) / np.sum(density))
     assert found.marginals[0].value == pytest.approx(mean, abs=0.1 * deviation)
     assert found.marginals[0].deviation == pytest.approx(deviation, rel=0.06)
+
+
+def test_a_number_beyond_its_bound_is_held_there():
+    """Against the integral over the distribution; the number beside it follows."""
+    rng = np.random.default_rng(0)
+    rows = np.repeat([[1.0, 1.0], [1.0, 2.0]], 200, axis=0)
+    data = rows @ [5.0, 3.0] + rng.standard_normal(400)
+
+    class Straight:
+        unknowns = sought = (Unknown.within("a", "1", 6.0, 8.0), Unknown.within("b", "1", 0.0, 10.0))
+        starts, spreads = np.array([6.8, 5.0]), np.array([2.4, 10.0]) / np.sqrt(12.0)
+        bounds = np.array([6.0, 0.0]), np.array([8.0, 10.0])
+
+        def comparisons(self, z, workers=1):
+            yield Comparison("run", "x", data - rows @ z, rows, (0, 1), None, 1.0)
+
+        def thinned(self, step):
+            return self
+
+    b = float(np.linalg.lstsq(rows[:, 1:], data - 6.0, rcond=None)[0][0])
+    problem = Straight()
+    found = posterior(problem, normal(problem, np.array([6.0, b])))
+    assert found.held == ("a",)
+    axes = np.linspace(6.0, 6.5, 1201), np.linspace(b - 0.6, b + 0.3, 901)
+    a, b = np.meshgrid(*axes, indexing="ij")
+    squares = sum((d - x * a - y * b) ** 2 for d, (x, y) in zip(data, rows, strict=True))
+    density = np.exp(-0.5 * (squares - squares.min()))
+    for k, x in enumerate((a, b)):
+        mean = np.sum(x * density) / np.sum(density)
+        deviation = np.sqrt(np.sum((x - mean) ** 2 * density) / np.sum(density))
+        print(k, found.marginals[k], mean, deviation)
+        assert found.marginals[k].value == pytest.approx(mean, abs=0.35 * deviation)
+        assert found.marginals[k].deviation == pytest.approx(deviation, rel=0.35)
+    assert 6.0 <= found.marginals[0].low < found.marginals[0].high < 6.3
+
+
+@pytest.mark.parametrize("size", [1.0, 5.0, 20.0])
+def test_noise_of_any_size_is_measured(size):
+    """Also of a column with outliers."""
+    residuals = size * np.random.default_rng(2).standard_normal(20_000)
+    residuals[::500] = 60.0 * size
+    of = Comparison("run", "motor.i", residuals, None, (), None, 1.0)
+    ((_, found),) = fitting._noises(SimpleNamespace(comparisons=[of])).items()
+    assert found == pytest.approx(size, rel=0.05)
+
+
+def test_a_number_without_a_sum_that_is_told():
+    """Of two numbers, one of which leaves no trace."""
+    own = tuple(Unknown.within(name, "1", 0.0, 1.0) for name in "ab")
+    problem = SimpleNamespace(sought=own, spreads=np.array([u.spread for u in own]))
+    assert what_runs_tell._combinations(problem, np.diag([1e6, 1e-3])) == ()
+
+
+def test_few_rows_tell_no_orders():
+    angle = np.linspace(0.0, 30.0, 42)
+    own = Comparison("run", "motor.i", np.random.default_rng(1).standard_normal(42), None, (), angle, 1.0)
+    assert residuals.check_residuals(SimpleNamespace(comparisons=(own,))) == []
 
 
 def test_what_is_known_beforehand_counts(loaded):

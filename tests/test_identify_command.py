@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import tomllib
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,9 +15,11 @@ from chainunit import InputError, Study
 from chainunit.native.compilers import compiler
 from chainunit.study import config as study_files
 from chainunit.study.choice import choose
+from chainunit.study.identification import identification
 from chainunit.study.identification.measurands import MEASURANDS
-from chainunit.study.identification.result import sentences
+from chainunit.study.identification.result import _number, sentences
 from chainunit.study.identification.synthetic import HiddenRun, Logger, synthetic
+from chainunit.study.identification.unknown import Unknown
 from chainunit.system import Profile
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
@@ -159,6 +162,11 @@ def test_one_run_does_not_tell_web_from_feed(tmp_path):
     (tmp_path / "mine.toml").write_text(text, "utf-8")
     done = chainunit("identify", "mine.toml", "-o", "out", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
+    before = " ".join(done.stderr.split())
+    assert (
+        "Before the fit: these recordings can determine 2 of 4 numbers (feed.right.material_mass to" in before
+    )
+    assert "this one would tell most: empty (then 4 numbers)" in before
     words = " ".join(done.stdout.split())
     assert "These recordings determine 2 of 4 numbers" in words
     assert "No trace in any column: left.material_mass" in words or "left.web_mass up by 1 kg" in words
@@ -256,6 +264,8 @@ def test_a_wrong_gear_is_recognised(tmp_path):
     assert "The model does not describe the recordings." in " ".join(done.stdout.split())
     result = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))
     assert any(not each["is_noise"] for each in result["residuals"])
+    file = (tmp_path / "out" / "identified.toml").read_text("utf-8")
+    assert file.startswith("# The model does not describe the recordings")
 
 
 def test_what_was_known_and_is_contradicted(tmp_path):
@@ -270,8 +280,41 @@ def test_what_was_known_and_is_contradicted(tmp_path):
     words = " ".join(sentences(Study.from_file(tmp_path / "mine.toml").identify().found))
     result = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))
     assert "machine.left.web_mass = " in words and "deviations beside the known value, 21.6 kg" in words
-    assert "machine.joint_damping = 1.1 N m s/rad lies at its upper bound" in words
+    assert (
+        "machine.joint_damping = 1.1 N m s/rad lies at its upper bound, and the recordings contradict"
+        in words
+    )
+    damping = result["numbers"]["machine.joint_damping"]
+    assert 1.0 < damping["from"]["value"] < damping["to"]["value"] <= 1.1
     assert not result["numbers"]["machine.joint_damping"]["told"]
+
+
+def test_a_motor_beside_the_torque_of_the_crank(tmp_path):
+    """The motor follows its reference also where the torque behind the gear is recorded."""
+    write(tmp_path, "loaded.csv.gz", heads={}, measured=(*MOTOR, "crank.tau"))
+    (tmp_path / "mine.toml").write_text(FILE, "utf-8")
+    config = study_files.load(tmp_path / "mine.toml")
+    plan = identification.plan_of(config)
+    recordings = identification._recordings(plan)
+    problem = identification._problem(config, plan, identification.drive_of(config, recordings), recordings)
+    assert problem.runs[0].values["motor.w_ref"] == 150.0
+    identification.inspect_runs(problem, 1)
+
+
+def test_a_deviation_of_a_temperature_is_a_difference():
+    """20 K are no -253 degC."""
+    unknown = Unknown("motor.ambient.T", "K", 293.15, 250.0, 340.0, 5.0)
+    outlook = SimpleNamespace(name="motor.ambient.T", by_both=2.0, by_runs=3.0)
+    variable = SimpleNamespace(description="", unit="K", kind="temperature")
+    found = SimpleNamespace(
+        plan=SimpleNamespace(variables={"motor.ambient.T": variable}),
+        before=SimpleNamespace(outlooks=[outlook]),
+    )
+    each = identification.FittedNumber(unknown, 300.0, 300.0, 2.0, 296.0, 304.0, True)
+    own = _number(found, each)
+    for key in ("deviation", "given_deviation", "expected", "by_runs"):
+        assert own[key]["kind"] == "difference", key
+    assert own["value"]["kind"] == "temperature"
 
 
 def test_refusals(tmp_path):

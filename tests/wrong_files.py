@@ -217,6 +217,10 @@ FILES = [
             (19, "sweep.parameter.4.to", "must be > from, 2"),
         ],
     ),
+    (
+        "[feed]\nleft.material_mass = 0\nright.material_mass = 0\n[watch]\nfile = 'a.csv'\n",
+        [(4, "watch", "watches for a feed that moves to one side")],
+    ),
     ("[identify]", [(1, "identify.parameter", "is missing; add"), (1, "identify.run", "is missing; add")]),
     (
         "[[identify.parameter]]\nname = 'machine.left.web_mas'\nfrom = 1\nto = 2\n"
