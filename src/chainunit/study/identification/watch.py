@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ...drives.terminal_signals import terminal_signals
-from ...errors import InputError
+from ...errors import Faults, InputError
 from ...fmu.backends import export
 from ...machines.load_observer import LoadObserver
 from ...progress import Report
@@ -157,7 +157,7 @@ def watch(config: Config, report: Report = lambda *_: None) -> WatchedRecording:
     plan = watch_plan_of(config)
     workers = min(2, os.cpu_count() or 1)
     report("reading the recording", 0.0, 1.0)
-    recording = read_signal(plan)
+    recording, errors = _files(plan)
     duration = float(recording.time[-1] - recording.time[0])
     if not plan.learning < duration:
         raise InputError(
@@ -176,7 +176,7 @@ def watch(config: Config, report: Report = lambda *_: None) -> WatchedRecording:
     angle = float(angle) if "motor.count" in recording.columns else found.get(MARK_ANGLE, 0.0)
     phi, w = crank_motion(recording, angle, drive.ratio)
     values = _parameters(config, plan, drive, recording, found, ratio)
-    uncertainty = _uncertainty(plan, values)
+    uncertainty = _uncertainty(plan, values, errors)
     values |= dict(zip(UNCERTAINTIES, uncertainty, strict=True))
     gain = {name: found.get(f"gain({name})", 1.0) for name in recording.columns}
     of_speed = next((gain[name] for name in ("crank.w", "motor.w") if name in gain), 1.0)
@@ -205,6 +205,18 @@ def watch(config: Config, report: Report = lambda *_: None) -> WatchedRecording:
         outputs,
         alarms,
     )
+
+
+def _files(plan: WatchPlan) -> tuple[Recording, tuple[list[str], Any] | None]:
+    """The recording, and names and covariance of the identified parameters where a file has them."""
+    faults, errors, found = Faults(), None, list[Recording]()
+    with faults.collected():
+        found.append(read_signal(plan))
+    if plan.identification is not None:
+        with faults.collected():
+            errors = _covariance(plan.identification)
+    faults.refuse()
+    return found[0], errors
 
 
 def _problem(config: Config, plan: WatchPlan, drive: Drive, recording: Recording) -> Problem:
@@ -285,13 +297,14 @@ def _zero(found: Mapping[str, float], column: str) -> float:
     return found[f"{RUN}.offset({column})"] / found.get(f"gain({column})", 1.0)
 
 
-def _uncertainty(plan: WatchPlan, values: Mapping[str, float]) -> tuple[float, float]:
+def _uncertainty(
+    plan: WatchPlan, values: Mapping[str, float], errors: tuple[list[str], Any] | None
+) -> tuple[float, float]:
     """The false imbalance by errors of the machine: of an identified one, or as the table [observer] has it."""
-    if plan.identification is None:
+    if errors is None:
         feed, force = (values[name] for name in UNCERTAINTIES)
         return feed, force
-    names, covariance = _covariance(plan.identification)
-    feed, force = false_imbalance(values, names, covariance, plan.crank_speed).values()
+    feed, force = false_imbalance(values, *errors, plan.crank_speed).values()
     return feed, force
 
 
@@ -300,7 +313,10 @@ def _covariance(file: Path) -> tuple[list[str], Any]:
     try:
         table = json.loads(file.read_text("utf-8"))["covariance"]
         names, matrix = list(table["names"]), np.array(table["matrix"], float)
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except OSError as error:
+        words = f"cannot be read ({error.strerror or error})"
+        raise InputError(f"watch.identification = {file}: {words}", "watch.identification") from error
+    except (ValueError, KeyError, TypeError) as error:
         raise InputError(
             f"watch.identification = {file}: is no result.json of chainunit identify", "watch.identification"
         ) from error
