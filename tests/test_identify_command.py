@@ -295,7 +295,7 @@ def test_a_motor_beside_the_torque_of_the_crank(tmp_path):
     (tmp_path / "mine.toml").write_text(FILE, "utf-8")
     config = study_files.load(tmp_path / "mine.toml")
     plan = identification.plan_of(config)
-    recordings = identification._recordings(plan)
+    recordings = identification.read_runs(plan.runs)
     problem = identification._problem(config, plan, identification.drive_of(config, recordings), recordings)
     assert problem.runs[0].values["motor.w_ref"] == 150.0
     identification.inspect_runs(problem, 1)

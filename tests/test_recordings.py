@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import gzip
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from chainunit import InputError
-from chainunit.study.identification.inspection import Expectation, inspect
-from chainunit.study.identification.recording import Recording, read_recording
+from chainunit.study.config import parse
+from chainunit.study.identification.identification import read_runs
+from chainunit.study.identification.inspection import Expectation, inspect_columns, inspect_motion
+from chainunit.study.identification.reading import PlannedRun
+from chainunit.study.identification.recording import Recording, read_part, read_recording, write_recording
+from chainunit.study.identification.watch import watch
 
 SPEED, RATIO = 3.0, 50.0
 EXPECTED = {
-    "motor.i": Expectation(0.04, 5.3, "limit.i = 4.4 A", driving=True),
-    "motor.u": Expectation(2.4, 290.0, "limit.v = 240 V", driving=True),
-    "motor.w": Expectation(7.0, 300.0, "the speed of the motor", driving=True),
+    "motor.i": Expectation(0.04, 5.3, "limit.i = 4.4 A"),
+    "motor.u": Expectation(2.4, 290.0, "limit.v = 240 V"),
+    "motor.w": Expectation(7.0, 300.0, "the speed of the motor"),
 }
 
 
@@ -45,8 +50,9 @@ def rows(recording, keep):
     return Recording(recording.source, recording.time[keep], columns, recording.heads)
 
 
-def faults(recording):
-    return [str(each) for each in inspect(recording, EXPECTED, SPEED, RATIO)]
+def faults(recording, speeds=(SPEED, SPEED), off=None):
+    found = inspect_motion(recording, speeds, RATIO, off) or inspect_columns(recording, EXPECTED, off)
+    return [str(each) for each in found]
 
 
 GOOD = recorded()
@@ -99,6 +105,72 @@ def test_faults_of_the_rows():
     assert "2.5 s are 1.2 turns of the crank; record >= 3 turns" in fault
 
 
+@pytest.mark.parametrize(
+    ("factor", "unit", "words"),
+    [
+        (1e3, "s", "time [s]: 9999 s with 2.1 rows in a turn of the crank: the values look like ms; write [ms] into"),
+        (1e6, "s", "the values look like µs; write [µs] into its head"),
+        (1e-3, "ms", "the values look like s; write [s] into its head"),
+        (200.0, "s", "2000 s; must be <= 1200 s: name a part (begin, end), of which a minute is enough"),
+    ],
+)  # fmt: skip
+def test_times_of_another_unit(factor, unit, words):
+    """Such a run would be simulated for minutes."""
+    good = recorded(rate=20.0 * 1000.0 if factor == 200.0 else 1000.0)
+    heads = {**good.heads, "time": f"time [{unit}]"}
+    columns = {name: x for name, x in good.columns.items() if name != "mark"}
+    (fault,) = inspect_motion(Recording("run.csv", factor * good.time, columns, heads), (SPEED, SPEED), RATIO)
+    assert words in str(fault)
+
+
+def passes(*angles):
+    """A mark that is passed at these angles of a turn."""
+    angle = SPEED * GOOD.time / (2.0 * np.pi)
+    return sum(np.append(0.0, np.diff(np.floor(angle - at / (2.0 * np.pi)))) for at in angles)
+
+
+def test_a_mark_is_passed_once_in_a_turn():
+    (fault,) = faults(recorded(mark=0.0 * I + 1.0))
+    assert fault.startswith(
+        "run.csv, column mark [1]: is 1 in all 10000 rows of 4.77 turns of the crank; must be 1 only"
+    )
+    assert "only in the first row after the mark, once in a turn" in fault
+    (fault,) = faults(recorded(mark=passes(0.0, 2.0)))
+    assert "is 1 in 9 rows of 4.77 turns of the crank" in fault
+    # a target of some width
+    (fault,) = faults(recorded(mark=np.convolve(passes(0.0), np.ones(9))[: len(I)]))
+    assert "is 1 in 36 rows" in fault
+    (fault,) = faults(recorded(mark=passes(0.0) * (GOOD.time < 3.0)))
+    assert "is 1 in 1 rows of 4.77 turns" in fault
+    assert faults(recorded(mark=passes(0.5))) == []
+    # the crank turns at half the speed for a part of the run, by the reference or as measured
+    assert (
+        faults(recorded(), (0.8 * SPEED, 2.0 * SPEED)) == [] and faults(recorded(), (2.0 * SPEED,) * 2) == []
+    )
+
+
+def coast(current=0.0):
+    """The motor is switched off at 4 s; then its electric columns are zero, and the speed falls to zero."""
+    on = GOOD.time <= 4.0
+    zero = {"motor.i": np.where(on, I, current), "motor.u": np.where(on, U, 0.0)}
+    rolling = W * np.where(on, 1.0, np.exp(4.0 - GOOD.time))
+    return recorded(**zero, **{"motor.w": rolling}, mark=passes(0.0) * (GOOD.time < 6.0))
+
+
+def test_electric_columns_are_inspected_until_the_motor_is_switched_off():
+    assert faults(coast(), off=4.0) == [] and len(faults(coast())) == 2
+    assert faults(coast(-500.0), off=4.0) == []
+    high = coast()
+    high.columns["motor.i"][:3500] *= 1e3
+    (fault,) = faults(high, off=4.0)
+    assert "column motor.i [A]: RMS of" in fault and "look like mA" in fault
+    # a column of motion is inspected behind it
+    stopped = coast()
+    stopped.columns["motor.w"][6000:8000] = 20.0
+    (fault,) = faults(stopped, off=4.0)
+    assert "column motor.w [rad/s]: keeps the value 20 rad/s from 6 to 8 s" in fault
+
+
 def written(folder, text, name="run.csv"):
     file = folder / name
     file.write_bytes(gzip.compress(text.encode()) if name.endswith(".gz") else text.encode())
@@ -139,12 +211,25 @@ def test_columns_may_have_other_heads_and_decimal_commas(tmp_path):
         (table("t [s],motor.i [A]"), "has no column time [s]"),
         (table("time [s],x [A]"), "has no column of a known quantity, such as motor.i [A], "),
         (table("time [s],motor.i"), "column motor.i: has no unit; write [A] behind its name"),
-        (table("time [s],motor.i [V]"), "column motor.i [V]: must have a unit like [A]"),
-        (table("time [s],motor.i [A]").replace("\n0.003,4\n", "\n0.003,-\n"), "line 5, column 2: - is no number"),
+        (table("time [s],motor.i [V]"), "column motor.i [V]: V is a voltage; must be a current, such as [A] or [mA]"),
+        (table("time [s],motor.i [A]").replace("\n0.003,4\n", "\n0.003,-\n"),
+         "line 5, column 2, motor.i [A]: - is no number"),
         (table("time [s],motor.i [A]").replace("\n0.003,4\n", "\n0.003\n"),
-         "line 5, column 2: an empty cell is no number"),
+         "line 5, column 2, motor.i [A]: an empty cell is no number"),
+        (table("time [s],motor.i [A]").replace("\n0.003,4\n", "\n\n0.003,nan\n"),
+         "line 6, column 2, motor.i [A]: nan is no number"),
+        (table("time [s],motor.i [A]").replace("\n0.003,4\n", "\ninf,4\n"),
+         "line 5, column 1, time [s]: inf is no number"),
         (table("time [s],motor.i [A]").replace("\n0.003,4\n", "\n0.001,4\n"),
          "line 5: time = 0.001 s: must be later than 0.002 s of the line before"),
+        (table("Zeit [s],Strom [A]"),
+         "its heads are: Zeit [s], Strom [A]; name it by the key columns, such as columns = { \"time\" = \"Zeit\" }"),
+        (table("time [s],Strom [A]"),
+         "heads are: time [s], Strom [A]; name it by the key columns, such as columns = { \"motor.i\" = \"Strom\" }"),
+        (table("time [s],motor.w [kg]"), "[kg]: kg is a mass; must be a speed, such as [rad/s] or [rev/min]"),
+        (table("time [s],crank.tau [%]"), "[%]: % is a share; must be a torque, such as [N m] or [kN m]"),
+        (table("time [s],motor.w [1/s]"), "must have a unit like [rad/s]: no angle is named"),
+        (table("time [s],motor.i [Foo]"), "must have a unit like [A]: Foo: is no unit"),
     ],
 )  # fmt: skip
 def test_files_that_are_no_recording(tmp_path, text, words):
@@ -158,6 +243,97 @@ def test_all_faults_of_a_head_at_once(tmp_path):
         read_recording(written(tmp_path, table("time,motor.u [A]")), {"motor.y": "x", "motor.i": "Stron"})
     text = str(refusal.value)
     assert "columns.motor.y: no such quantity" in text and "columns.motor.i = 'Stron': no such column" in text
-    assert "column time: has no unit" in text and "column motor.u [A]: must have a unit like [V]" in text
+    assert (
+        "column time: has no unit" in text
+        and "column motor.u [A]: A is a current; must be a voltage, such as [V]" in text
+    )
     with pytest.raises(InputError, match="cannot be read"):
         read_recording(tmp_path / "absent.csv")
+
+
+def test_a_part_is_within_the_recording_and_counts_from_its_first_row(tmp_path):
+    """With rows of 1 ms from 0 s to 0.149 s; an end may be that of the last row's step."""
+    file = written(tmp_path, table("time [s],motor.i [A],motor.count [1]"))
+    part = read_part(file, {}, 0.01, 0.15)
+    np.testing.assert_array_equal(part.columns["motor.count"], np.arange(140.0))
+    assert part.columns["motor.i"][0] == 11.0
+    # a part of a part goes on counting
+    assert part.part(begin=0.1).columns["motor.count"][0] == 90.0
+    with pytest.raises(InputError) as refusal:
+        read_part(file, {}, -0.01, 0.2)
+    first, second = str(refusal.value).splitlines()
+    assert first == f"begin = -0.01 s: {file} goes from 0 s to 0.149 s; must lie within, or be left out"
+    assert second.startswith("end = 0.2 s: ")
+    with pytest.raises(
+        InputError, match=r"has 49 rows from begin = 0\.101 s to the last row; must have >= 100 "
+    ):
+        read_part(file, {}, 0.101, np.inf)
+    with pytest.raises(InputError, match=r"has 51 rows from the first row to end = 0\.05 s"):
+        read_part(file, {}, -np.inf, 0.05)
+
+
+def test_counts_and_times_are_written_in_full(tmp_path):
+    time = 1.7e9 + 1e-3 * np.arange(150)
+    count = 123456789.0 + np.arange(150)
+    heads = {"time": "t [s]", "motor.count": "n", "motor.i": "Strom [mA]"}
+    columns = {"motor.count": count, "motor.i": np.linspace(0.1, 0.2, 150)}
+    write_recording(Recording("x", time, columns, heads), tmp_path / "run.csv")
+    again = read_recording(tmp_path / "run.csv")
+    np.testing.assert_array_equal(again.columns["motor.count"], count)
+    np.testing.assert_allclose(again.time - 1.7e9, time - 1.7e9, atol=1e-5)
+    np.testing.assert_allclose(again.columns["motor.i"], columns["motor.i"], rtol=1e-6)
+
+
+def run(name, file, **more):
+    plan = PlannedRun(name, file, {}, SPEED, -np.inf, np.inf, 293.15, name != "empty", {})
+    return replace(plan, **more)
+
+
+def test_faults_of_all_files_at_once(tmp_path):
+    """Absent ones, one with the rows of another one, and one without a signal whose columns have other names."""
+    same, other = (written(tmp_path, table("time [s],motor.i [A]"), f"{name}.csv") for name in "ab")
+    foreign = written(tmp_path, table("time [s],motor.w [rad/s],Strom [A]"), "foreign.csv")
+    runs = [
+        run("loaded", same),
+        run("empty", other),
+        run("third", foreign),
+        run("fourth", tmp_path / "absent"),
+    ]
+    with pytest.raises(InputError) as refusal:
+        read_runs(runs)
+    rows, names, absent = str(refusal.value).splitlines()
+    assert (
+        rows
+        == f"identify.run (empty): {other} has rows of the run loaded; each run must have its own recording"
+    )
+    assert (
+        "has no column that tells the torque" in names
+        and "its other heads are: Strom [A]; name it by" in names
+    )
+    assert "absent: cannot be read" in absent
+    assert list(read_runs(runs[:1])) == ["loaded"]
+    # parts of one file that overlap
+    first, second = run("loaded", same, end=0.1), run("second", same, begin=0.049)
+    with pytest.raises(InputError, match=r"second.*has rows of the run loaded"):
+        read_runs([first, second])
+    text = '[watch]\nfile = "absent.csv"\nidentification = "none.json"\n'
+    with pytest.raises(InputError) as refusal:
+        watch(parse(text))
+    recording, result = str(refusal.value).splitlines()
+    assert recording.startswith("absent.csv: cannot be read (")
+    assert result.startswith("watch.identification = none.json: cannot be read (")
+
+
+@pytest.mark.parametrize(
+    ("part", "words"),
+    [
+        ("begin = 4\n", "must be > begin = 4 s"),
+        ("end = 2\n", "must be < end = 2 s"),
+        ("begin = 4\nend = 9\n", "must be > begin = 4 s and < end = 9 s"),
+    ],
+)
+def test_a_switch_outside_of_the_part_is_refused_by_its_ends_that_are_given(part, words):
+    text = f'[[identify.run]]\nfile = "run.csv"\nswitched_off = 3\n{part}'
+    with pytest.raises(InputError) as refusal:
+        parse(text)
+    assert f"identify.run.1.switched_off = 3 s: {words}" in str(refusal.value).splitlines()

@@ -13,7 +13,7 @@ from command import chainunit
 from chainunit import InputError, Study
 from chainunit.native.compilers import compiler
 from chainunit.study.identification.crank_motion import crank_motion
-from chainunit.study.identification.recording import Recording, read_recording
+from chainunit.study.identification.recording import Recording, read_recording, write_recording
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 EXAMPLES = Path(__file__).parents[1] / "examples" / "identification"
@@ -128,11 +128,59 @@ def test_errors_of_an_identified_machine_widen_the_threshold(tmp_path):
         Study.from_file(tmp_path / "mine.toml").watch()
 
 
+def changed(folder, keep=lambda time: time < 60.0, **columns):
+    """Write the example's recording with other rows and columns; returns the file."""
+    recording = read_recording(EXAMPLES / "watch.csv.gz")
+    values = {
+        name: columns[name.replace(".", "_")](recording.time, x) if name.replace(".", "_") in columns else x
+        for name, x in recording.columns.items()
+    }
+    rows = keep(recording.time)
+    values = {name: x[rows] for name, x in values.items()}
+    write_recording(Recording("", recording.time[rows], values, recording.heads), folder / "changed.csv")
+    return folder / "changed.csv"
+
+
+def test_behind_a_gap_the_observer_starts_anew(tmp_path):
+    """Without a false alarm, and it finds the shift that comes later. A noise that is louder than stated is told and
+    counts, and so are errors of the forces and an identification that failed."""
+    file = changed(tmp_path, lambda t: (t < 30.0) | ((t > 33.0) & (t < 50.0)) | ((t > 51.1) & (t < 80.0)))
+    result = {
+        "status": "the model does not describe the recordings",
+        "covariance": {"names": ["motor.rotor.J"], "matrix": [[1.0]]},
+    }
+    (tmp_path / "result.json").write_text(json.dumps(result), "utf-8")
+    more = {"noise": 0.002, "identification": "result.json"}
+    text = study_text(TRUTH["machine"], file=file, **more)
+    (tmp_path / "mine.toml").write_text(text, "utf-8")
+    found = Study.from_file(tmp_path / "mine.toml").watch()
+    alarms = found.alarms
+    assert {each.side for each in alarms} == {"left"} and 70.0 < alarms[0].begin < 70.5 + TURN
+    words = " ".join(repr(found).split())
+    assert "No rows from 30.00 s to 33.01 s: the observer starts anew behind this gap." in words
+    assert "No rows from 49.99 s to 51.1" in words
+    assert "The identification of this machine failed: the model does not describe the recordings." in words
+    assert "The identification sought no number of the machine that the observer knows." in words
+    noise = json.loads(found.to_json())["noise"]["value"]
+    assert (
+        noise == pytest.approx(5.0, rel=0.1) and f"is {noise:.2g} times the stated one (watch.noise)" in words
+    )
+    assert found.watched.parameters["noise.w"] == pytest.approx(0.002 * noise * 150.0, rel=0.01)
+
+
+def test_a_sensor_that_fails_behind_the_begin(tmp_path):
+    """It would make a false alarm."""
+    stuck = changed(tmp_path, motor_i=lambda t, x: np.where(t > 35.0, x[7000], x))
+    (tmp_path / "mine.toml").write_text(study_text(TRUTH["machine"], file=stuck), "utf-8")
+    with pytest.raises(InputError, match=r"motor\.i.* keeps the value .* from 35 to 60 s"):
+        Study.from_file(tmp_path / "mine.toml").watch()
+
+
 def test_refusals(tmp_path):
     with pytest.raises(InputError, match="watch: is missing"):
         Study().watch()
     for more, words in (
-        ({"begin": 300}, "has 0 rows from begin = 300 s"),
+        ({"begin": 300}, "begin = 300 s: .* goes from 0 s to 119.995 s; must lie within"),
         ({"learning": 500}, "and < 120 s, the duration"),
         ({"learning": 5}, r"watch\.learning = 5 s: must be >= 6\.283 s, 3 turns"),
     ):

@@ -92,6 +92,26 @@ FITTING: dict[str, tuple[str, ...]] = {
 """By declared unit, the units in which people write a quantity, the usual one first."""
 
 
+_KINDS = {
+    "m": "a length",
+    "m/s": "a speed along a path",
+    "m/s2": "an acceleration",
+    "kg": "a mass",
+    "kg.m2": "an inertia",
+    "N": "a force",
+    "N.m": "a torque",
+    "N/m2": "a pressure",
+    "s": "a time",
+    "rad": "an angle",
+    "rad/s": "a speed",
+    "K": "a temperature",
+    "W": "a power",
+    "V": "a voltage",
+    "A": "a current",
+    "Ohm": "a resistance",
+    "H": "an inductance",
+}
+"""By declared unit, what it measures."""
 _WRITTEN_TOO = {"rad/s": ("U/min", "1/min", "r/min"), "N.m": ("Nmm", "Ncm"), "H": ("µH",), "s": ("µs",)}
 """Units that people write beside them, by the declared unit."""
 _RARE = ("cm", "g", "t", "h", "kg cm2", "mOhm", "rpm", "Hz")
@@ -199,6 +219,27 @@ def scale(unit_text: str, unit: str, kind: str = "") -> tuple[float, float]:
     """Factor and offset from the unit `unit_text` to the declared `unit`; the errors are those of `convert`."""
     offset = convert(0.0, unit_text, unit, kind)
     return convert(1.0, unit_text, unit, kind) - offset, offset
+
+
+def of_other_kind(unit_text: str, unit: str) -> str:
+    """Words for a unit that is none of the declared `unit`, which measures something else: ``kg is a mass; must be a
+    speed, such as [rad/s] or [rev/min]``. Empty for an unknown unit, and for one of the same dimension.
+
+    Parameters
+    ----------
+    unit : one of which `_KINDS` has the name
+    """
+    try:
+        own = dimension(unit_text)
+    except ValueError:
+        return ""
+    if own == dimension(unit):
+        return ""
+    is_share = not own and not any(name in _ANGLES for name, _ in _factors(_ascii(unit_text)))
+    kind = next((words for each, words in _KINDS.items() if dimension(each) == own), "no unit of it")
+    wanted = dict.fromkeys((unit.replace(".", " "), *fitting(unit)[:2]))
+    such = " or ".join(f"[{each}]" for each in list(wanted)[:2])
+    return f"{unit_text} is {'a share' if is_share else kind}; must be {_KINDS[unit]}, such as {such}"
 
 
 def probable_text(text: str, unit: str, kind: str = "") -> str:

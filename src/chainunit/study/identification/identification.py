@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ...drives.induction_motor import InductionMotor
-from ...errors import Faults, InputError
+from ...errors import Faults, InputError, printable
 from ...progress import Report
 from ...system import Profile
 from ..arrays import rms
@@ -21,13 +21,13 @@ from ..config import Config
 from ..drive import Drive
 from .fit import MOST_ROUNDS, Fit, fit
 from .information import Combination, Information, information
-from .inspection import OF_SPEED, Expectation, inspect
+from .inspection import OF_SPEED, Expectation, inspect_columns, inspect_motion
 from .measurands import MEASURANDS
 from .plant import AnyPlant, Plant
 from .posterior import Posterior, posterior
 from .problem import Comparison, Problem, RecordedRun, Sensor
 from .reading import OFFSET_SHARE, WITH_OFFSET, IdentificationPlan, PlannedRun, WatchPlan
-from .recording import Recording, read_part
+from .recording import Recording, read_part, remedy
 from .residuals import ResidualCheck, Strain, check_residuals, strained_priors, strains
 from .shaft import MEASURED, MeasuredShaft
 from .suspicion import Suspicion, suspicions
@@ -178,7 +178,7 @@ def identify(
     plan = plan_of(config)
     workers = min(2, os.cpu_count() or 1)
     report("reading recordings", 0.0, 1.0)
-    recordings = _recordings(plan)
+    recordings = read_runs(plan.runs)
     drive = drive_of(config, recordings)
     report("simulating", 0.1, 1.0)
     problem = _problem(config, plan, drive, recordings)
@@ -231,16 +231,28 @@ def read_signal(of: PlannedRun | WatchPlan) -> Recording:
     """
     recording = read_part(of.file, of.columns, of.begin, of.end)
     if not recording.columns.keys() & set(SIGNALS):
+        others = recording.others
+        more = (
+            f"; its other heads are: {printable(', '.join(others))}{remedy('motor.i', others)}"
+            if others
+            else ""
+        )
         raise InputError(
-            f"{of.file}: has no column that tells the torque; must have one of {', '.join(SIGNALS)}"
+            f"{of.file}: has no column that tells the torque; must have one of {', '.join(SIGNALS)}{more}"
         )
     return recording
 
 
-def _recordings(plan: IdentificationPlan) -> dict[str, Recording]:
-    """The recordings by the names of the runs, each with the part that counts."""
+def read_runs(runs: Sequence[PlannedRun]) -> dict[str, Recording]:
+    """The recordings by the names of the runs, each with the part that counts.
+
+    Raises
+    ------
+    InputError
+        with a line for each fault of a file.
+    """
     faults, recordings = Faults(), dict[str, Recording]()
-    for run in plan.runs:
+    for run in runs:
         with faults.collected():
             recording = read_signal(run)
             begin, end = recording.time[0], recording.time[-1]
@@ -250,9 +262,25 @@ def _recordings(plan: IdentificationPlan) -> dict[str, Recording]:
                     f"{end:g} s; must lie within",
                     "identify.run",
                 )
+            for name, other in recordings.items():
+                if _same_rows(recording, other):
+                    raise InputError(
+                        f"identify.run ({run.name}): {run.file} has rows of the run {name}; each run must have "
+                        "its own recording",
+                        "identify.run",
+                    )
             recordings[run.name] = recording
     faults.refuse()
     return recordings
+
+
+def _same_rows(first: Recording, second: Recording) -> bool:
+    """Whether two recordings have rows of one file in common, or the same values in all signals that both have."""
+    ends = [(float(each.time[0]), float(each.time[-1])) for each in (first, second)]
+    if first.source == second.source and max(begin for begin, _ in ends) < min(end for _, end in ends):
+        return True
+    common = [name for name in SIGNALS if name in first.columns and name in second.columns]
+    return bool(common) and all(np.array_equal(first.columns[name], second.columns[name]) for name in common)
 
 
 def drive_of(config: Config, recordings: Mapping[str, Recording]) -> Drive:
@@ -329,21 +357,26 @@ def _sensors(
 
 
 def inspect_runs(problem: Problem, workers: int) -> None:
-    """Refuse recordings with faults; the sizes to expect are those of the drive at the start values."""
-    faults = Faults()
+    """Refuse recordings with faults; the sizes to expect are those of the drive at the start values. What needs no
+    simulation is told before it, as with a wrong unit of the time it has no end."""
+    faults, ratio = Faults(), problem.plant.ratio
+    for run in problem.runs:
+        reference = run.values.get("motor.w_ref")
+        speeds = [run.crank_speed, *(w / ratio for _, _, w in getattr(reference, "changes", ()))]
+        faults.add(inspect_motion(run.recording, (min(speeds), max(speeds)), ratio, run.off))
+    faults.refuse()
     for run in problem.runs:
         response = problem.simulated(run, problem.starts, workers)
-        expected = {}
-        for name in run.recording.columns:
-            if MEASURANDS[name].analog:
-                size, factor = rms(response.values[name]), NEAR if name in OF_SPEED else WIDE
-                expected[name] = Expectation(
-                    size / factor,
-                    size * factor,
-                    f"{1.0 / factor:.2g} to {factor:g} times the simulated one",
-                    True,
-                )
-        faults.add(inspect(run.recording, expected, run.crank_speed, problem.plant.ratio))
+        expected, off = dict[str, Expectation](), np.inf if run.off is None else run.off
+        # of less than a turn the RMS is that of an angle
+        known = off - float(run.recording.time[0]) >= 2.0 * np.pi / run.crank_speed
+        for name in run.recording.columns if known else ():
+            rows = response.describes(name, response.time) & (response.time <= off)
+            if MEASURANDS[name].analog and rows.any():
+                size, factor = rms(response.values[name][rows]), NEAR if name in OF_SPEED else WIDE
+                words = f"{1.0 / factor:.2g} to {factor:g} times the simulated one"
+                expected[name] = Expectation(size / factor, size * factor, words)
+        faults.add(inspect_columns(run.recording, expected, run.off))
     faults.refuse()
 
 

@@ -11,8 +11,11 @@ import numpy as np
 
 from ...errors import InputError
 from ...refusals import unit_behind
+from ...units import scale
 from ..arrays import rms, stretches
 from .measurands import MEASURANDS
+from .plant import MOVING
+from .problem import crank_speed as speed_at
 from .recording import Recording
 
 MISSING = 0.2
@@ -20,6 +23,11 @@ MISSING = 0.2
 LEAST_ROWS = 40.0
 """Fewest rows in a turn of the crank: the torque has orders up to some 20."""
 FEWEST_TURNS = 3.0
+LONGEST, LONGEST_TURNS = 1200.0, 20.0
+"""Longest recording, in seconds or, where that is longer, in turns of the crank: more tells little more, and is
+simulated again and again."""
+PASSES = 1.5
+"""Factor by which the number of passes of the mark may differ from that of the turns."""
 STUCK = 0.2
 """Longest time for which a column with noise may keep its value [s]."""
 CLIPPED = 2e-3
@@ -34,34 +42,47 @@ OF_SPEED = ("motor.w", "crank.w", "motor.u")
 @dataclass(frozen=True)
 class Expectation:
     """The sizes that a column can have: its RMS lies between `low` and `high`; `words` say from where the upper limit
-    comes. A quantity that is `driving` has a mean of the sign of the speed."""
+    comes."""
 
     low: float
     high: float
     words: str
-    driving: bool = False
 
     def admits(self, size: float) -> bool:
         """Whether the RMS can have this size."""
         return self.low <= size <= self.high
 
 
-def inspect(
-    recording: Recording, expected: Mapping[str, Expectation], crank_speed: float, ratio: float
+def inspect_motion(
+    recording: Recording, speeds: tuple[float, float], ratio: float, off: float | None = None
 ) -> list[InputError]:
-    """The faults of a recording of a running machine.
+    """The faults of rows, speed and marks of a recording of a running machine, which are told without a simulation.
 
     Parameters
     ----------
-    expected : by quantity, the sizes that its column can have
-    crank_speed : the usual speed of the crank [rad/s]
+    speeds : least and largest speed of the crank before the motor is switched off [rad/s], as they are known
     ratio : motor turns per crank turn
+    off : the time at which the motor is switched off [s]
     """
-    faults = [*_rows(recording, crank_speed)]
-    stands = _stands(recording, crank_speed, ratio)
-    if stands:
-        return [*faults, *stands]
-    sizes = {name: rms(x) for name, x in recording.columns.items()}
+    driven = recording if off is None else recording.part(end=off)
+    return [
+        *_rows(recording, speeds[1]),
+        *(_stands(recording, driven, speeds[0], ratio) or _marks(driven, speeds, ratio)),
+    ]
+
+
+def inspect_columns(
+    recording: Recording, expected: Mapping[str, Expectation], off: float | None = None
+) -> list[InputError]:
+    """The faults of the columns of a recording of a running machine.
+
+    Parameters
+    ----------
+    expected : by quantity, the sizes that its column can have up to the time `off`, where they are known
+    off : the time at which the motor is switched off [s]; electric quantities are inspected up to it
+    """
+    driven = recording if off is None else recording.part(end=off)
+    faults, sizes = list[InputError](), {name: rms(driven.columns[name]) for name in expected}
     swapped = _swapped(sizes, expected)
     if swapped:
         first, second = swapped
@@ -69,16 +90,18 @@ def inspect(
             _fault(recording, first, f"RMS of {_size(first, sizes[first])} and of {recording.heads[second]} "
                    f"{_size(second, sizes[second])}: the two columns look swapped; exchange their heads")
         )  # fmt: skip
-    for name, x in recording.columns.items():
-        if name not in expected or (swapped and name in swapped):
-            continue
-        faults += _of_column(recording, name, x, sizes[name], expected[name])
+    for name in recording.columns:
+        if MEASURANDS[name].analog and not (swapped and name in swapped):
+            inspected = recording if name in MOVING else driven
+            faults += _of_column(inspected, name, driven.columns[name], expected.get(name))
     return faults
 
 
 def _of_column(
-    recording: Recording, name: str, x: Any, size: float, expected: Expectation
+    recording: Recording, name: str, driven: Any, expected: Expectation | None
 ) -> Iterator[InputError]:
+    """The faults of a column; `driven` are its rows whose RMS and mean are `expected`, where they are known."""
+    x, size, mean = recording.columns[name], rms(driven), float(np.mean(driven))
     stuck = _longest_constant(recording.time, x)
     extreme, share, at = _extremes(x)
     if stuck is not None and not (share > CLIPPED and x[stuck[0]] in (x.min(), x.max())):
@@ -90,13 +113,13 @@ def _of_column(
         )  # fmt: skip
         yield _fault(recording, name, words)
         return
-    if not expected.admits(size):
+    if expected is not None and not expected.admits(size):
         yield _fault(recording, name, _scale_words(name, size, expected))
         return
-    if expected.driving and float(np.mean(x)) < 0.0:
+    if expected is not None and mean < 0.0:
         yield _fault(
             recording, name,
-            f"mean of {_size(name, float(np.mean(x)))}, although the motor drives: the sign is reversed; change the "
+            f"mean of {_size(name, mean)}, although the motor drives: the sign is reversed; change the "
             "sign of the column, or turn the sensor round",
         )  # fmt: skip
     if share > CLIPPED and at >= 3:
@@ -110,11 +133,26 @@ def _of_column(
 
 def _rows(recording: Recording, crank_speed: float) -> Iterator[InputError]:
     step, turn = recording.step, 2.0 * math.pi / crank_speed
+    span, longest = float(recording.time[-1] - recording.time[0]), max(LONGEST, LONGEST_TURNS * turn)
+    if turn / step < LEAST_ROWS or span < FEWEST_TURNS * turn:
+        likely = _likely_unit(recording, turn, longest)
+        if likely:
+            words = f"{span:.4g} s with {turn / step:.2g} rows in a turn of the crank"
+            yield _fault(
+                recording, "time", f"{words}: the values look like {likely}; write [{likely}] into its head"
+            )
+            return
+    if span > longest:
+        yield _fault(
+            recording, "time",
+            f"{span:.4g} s; must be <= {longest:.4g} s: name a part (begin, end), of which a minute is enough, or "
+            "write the unit of its times into its head",
+        )  # fmt: skip
     if turn / step < LEAST_ROWS:
         yield _fault(
             recording, "time",
             f"{1.0 / step:.3g} rows a second are {turn / step:.2g} in a turn of the crank; record >= "
-            f"{LEAST_ROWS / turn:.2g} rows a second, better 200",
+            f"{LEAST_ROWS / turn:.2g} rows a second, better 200, or write the unit of the times into their head",
         )  # fmt: skip
     if recording.missing > MISSING:
         begin, end = max(recording.gaps, key=lambda gap: gap[1] - gap[0])
@@ -124,7 +162,6 @@ def _rows(recording: Recording, crank_speed: float) -> Iterator[InputError]:
             f"from {begin:.3g} s; must be <= {100.0 * MISSING:.0f} %: name a part without gaps (begin, end), or "
             "record again",
         )  # fmt: skip
-    span = float(recording.time[-1] - recording.time[0])
     if span < FEWEST_TURNS * turn:
         yield _fault(
             recording, "time",
@@ -132,11 +169,43 @@ def _rows(recording: Recording, crank_speed: float) -> Iterator[InputError]:
         )  # fmt: skip
 
 
-def _stands(recording: Recording, crank_speed: float, ratio: float) -> list[InputError]:
-    """That the machine does not turn, by the first column that tells."""
+def _likely_unit(recording: Recording, turn: float, longest: float) -> str:
+    """The unit in which the times would be those of a recording that can be used; empty where there is none."""
+    own = scale(recording.heads["time"].partition("[")[2].partition("]")[0].strip(), "s")[0]
+    span = float(recording.time[-1] - recording.time[0])
+    for unit in ("s", "ms", "µs"):
+        factor = scale(unit, "s")[0] / own
+        fits = FEWEST_TURNS * turn <= factor * span <= longest
+        if factor != 1.0 and fits and LEAST_ROWS * factor * recording.step <= turn:
+            return unit
+    return ""
+
+
+def _marks(recording: Recording, speeds: tuple[float, float], ratio: float) -> Iterator[InputError]:
+    """That the marks are not those of the turns. The speed is that of the run, or the measured one."""
+    if "mark" not in recording.columns or len(recording.time) < 2:
+        return
+    own = speed_at(recording, ratio)
+    known = [*speeds, *([] if own is None else [float(np.mean(own))])]
+    seen = recording.step * len(recording.time) / (2.0 * math.pi)
+    passes, rows = int(np.sum(recording.columns["mark"] > 0.5)), len(recording.time)
+    if not (passes - 1 <= PASSES * max(known) * seen and PASSES * (passes + 1) >= min(known) * seen):
+        turns = f"{seen * min(known):.3g}"
+        if max(known) > 1.01 * min(known):
+            turns += f" to {seen * max(known):.3g}"
+        yield _fault(
+            recording, "mark",
+            f"is 1 in {'all ' if passes == rows else ''}{passes} rows of {turns} turns of the crank; must be 1 only "
+            "in the first row after the mark, once in a turn: check sensor and crank_speed",
+        )  # fmt: skip
+
+
+def _stands(recording: Recording, driven: Recording, crank_speed: float, ratio: float) -> list[InputError]:
+    """That the machine does not turn, by the first column that tells; `driven` is the part before the motor is
+    switched off."""
     for name, of in (("motor.w", ratio), ("crank.w", 1.0)):
         if name in recording.columns:
-            mean = float(np.mean(recording.columns[name]))
+            mean = float(np.mean(driven.columns[name]))
             if abs(mean) < STANDS * crank_speed * of:
                 return [_standing(recording, name, f"mean of {_size(name, mean)}")]
     if "motor.count" in recording.columns and np.ptp(recording.columns["motor.count"]) < 4.0:

@@ -69,9 +69,8 @@ def posterior(problem: Problem, best: Normal, workers: int = 2, seed: int = 0) -
     held = _held(problem, best)
     bent = _Bent(problem, best, workers, held)
     samples = bent.sampled(rng)
-    for k, pull in held.items():
-        # the density falls by the gradient behind the bound
-        samples[:, k] = best.z[k] - np.sign(pull) * rng.exponential(1.0 / abs(pull), len(samples))
+    if held:
+        samples = _from_bounds(problem, best, held, samples, rng)
     edges = np.quantile(samples, [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL], axis=0)
     means, deviations = np.mean(samples, axis=0), np.std(samples, axis=0, ddof=1)
     rows = np.stack([means, deviations, *edges], axis=1)
@@ -100,6 +99,18 @@ def _held(problem: Problem, best: Normal) -> dict[int, float]:
         if abs(pull[k]) * math.sqrt(covariance[k, k]) > PRESSED:
             held[int(k)] = float(pull[k])
     return held
+
+
+def _from_bounds(problem: Problem, best: Normal, held: dict[int, float], samples: Any, rng: Any) -> Any:
+    """The samples with the numbers that are held on their side of the bound, from which the density falls by the
+    gradient; the others follow."""
+    places, pulls = list(held), np.array(list(held.values()))
+    steps = -np.sign(pulls) * rng.exponential(1.0 / np.abs(pulls), (len(samples), len(held)))
+    covariance = best.covariance[places, : samples.shape[1]]
+    samples = samples + steps @ np.linalg.solve(covariance[:, places], covariance)
+    samples[:, places] = best.z[places] + steps
+    low, high = (bound[: samples.shape[1]] for bound in problem.bounds)
+    return np.clip(samples, low, high)
 
 
 class _Bent:

@@ -337,7 +337,8 @@ def _run(
     off = float(given["switched_off"]) if "switched_off" in given else None
     if off is not None and not begin < off < end:
         key = f"{place}.switched_off"
-        words = f"must lie between begin = {begin:g} s and end = {end:g} s"
+        bounds = (("> begin", begin), ("< end", end))
+        words = "must be " + " and ".join(f"{word} = {x:g} s" for word, x in bounds if math.isfinite(x))
         faults.add([InputError(f"{key} = {off:g} s: {words}", key)])
     added: dict[str, float] = {}
     for full, value in _leaves(given.get("added", {})):

@@ -5,8 +5,8 @@ from __future__ import annotations
 import gzip
 import math
 import zlib
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ import numpy as np
 from ...errors import Faults, InputError, meant, near_name, printable
 from ...files import whole
 from ...reading import decoded, file_bytes
-from ...units import scale
+from ...units import of_other_kind, scale
 from .measurands import MEASURANDS, Measurand
 
 FEWEST = 100
@@ -25,12 +25,14 @@ FEWEST = 100
 @dataclass(frozen=True)
 class Recording:
     """The rows of a file: `time` [s], shape (n,), and the `columns` by the name of the quantity, each of shape (n,),
-    in the unit of the quantity. `heads` are the heads of the columns in the file."""
+    in the unit of the quantity. `heads` are the heads of the columns in the file, `others` those of columns that were
+    left out."""
 
     source: str
     time: Any
     columns: Mapping[str, Any]
     heads: Mapping[str, str]
+    others: Sequence[str] = ()
 
     @property
     def step(self) -> float:
@@ -53,7 +55,7 @@ class Recording:
         """The rows from `begin` to `end` [s], both included."""
         rows = (self.time >= begin) & (self.time <= end)
         columns = {name: x[rows] for name, x in self.columns.items()}
-        return Recording(self.source, self.time[rows], columns, self.heads)
+        return replace(self, time=self.time[rows], columns=columns)
 
 
 def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Recording:
@@ -72,13 +74,14 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
     ------
     InputError
         with a line for each fault: the file that cannot be read, a column without unit or with a unit that does not
-        fit, a cell that is no number, times that do not rise.
+        fit, a cell that is no finite number, times that do not rise.
     """
     lines = _text(file).splitlines()
     if not lines:
         raise InputError(f"{file}: is empty; must have a head and >= {FEWEST} rows")
-    if len(lines) < 1 + FEWEST:
-        raise InputError(f"{file}: has {max(0, len(lines) - 1)} rows behind its head; must have >= {FEWEST}")
+    rows = [(number, line) for number, line in enumerate(lines[1:], 2) if line.strip()]
+    if len(rows) < FEWEST:
+        raise InputError(f"{file}: has {len(rows)} rows behind its head; must have >= {FEWEST}")
     mark = ";" if lines[0].count(";") > lines[0].count(",") else ","
     heads = [head.strip().strip('"') for head in lines[0].split(mark)]
     faults, units = Faults(), dict[str, tuple[int, float, float]]()
@@ -88,26 +91,44 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
             units[name] = (place, *_scale(file, heads[place], MEASURANDS[name], unit))
     if "time" not in known:
         words = f"{meant('time', heads)} its heads are: {', '.join(heads)}"
-        faults.add([InputError(f"{file}: has no column time [s]{words}")])
+        faults.add([InputError(f"{file}: has no column time [s]{words}{remedy('time', heads)}")])
     if not known.keys() - {"time"}:
         words = ", ".join(f"{each.name} [{each.unit}]" for each in MEASURANDS.values() if each.name != "time")
+        words += f"; its heads are: {', '.join(heads)}{remedy('motor.i', heads[::-1])}"
         faults.add([InputError(f"{file}: has no column of a known quantity, such as {words}")])
     faults.refuse()
-    table = _numbers(file, lines[1:], mark, [units[name][0] for name in known])
+    table = _numbers(file, rows, mark, {units[name][0]: heads[units[name][0]] for name in known})
     columns = {name: table[:, k] * units[name][1] + units[name][2] for k, name in enumerate(known)}
     time = columns.pop("time")
     back = np.flatnonzero(np.diff(time) <= 0.0)
     if len(back):
-        row = int(back[0]) + 3
+        k = int(back[0])
         raise InputError(
-            f"{file}, line {row}: time = {time[row - 2]:g} s: must be later than {time[row - 3]:g} s of the line "
-            "before"
+            f"{file}, line {rows[k + 1][0]}: time = {time[k + 1]:.12g} s: must be later than {time[k]:.12g} s of the "
+            "line before"
         )
-    return Recording(str(file), time, columns, {name: heads[place] for name, (place, _) in known.items()})
+    used = {place for place, _ in known.values()}
+    return Recording(
+        str(file),
+        time,
+        columns,
+        {name: heads[place] for name, (place, _) in known.items()},
+        [head for place, head in enumerate(heads) if place not in used],
+    )
+
+
+def remedy(quantity: str, heads: Sequence[str]) -> str:
+    """Words for a file without the column of a quantity, with one of its `heads` for example: the key that names
+    it."""
+    if not heads:
+        return ""
+    head = printable(heads[0].partition("[")[0].strip())
+    return f'; name it by the key columns, such as columns = {{ "{quantity}" = "{head}" }}'
 
 
 def write_recording(recording: Recording, file: Path) -> None:
-    """Write a recording as `read_recording` takes it, with seven digits; packed where the name ends with ``.gz``.
+    """Write a recording as `read_recording` takes it, with names and units of the quantities; packed where the name
+    ends with ``.gz``. Times have 15 digits, analog columns seven, counted ones all.
 
     Raises
     ------
@@ -115,8 +136,10 @@ def write_recording(recording: Recording, file: Path) -> None:
         where the file cannot be written.
     """
     rows = np.column_stack([recording.time, *recording.columns.values()])
-    heads = [recording.heads[name] for name in ("time", *recording.columns)]
-    lines = [",".join(heads), *(",".join(f"{x:.7g}" for x in row) for row in rows)]
+    names = ("time", *recording.columns)
+    forms = [".15g" if name == "time" else ".7g" if MEASURANDS[name].analog else ".0f" for name in names]
+    lines = [",".join(f"{name} [{MEASURANDS[name].unit}]" for name in names)]
+    lines += (",".join(format(x, form) for x, form in zip(row, forms, strict=True)) for row in rows.tolist())
     content = ("\n".join(lines) + "\n").encode()
     with whole(file) as part:
         # without a time in its head, the same recording gives the same file
@@ -124,20 +147,33 @@ def write_recording(recording: Recording, file: Path) -> None:
 
 
 def read_part(file: Path, names: Mapping[str, str], begin: float, end: float) -> Recording:
-    """The rows of a recording from `begin` to `end` [s]; see `read_recording`.
+    """The rows of a recording from `begin` to `end` [s]; see `read_recording`. The count of an encoder begins with 0
+    in the first of them.
 
     Raises
     ------
     InputError
-        also where these are fewer than `FEWEST`.
+        also where `begin` or `end` is beyond the recording, and where these rows are fewer than `FEWEST`.
     """
     whole = read_recording(file, names)
+    first, last = float(whole.time[0]), float(whole.time[-1])
+    goes, faults = f"{file} goes from {first:.7g} s to {last:.7g} s", Faults()
+    for key, limit in (("begin", begin), ("end", end)):
+        # 60 s is the end of a minute whose last row is one step before
+        if math.isfinite(limit) and not first - 1.01 * whole.step <= limit <= last + 1.01 * whole.step:
+            words = "must lie within, or be left out"
+            faults.add([InputError(f"{key} = {limit:g} s: {goes}; {words}")])
+    faults.refuse()
     part = whole.part(begin, end)
     if len(part.time) < FEWEST:
+        begins = f"begin = {begin:g} s" if math.isfinite(begin) else "the first row"
+        ends = f"end = {end:g} s" if math.isfinite(end) else "the last row"
         raise InputError(
-            f"{file}: has {len(part.time)} rows from begin = {begin:g} s to end = {end:g} s, and goes from "
-            f"{whole.time[0]:.5g} s to {whole.time[-1]:.5g} s; must have >= {FEWEST} rows in this part"
+            f"{goes}, and has {len(part.time)} rows from {begins} to {ends}; must have >= {FEWEST} rows in this part"
         )
+    if "motor.count" in part.columns:
+        count = part.columns["motor.count"]
+        part = replace(part, columns={**part.columns, "motor.count": count - count[0]})
     return part
 
 
@@ -180,6 +216,9 @@ def _scale(file: Path, head: str, quantity: Measurand, unit: str) -> tuple[float
         raise InputError(
             f"{file}, column {head}: has no unit; write [{quantity.unit}] behind its name, or its own unit"
         )
+    other = of_other_kind(unit, quantity.unit)
+    if other:
+        raise InputError(f"{file}, column {head}: {other}")
     try:
         return scale(unit, quantity.unit)
     except ValueError as error:
@@ -188,24 +227,30 @@ def _scale(file: Path, head: str, quantity: Measurand, unit: str) -> tuple[float
         ) from error
 
 
-def _numbers(file: Path, lines: list[str], mark: str, places: list[int]) -> Any:
-    """The cells of these columns, shape (rows, columns)."""
+def _numbers(file: Path, rows: Sequence[tuple[int, str]], mark: str, heads: Mapping[int, str]) -> Any:
+    """The cells of the columns whose `heads` are given by place, shape (rows, columns), of lines with their
+    numbers."""
     if mark == ";":
-        lines = [line.replace(",", ".") for line in lines]
+        rows = [(number, line.replace(",", ".")) for number, line in rows]
     try:
-        return np.loadtxt(lines, delimiter=mark, usecols=places, ndmin=2)
+        table = np.loadtxt(
+            [line for _, line in rows], delimiter=mark, usecols=list(heads), ndmin=2, comments=None
+        )
+        # it takes nan and inf for numbers
+        if np.isfinite(table).all():
+            return table
     except (ValueError, IndexError):
         pass
-    for number, line in enumerate(lines, 2):
+    for number, line in rows:
         cells = line.split(mark)
-        for place in places:
+        for place, head in heads.items():
             cell = cells[place].strip() if place < len(cells) else ""
             try:
                 if not math.isfinite(float(cell)):
                     raise ValueError
             except ValueError:
-                raise InputError(
-                    f"{file}, line {number}, column {place + 1}: {printable(cell) or 'an empty cell'} is no number; "
-                    "leave out rows without measurement"
-                ) from None
+                words = (
+                    f"{printable(cell) or 'an empty cell'} is no number; leave out rows without measurement"
+                )
+                raise InputError(f"{file}, line {number}, column {place + 1}, {head}: {words}") from None
     raise InputError(f"{file}: is no table of numbers")

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ...drives.terminal_signals import terminal_signals
-from ...errors import InputError
+from ...errors import Faults, InputError
 from ...fmu.backends import export
 from ...machines.load_observer import LoadObserver
 from ...progress import Report
@@ -30,7 +30,7 @@ from ..observer_table import ObserverTable
 from .crank_motion import crank_motion
 from .fit import Fit, fit
 from .identification import drive_of, inspect_runs, is_of_shaft, plant_for, read_signal
-from .inspection import FEWEST_TURNS
+from .inspection import FEWEST_TURNS, inspect_columns
 from .measurands import MEASURANDS
 from .problem import MARK_ANGLE, Problem, RecordedRun, Sensor
 from .reading import OFFSET_SHARE, WITH_OFFSET, WatchPlan
@@ -89,6 +89,16 @@ class Alarm:
     lasts: bool
     at: float
     values: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class MachineErrors:
+    """Names and covariance of identified parameters of the machine, and the status of their identification where its
+    model did not describe its recordings."""
+
+    names: list[str]
+    covariance: Any
+    failed: str
 
 
 @dataclass(frozen=True)
@@ -169,7 +179,7 @@ def watch(config: Config, report: Report = lambda *_: None) -> WatchedRecording:
     plan = watch_plan_of(config)
     workers = min(2, os.cpu_count() or 1)
     report("reading the recording", 0.0, 1.0)
-    recording = read_signal(plan)
+    recording, errors = _files(plan)
     duration = float(recording.time[-1] - recording.time[0])
     least = FEWEST_TURNS * 2.0 * math.pi / plan.crank_speed
     if not least <= plan.learning < duration:
@@ -193,7 +203,7 @@ def watch(config: Config, report: Report = lambda *_: None) -> WatchedRecording:
     values = _parameters(
         config, replace(plan, noise=plan.noise * noise_of(checks)), drive, recording, found, ratio
     )
-    uncertainty, failed = _uncertainty(plan, values)
+    uncertainty = _uncertainty(plan, values, errors)
     values |= dict(zip(UNCERTAINTIES, uncertainty, strict=True))
     gain = {name: found.get(f"gain({name})", 1.0) for name in recording.columns}
     of_speed = next((gain[name] for name in ("crank.w", "motor.w") if name in gain), 1.0)
@@ -216,10 +226,24 @@ def watch(config: Config, report: Report = lambda *_: None) -> WatchedRecording:
         values,
         uncertainty,
         (widening[0], widening[1]),
-        failed,
+        errors.failed if errors else "",
         outputs,
         alarms,
     )
+
+
+def _files(plan: WatchPlan) -> tuple[Recording, MachineErrors | None]:
+    """The recording, and the errors of the machine where the file of an identification has them."""
+    faults, errors, found = Faults(), None, list[Recording]()
+    with faults.collected():
+        found.append(read_signal(plan))
+        # of the rest behind the learned part the sizes are not known, in an overload
+        faults.add(inspect_columns(found[0], {}))
+    if plan.identification is not None:
+        with faults.collected():
+            errors = _errors(plan.identification)
+    faults.refuse()
+    return found[0], errors
 
 
 def _problem(config: Config, plan: WatchPlan, drive: Drive, recording: Recording) -> Problem:
@@ -306,31 +330,33 @@ def noise_of(checks: Sequence[ResidualCheck]) -> float:
     return max([1.0, *(check.noise for check in checks)])
 
 
-def _uncertainty(plan: WatchPlan, values: Mapping[str, float]) -> tuple[tuple[float, float], str]:
-    """The false imbalance by errors of the machine: of an identified one, or as the table [observer] has it; and the
-    status of an identification that failed."""
-    if plan.identification is None:
+def _uncertainty(
+    plan: WatchPlan, values: Mapping[str, float], errors: MachineErrors | None
+) -> tuple[float, float]:
+    """The false imbalance by errors of the machine: of an identified one, or as the table [observer] has it."""
+    if errors is None:
         feed, force = (values[name] for name in UNCERTAINTIES)
-        return (feed, force), ""
-    names, covariance, failed = _covariance(plan.identification)
-    feed, force = false_imbalance(values, names, covariance, plan.crank_speed).values()
-    return (feed, force), failed
+        return feed, force
+    feed, force = false_imbalance(values, errors.names, errors.covariance, plan.crank_speed).values()
+    return feed, force
 
 
-def _covariance(file: Path) -> tuple[list[str], Any, str]:
-    """Names of the machine's parameters, their covariance, and the status if it is not "complete", from the result of
-    an identification."""
+def _errors(file: Path) -> MachineErrors:
+    """The errors of the machine by the result of an identification."""
     try:
         result = json.loads(file.read_text("utf-8"))
         table, status = result["covariance"], str(result["status"])
         names, matrix = list(table["names"]), np.array(table["matrix"], float)
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except OSError as error:
+        words = f"cannot be read ({error.strerror or error})"
+        raise InputError(f"watch.identification = {file}: {words}", "watch.identification") from error
+    except (ValueError, KeyError, TypeError) as error:
         raise InputError(
             f"watch.identification = {file}: is no result.json of chainunit identify", "watch.identification"
         ) from error
     rows = [k for k, name in enumerate(names) if name.startswith("machine.")]
     names = [names[k].removeprefix("machine.") for k in rows]
-    return names, matrix[np.ix_(rows, rows)], "" if status == "complete" else status
+    return MachineErrors(names, matrix[np.ix_(rows, rows)], "" if status == "complete" else status)
 
 
 def observe(
