@@ -35,7 +35,7 @@ from chainunit.study.identification.fit import fit
 from chainunit.study.identification.plant import Plant
 from chainunit.study.identification.posterior import posterior
 from chainunit.study.identification.problem import Problem, RecordedRun, Sensor
-from chainunit.study.identification.residuals import check_residuals, strains
+from chainunit.study.identification.residuals import check_residuals, strained_priors, strains
 from chainunit.study.identification.shaft import MeasuredShaft
 from chainunit.study.identification.suspicion import suspicions
 from chainunit.study.identification.synthetic import HiddenRun, Logger, synthetic
@@ -216,17 +216,19 @@ def result(trial: str, k: int) -> dict[str, Any]:
             {"run": c.run, "column": c.column, "statistic": c.statistic, "noise": c.noise, "is_noise": c.is_noise}
             for c in check_residuals(best)
         ],
-        "strains": [each.name for each in strains(asked, best)],
+        "strains": [each.name for each in (*strains(asked, best), *strained_priors(asked.sought, best))],
         "suspicions": {each.name: (each.change, each.deviation) for each in suspects},
         "suspicious": [each.name for each in suspects if each.is_suspicious],
     }  # fmt: skip
+    around = posterior(asked, best)
+    figures["held"] = around.held
     if trial not in OTHERS:
         figures["numbers"] = [
             {
                 "name": m.name, "true": of.values[m.name], "value": m.value, "deviation": m.deviation, "low": m.low,
                 "high": m.high, "spread": m.spread, "fitted": float(x), "bound": float(s),
             }
-            for m, x, s in zip(posterior(asked, best).marginals, best.z, best.deviations, strict=False)
+            for m, x, s in zip(around.marginals, best.z, best.deviations, strict=False)
         ]  # fmt: skip
     figures["seconds"] = time.perf_counter() - began
     return figures
@@ -265,9 +267,8 @@ def coverage(trials: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
 
 def is_wrong(trial: Mapping[str, Any]) -> bool:
     """Whether the model is taken for a wrong one."""
-    return bool(trial["strains"] or trial["suspicious"]) or not all(
-        check["is_noise"] for check in trial["checks"]
-    )
+    doubts = trial["strains"] or trial["suspicious"] or trial["held"]
+    return bool(doubts) or not all(check["is_noise"] for check in trial["checks"])
 
 
 def by_number(trials: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, float]]:

@@ -253,6 +253,7 @@ def test_time_simulation_finds_the_steady_motion_where_it_is_stable():
     np.testing.assert_allclose(seen.peak3, found.peak3, rtol=3e-3)
 
 
+@pytest.mark.slow
 def test_time_simulation_leaves_an_unstable_motion():
     p = bent(35.0, 8.0)
     speed = np.array([1.0]) * frequency(p)
@@ -443,6 +444,7 @@ def said(found, beginning, severity="warning"):
     return [remark for remark in remarks if str(remark).startswith(beginning)]
 
 
+@pytest.mark.slow
 def test_numbers_are_those_of_the_former_program():
     """Its file, its line and its load; `driveline.json` is what it wrote."""
     before = json.loads((Path(__file__).parent / "data" / "driveline.json").read_text())

@@ -702,6 +702,7 @@ def sampled(rng):
 
 
 @native
+@pytest.mark.slow
 def test_random_machines_run(files):
     """100 machines of four rods an organ, drawn from `SAMPLED`, geometry as `ChainUnitMachine` admits it, half of the
     sides with processing force and half with material, 20 turns in steps of 20 ms: none fails, every output is

@@ -82,6 +82,7 @@ def cut_work(study):
     return study.findings["blade"].numbers.cut_work
 
 
+@pytest.mark.slow
 def test_a_dc_motor_keeps_the_speed_and_each_flywheel_has_gains_of_its_own(tmp_path):
     study = run(DC_MOTOR, tmp_path)
     steady, drive = study.answers["steady"], study.drive
@@ -138,6 +139,7 @@ def test_a_coupling_opens_in_a_hard_cut_and_the_machine_comes_to_rest(tmp_path):
     assert sections(study) == COMMON | {"flywheels"}
 
 
+@pytest.mark.slow
 def test_a_cardan_line_on_the_crank(tmp_path):
     study = run(HEAD + "[flywheel]\nJ = 0.8\ncompare = []\nfluctuation = 0.045\n" + CARDAN, tmp_path)
     steady, rows = study.answers["steady"], study.steady

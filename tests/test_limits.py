@@ -47,6 +47,7 @@ def studied(text, folder):
     return study, motor_verdict(study), {each.kind: each for each in study.warnings}
 
 
+@pytest.mark.slow
 def test_a_motor_that_burns_in_steady_running_is_no_good(tmp_path):
     """It keeps the speed of a load that comes and goes, with 129 % of its rated current and no reserve of torque."""
     study, verdict, warnings = studied(KNIFE, tmp_path)
@@ -107,6 +108,7 @@ def test_a_motor_above_its_breakdown_speed_has_the_speed_of_ratio_and_slip(tmp_p
     assert "stalls" not in missed
 
 
+@pytest.mark.slow
 def test_the_permitted_temperature_of_a_dc_motor(tmp_path):
     """One that is badly cooled passes the permitted temperature, which the file may set."""
     study, verdict, warnings = studied(JAM + CHAIN_UNIT.format(R_th=60), tmp_path)
@@ -130,6 +132,7 @@ def test_sizing_has_the_permitted_temperature():
         parse("[sizing]\n[run]\nwinding_temperature = 400")
 
 
+@pytest.mark.slow
 def test_a_motor_that_fits_by_its_speed_keeps_it(tmp_path):
     """One limit for the choice and the verdict: behind the given gear the crank is 2.5 % too fast."""
     text = "event = []\n[sizing]\npoles_least = 4\npoles_most = 4\ncandidates = 1\n[gear]\nratio = 51.0\n"

@@ -17,7 +17,7 @@ from chainunit.errors import InputError
 from chainunit.machines.linkages.file import description_of
 from chainunit.machines.linkages.model import machine_of
 
-COUNTS = [100, pytest.param(1000, marks=pytest.mark.slow)]
+COUNTS = [50, pytest.param(1000, marks=pytest.mark.slow)]
 FORCES = ("tau", "fx", "fy", "normal", "moment", "load_power")
 
 

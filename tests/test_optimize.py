@@ -410,6 +410,7 @@ def test_a_linkage_file():
     assert own.answer.value <= least * (1.0 + 1e-6) and own.answer.value == pytest.approx(least, rel=0.01)
 
 
+@pytest.mark.slow
 def test_two_objectives():
     """No machine of the front is better than another in both; its ends are the best of each objective."""
     text = PRESS.replace('["rms(crank_torque)"]', '["rms(crank_torque)", "max(force(A))"]')

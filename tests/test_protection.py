@@ -327,6 +327,7 @@ def test_a_coupling_is_needless_to_hold_only_where_no_start_would_open_it(tmp_pa
     assert message.runs == ("start_loaded_right",) and "start with all feed on the right" in message.text
 
 
+@pytest.mark.slow
 def test_the_coming_of_the_feed_belongs_to_the_start_of_a_coupling(tmp_path, monkeypatch):
     """It puts more on the coupling than a recommended setting, and than one that is given."""
     empty = "empty_start = true\n" + event_line("jam_left", force=2000.0, turns=1)

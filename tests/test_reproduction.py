@@ -186,6 +186,7 @@ def test_hinge_loading_is_the_limit_of_the_model():
         assert got.Y_A1[k] == pytest.approx(at_a1 * np.cos(o.al1[k]), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_command_line(tmp_path):
     process = chainunit("reproduce", "-o", "out", cwd=tmp_path)
     assert process.returncode == 0, process.stderr

@@ -99,6 +99,7 @@ def test_a_rigid_drive_carries_what_the_machine_and_the_inertia_take(study, tmp_
             assert np.max(np.abs(result)) == pytest.approx(np.max(np.abs(reference)), rel=0.02)
 
 
+@pytest.mark.slow
 def test_before_or_behind_the_gear(tmp_path):
     """Straight joints on the motor's shaft, seen through the gear, are those on the crank's with stiffness, damping
     and inertia times the square of the ratio."""
@@ -263,6 +264,7 @@ def test_the_rigid_drive_has_the_same_coupling(tmp_path):
     assert 140.0 < blocked.tau2_rigid < 300.0 and 0.6 < blocked.amplification < 1.5
 
 
+@pytest.mark.slow
 def test_without_a_motor_that_fits_the_shaft_is_that_of_the_nearest(tmp_path):
     sizing = "[sizing]\ncandidates = 1\ninertia_ratio = 1e-6\npoles_least = 2\npoles_most = 2\n"
     text = f"event = []\n{LINE}{sizing}[run]\nstep = 0.002\n"

@@ -309,6 +309,7 @@ def test_a_motor_that_cannot_reach_the_speed_is_told(tmp_path):
     assert numbers["answers"]["jam_left"]["recovery_time"]["value"] is None
 
 
+@pytest.mark.slow
 def test_no_gravity_no_organs_and_markup_in_the_title(tmp_path):
     empty = """
 g = 0
@@ -621,6 +622,7 @@ def test_a_cycle_that_does_not_close_is_told(text, told, there, tmp_path, monkey
     assert (tmp_path / "load_cycle.csv").exists() == there
 
 
+@pytest.mark.slow
 def test_the_winding_temperature_is_that_of_the_duty_for_ever(tmp_path):
     """The same duty with a winding that stores little heat: it comes to rest in a run of seven time constants."""
     settings = "[motor]\narmature = {{ R = 9.5, L = 0.11, k = 1.27, R_th = 9, C = {} }}\n"
@@ -670,6 +672,7 @@ def test_each_overload_has_its_mirror_on_the_other_side():
                 )
 
 
+@pytest.mark.slow
 def test_both_sides_are_run_and_differ(tmp_path):
     """The rocker swings 9.06 deg to the right and 8.19 deg to the left."""
     study, numbers = ran(LIGHT.replace("event = []\n", event_line(*STANDARD, turns=1)), tmp_path)

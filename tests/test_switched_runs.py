@@ -80,6 +80,7 @@ def fine(monkeypatch):
     monkeypatch.setattr("chainunit.study.identification.problem.STEP", 4e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["dc", pytest.param("im", marks=SLOW), pytest.param("torque", marks=SLOW)])
 def test_derivatives_of_a_coast(kind, fine):
     """By every unknown against differences, through the switch; among them the time of the switch, and inertia and

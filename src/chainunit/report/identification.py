@@ -293,7 +293,10 @@ def _runs(s: b.Source) -> Iterator[b.Block]:
         form="long",
     )
     yield b.Text(
-        s.line("The fit took {=fit.rounds} rounds; {=fit.agreeing} of {=fit.starts} starts agree."),
+        s.line(
+            "The fit took {=fit.rounds} rounds"
+            + ("." if s.value("fit.starts") == 1.0 else "; {=fit.agreeing} of {=fit.starts} starts agree.")
+        ),
         "fine",
         "long",
     )
