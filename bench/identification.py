@@ -265,6 +265,36 @@ def coverage(trials: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
     return figures
 
 
+GOALS = {"material_mass": 0.03, "pin.friction": 0.05, "joint_damping": 0.05}
+"""By the end of a name, the error in parts of the value that is the goal with weighed machines."""
+
+
+def reached(trials: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """How many numbers are within their goals, by drive: of all, and of those for which the bound by Cramer and Rao
+    lets 95 % be within it."""
+    rows = []
+    for end, goal in GOALS.items():
+        for kind in KINDS:
+            own = [
+                each
+                for trial in trials
+                if trial["kind"] == kind
+                for each in trial["numbers"]
+                if each["name"].endswith(end)
+            ]
+            near = [abs(each["value"] / each["true"] - 1.0) <= goal for each in own]
+            can = [2.0 * each["bound"] <= goal * each["true"] for each in own]
+            both = sum(a and b for a, b in zip(near, can, strict=True))
+            rows.append(
+                {
+                    "number": end, "kind": kind, "goal": goal, "numbers": len(own), "within": sum(near),
+                    "possible": sum(can), "both": both,
+                    "bound": float(np.median([each["bound"] / each["true"] for each in own])) if own else 0.0,
+                }
+            )  # fmt: skip
+    return rows
+
+
 def is_wrong(trial: Mapping[str, Any]) -> bool:
     """Whether the model is taken for a wrong one."""
     doubts = trial["strains"] or trial["suspicious"] or trial["held"]
@@ -303,6 +333,7 @@ def summary(trials: Mapping[str, Sequence[Mapping[str, Any]]]) -> dict[str, Any]
                     if (some := [each for each in own if each["kind"] == kind])
                 },
                 "alarms": float(np.mean(alarms)),
+                "goals": reached(own),
                 "rounds": max(each["rounds"] for each in own),
                 "seconds": float(np.median([each["seconds"] for each in own])),
             }
@@ -355,6 +386,19 @@ def words(figures: Mapping[str, Any]) -> str:
     )
 
 
+def goal_table(figures: Mapping[str, Any]) -> str:
+    """How many numbers are within their goals."""
+    cells = (
+        [
+            f"{row['number']}, {row['kind']}", f"{100.0 * row['goal']:g} %", f"{100.0 * row['bound']:.2g} %",
+            f"{row['within']} of {row['numbers']}", f"{row['both']} of {row['possible']}",
+        ]
+        for row in figures["goals"]
+    )  # fmt: skip
+    heads = ["", "goal", "median bound", "within the goal", "of those with a bound of half the goal"]
+    return table(heads, cells)
+
+
 def recognised(figures: Mapping[str, Any]) -> str:
     """How many wrong models are recognised."""
     others = {name: row for trial in OTHERS for name, row in figures.get(trial, {}).items()}
@@ -368,6 +412,7 @@ def tables(figures: Mapping[str, Any]) -> dict[str, str]:
     return {
         **{trial: coverage_table(figures[trial]) for trial in own},
         **{f"{trial}_words": words(figures[trial]) for trial in own},
+        **{f"{trial}_goals": goal_table(figures[trial]) for trial in own},
         "recognised": recognised(figures),
     }
 

@@ -60,9 +60,9 @@ def drive_of(**parameters):
     return Drive(DcMotor, config.motor, config.machine.replace(parameters))
 
 
-def recorded(empty=False, seed=4):
-    """A recording of the drive with the true values, by scipy's integrator."""
-    values = {**TRUTH, **FORCES, "motor.w_ref": 150.0} | (NO_FEED if empty else {})
+def recorded(empty=False, seed=4, **more):
+    """A recording of the drive with the true values, and `more` of them, by scipy's integrator."""
+    values = {**TRUTH, **FORCES, "motor.w_ref": 150.0} | (NO_FEED if empty else {}) | more
     run = HiddenRun(SPEED, DURATION, values, angle=1.0, before=5.0)
     rng = np.random.default_rng(seed)
     return synthetic(drive_of(), ("motor.i", "motor.u", "motor.w"), run, LOGGER, rng, "monolithic")
@@ -202,6 +202,16 @@ def test_a_known_number_that_is_wrong_is_suspicious(loaded, empty):
     (own,) = suspicions(wrong, fit(wrong), names=("r",))
     assert own.is_suspicious and own.known == 0.153
     assert own.known + own.change == pytest.approx(0.15, abs=4.0 * own.deviation) and own.deviation < 5e-4
+
+
+def test_another_law_of_friction_is_suspicious():
+    """Friction that is full at ten times the speed is told from that of the model, with nearly the right speed."""
+    law = {"machine.pin.w_smooth": 0.2}
+    recordings = [without(recorded(k == 1, 4 + k, **law), "motor.count") for k in range(2)]
+    wrong = problem_of(*recordings, empty=(1,))
+    (own,) = suspicions(wrong, fit(wrong), names=("pin.w_smooth",))
+    assert own.is_suspicious and own.known == 0.02
+    assert own.known + own.change == pytest.approx(0.2, abs=0.02 + 4.0 * own.deviation)
 
 
 def test_the_statistic_of_noise_is_that_of_its_distribution():

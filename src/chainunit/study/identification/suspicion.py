@@ -2,25 +2,28 @@
 
 Each is let free alone, around the best fit: the derivatives of the columns by it tell how far it would move, and with
 which standard deviation (a score test). A wrong dimension or another law of friction, which the sought numbers make
-up for almost wholly, shows here before it shows in the sum of all orders of the residuals.
+up for almost wholly, shows here before it shows in the sum of all orders of the residuals. As the torque is far from
+straight in the speed of smooth friction, the secant up to another law stands for its derivative.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ...refusals import unit_behind
-from .fit import Normal, normal
-from .problem import Problem
+from .fit import Normal, normal_of
+from .problem import Comparison, Problem
 from .unknown import Unknown
 
 SUSPECTS = ("pin.w_smooth", "processing.v_smooth", "r", "l", "h", "e", "l1", "z", "web_share")
 """Numbers of a chain unit that may be wrong: its law of friction, its dimensions, and where the material lies."""
+SMOOTH, LAW = "machine.pin.w_smooth", 10.0
+"""The number by which the law of friction is another one, and the factor on it for friction that grows with speed."""
 SUSPICIOUS = 4.0
 """Change of a number, in standard deviations, from which it is suspicious."""
 BLIND = 1e-9
@@ -76,8 +79,27 @@ def suspicions(
     z = wider.starts
     for name, place in problem.place.items():
         z[wider.place[name]] = best.z[place]
-    at = normal(wider, z, workers, {key: 1.0 / weight for key, weight in best.weights.items()})
+    comparisons = tuple(wider.comparisons(z, workers))
+    if SMOOTH in wider.place and SMOOTH not in taken:
+        comparisons = _with_secant(wider, z, comparisons, workers)
+    at = normal_of(wider, z, comparisons, {key: 1.0 / weight for key, weight in best.weights.items()})
     return [_suspicion(each, wider, at, {u.name for u in more}) for each in more]
+
+
+def _with_secant(
+    problem: Problem, z: Any, comparisons: tuple[Comparison, ...], workers: int
+) -> tuple[Comparison, ...]:
+    """The comparisons with the secant to another law of friction as the derivative by `SMOOTH`."""
+    place, other = problem.place[SMOOTH], z.copy()
+    other[place] *= LAW
+    found = []
+    for here, there in zip(comparisons, problem.comparisons(other, workers), strict=True):
+        slopes = here.slopes.copy()
+        if place in here.places:
+            change = here.residuals - there.residuals
+            slopes[:, list(here.places).index(place)] = change / (other[place] - z[place])
+        found.append(replace(here, slopes=slopes))
+    return tuple(found)
 
 
 def _suspicion(of: Unknown, problem: Problem, at: Normal, more: set[str]) -> Suspicion:
