@@ -61,7 +61,8 @@ INDUCTION = {
 FULL = {
     "motor.i": 5.0, "motor.u": 250.0, "motor.w": 200.0, "motor.power": 1000.0, "crank.tau": 500.0, "crank.w": 5.0,
 }  # fmt: skip
-KINDS = ("dc", "im", "torque")
+NAMES = {"dc": "DC motor", "im": "induction motor", "torque": "torque behind the gear"}
+KINDS = tuple(NAMES)
 SPEED = {"dc": 3.0, "im": 3.08, "torque": 3.0}
 WRONG: dict[str, dict[str, float]] = {
     "friction grows with speed": {"machine.pin.w_smooth": 0.2},
@@ -360,12 +361,13 @@ HEADS = {
 def cell(key: str, x: float) -> str:
     if key in ("error", "to_bound"):
         return f"{x:.2f}"
-    return f"{100.0 * x:.1f} %" if key == "cover" else f"{100.0 * x:.2g} %"
+    return f"{100.0 * x:.1f} %" if key == "cover" or x > 1.0 else f"{100.0 * x:.2g} %"
 
 
 def coverage_table(figures: Mapping[str, Any]) -> str:
     """How errors follow their stated deviations, over all numbers, by drive and by number."""
-    rows = {"all numbers": figures, **figures["by_kind"], **figures["by_number"]}
+    kinds = {f"all, {NAMES[kind]}": row for kind, row in figures["by_kind"].items()}
+    rows = {"all numbers": figures, **kinds, **figures["by_number"]}
     keys = list(HEADS)
     cells = (
         [name, *(cell(key, row[key]) if key in row else "" for key in keys)] for name, row in rows.items()
@@ -390,7 +392,7 @@ def goal_table(figures: Mapping[str, Any]) -> str:
     """How many numbers are within their goals."""
     cells = (
         [
-            f"{row['number']}, {row['kind']}", f"{100.0 * row['goal']:g} %", f"{100.0 * row['bound']:.2g} %",
+            f"{row['number']}, {NAMES[row['kind']]}", f"{100.0 * row['goal']:g} %", f"{100.0 * row['bound']:.2g} %",
             f"{row['within']} of {row['numbers']}", f"{row['both']} of {row['possible']}",
         ]
         for row in figures["goals"]

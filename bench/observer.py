@@ -285,7 +285,7 @@ def tables(figures):
         [
             f"{row['speed']:.2f}",
             f"{row['share']:.2f}",
-            *(f"{100.0 * row[x]:.1f} %" for x in ("mean", "most", "bars")),
+            *(f"{100.0 * row[x]:.1f} %".replace("-0.0", "0.0") for x in ("mean", "most", "bars")),
         ]
         for row in figures["chains"]
     )

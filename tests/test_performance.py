@@ -12,6 +12,7 @@ import pytest
 from chainunit.model import Model, Part
 from chainunit.native.compilers import compiler
 from chainunit.quantities import Value, declaration, quantity
+from chainunit.study.notices import CHAINS_GOOD
 
 ROOT = Path(__file__).parents[1]
 
@@ -36,6 +37,13 @@ def test_the_page_is_made_from_the_figures(bench, figures):
     for name, text in page.PAGES.items():
         assert (page.DOCS / name).read_text("utf-8") == text(figures)
     assert set(figures) == {*page.BENCHES, *page.LONG}
+
+
+def test_the_limit_of_chains_is_the_measured_one(bench, figures):
+    """The speed up to which a study takes the observer's word beside chains."""
+    assert f"{bench('observer').share_below(figures['observer'], 0.2):.2f}" == str(CHAINS_GOOD)
+    page = (bench("page").DOCS / "identification.md").read_text("utf-8")
+    assert f"{bench('observer').share_below(figures['observer'], 0.05):.2f} of their lowest resonance" in page
 
 
 def test_each_goal_stands_there_with_its_measured_value(bench, figures):
