@@ -383,8 +383,8 @@ def words(figures: Mapping[str, Any]) -> str:
         f"{f['mean']:.2f} and the root mean square {f['error']:.2f}; the spread is {f['to_bound']:.2f} of the "
         f"bound. Of {f['sharp']} numbers with a bound of at most {100.0 * SHARP:g} % the largest error is "
         f"{100.0 * f.get('sharp_worst', 0.0):.2g} %, the median {100.0 * f.get('sharp_median', 0.0):.2g} %. A fit "
-        f"takes at most {f['rounds']} rounds and {f['seconds']:.0f} s (median). {100.0 * f['alarms']:.2g} % of the "
-        "machines are taken for another one."
+        f"takes at most {f['rounds']} rounds, an identification {f['seconds']:.0f} s (median). "
+        f"{100.0 * f['alarms']:.2g} % of the machines are taken for another one."
     )
 
 

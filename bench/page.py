@@ -1,8 +1,8 @@
 """Writes docs/performance.md and docs/trials.md from bench/figures.json, the figures that the benches print.
 
 `python bench/page.py` writes the pages. `python bench/page.py --measure` runs all benches before that but for the
-identification, which takes two hours, and `--measure states accuracy` those that are named; the figures of the others
-stay.
+identification, which takes an hour and a half, and `--measure states accuracy` those that are named; the figures of
+the others stay.
 """
 
 from __future__ import annotations

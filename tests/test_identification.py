@@ -7,8 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from derivatives import check_derivatives
+from scipy.optimize import nnls
 
-from chainunit import InputError
+from chainunit import InputError, RunError
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor
 from chainunit.native.compilers import compiler
@@ -214,18 +215,33 @@ def test_another_law_of_friction_is_suspicious():
     assert own.known + own.change == pytest.approx(0.2, abs=0.02 + 4.0 * own.deviation)
 
 
+def test_a_law_with_which_the_machine_does_not_run_is_left_out(loaded, monkeypatch):
+    """The derivative stands in its place."""
+    problem = problem_of(without(loaded, "motor.count"))
+    best, own = fit(problem), Problem.comparisons
+
+    def comparisons(self, z, workers=1):
+        if "machine.pin.w_smooth" in self.place and z[self.place["machine.pin.w_smooth"]] > 0.1:
+            raise RunError("it stalls")
+        return own(self, z, workers)
+
+    monkeypatch.setattr(Problem, "comparisons", comparisons)
+    (found,) = suspicions(problem, best, names=("pin.w_smooth",))
+    assert np.isfinite(found.change) and not found.is_suspicious
+
+
 def test_the_statistic_of_noise_is_that_of_its_distribution():
     """Its mean is the number of waves, and it exceeds its limit as seldom as is stated; an order of known size is
     found in the unit of the column."""
     rng, angle = np.random.default_rng(7), np.linspace(0.0, 60.0, 1500)
     found = [
-        residuals.check(Comparison("run", "motor.i", rng.standard_normal(1500), None, (), angle, 0.2), 63.7)
+        residuals.check(Comparison("run", "motor.i", rng.standard_normal(1500), None, (), angle, 0.2), 0.99)
         for _ in range(300)
     ]
     assert np.mean([each.statistic for each in found]) == pytest.approx(40.0, abs=2.0)
     assert np.mean([each.is_noise for each in found]) > 0.97  # the limit is that of 1 %
     wave = rng.standard_normal(1500) + 0.9 * np.cos(3.0 * angle + 0.4)
-    own = residuals.check(Comparison("run", "motor.i", wave, None, (), angle, 0.2), 63.7)
+    own = residuals.check(Comparison("run", "motor.i", wave, None, (), angle, 0.2), 0.99)
     assert own.orders[0] == (3, pytest.approx(0.18, abs=0.02)) and not own.is_noise
 
 
@@ -324,6 +340,29 @@ def test_a_number_beyond_its_bound_is_held_there():
     assert 6.0 <= found.marginals[0].low < found.marginals[0].high < 6.3
 
 
+def test_two_numbers_in_a_corner_are_not_held():
+    """Two numbers that are truly at their bounds, of which the data tell the sum well and the difference hardly."""
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        rows = np.column_stack([np.ones(400), 1.0 + 0.01 * rng.standard_normal(400)])
+        data = rng.standard_normal(400)
+
+        class Corner:
+            unknowns = sought = tuple(Unknown.within(name, "1", 0.0, 10.0) for name in "ab")
+            starts, spreads = np.array([5.0, 5.0]), np.array([10.0, 10.0]) / np.sqrt(12.0)
+            bounds = np.array([0.0, 0.0]), np.array([10.0, 10.0])
+
+            def comparisons(self, z, workers=1, data=data, rows=rows):
+                yield Comparison("run", "x", data - rows @ z, rows, (0, 1), None, 1.0)
+
+            def thinned(self, step):
+                return self
+
+        problem = Corner()
+        found = posterior(problem, normal(problem, nnls(rows, data)[0]))
+        assert found.held == () and 0.0 < found.marginals[0].high < 0.5
+
+
 @pytest.mark.parametrize("size", [1.0, 5.0, 20.0])
 def test_noise_of_any_size_is_measured(size):
     """Also of a column with outliers."""
@@ -341,10 +380,15 @@ def test_a_number_without_a_sum_that_is_told():
     assert what_runs_tell._combinations(problem, np.diag([1e6, 1e-3])) == ()
 
 
-def test_few_rows_tell_no_orders():
-    angle = np.linspace(0.0, 30.0, 42)
-    own = Comparison("run", "motor.i", np.random.default_rng(1).standard_normal(42), None, (), angle, 1.0)
-    assert residuals.check_residuals(SimpleNamespace(comparisons=(own,))) == []
+@pytest.mark.parametrize("rows", [30, 42, 120])
+def test_of_few_rows_few_orders_are_looked_at(rows):
+    """Noise exceeds the limit as seldom as with many rows, and a wave is found."""
+    rng, angle = np.random.default_rng(7), np.linspace(0.0, 30.0, rows)
+    noises = [rng.standard_normal(rows) for _ in range(400)]
+    found = [residuals.check(Comparison("run", "motor.i", x, None, (), angle, 1.0), 0.95) for x in noises]
+    assert np.mean([each.is_noise for each in found]) == pytest.approx(0.95, abs=0.03)
+    wave = noises[0] + 5.0 * np.cos(angle)
+    assert not residuals.check(Comparison("run", "motor.i", wave, None, (), angle, 1.0), 0.95).is_noise
 
 
 def test_what_is_known_beforehand_counts(loaded):

@@ -12,12 +12,14 @@ import pytest
 from command import chainunit
 
 from chainunit import InputError, Study
+from chainunit.machines.load_observer import LoadObserver
 from chainunit.native.compilers import compiler
 from chainunit.study import config as study_files
 from chainunit.study.choice import choose
+from chainunit.study.false_loads import false_loads
 from chainunit.study.identification import identification
 from chainunit.study.identification.measurands import MEASURANDS
-from chainunit.study.identification.result import _number, sentences
+from chainunit.study.identification.result import _number, identified_tables, sentences
 from chainunit.study.identification.synthetic import HiddenRun, Logger, synthetic
 from chainunit.study.identification.unknown import Unknown
 from chainunit.system import Profile
@@ -315,6 +317,26 @@ def test_a_deviation_of_a_temperature_is_a_difference():
     for key in ("deviation", "given_deviation", "expected", "by_runs"):
         assert own[key]["kind"] == "difference", key
     assert own["value"]["kind"] == "temperature"
+
+
+def test_the_observer_gets_the_errors_at_the_fitted_loads(tmp_path):
+    """An error of the friction makes false loads by the forces that there are."""
+    config = study_files.parse("[observer]\n[feed]\nright = { material_mass = 20, processing_force = 100 }\n")
+    values = {"machine.pin.friction": (0.12, 0.01), "feed.left.processing_force": (300.0, 1.0)}
+    estimates = {
+        name: identification.FittedNumber(Unknown.within(name, "1", 0.0, 1e3), x, x, s, x - s, x + s, True)
+        for name, (x, s) in values.items()
+    }
+    found = SimpleNamespace(config=config, estimates=estimates, covariance=np.diag([1e-4, 1.0]))
+    written = identified_tables(found, tmp_path)["observer"]
+    known = {"pin.friction": 0.12, "feed.expected": 25.0, "force.expected": 200.0}
+    p = LoadObserver.parameter_layout.from_names(known)
+    own = false_loads(p, ["pin.friction"], [[1e-4]], config.run.crank_speed)
+    assert written["uncertainty"] == pytest.approx(own.imbalance, rel=1e-3)
+    assert written["force_uncertainty"] == pytest.approx(own.force_imbalance, rel=1e-3)
+    without = LoadObserver.parameter_layout.from_names({"pin.friction": 0.12})
+    other = false_loads(without, ["pin.friction"], [[1e-4]], config.run.crank_speed)
+    assert written["force_uncertainty"] != pytest.approx(other.force_imbalance, rel=0.1)
 
 
 def test_refusals(tmp_path):

@@ -96,7 +96,7 @@ def test_a_fault_names_its_column(changes, column, words):
 def test_faults_of_the_rows():
     missing = rows(GOOD, (GOOD.time < 2.0) | (GOOD.time > 6.0))
     (fault,) = faults(missing)
-    assert "column time [s]: 40 % of the rows are missing, 4 s of them in one piece from 2 s" in fault
+    assert "column time [s]: 40 % of the rows are missing, 4 s of them in one piece from 1.999 s" in fault
     assert missing.missing == pytest.approx(0.4, abs=1e-3) and missing.gaps == [(1.999, 6.001)]
     slow = recorded(rate=5.0, duration=60.0)
     (fault,) = faults(slow)
@@ -149,6 +149,22 @@ def test_a_mark_is_passed_once_in_a_turn():
     )
 
 
+def test_an_encoder_counts_up_and_does_not_begin_anew():
+    count = np.floor(SPEED * RATIO * 4096.0 / (2.0 * np.pi) * GOOD.time)
+
+    def of_count(x):
+        columns = {name: x for name, x in GOOD.columns.items() if name != "mark"} | {"motor.count": x}
+        return faults(
+            Recording("run.csv", GOOD.time, columns, GOOD.heads | {"motor.count": "motor.count [1]"})
+        )
+
+    assert of_count(count) == [] == of_count(count + 3e9)
+    (fault,) = of_count(-count)
+    assert "motor.count [1]: counts down, while the motor turns forward: change its sign" in fault
+    (fault,) = of_count(count % 65536.0)
+    assert "falls by 65" in fault and "the counter begins anew; write the count without the jump" in fault
+
+
 def coast(current=0.0):
     """The motor is switched off at 4 s; then its electric columns are zero, and the speed falls to zero."""
     on = GOOD.time <= 4.0
@@ -168,7 +184,7 @@ def test_electric_columns_are_inspected_until_the_motor_is_switched_off():
     stopped = coast()
     stopped.columns["motor.w"][6000:8000] = 20.0
     (fault,) = faults(stopped, off=4.0)
-    assert "column motor.w [rad/s]: keeps the value 20 rad/s from 6 to 8 s" in fault
+    assert "column motor.w [rad/s]: keeps the value 20 rad/s from 6 to 7.999 s" in fault
 
 
 def written(folder, text, name="run.csv"):
@@ -202,6 +218,8 @@ def test_columns_may_have_other_heads_and_decimal_commas(tmp_path):
     recording = read_recording(written(tmp_path, text), names)
     np.testing.assert_allclose(recording.columns["motor.power"], 1e3 * (2.0 + np.arange(150)))
     assert recording.heads["motor.i"] == "Strom [A]" and recording.time[-1] == pytest.approx(0.149)
+    remarked = table("time [s],motor.i [A]").replace("\n0.003,", "\n# logger restarted, 3\n0.003,")
+    assert len(read_recording(written(tmp_path, remarked)).time) == 150
 
 
 @pytest.mark.parametrize(
@@ -227,6 +245,7 @@ def test_columns_may_have_other_heads_and_decimal_commas(tmp_path):
         (table("time [s],Strom [A]"),
          "heads are: time [s], Strom [A]; name it by the key columns, such as columns = { \"motor.i\" = \"Strom\" }"),
         (table("time [s],motor.w [kg]"), "[kg]: kg is a mass; must be a speed, such as [rad/s] or [rev/min]"),
+        (table("time [s],motor.power [kWh]"), "kWh is a torque or an energy; must be a power, such as [W] or [kW]"),
         (table("time [s],crank.tau [%]"), "[%]: % is a share; must be a torque, such as [N m] or [kN m]"),
         (table("time [s],motor.w [1/s]"), "must have a unit like [rad/s]: no angle is named"),
         (table("time [s],motor.i [Foo]"), "must have a unit like [A]: Foo: is no unit"),

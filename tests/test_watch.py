@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from command import chainunit
 
 from chainunit import InputError, Study
 from chainunit.native.compilers import compiler
+from chainunit.study.identification import watch as watching
 from chainunit.study.identification.crank_motion import crank_motion
 from chainunit.study.identification.recording import Recording, read_recording, write_recording
 
@@ -161,19 +163,40 @@ def test_behind_a_gap_the_observer_starts_anew(tmp_path):
     assert "No rows from 49.99 s to 51.1" in words
     assert "The identification of this machine failed: the model does not describe the recordings." in words
     assert "The identification sought no number of the machine that the observer knows." in words
-    noise = json.loads(found.to_json())["noise"]["value"]
+    noise = {name: each["value"] for name, each in json.loads(found.to_json())["noise"].items()}
+    assert list(noise.values()) == pytest.approx([5.0, 5.0], rel=0.1)
     assert (
-        noise == pytest.approx(5.0, rel=0.1) and f"is {noise:.2g} times the stated one (watch.noise)" in words
+        f"The noise of the measured speed at the begin is {noise['speed']:.2g} times the stated one" in words
     )
-    assert found.watched.parameters["noise.w"] == pytest.approx(0.002 * noise * 150.0, rel=0.01)
+    assert found.watched.parameters["noise.w"] == pytest.approx(0.002 * noise["speed"] * 150.0, rel=0.01)
+
+
+def test_the_noise_of_columns_that_the_observer_does_not_use():
+    """It is no noise of the observer."""
+    recording = Recording(
+        "", np.arange(9.0), dict.fromkeys(("motor.i", "motor.u", "motor.w"), np.ones(9)), {}
+    )
+    measured = {"motor.i": 3.0, "motor.u": 8.0, "motor.w": 0.9}
+    checks = [SimpleNamespace(column=name, noise=x) for name, x in measured.items()]
+    assert watching.noises(checks, recording) == (3.0, 1.0)
 
 
 def test_a_sensor_that_fails_behind_the_begin(tmp_path):
-    """It would make a false alarm."""
+    """It makes a false alarm, which the page doubts; a machine that stops is watched all the same."""
     stuck = changed(tmp_path, motor_i=lambda t, x: np.where(t > 35.0, x[7000], x))
     (tmp_path / "mine.toml").write_text(study_text(TRUTH["machine"], file=stuck), "utf-8")
-    with pytest.raises(InputError, match=r"motor\.i.* keeps the value .* from 35 to 60 s"):
-        Study.from_file(tmp_path / "mine.toml").watch()
+    words = " ".join(repr(Study.from_file(tmp_path / "mine.toml").watch()).split())
+    assert "Overload of the" in words and "motor.i keeps the value" in words
+    doubt = (
+        "from 35 to 59.995 s: a sensor that is stuck, a stop or a limit. An alarm in this time may be false."
+    )
+    assert doubt in words
+    stop = {
+        name: lambda t, x: np.where(t > 50.0, 0.0, x) for name in ("motor_i", "motor_u", "motor_w", "mark")
+    }
+    changed(tmp_path, **stop)
+    words = " ".join(repr(Study.from_file(tmp_path / "mine.toml").watch()).split())
+    assert "motor.w keeps the value 0 rad/s from 50" in words
 
 
 def test_refusals(tmp_path):

@@ -236,7 +236,8 @@ def of_other_kind(unit_text: str, unit: str) -> str:
     if own == dimension(unit):
         return ""
     is_share = not own and not any(name in _ANGLES for name, _ in _factors(_ascii(unit_text)))
-    kind = next((words for each, words in _KINDS.items() if dimension(each) == own), "no unit of it")
+    alike = {**_KINDS, "N.m": "a torque or an energy"}
+    kind = next((words for each, words in alike.items() if dimension(each) == own), "of another quantity")
     wanted = dict.fromkeys((unit.replace(".", " "), *fitting(unit)[:2]))
     such = " or ".join(f"[{each}]" for each in list(wanted)[:2])
     return f"{unit_text} is {'a share' if is_share else kind}; must be {_KINDS[unit]}, such as {such}"

@@ -86,14 +86,13 @@ def _opening(s: b.Source) -> Iterator[b.Block]:
                 "those of {identification}."
             ),
         )
-    if (s.value("noise") or 0.0) > LOUD:
-        yield b.Judgement(
-            "warning",
-            s.line(
-                "The noise at the begin of the recording is {=noise:2} times the stated one (watch.noise): the "
-                "thresholds are those of the measured noise."
-            ),
-        )
+    for name, of in (("signal", "signal"), ("speed", "measured speed")):
+        if (s.value(f"noise.{name}") or 0.0) > LOUD:
+            louder = f"The noise of the {of} at the begin is {{=noise.{name}:2}} times the stated one (watch.noise)"
+            yield b.Judgement("warning", s.line(f"{louder}: the thresholds are those of the measured noise."))
+    for each in s.lines("constant_parts"):
+        more = ": a sensor that is stuck, a stop or a limit. An alarm in this time may be false."
+        yield b.Judgement("warning", line(each, more))
     for k in range(len(s.result["gaps"])):
         words = f"No rows from {{gaps.{k}.from:4}} to {{gaps.{k}.to:4}}: the observer starts anew behind this gap."
         yield b.Judgement("remark", s.line(words))

@@ -258,8 +258,8 @@ def read_runs(runs: Sequence[PlannedRun]) -> dict[str, Recording]:
             begin, end = recording.time[0], recording.time[-1]
             if run.off is not None and not begin < run.off < end:
                 raise InputError(
-                    f"identify.run ({run.name}): switched_off = {run.off:g} s: {run.file} goes from {begin:g} to "
-                    f"{end:g} s; must lie within",
+                    f"identify.run ({run.name}): switched_off = {run.off:.12g} s: {run.file} goes from "
+                    f"{begin:.12g} to {end:.12g} s; must lie within",
                     "identify.run",
                 )
             for name, other in recordings.items():

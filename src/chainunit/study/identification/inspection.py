@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -32,6 +32,8 @@ STUCK = 0.2
 """Longest time for which a column with noise may keep its value [s]."""
 CLIPPED = 2e-3
 """Largest share of rows at the same extreme value, in parts of all rows."""
+JUMP = 1e4
+"""Fall of the count of an encoder from which it began anew."""
 STANDS = 0.05
 """Mean speed, in parts of the expected one, below which the machine stands."""
 _ROWS_STUCK = 20
@@ -68,6 +70,7 @@ def inspect_motion(
     return [
         *_rows(recording, speeds[1]),
         *(_stands(recording, driven, speeds[0], ratio) or _marks(driven, speeds, ratio)),
+        *_counted(recording),
     ]
 
 
@@ -106,7 +109,7 @@ def _of_column(
     extreme, share, at = _extremes(x)
     if stuck is not None and not (share > CLIPPED and x[stuck[0]] in (x.min(), x.max())):
         begin, end = recording.time[stuck[0]], recording.time[stuck[1]]
-        words = f"keeps the value {_size(name, float(x[stuck[0]]))} from {begin:.3g} to {end:.3g} s: "
+        words = f"keeps the value {_size(name, float(x[stuck[0]]))} from {begin:.10g} to {end:.10g} s: "
         words += "the sensor or the logger is stuck; " + (
             "record again" if end - begin > 0.5 * (recording.time[-1] - recording.time[0]) else
             "leave this part out (begin, end), or record again"
@@ -159,7 +162,7 @@ def _rows(recording: Recording, crank_speed: float) -> Iterator[InputError]:
         yield _fault(
             recording, "time",
             f"{100.0 * recording.missing:.0f} % of the rows are missing, {end - begin:.3g} s of them in one piece "
-            f"from {begin:.3g} s; must be <= {100.0 * MISSING:.0f} %: name a part without gaps (begin, end), or "
+            f"from {begin:.10g} s; must be <= {100.0 * MISSING:.0f} %: name a part without gaps (begin, end), or "
             "record again",
         )  # fmt: skip
     if span < FEWEST_TURNS * turn:
@@ -198,6 +201,32 @@ def _marks(recording: Recording, speeds: tuple[float, float], ratio: float) -> I
             f"is 1 in {'all ' if passes == rows else ''}{passes} rows of {turns} turns of the crank; must be 1 only "
             "in the first row after the mark, once in a turn: check sensor and crank_speed",
         )  # fmt: skip
+
+
+def _counted(recording: Recording) -> Iterator[InputError]:
+    """That an encoder counts down, or begins anew."""
+    count = recording.columns.get("motor.count")
+    if count is None:
+        return
+    steps = np.diff(count)
+    place = int(np.argmin(steps))
+    if count[-1] < count[0] and np.median(steps) < 0.0:
+        yield _fault(recording, "motor.count", "counts down, while the motor turns forward: change its sign")
+    elif steps[place] < -JUMP:
+        at = recording.time[place + 1]
+        yield _fault(
+            recording, "motor.count",
+            f"falls by {-steps[place]:.0f} at {at:.10g} s: the counter begins anew; write the count without the jump",
+        )  # fmt: skip
+
+
+def constant_parts(recording: Recording, names: Iterable[str]) -> Iterator[str]:
+    """Words on columns that keep a value over a part: a sensor that is stuck, a stop, or a limit."""
+    for name in names:
+        x = recording.columns[name]
+        if (stuck := _longest_constant(recording.time, x)) is not None:
+            begin, end = recording.time[stuck[0]], recording.time[stuck[1]]
+            yield f"{name} keeps the value {_size(name, float(x[stuck[0]]))} from {begin:.10g} to {end:.10g} s"
 
 
 def _stands(recording: Recording, driven: Recording, crank_speed: float, ratio: float) -> list[InputError]:

@@ -94,10 +94,13 @@ def _held(problem: Problem, best: Normal) -> dict[int, float]:
     near = 1e-6 * problem.spreads
     at = np.where(best.z <= low + near, pull < 0.0, (best.z >= high - near) & (pull > 0.0))
     held: dict[int, float] = {}
-    covariance = best.covariance
-    for k in np.flatnonzero(at[:count]):
-        if abs(pull[k]) * math.sqrt(covariance[k, k]) > PRESSED:
-            held[int(k)] = float(pull[k])
+    pressed = [int(k) for k in np.flatnonzero(at[:count])]
+    for k in pressed:
+        # the others stay at their bounds, as they did in the fit
+        free = [j for j in range(len(best.z)) if j == k or j not in pressed]
+        own = inverse(best.matrix[np.ix_(free, free)])[free.index(k), free.index(k)]
+        if abs(pull[k]) * math.sqrt(own) > PRESSED:
+            held[k] = float(pull[k])
     return held
 
 

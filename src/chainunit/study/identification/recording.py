@@ -79,7 +79,7 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
     lines = _text(file).splitlines()
     if not lines:
         raise InputError(f"{file}: is empty; must have a head and >= {FEWEST} rows")
-    rows = [(number, line) for number, line in enumerate(lines[1:], 2) if line.strip()]
+    rows = [(number, line) for number, line in enumerate(lines[1:], 2) if line.partition("#")[0].strip()]
     if len(rows) < FEWEST:
         raise InputError(f"{file}: has {len(rows)} rows behind its head; must have >= {FEWEST}")
     mark = ";" if lines[0].count(";") > lines[0].count(",") else ","
@@ -157,17 +157,17 @@ def read_part(file: Path, names: Mapping[str, str], begin: float, end: float) ->
     """
     whole = read_recording(file, names)
     first, last = float(whole.time[0]), float(whole.time[-1])
-    goes, faults = f"{file} goes from {first:.7g} s to {last:.7g} s", Faults()
+    goes, faults = f"{file} goes from {first:.12g} s to {last:.12g} s", Faults()
     for key, limit in (("begin", begin), ("end", end)):
         # 60 s is the end of a minute whose last row is one step before
         if math.isfinite(limit) and not first - 1.01 * whole.step <= limit <= last + 1.01 * whole.step:
             words = "must lie within, or be left out"
-            faults.add([InputError(f"{key} = {limit:g} s: {goes}; {words}")])
+            faults.add([InputError(f"{key} = {limit:.12g} s: {goes}; {words}")])
     faults.refuse()
     part = whole.part(begin, end)
     if len(part.time) < FEWEST:
-        begins = f"begin = {begin:g} s" if math.isfinite(begin) else "the first row"
-        ends = f"end = {end:g} s" if math.isfinite(end) else "the last row"
+        begins = f"begin = {begin:.12g} s" if math.isfinite(begin) else "the first row"
+        ends = f"end = {end:.12g} s" if math.isfinite(end) else "the last row"
         raise InputError(
             f"{goes}, and has {len(part.time)} rows from {begins} to {ends}; must have >= {FEWEST} rows in this part"
         )

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.stats import f
 
 from ...refusals import unit_behind
 from .fit import Normal
@@ -17,8 +17,8 @@ from .unknown import Unknown
 
 ORDERS = 20
 """Highest order of the crank that is looked at."""
-LEAST_ROWS = 10 * ORDERS
-"""Least number of rows whose orders can be checked."""
+ROWS = 10
+"""Number of rows for each order that is looked at."""
 FALSE_ALARMS = 0.01
 """Share of right models of which some column is taken for wrong."""
 
@@ -84,17 +84,19 @@ def strained_priors(sought: Sequence[Unknown], best: Normal) -> list[Strain]:
 
 
 def check_residuals(best: Normal) -> list[ResidualCheck]:
-    """The checks of all columns of a fit that have a value in each row, and enough rows."""
-    columns = [
-        each for each in best.comparisons if each.column != "mark" and len(each.residuals) >= LEAST_ROWS
-    ]
-    limit = float(chi2.ppf((1.0 - FALSE_ALARMS) ** (1.0 / max(1, len(columns))), 2 * ORDERS))
-    return [check(each, limit) for each in columns]
+    """The checks of all columns of a fit that have a value in each row. Of few rows fewer orders are looked at."""
+    columns = [each for each in best.comparisons if each.column != "mark" and len(each.residuals) >= 2 * ROWS]
+    level = (1.0 - FALSE_ALARMS) ** (1.0 / max(1, len(columns)))
+    return [check(each, level) for each in columns]
 
 
-def check(of: Comparison, limit: float) -> ResidualCheck:
-    """The check of one column, with this limit of the statistic."""
-    waves = np.stack(list(_waves(of.angle)), axis=1)
+def check(of: Comparison, level: float) -> ResidualCheck:
+    """The check of one column; noise is within the limit of its statistic with the probability `level`."""
+    rows = len(of.residuals)
+    orders = min(ORDERS, rows // ROWS)
+    # the noise is measured, too
+    limit = 2 * orders * float(f.ppf(level, 2 * orders, rows - 2 * orders - 1))
+    waves = np.stack(list(_waves(of.angle, orders)), axis=1)
     parts, *_ = np.linalg.lstsq(waves, of.residuals, rcond=None)
     rest = of.residuals - waves @ parts
     noise = float(np.sqrt(np.sum(rest**2) / (len(rest) - waves.shape[1])))
@@ -103,12 +105,12 @@ def check(of: Comparison, limit: float) -> ResidualCheck:
     statistic = float(parts[1:] @ np.linalg.solve(covariance, parts[1:])) / noise**2
     sizes = np.hypot(parts[1::2], parts[2::2]) * of.size
     largest = np.argsort(-sizes)[:3]
-    orders = tuple((int(k) + 1, float(sizes[k])) for k in largest)
-    return ResidualCheck(of.run, of.column, statistic, limit, orders, noise)
+    found = tuple((int(k) + 1, float(sizes[k])) for k in largest)
+    return ResidualCheck(of.run, of.column, statistic, limit, found, noise)
 
 
-def _waves(angle: Any) -> Iterator[Any]:
+def _waves(angle: Any, orders: int) -> Iterator[Any]:
     yield np.ones(len(angle))
-    for order in range(1, ORDERS + 1):
+    for order in range(1, orders + 1):
         yield np.cos(order * angle)
         yield np.sin(order * angle)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ... import __version__
+from ...quantities import Layout
 from ...refusals import unit_behind
 from ...text import array_entry, entry, shown_in
 from ..observation import false_imbalance
@@ -276,9 +277,12 @@ def identified_tables(found: IdentifiedMachine, folder: Path) -> dict[str, Any]:
     if "observer" in tables:
         config = found.config
         own = {name.removeprefix("machine."): x for name, x in values.items()}
-        machine = config.machine.by_name | {
+        machine: dict[str, float] = config.machine.by_name | {
             name: x for name, x in own.items() if name in config.machine.by_name
         }
+        loads = Layout(type(config.feed)).by_name(config.feed).items()
+        for key, end in (("feed.expected", "material_mass"), ("force.expected", "processing_force")):
+            machine[key] = float(np.mean([values.get(f"feed.{n}", x) for n, x in loads if n.endswith(end)]))
         names = [name.removeprefix("machine.") for name in found.estimates]
         false = false_imbalance(machine, names, found.covariance, config.run.crank_speed)
         tables["observer"] |= {name: float(f"{x:.4g}") for name, x in false.items()}

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from ...errors import RunError
 from ...refusals import unit_behind
 from .fit import Normal, normal_of
 from .problem import Comparison, Problem
@@ -24,6 +25,8 @@ SUSPECTS = ("pin.w_smooth", "processing.v_smooth", "r", "l", "h", "e", "l1", "z"
 """Numbers of a chain unit that may be wrong: its law of friction, its dimensions, and where the material lies."""
 SMOOTH, LAW = "machine.pin.w_smooth", 10.0
 """The number by which the law of friction is another one, and the factor on it for friction that grows with speed."""
+NEAR = 0.3
+"""Change of the crank angle by the other law up to which its columns are compared [rad]."""
 SUSPICIOUS = 4.0
 """Change of a number, in standard deviations, from which it is suspicious."""
 BLIND = 1e-9
@@ -89,11 +92,19 @@ def suspicions(
 def _with_secant(
     problem: Problem, z: Any, comparisons: tuple[Comparison, ...], workers: int
 ) -> tuple[Comparison, ...]:
-    """The comparisons with the secant to another law of friction as the derivative by `SMOOTH`."""
+    """The comparisons with the secant to another law of friction as the derivative by `SMOOTH`, where the machine
+    runs with it and keeps its phase."""
     place, other = problem.place[SMOOTH], z.copy()
     other[place] *= LAW
+    try:
+        others = tuple(problem.comparisons(other, workers))
+    except RunError:
+        return comparisons
+    pairs = list(zip(comparisons, others, strict=True))
+    if max(float(np.max(np.abs(there.angle - here.angle))) for here, there in pairs) > NEAR:
+        return comparisons
     found = []
-    for here, there in zip(comparisons, problem.comparisons(other, workers), strict=True):
+    for here, there in pairs:
         slopes = here.slopes.copy()
         if place in here.places:
             change = here.residuals - there.residuals

@@ -30,7 +30,7 @@ from ..observer_table import ObserverTable
 from .crank_motion import crank_motion
 from .fit import Fit, fit
 from .identification import drive_of, inspect_runs, is_of_shaft, plant_for, read_signal
-from .inspection import FEWEST_TURNS, inspect_columns
+from .inspection import FEWEST_TURNS, constant_parts
 from .measurands import MEASURANDS
 from .problem import MARK_ANGLE, Problem, RecordedRun, Sensor
 from .reading import OFFSET_SHARE, WITH_OFFSET, WatchPlan
@@ -144,6 +144,17 @@ class WatchedRecording:
         return not self.is_described and not own and all(check.is_noise for check in self.checks)
 
     @property
+    def noises(self) -> tuple[float, float]:
+        """See `noises`."""
+        return noises(self.checks, self.problem.runs[0].recording)
+
+    @property
+    def constant_parts(self) -> list[str]:
+        """Words on columns of the observer that keep a value over a part behind the begin."""
+        names = [name for name in self.recording.columns if MEASURANDS[name].analog and name != "motor.u"]
+        return list(constant_parts(self.recording, names))
+
+    @property
     def turn(self) -> float:
         """Time of a turn of the crank [s]."""
         return 2.0 * math.pi / self.plan.crank_speed
@@ -200,9 +211,8 @@ def watch(config: Config, report: Report = lambda *_: None) -> WatchedRecording:
     angle = float(angle) if "motor.count" in recording.columns else found.get(MARK_ANGLE, 0.0)
     phi, w = crank_motion(recording, angle, drive.ratio)
     checks = tuple(check_residuals(learned))
-    values = _parameters(
-        config, replace(plan, noise=plan.noise * noise_of(checks)), drive, recording, found, ratio
-    )
+    first = problem.runs[0].recording
+    values = _parameters(config, plan, drive, first, found, ratio, noises(checks, first))
     uncertainty = _uncertainty(plan, values, errors)
     values |= dict(zip(UNCERTAINTIES, uncertainty, strict=True))
     gain = {name: found.get(f"gain({name})", 1.0) for name in recording.columns}
@@ -211,8 +221,10 @@ def watch(config: Config, report: Report = lambda *_: None) -> WatchedRecording:
         name: recording.columns[column] / gain[column] for name, column in _signals(recording).items()
     }
     report("watching", 0.5, 1.0)
-    tunings = [values, values | dict.fromkeys(UNCERTAINTIES, 0.0)]
-    outputs, right = observe(recording, signals, tunings, GAP * 2.0 * math.pi / plan.crank_speed)
+    # the thresholds of a machine that is known show by how much errors widen them
+    tunings = [values, *([values | dict.fromkeys(UNCERTAINTIES, 0.0)] if any(uncertainty) else [])]
+    courses = observe(recording, signals, tunings, GAP * 2.0 * math.pi / plan.crank_speed)
+    outputs, right = courses[0], courses[-1]
     widening = [float(np.median(outputs[name] / right[name])) for name in THRESHOLDS]
     alarms = tuple(_alarms(recording.time, outputs, 2.0 * math.pi / plan.crank_speed))
     return WatchedRecording(
@@ -237,8 +249,6 @@ def _files(plan: WatchPlan) -> tuple[Recording, MachineErrors | None]:
     faults, errors, found = Faults(), None, list[Recording]()
     with faults.collected():
         found.append(read_signal(plan))
-        # of the rest behind the learned part the sizes are not known, in an overload
-        faults.add(inspect_columns(found[0], {}))
     if plan.identification is not None:
         with faults.collected():
             errors = _errors(plan.identification)
@@ -282,8 +292,10 @@ def _parameters(
     recording: Recording,
     found: Mapping[str, float],
     ratio: float,
+    louder: tuple[float, float],
 ) -> dict[str, float]:
-    """The parameters of the observer by name."""
+    """The parameters of the observer by name, by the recording of the begin; `louder` are the factors on the stated
+    noise of signal and speed."""
     columns = recording.columns
     own = drive.machine.by_name | {"ratio": ratio}
     if is_of_shaft(columns):
@@ -312,8 +324,8 @@ def _parameters(
     feed = layout.from_names({name: found[f"machine.{name}"] for name in layout.names})
     table = replace(
         config.observer or instance(ObserverTable, {}),
-        signal_noise=plan.noise,
-        speed_noise=plan.noise,
+        signal_noise=plan.noise * louder[0],
+        speed_noise=plan.noise * louder[1],
         rate=1.0 / recording.step,
     )
     return own | tuning(table, feed, plan.crank_speed * ratio, torque)
@@ -324,10 +336,13 @@ def _zero(found: Mapping[str, float], column: str) -> float:
     return found[f"{RUN}.offset({column})"] / found.get(f"gain({column})", 1.0)
 
 
-def noise_of(checks: Sequence[ResidualCheck]) -> float:
-    """The noise at the begin of the recording, in parts of the stated one, where it is larger: that of the column
-    with the most."""
-    return max([1.0, *(check.noise for check in checks)])
+def noises(checks: Sequence[ResidualCheck], recording: Recording) -> tuple[float, float]:
+    """The noise of the signal of the observer and that of the speed at the begin of the recording, in parts of the
+    stated one, where they are larger."""
+    found = {check.column: check.noise for check in checks}
+    signal = max([1.0, *(found.get(name, 1.0) for name in _signals(recording).values())])
+    speed = next((found[name] for name in ("crank.w", "motor.w") if name in found), 1.0)
+    return signal, max(1.0, speed)
 
 
 def _uncertainty(

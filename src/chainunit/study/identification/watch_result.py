@@ -11,7 +11,7 @@ from ... import __version__
 from ...machines.load_observer import LoadObserver
 from ...text import array_entry, entry, shown_in
 from .result import fitted_entries
-from .watch import GAP, OUTPUTS, Alarm, WatchedRecording, file_name, noise_of
+from .watch import GAP, OUTPUTS, Alarm, WatchedRecording, file_name
 
 ROWS = 1500
 """Most rows of a course in the result."""
@@ -64,7 +64,8 @@ def _as_dict(watched: WatchedRecording) -> dict[str, Any]:
         "force_uncertainty": entry(watched.uncertainty[1], "N"),
         "widening": entry(watched.widening[0], "1"),
         "force_widening": entry(watched.widening[1], "1"),
-        "noise": entry(noise_of(watched.checks), "1"),
+        "noise": {name: entry(x, "1") for name, x in zip(("signal", "speed"), watched.noises, strict=True)},
+        "constant_parts": watched.constant_parts,
         "gaps": [
             {"from": entry(begin, "s"), "to": entry(end, "s")}
             for begin, end in recording.gaps
