@@ -105,6 +105,7 @@ def test_a_dc_motor_keeps_the_speed_and_each_flywheel_has_gains_of_its_own(tmp_p
     assert sections(study) == COMMON | {"flywheels"}
 
 
+@pytest.mark.slow
 def test_a_coupling_opens_in_a_hard_cut_and_the_machine_comes_to_rest(tmp_path):
     study = run(COUPLING, tmp_path)
     answers = study.answers["hard_cut"]

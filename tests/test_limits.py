@@ -79,6 +79,7 @@ turns = 2
 """
 
 
+@pytest.mark.slow
 def test_a_motor_below_its_breakdown_speed_stalls_under_the_load(tmp_path):
     """That is said in place of ratio and slip, and no state of overloads where there are none."""
     study, verdict, warnings = studied(STALLED.format(events="[]"), tmp_path)
