@@ -111,7 +111,7 @@ def test_errors_of_an_identified_machine_widen_the_threshold(tmp_path):
         "names": ["machine.left.web_mass", "feed.left.material_mass"],
         "matrix": [[1.0, 0.0], [0.0, 9.0]],
     }
-    result = {"status": "complete", "covariance": covariance}
+    result = {"is_described": True, "covariance": covariance}
     (tmp_path / "result.json").write_text(json.dumps(result), "utf-8")
     thresholds, results = [], []
     for more in ({}, {"identification": "result.json"}):
@@ -148,7 +148,7 @@ def test_behind_a_gap_the_observer_starts_anew(tmp_path):
     counts, and so are errors of the forces and an identification that failed."""
     file = changed(tmp_path, lambda t: (t < 30.0) | ((t > 33.0) & (t < 50.0)) | ((t > 51.1) & (t < 80.0)))
     result = {
-        "status": "the model does not describe the recordings",
+        "is_described": False,
         "covariance": {"names": ["motor.rotor.J"], "matrix": [[1.0]]},
     }
     (tmp_path / "result.json").write_text(json.dumps(result), "utf-8")
@@ -161,7 +161,7 @@ def test_behind_a_gap_the_observer_starts_anew(tmp_path):
     words = " ".join(repr(found).split())
     assert "No rows from 30.00 s to 33.01 s: the observer starts anew behind this gap." in words
     assert "No rows from 49.99 s to 51.1" in words
-    assert "The identification of this machine failed: the model does not describe the recordings." in words
+    assert "The identification of this machine failed: its model does not describe its recordings." in words
     assert "The identification sought no number of the machine that the observer knows." in words
     noise = {name: each["value"] for name, each in json.loads(found.to_json())["noise"].items()}
     assert list(noise.values()) == pytest.approx([5.0, 5.0], rel=0.1)

@@ -211,7 +211,8 @@ def _residuals(s: b.Source) -> Iterator[b.Block]:
         title="Residuals",
     )
     yield b.Text(
-        "Orders of the crank: the sum of the squares of twenty orders in the residuals, in parts of those of noise.",
+        "Orders of the crank: the sum of the squares of up to twenty orders in the residuals, in parts of those of "
+        "noise.",
         "note",
         "long",
     )

@@ -82,8 +82,8 @@ def _opening(s: b.Source) -> Iterator[b.Block]:
         yield b.Judgement(
             "warning",
             s.line(
-                "The identification of this machine failed: {failed_identification}. Its errors are not bounded by "
-                "those of {identification}."
+                "The identification of this machine failed: its model does not describe its recordings. The errors "
+                "of the machine are not bounded by those of {identification}."
             ),
         )
     for name, of in (("signal", "signal"), ("speed", "measured speed")):

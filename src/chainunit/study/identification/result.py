@@ -55,6 +55,7 @@ def _as_dict(found: IdentifiedMachine) -> dict[str, Any]:
         "title": config.title,
         "source": config.source,
         "report": dict(config.labels),
+        "is_described": found.is_described,
         "status": "complete" if found.is_described else "the model does not describe the recordings",
         "sought": entry(float(len(estimates)), "1"),
         "told": entry(float(told), "1"),

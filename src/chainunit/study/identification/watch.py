@@ -93,12 +93,12 @@ class Alarm:
 
 @dataclass(frozen=True)
 class MachineErrors:
-    """Names and covariance of identified parameters of the machine, and the status of their identification where its
-    model did not describe its recordings."""
+    """Names and covariance of identified parameters of the machine, and whether the identification failed: its model
+    did not describe its recordings."""
 
     names: list[str]
     covariance: Any
-    failed: str
+    failed: bool
 
 
 @dataclass(frozen=True)
@@ -107,8 +107,8 @@ class WatchedRecording:
 
     `learned` is the fit over its begin, `checks` are those of its residuals, `parameters` are those of the observer
     by name, and `uncertainty` is the false imbalance by errors of the machine's parameters: of the feed [kg] and of
-    the forces [N]. With these errors the thresholds are wider by the factors `widening`. `failed` is the status of an
-    identification whose model did not describe its recordings.
+    the forces [N]. With these errors the thresholds are wider by the factors `widening`. `failed` says whether
+    the model of the identification did not describe its own recordings.
     """
 
     config: Config
@@ -121,7 +121,7 @@ class WatchedRecording:
     parameters: Mapping[str, float]
     uncertainty: tuple[float, float]
     widening: tuple[float, float]
-    failed: str
+    failed: bool
     outputs: Mapping[str, Any]
     alarms: tuple[Alarm, ...]
 
@@ -238,7 +238,7 @@ def watch(config: Config, report: Report = lambda *_: None) -> WatchedRecording:
         values,
         uncertainty,
         (widening[0], widening[1]),
-        errors.failed if errors else "",
+        errors is not None and errors.failed,
         outputs,
         alarms,
     )
@@ -360,7 +360,7 @@ def _errors(file: Path) -> MachineErrors:
     """The errors of the machine by the result of an identification."""
     try:
         result = json.loads(file.read_text("utf-8"))
-        table, status = result["covariance"], str(result["status"])
+        table, failed = result["covariance"], not result["is_described"]
         names, matrix = list(table["names"]), np.array(table["matrix"], float)
     except OSError as error:
         words = f"cannot be read ({error.strerror or error})"
@@ -371,7 +371,7 @@ def _errors(file: Path) -> MachineErrors:
         ) from error
     rows = [k for k, name in enumerate(names) if name.startswith("machine.")]
     names = [names[k].removeprefix("machine.") for k in rows]
-    return MachineErrors(names, matrix[np.ix_(rows, rows)], "" if status == "complete" else status)
+    return MachineErrors(names, matrix[np.ix_(rows, rows)], failed)
 
 
 def observe(
