@@ -314,9 +314,9 @@ def test_a_number_beyond_its_bound_is_held_there():
     data = rows @ [5.0, 3.0] + rng.standard_normal(400)
 
     class Straight:
-        unknowns = sought = (Unknown.within("a", "1", 6.0, 8.0), Unknown.within("b", "1", 0.0, 10.0))
-        starts, spreads = np.array([6.8, 5.0]), np.array([2.4, 10.0]) / np.sqrt(12.0)
-        bounds = np.array([6.0, 0.0]), np.array([8.0, 10.0])
+        unknowns = sought = (Unknown.within("a", "1", 6.0, 20.0), Unknown.within("b", "1", 0.0, 10.0))
+        starts, spreads = np.array([13.0, 5.0]), np.array([14.0, 10.0]) / np.sqrt(12.0)
+        bounds = np.array([6.0, 0.0]), np.array([20.0, 10.0])
 
         def comparisons(self, z, workers=1):
             yield Comparison("run", "x", data - rows @ z, rows, (0, 1), None, 1.0)

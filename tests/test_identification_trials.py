@@ -57,7 +57,9 @@ def test_twelve_hidden_machines(bench):
 def test_a_machine_at_its_bounds(bench):
     """A wall and an inertia are at the ends of their ranges, which hold the best fit: the residuals that this leaves
     are no reason for a distribution elsewhere."""
-    numbers = bench.result("bare", 34)["numbers"]
+    found = bench.result("bare", 34)
+    numbers = found["numbers"]
+    assert found["held"] == ()
     limits = [bench.ranges()[each["name"].removeprefix("machine.")] for each in numbers]
     assert any(each["fitted"] in ends for each, ends in zip(numbers, limits, strict=True))
     assert all(abs(each["value"] - each["true"]) < 3.0 * each["deviation"] for each in numbers)

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.stats import chi2
 
 from .fit import Normal, inverse
 from .problem import OUTLIER, Problem
@@ -29,9 +30,9 @@ CHAINS, STEPS, KEPT = 300, 1200, 10
 _STIFF = 1e4
 LEVEL = 0.95
 """Probability of an interval."""
-PRESSED = 3.0
-"""Standard deviations by which the best fit without a bound would lie beyond it, from which on the number is held
-there: the recordings contradict the bound."""
+SHARP, PRESSURE, PRESSED = 0.1, 0.9973, 3.0
+"""Standard deviation of a number, in parts of that of its prior, up to which a bound can contradict it; probability
+with which right bounds press less; and standard deviations beyond its bound from which on it is held there."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,14 @@ def _held(problem: Problem, best: Normal) -> dict[int, float]:
     at = np.where(best.z <= low + near, pull < 0.0, (best.z >= high - near) & (pull > 0.0))
     held: dict[int, float] = {}
     pressed = [int(k) for k in np.flatnonzero(at[:count])]
+    # what the sum of squares would fall by without these bounds; one of them alone may press for another one's error
+    fall = float(pull[pressed] @ best.covariance[np.ix_(pressed, pressed)] @ pull[pressed])
+    if not pressed or fall < chi2.ppf(PRESSURE, len(pressed)):
+        return held
+    deviations = best.deviations
     for k in pressed:
+        if deviations[k] > SHARP * problem.spreads[k]:
+            continue  # what is hardly told comes to its bound by chance, and along a bend
         # the others stay at their bounds, as they did in the fit
         free = [j for j in range(len(best.z)) if j == k or j not in pressed]
         own = inverse(best.matrix[np.ix_(free, free)])[free.index(k), free.index(k)]
