@@ -397,7 +397,7 @@ def goal_table(figures: Mapping[str, Any]) -> str:
         ]
         for row in figures["goals"]
     )  # fmt: skip
-    heads = ["", "goal", "median bound", "within the goal", "of those with a bound of half the goal"]
+    heads = ["", "goal", "median bound", "within the goal", "of those with a bound of at most half the goal"]
     return table(heads, cells)
 
 

@@ -50,6 +50,14 @@ def weights(signals: TerminalSignals) -> dict[str, float]:
     }
 
 
+def usual_loads(feed: Any) -> dict[str, float]:
+    """The parameters of the observer by name that are the loads of normal running: the means of both sides."""
+    return {
+        "feed.expected": 0.5 * (feed.left.material_mass + feed.right.material_mass),
+        "force.expected": 0.5 * (feed.left.processing_force + feed.right.processing_force),
+    }
+
+
 def tuning(table: ObserverTable, feed: Any, speed: float, torque: float) -> dict[str, float]:
     """Parameters of the observer by name.
 
@@ -60,18 +68,16 @@ def tuning(table: ObserverTable, feed: Any, speed: float, torque: float) -> dict
     speed : of the motor in normal running [rad/s]
     torque : RMS torque on the rotor in normal running [N m]
     """
-    usual = 0.5 * (feed.left.material_mass + feed.right.material_mass)
-    force = 0.5 * (feed.left.processing_force + feed.right.processing_force)
-    return {
+    expected = usual_loads(feed)
+    usual = expected["feed.expected"]
+    return expected | {
         "noise.w": table.speed_noise * speed,
         "noise.torque": table.signal_noise * torque,
         "noise.rate": table.rate,
-        "feed.expected": usual,
         "feed.spread": FEED_SPREAD * usual,
         "feed.change": table.change * usual,
         "feed.fluctuation": table.fluctuation,
         "feed.time": table.fluctuation_time,
-        "force.expected": force,
         "force.spread": table.force_overload,
         "force.change": FORCE_CHANGE * table.force_overload,
         "force.fluctuation": FORCE_FLUCTUATION * table.force_overload,

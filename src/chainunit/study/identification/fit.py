@@ -55,7 +55,7 @@ class Normal:
         """The mean squares of the residuals by run and column."""
         return {(each.run, each.column): float(np.mean(each.residuals**2)) for each in self.comparisons}
 
-    @property
+    @cached_property
     def covariance(self) -> Any:
         """The covariance of all unknowns, shape (unknowns, unknowns)."""
         return inverse(self.matrix)

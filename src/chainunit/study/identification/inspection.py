@@ -16,7 +16,7 @@ from ..arrays import rms, stretches
 from .measurands import MEASURANDS
 from .plant import MOVING
 from .problem import crank_speed as speed_at
-from .recording import Recording
+from .recording import Recording, name_and_unit
 
 MISSING = 0.2
 """Largest share of rows that may be missing."""
@@ -108,13 +108,12 @@ def _of_column(
     stuck = _longest_constant(recording.time, x)
     extreme, share, at = _extremes(x)
     if stuck is not None and not (share > CLIPPED and x[stuck[0]] in (x.min(), x.max())):
-        begin, end = recording.time[stuck[0]], recording.time[stuck[1]]
-        words = f"keeps the value {_size(name, float(x[stuck[0]]))} from {begin:.10g} to {end:.10g} s: "
-        words += "the sensor or the logger is stuck; " + (
-            "record again" if end - begin > 0.5 * (recording.time[-1] - recording.time[0]) else
-            "leave this part out (begin, end), or record again"
-        )  # fmt: skip
-        yield _fault(recording, name, words)
+        begin, end = recording.time[list(stuck)]
+        words = "record again"
+        if end - begin <= 0.5 * (recording.time[-1] - recording.time[0]):
+            words = f"leave this part out (begin, end), or {words}"
+        kept = _kept(recording, name, stuck)
+        yield _fault(recording, name, f"{kept}: the sensor or the logger is stuck; {words}")
         return
     if expected is not None and not expected.admits(size):
         yield _fault(recording, name, _scale_words(name, size, expected))
@@ -174,7 +173,7 @@ def _rows(recording: Recording, crank_speed: float) -> Iterator[InputError]:
 
 def _likely_unit(recording: Recording, turn: float, longest: float) -> str:
     """The unit in which the times would be those of a recording that can be used; empty where there is none."""
-    own = scale(recording.heads["time"].partition("[")[2].partition("]")[0].strip(), "s")[0]
+    own = scale(name_and_unit(recording.heads["time"])[1], "s")[0]
     span = float(recording.time[-1] - recording.time[0])
     for unit in ("s", "ms", "µs"):
         factor = scale(unit, "s")[0] / own
@@ -223,10 +222,14 @@ def _counted(recording: Recording) -> Iterator[InputError]:
 def constant_parts(recording: Recording, names: Iterable[str]) -> Iterator[str]:
     """Words on columns that keep a value over a part: a sensor that is stuck, a stop, or a limit."""
     for name in names:
-        x = recording.columns[name]
-        if (stuck := _longest_constant(recording.time, x)) is not None:
-            begin, end = recording.time[stuck[0]], recording.time[stuck[1]]
-            yield f"{name} keeps the value {_size(name, float(x[stuck[0]]))} from {begin:.10g} to {end:.10g} s"
+        if (stuck := _longest_constant(recording.time, recording.columns[name])) is not None:
+            yield f"{name} {_kept(recording, name, stuck)}"
+
+
+def _kept(recording: Recording, name: str, rows: tuple[int, int]) -> str:
+    """Words on a column that is constant from a row to another one."""
+    begin, end = recording.time[list(rows)]
+    return f"keeps the value {_size(name, float(recording.columns[name][rows[0]]))} from {begin:.10g} to {end:.10g} s"
 
 
 def _stands(recording: Recording, driven: Recording, crank_speed: float, ratio: float) -> list[InputError]:

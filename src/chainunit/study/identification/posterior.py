@@ -12,6 +12,7 @@ import itertools
 import math
 from collections.abc import Collection
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ STEP = 5e-3
 CHAINS, STEPS, KEPT = 300, 1200, 10
 """Number of chains, their steps, of which the second half counts, and states that are kept of each."""
 _STIFF = 1e4
+"""Stiffness of a number that is held, in parts of one standard deviation of its prior."""
 LEVEL = 0.95
 """Probability of an interval."""
 SHARP, PRESSURE, PRESSED = 0.1, 0.9973, 3.0
@@ -58,7 +60,7 @@ class Posterior:
     samples: Any
     held: tuple[str, ...] = ()
 
-    @property
+    @cached_property
     def covariance(self) -> Any:
         """The covariance of the sought numbers, shape (numbers, numbers)."""
         return np.atleast_2d(np.cov(self.samples, rowvar=False))
@@ -94,13 +96,14 @@ def _held(problem: Problem, best: Normal) -> dict[int, float]:
     count, (low, high), pull = len(problem.sought), problem.bounds, _pull(problem, best)
     near = 1e-6 * problem.spreads
     at = np.where(best.z <= low + near, pull < 0.0, (best.z >= high - near) & (pull > 0.0))
-    held: dict[int, float] = {}
     pressed = [int(k) for k in np.flatnonzero(at[:count])]
+    if not pressed:
+        return {}
     # what the sum of squares would fall by without these bounds; one of them alone may press for another one's error
     fall = float(pull[pressed] @ best.covariance[np.ix_(pressed, pressed)] @ pull[pressed])
-    if not pressed or fall < chi2.ppf(PRESSURE, len(pressed)):
-        return held
-    deviations = best.deviations
+    if fall < chi2.ppf(PRESSURE, len(pressed)):
+        return {}
+    held, deviations = dict[int, float](), best.deviations
     for k in pressed:
         if deviations[k] > SHARP * problem.spreads[k]:
             continue  # what is hardly told comes to its bound by chance, and along a bend

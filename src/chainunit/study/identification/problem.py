@@ -373,13 +373,18 @@ def mark_times(recording: Recording) -> Any:
     return recording.time[recording.columns["mark"] > 0.5] - 0.5 * recording.step
 
 
+def speed_column(recording: Recording) -> str:
+    """The column that tells the speed; empty without one."""
+    return next((name for name in ("crank.w", "motor.w") if name in recording.columns), "")
+
+
 def crank_speed(recording: Recording, ratio: float) -> Any:
     """The speed of the crank at the rows [rad/s], shape (n,), by a column of it or of the motor's speed; None without
     one."""
-    columns = recording.columns
-    if "crank.w" in columns:
-        return columns["crank.w"]
-    return columns["motor.w"] / ratio if "motor.w" in columns else None
+    name = speed_column(recording)
+    if not name:
+        return None
+    return recording.columns[name] / (ratio if name == "motor.w" else 1.0)
 
 
 def until_rest(run: RecordedRun, ratio: float) -> RecordedRun:

@@ -85,6 +85,11 @@ class WatchPlan:
     gain: float
     identification: Path | None
 
+    @property
+    def turn(self) -> float:
+        """Time of a turn of the crank [s]."""
+        return 2.0 * math.pi / self.crank_speed
+
 
 @dataclasses.dataclass(frozen=True)
 class IdentificationPlan:

@@ -117,12 +117,18 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
     )
 
 
+def name_and_unit(head: str) -> tuple[str, str]:
+    """The name of a column and its unit, as its head has them; the unit may be missing."""
+    name, _, rest = head.partition("[")
+    return name.strip(), rest.partition("]")[0].strip()
+
+
 def remedy(quantity: str, heads: Sequence[str]) -> str:
     """Words for a file without the column of a quantity, with one of its `heads` for example: the key that names
     it."""
     if not heads:
         return ""
-    head = printable(heads[0].partition("[")[0].strip())
+    head = printable(name_and_unit(heads[0])[0])
     return f'; name it by the key columns, such as columns = {{ "{quantity}" = "{head}" }}'
 
 
@@ -155,16 +161,16 @@ def read_part(file: Path, names: Mapping[str, str], begin: float, end: float) ->
     InputError
         also where `begin` or `end` is beyond the recording, and where these rows are fewer than `FEWEST`.
     """
-    whole = read_recording(file, names)
-    first, last = float(whole.time[0]), float(whole.time[-1])
+    full = read_recording(file, names)
+    first, last = float(full.time[0]), float(full.time[-1])
     goes, faults = f"{file} goes from {first:.12g} s to {last:.12g} s", Faults()
     for key, limit in (("begin", begin), ("end", end)):
         # 60 s is the end of a minute whose last row is one step before
-        if math.isfinite(limit) and not first - 1.01 * whole.step <= limit <= last + 1.01 * whole.step:
+        if math.isfinite(limit) and not first - 1.01 * full.step <= limit <= last + 1.01 * full.step:
             words = "must lie within, or be left out"
             faults.add([InputError(f"{key} = {limit:.12g} s: {goes}; {words}")])
     faults.refuse()
-    part = whole.part(begin, end)
+    part = full.part(begin, end)
     if len(part.time) < FEWEST:
         begins = f"begin = {begin:.12g} s" if math.isfinite(begin) else "the first row"
         ends = f"end = {end:.12g} s" if math.isfinite(end) else "the last row"
@@ -191,7 +197,7 @@ def _places(
     file: Path, heads: list[str], names: Mapping[str, str], faults: Faults
 ) -> Iterator[tuple[str, tuple[int, str]]]:
     """By quantity, the place of its column and its unit in the head."""
-    plain = [head.partition("[")[0].strip() for head in heads]
+    plain = [name_and_unit(head)[0] for head in heads]
     for quantity, head in names.items():
         if quantity not in MEASURANDS:
             hint = near_name(quantity, MEASURANDS) or f"; there are {', '.join(MEASURANDS)}"
@@ -203,7 +209,7 @@ def _places(
     for place, (head, name) in enumerate(zip(heads, plain, strict=True)):
         quantity = taken.get(head, taken.get(name, name if name not in names else ""))
         if quantity in MEASURANDS:
-            yield quantity, (place, head.partition("[")[2].partition("]")[0].strip())
+            yield quantity, (place, name_and_unit(head)[1])
 
 
 def _scale(file: Path, head: str, quantity: Measurand, unit: str) -> tuple[float, float]:

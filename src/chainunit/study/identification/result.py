@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from ... import __version__
 from ...quantities import Layout
 from ...refusals import unit_behind
 from ...text import array_entry, entry, shown_in
-from ..observation import false_imbalance
+from ..observation import false_imbalance, usual_loads
 from ..study_file import changed_tables
 from .fit import Normal
 from .identification import FittedNumber, IdentifiedMachine, remarks, system_name
@@ -108,22 +108,26 @@ def _number(found: IdentifiedMachine, each: FittedNumber) -> dict[str, Any]:
     variable = found.plan.variables[each.unknown.name]
     before = next(one for one in found.before.outlooks if one.name == system_name(each.unknown.name))
     own, unit, kind = each.unknown, variable.unit, variable.kind
-    difference = "difference" if unit == "K" else ""
     return {
         "title": variable.description,
         "told": each.is_told,
         "value": entry(each.value if each.is_told else None, unit, kind),
         "fitted": entry(each.fitted if each.is_told else None, unit, kind),
-        "deviation": entry(each.deviation, unit, difference),
+        "deviation": _difference(each.deviation, unit),
         "from": entry(each.low, unit, kind),
         "to": entry(each.high, unit, kind),
         "given": entry(own.start, unit, kind),
-        "given_deviation": entry(own.spread, unit, difference),
+        "given_deviation": _difference(own.spread, unit),
         "least": entry(own.low, unit, kind),
         "most": entry(own.high, unit, kind),
-        "expected": entry(before.by_both, unit, difference),
-        "by_runs": entry(before.by_runs, unit, difference),
+        "expected": _difference(before.by_both, unit),
+        "by_runs": _difference(before.by_runs, unit),
     }
+
+
+def _difference(x: float, unit: str) -> dict[str, Any]:
+    """The entry of a number that is no temperature itself, such as a standard deviation."""
+    return entry(x, unit, "difference" if unit == "K" else "")
 
 
 def _correlations(found: IdentifiedMachine) -> Iterator[dict[str, Any]]:
@@ -139,13 +143,12 @@ def _correlations(found: IdentifiedMachine) -> Iterator[dict[str, Any]]:
 
 def _combination(found: IdentifiedMachine, each: Combination) -> dict[str, Any]:
     value, deviation = found.combined(each)
-    difference = "difference" if each.unit == "K" else ""
     return {
         "text": str(each),
         "terms": dict(each.terms),
         # of temperatures, a sum is no temperature
-        "value": entry(value, each.unit, difference),
-        "deviation": entry(deviation, each.unit, difference),
+        "value": _difference(value, each.unit),
+        "deviation": _difference(deviation, each.unit),
     }
 
 
@@ -182,14 +185,14 @@ def fitted_entries(problem: Problem, best: Normal) -> Iterator[tuple[Unknown, di
     """Each unknown of a fit with its value and standard deviation as entries of a result. The angle of a run is
     within a turn; that of the mark lies on both sides of 0."""
     for unknown, x, s in zip(problem.unknowns, best.z, best.deviations, strict=True):
-        value, kelvin = float(x), unknown.unit == "K"
+        value, unit = float(x), unknown.unit
         if unknown.is_nuisance and unknown.name.endswith(f".{ANGLE}") and unknown.name != MARK_ANGLE:
             value %= 2.0 * math.pi
         yield (
             unknown,
             {
-                "value": entry(value, unknown.unit, "temperature" if kelvin else ""),
-                "deviation": entry(float(s), unknown.unit, "difference" if kelvin else ""),
+                "value": entry(value, unit, "temperature" if unit == "K" else ""),
+                "deviation": _difference(float(s), unit),
             },
         )
 
@@ -276,18 +279,20 @@ def identified_tables(found: IdentifiedMachine, folder: Path) -> dict[str, Any]:
     if "watch" in tables:
         tables["watch"]["identification"] = RESULT
     if "observer" in tables:
-        config = found.config
-        own = {name.removeprefix("machine."): x for name, x in values.items()}
-        machine: dict[str, float] = config.machine.by_name | {
-            name: x for name, x in own.items() if name in config.machine.by_name
-        }
-        loads = Layout(type(config.feed)).by_name(config.feed).items()
-        for key, end in (("feed.expected", "material_mass"), ("force.expected", "processing_force")):
-            machine[key] = float(np.mean([values.get(f"feed.{n}", x) for n, x in loads if n.endswith(end)]))
-        names = [name.removeprefix("machine.") for name in found.estimates]
-        false = false_imbalance(machine, names, found.covariance, config.run.crank_speed)
+        false = _false_imbalance(found, values)
         tables["observer"] |= {name: float(f"{x:.4g}") for name, x in false.items()}
     return tables
+
+
+def _false_imbalance(found: IdentifiedMachine, values: Mapping[str, float]) -> dict[str, float]:
+    """The false imbalance of an observer of the machine with the fitted `values`, by its key in [observer]."""
+    config = found.config
+    loads = {name.removeprefix("feed."): x for name, x in values.items() if name.startswith("feed.")}
+    feed = Layout(type(config.feed)).from_names(loads, config.feed)
+    own = {name.removeprefix("machine."): x for name, x in values.items()}
+    names = [name.removeprefix("machine.") for name in found.estimates]
+    known = config.machine.by_name | own | usual_loads(feed)
+    return false_imbalance(known, names, found.covariance, config.run.crank_speed)
 
 
 def identified_notes(found: IdentifiedMachine) -> dict[str, str]:

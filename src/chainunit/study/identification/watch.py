@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import math
 import os
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -32,7 +31,7 @@ from .fit import Fit, fit
 from .identification import drive_of, inspect_runs, is_of_shaft, plant_for, read_signal
 from .inspection import FEWEST_TURNS, constant_parts
 from .measurands import MEASURANDS
-from .problem import MARK_ANGLE, Problem, RecordedRun, Sensor
+from .problem import MARK_ANGLE, Problem, RecordedRun, Sensor, speed_column
 from .reading import OFFSET_SHARE, WITH_OFFSET, WatchPlan
 from .recording import Recording
 from .residuals import ResidualCheck, Strain, check_residuals, strained_priors, strains
@@ -150,14 +149,10 @@ class WatchedRecording:
 
     @property
     def constant_parts(self) -> list[str]:
-        """Words on columns of the observer that keep a value over a part behind the begin."""
-        names = [name for name in self.recording.columns if MEASURANDS[name].analog and name != "motor.u"]
+        """Words on columns of the observer that keep a value over a part."""
+        speed = speed_column(self.recording)
+        names = [*_signals(self.recording).values(), *([speed] if speed else [])]
         return list(constant_parts(self.recording, names))
-
-    @property
-    def turn(self) -> float:
-        """Time of a turn of the crank [s]."""
-        return 2.0 * math.pi / self.plan.crank_speed
 
 
 def file_name(name: str) -> str:
@@ -192,7 +187,7 @@ def watch(config: Config, report: Report = lambda *_: None) -> WatchedRecording:
     report("reading the recording", 0.0, 1.0)
     recording, errors = _files(plan)
     duration = float(recording.time[-1] - recording.time[0])
-    least = FEWEST_TURNS * 2.0 * math.pi / plan.crank_speed
+    least = FEWEST_TURNS * plan.turn
     if not least <= plan.learning < duration:
         raise InputError(
             f"watch.learning = {plan.learning:g} s: must be >= {least:.4g} s, {FEWEST_TURNS:g} turns of the crank, "
@@ -216,17 +211,17 @@ def watch(config: Config, report: Report = lambda *_: None) -> WatchedRecording:
     uncertainty = _uncertainty(plan, values, errors)
     values |= dict(zip(UNCERTAINTIES, uncertainty, strict=True))
     gain = {name: found.get(f"gain({name})", 1.0) for name in recording.columns}
-    of_speed = next((gain[name] for name in ("crank.w", "motor.w") if name in gain), 1.0)
+    of_speed = gain.get(speed_column(recording), 1.0)
     signals = {"phi": phi * ratio, "w": w * ratio / of_speed} | {
         name: recording.columns[column] / gain[column] for name, column in _signals(recording).items()
     }
     report("watching", 0.5, 1.0)
     # the thresholds of a machine that is known show by how much errors widen them
     tunings = [values, *([values | dict.fromkeys(UNCERTAINTIES, 0.0)] if any(uncertainty) else [])]
-    courses = observe(recording, signals, tunings, GAP * 2.0 * math.pi / plan.crank_speed)
+    courses = observe(recording, signals, tunings, GAP * plan.turn)
     outputs, right = courses[0], courses[-1]
     widening = [float(np.median(outputs[name] / right[name])) for name in THRESHOLDS]
-    alarms = tuple(_alarms(recording.time, outputs, 2.0 * math.pi / plan.crank_speed))
+    alarms = tuple(_alarms(recording.time, outputs, plan.turn))
     return WatchedRecording(
         config,
         plan,
@@ -341,8 +336,7 @@ def noises(checks: Sequence[ResidualCheck], recording: Recording) -> tuple[float
     stated one, where they are larger."""
     found = {check.column: check.noise for check in checks}
     signal = max([1.0, *(found.get(name, 1.0) for name in _signals(recording).values())])
-    speed = next((found[name] for name in ("crank.w", "motor.w") if name in found), 1.0)
-    return signal, max(1.0, speed)
+    return signal, max(1.0, found.get(speed_column(recording), 1.0))
 
 
 def _uncertainty(

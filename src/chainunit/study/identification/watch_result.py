@@ -35,7 +35,7 @@ def _as_dict(watched: WatchedRecording) -> dict[str, Any]:
         "file": str(plan.file),
         "columns": list(recording.columns),
         "duration": entry(float(recording.time[-1] - recording.time[0]), "s"),
-        "turns": entry(float(recording.time[-1] - recording.time[0]) / watched.turn, "1"),
+        "turns": entry(float(recording.time[-1] - recording.time[0]) / watched.plan.turn, "1"),
         "crank_speed": entry(plan.crank_speed, "rad/s", "speed"),
         "learning": entry(plan.learning, "s"),
         "learned": dict(_learned(watched)),
@@ -69,7 +69,7 @@ def _as_dict(watched: WatchedRecording) -> dict[str, Any]:
         "gaps": [
             {"from": entry(begin, "s"), "to": entry(end, "s")}
             for begin, end in recording.gaps
-            if end - begin > GAP * watched.turn
+            if end - begin > GAP * watched.plan.turn
         ],
         "failed_identification": watched.failed,
         "identification": None if plan.identification is None else str(plan.identification),
@@ -114,7 +114,7 @@ def _alarm(watched: WatchedRecording, each: Alarm) -> dict[str, Any]:
         "end": entry(each.end, "s"),
         "lasts": each.lasts,
         "in_learning": each.begin - start < watched.plan.learning,
-        "turn": entry((each.begin - start) / watched.turn, "1"),
+        "turn": entry((each.begin - start) / watched.plan.turn, "1"),
         "at": entry(each.at, "s"),
         "values": {name: entry(x, units[name]) for name, x in each.values.items()},
     }
