@@ -12,10 +12,14 @@ process asks (see `chainunit.native.cache`). Beyond that,
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import os
 import shutil
+import signal
+import subprocess
 import tempfile
+import threading
 
 import fmpy
 import pytest
@@ -39,11 +43,36 @@ def pytest_cmdline_main(config):
 
 
 def pytest_configure(config):
-    """The folder of compiled code for this process and all processes that it starts, workers included."""
+    """Ctrl-C for this process and all that it starts, also where the parent ignores it, as ``nohup`` and CI runners
+    do; and the folder of compiled code for all of them, workers included."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     if not hasattr(config, "workerinput"):
         store = tempfile.mkdtemp(prefix="chainunit_tests_")
         os.environ[VARIABLE] = store
         config.add_cleanup(lambda: shutil.rmtree(store, ignore_errors=True))
+
+
+@pytest.fixture(autouse=True)
+def _no_process_outlives_its_test(monkeypatch):
+    """A test that fails before it ends its processes leaves none that would disturb the next. A process that was
+    started in a session of its own is ended with all that it started."""
+    started = []
+
+    class Noted(subprocess.Popen):
+        def __init__(self, *arguments, **options):
+            super().__init__(*arguments, **options)
+            started.append((self, options.get("start_new_session", False)))
+
+    monkeypatch.setattr(subprocess, "Popen", Noted)
+    yield
+    for process, leads_session in started:
+        if leads_session:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+        if process.poll() is None:
+            process.kill()
+            process.communicate()
 
 
 @pytest.fixture(scope="session")

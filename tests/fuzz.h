@@ -43,12 +43,14 @@ void *__wrap_calloc(size_t n, size_t size) { return scarce && !random_below(3) ?
 static int flipped(unsigned char *bytes, size_t size) {
     bytes[random_below((unsigned)size)] ^= (unsigned char)(1 << random_below(8));
     if (random_below(2)) return 1;
-    unsigned long long h = 14695981039346656037ull, word;
-    for (size_t at = sizeof word; at < size; at += sizeof word) {
-        memcpy(&word, bytes + at, sizeof word);
-        h = (h ^ word) * 1099511628211ull;
+    /* the CRC-32 of all behind the first 8 bytes, bit by bit */
+    unsigned crc = ~0u;
+    for (size_t at = 8; at < size; ++at) {
+        crc ^= bytes[at];
+        for (int bit = 0; bit < 8; ++bit) crc = crc >> 1 ^ (crc & 1u ? 0xedb88320u : 0u);
     }
-    memcpy(bytes, &h, sizeof h);
+    const unsigned long long sum = crc ^ ~0u;
+    memcpy(bytes, &sum, sizeof sum);
     return 0;
 }
 

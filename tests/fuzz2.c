@@ -80,7 +80,10 @@ int main(int argc, char **argv) {
             fmi2GetRealStatus(alive, fmi2LastSuccessfulTime, &time);
             TRY(fmi2DoStep(c, random_below(20) ? time : random_value(), random_below(10) ? 1e-3 : random_value(), 1));
             break;
-        case 16: TRY(fmi2GetFMUstate(c, MAYBE(&state[i]))); break;
+        case 16:
+            TRY(fmi2GetFMUstate(c, MAYBE(&state[i])));
+            if (c && s == fmi2OK && fmi2SetFMUstate(c, state[i]) != fmi2OK) return puts("its own state was refused"), 1;
+            break;
         case 17: TRY(fmi2SetFMUstate(c, state[random_below(N)])); break;
         case 18:
             if (state[i] && fmi2SerializedFMUstateSize(alive, state[i], &size) == fmi2OK) {

@@ -88,7 +88,10 @@ int main(int argc, char **argv) {
             TRY(fmi3DoStep(c, random_below(20) ? time : random_value(), random_below(10) ? 1e-3 : random_value(), 1, MAYBE(&a), MAYBE(&b),
                            MAYBE(&d), MAYBE(&last)));
             break;
-        case 17: TRY(fmi3GetFMUState(c, MAYBE(&state[i]))); break;
+        case 17:
+            TRY(fmi3GetFMUState(c, MAYBE(&state[i])));
+            if (c && s == fmi3OK && fmi3SetFMUState(c, state[i]) != fmi3OK) return puts("its own state was refused"), 1;
+            break;
         case 18: TRY(fmi3SetFMUState(c, state[random_below(N)])); break;
         case 19:
             if (state[i] && fmi3SerializedFMUStateSize(alive, state[i], &size) == fmi3OK) {

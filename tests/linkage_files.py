@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 from chainunit.machines.linkages.file import description_of
@@ -40,6 +41,20 @@ def tables(d):
         "title": d["title"], "ground": d["ground"], "driver": {"link": d["driver"]["body"]}, "links": links,
         "joints": joints, "loads": loads, "start": start,
     }  # fmt: skip
+
+
+def pressed_both_ways(folder: Path) -> Path:
+    """The press of the gallery with the loads of its reference machine, forces that never change: a file in a
+    folder."""
+    text = (Path(__file__).parents[1] / "examples" / "linkages" / "slider_crank_press.toml").read_text(
+        "utf-8"
+    )
+    before, _, behind = text.partition("[loads.pressing]")
+    text = before + '[loads.pressing]\non = "ram.T"\nforce = ["150 N", "press_force"]\n\n[start]'
+    text = re.sub("pressing_way = .*\n", "", text).replace('"20 kN"', '"2.5 kN"')
+    file = folder / "slider_crank_press.toml"
+    file.write_text(text + behind.partition("[start]")[2], "utf-8")
+    return file
 
 
 def model(name):

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from chainunit import RunError
+from chainunit import InputError, RunError
 from chainunit.fmu.native import platforms
 from chainunit.fmu.native.export import export
 from chainunit.models import MODELS
@@ -170,7 +170,7 @@ def test_it_is_bounded_and_keeps_what_was_used_last(store, monkeypatch):
 def test_files_of_others_stay(store, monkeypatch):
     """A user may name a folder with other files: only entries of the cache count and are deleted."""
     monkeypatch.setattr(cache, "_MOST", 1000)
-    store.mkdir(parents=True)
+    store.mkdir(parents=True, mode=0o700)
     others = [folder / name for folder in (store, store.parent) for name in ("study.toml", "data.part", "x")]
     for file in others:
         file.write_bytes(bytes(2000))
@@ -203,3 +203,72 @@ def test_many_at_once(store):
     for thread in threads:
         thread.join()
     assert results == [b"code" * 1000] * 40 and len(list(store.iterdir())) == 5
+
+
+posix = pytest.mark.skipif(not hasattr(os, "geteuid"), reason="owners and rights of POSIX")
+
+
+@posix
+@pytest.mark.parametrize("mode", [0o770, 0o707, None])
+def test_a_folder_in_which_others_can_put_code_is_refused(mode, store, tmp_path, monkeypatch):
+    """Where the user named it; else it is not used, and nothing is written there."""
+    entry(b"key", lambda: b"code")
+    (file,) = store.iterdir()
+    file.write_bytes(cache._mark(file.name, b"planted") + b"planted")
+    if mode is None:
+        own = os.geteuid()
+        monkeypatch.setattr("os.geteuid", lambda: own + 1)
+    else:
+        store.chmod(mode)
+    words = "belongs to another user" if mode is None else "can be written by other users"
+    with pytest.raises(
+        InputError, match=f"CHAINUNIT_CACHE: its folder {store} {words}, so that .*; name a folder"
+    ):
+        entry(b"key", lambda: b"code")
+    monkeypatch.delenv(VARIABLE)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(store.parent))
+    assert cache.folder() == store or sys.platform == "darwin"
+    assert entry(b"key", lambda: b"mine") == b"mine" and entry(b"other", lambda: b"mine") == b"mine"
+    assert len(list(store.iterdir())) == 1
+
+
+@posix
+def test_a_planted_file_is_no_entry(store, tmp_path, monkeypatch):
+    """A file that others can write, one of another user, a link, a pipe, and an entry of other sources."""
+    entry(b"key", lambda: b"code")
+    (file,) = store.iterdir()
+    assert file.stat().st_mode & 0o777 == 0o600
+
+    def is_made_anew():
+        made = entry(b"key", lambda: b"code") == b"code"
+        good = file.read_bytes() == cache._mark(file.name, b"code") + b"code"
+        return made and good and file.stat().st_mode & 0o777 == 0o600 and not file.is_symlink()
+
+    planted = cache._mark(file.name, b"planted") + b"planted"
+    for mode in (0o620, 0o602):
+        file.write_bytes(planted)
+        file.chmod(mode)
+        assert is_made_anew()
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.write_bytes(planted)
+    file.unlink()
+    file.symlink_to(elsewhere)
+    assert is_made_anew() and elsewhere.read_bytes() == planted
+    entry(b"other", lambda: b"of other sources")
+    (other,) = set(store.iterdir()) - {file}
+    shutil.copy(other, file)
+    assert is_made_anew()
+    file.unlink()
+    os.mkfifo(file)
+    assert entry(b"key", lambda: b"code") == b"code"
+
+
+@posix
+def test_entries_are_private_whatever_the_user_s_mask(store):
+    """A group that may write the files of this user by default may not write the code."""
+    before = os.umask(0o002)
+    try:
+        entry(b"key", lambda: b"code")
+    finally:
+        os.umask(before)
+    assert entry(b"key", lambda: b"other") == b"code"

@@ -71,10 +71,20 @@ IE3 = {  # IEC 60034-30-1: coefficients of the limits at 50 Hz from 0.75 kW, by 
 }
 
 
+IE4 = {  # the same of class IE4, up to 200 kW
+    2.0: (0.34, -3.0479, 10.293, 84.8208),
+    4.0: (0.2412, -2.3608, 8.446, 86.8321),
+    6.0: (0.3598, -3.2107, 10.7933, 84.107),
+}
+
+
 def test_efficiencies_are_the_standards():
+    """IE4 where EU 2019/1781 lets no IE3 motor on the market since July 2023: from 75 to 200 kW."""
     for m in MOTORS:
+        name, limits = ("IE4", IE4) if m.nameplate.power >= 75e3 else ("IE3", IE3)
+        assert m.designation.startswith(f"{name} ") and name in m.source
         if m.nameplate.power >= 750.0:
-            limit = np.polyval(IE3[m.nameplate.poles], math.log10(m.nameplate.power / 1000.0))
+            limit = np.polyval(limits[m.nameplate.poles], math.log10(m.nameplate.power / 1000.0))
             assert 100.0 * m.nameplate.efficiency == pytest.approx(limit, abs=0.11), m.designation
 
 

@@ -59,7 +59,8 @@ def test_names_are_the_full_names_of_the_system(system):
     assert set(model.parts[0].layout.names) == {
         f"{name}.{v}" for name, m in every for v in m.parts[0].layout.names
     }
-    assert len(model.parts) == 1 and not model.terminals
+    assert len(model.parts) == 1
+    assert [t.name for t in model.terminals] == ["motor.measured"] * ("motor" in system.components)
     parameters = {f"{name}.{v}" for name, m in every for v in m.parameter_layout.names}
     own = {name for name in parameters if ".solver." not in name}
     assert set(model.parameter_layout.names) == own | {"solver.max_steps", "solver.tolerance"}

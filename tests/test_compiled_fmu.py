@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import re
+import zipfile
 from dataclasses import replace
 
 import fmpy
@@ -13,16 +14,20 @@ import pytest
 from command import chainunit
 from fmpy.validation import validate_fmu
 from systems import initialized, whole_systems
+from test_fmi_rules import reinitialized
 
 from chainunit import RunError
+from chainunit.fmu.description import Interface, model_description, terminals
 from chainunit.fmu.native.export import export
+from chainunit.machines.load_observer import LoadObserver
 from chainunit.native.compilers import compiler
 from chainunit.study import config
 from chainunit.study.choice import choose
-from chainunit.study.package import left_out, study_system
+from chainunit.study.package import left_out, study_system, whole_system
 from chainunit.system import (
     CoSimulation,
     Jump,
+    ModelComponent,
     ModelExchange,
     System,
     compiled,
@@ -83,6 +88,15 @@ def whole(request, tmp_path_factory):
 
 def of_whole(signals):
     return {f"whole.{name}": signal for name, signal in signals.items()}
+
+
+def test_the_states_that_an_event_changes_are_those_of_the_chains(whole):
+    _, part, _, file, _ = whole
+    states = part.model.state_layout.names
+    rods = {name for name in states if name.startswith("machine.")}
+    with zipfile.ZipFile(file) as archive:
+        found = reinitialized(archive.read("modelDescription.xml"))
+    assert found == rods and rods < set(states)
 
 
 def test_co_simulation_is_the_monolithic_solution(whole):
@@ -278,3 +292,35 @@ def test_what_is_not_of_a_study_is_refused(arguments, words, tmp_path):
 def test_a_wrong_study_is_refused(tmp_path):
     done = exported(STUDY.replace("ratio", "ratoi"), cwd=tmp_path)
     assert done.returncode == 2 and "mine.toml:3: machine.ratoi" in done.stderr
+
+
+def test_a_drive_and_the_observer_are_joined_by_what_is_measured():
+    """The FMU of a whole drive gives the measured signals of its motor, and the observer takes them."""
+    drive = compiled(SYSTEMS["motor"], "Drive")
+    (given,) = drive.model.terminals
+    (taken,) = LoadObserver.terminals
+    assert given.kind == taken.kind and given.rule == taken.rule == "bus"
+    parts = {"drive": drive, "observer": ModelComponent(LoadObserver, LoadObserver.Parameters())}
+    both = System(parts, [(f"drive.{given.name}", f"observer.{taken.name}")])
+    assert {*both.connections} == {
+        ("drive.motor.phi", "observer.phi"),
+        ("drive.motor.w", "observer.w"),
+        ("drive.motor.armature.i", "observer.current"),
+        ("drive.motor.supply_power", "observer.power"),
+    }
+    root = terminals(Interface(drive.model, {}))
+    assert [t.get("matchingRule") for t in root.iter("Terminal")] == ["bus"]
+
+
+def test_the_default_experiment_is_that_of_the_study(tmp_path):
+    """The motors' own of 1 s at 20 us is none for a drive that starts up in seconds."""
+    text = "[driveline]\n[run]\nstep = 0.5e-3\n[report]\nauthor = 'A. Bauer'\nrevision = 'C'\n"
+    loaded = config.parse(text)
+    model, start = whole_system(loaded, backend="python")
+    root = model_description(Interface(model, start), "", {}, "9.9")
+    experiment = {k: float(x) for k, x in root.find("DefaultExperiment").items()}
+    assert experiment["stepSize"] == 0.5e-3
+    assert experiment["stopTime"] == pytest.approx(
+        loaded.steady_begin + loaded.run.turns * loaded.turn, rel=1e-5
+    )
+    assert root.get("author") == "A. Bauer" and root.get("version") == "C" and root.get("license") is None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import pytest
 
@@ -198,6 +199,23 @@ def test_the_example_can_be_copied(tmp_path):
     assert load(tmp_path / "mine.toml").machine.p == load().machine.p
 
 
+@pytest.mark.parametrize(("name", "value"), [("r", 2.0), ("hy", 3.0), ("l1", 0.3), ("h", 0.2)])
+def test_a_refused_geometry_names_the_cause_and_the_range_in_which_all_holds(name, value):
+    """Whoever obeys is not refused again, and the range is no narrower than it must be."""
+    with pytest.raises(InputError) as refusal:
+        parse(f"[machine]\n{name} = {value}")
+    match = re.search(
+        rf"; with all other values as they are, {name} = {value:g} m must be (.*)$", str(refusal.value)
+    )
+    limits = re.findall(r"[<>]= (\S+) m", match[1])
+    assert limits
+    for limit in map(float, limits):
+        parse(f"[machine]\n{name} = {limit}")
+    beyond = min(map(float, limits), key=lambda limit: abs(limit - value))
+    with pytest.raises(InputError):
+        parse(f"[machine]\n{name} = {beyond + 0.002 * (value - beyond) / abs(value - beyond) * beyond}")
+
+
 def test_a_refused_geometry_names_the_lengths_that_are_the_examples():
     """Twice some of the lengths: c and hy, which the file does not give, are why they do not fit."""
     twice = {"r": 0.3, "l": 3.0, "h": 2.0, "l1": 2.7, "l2": 1.08, "e": 1.62, "z": 1.70763}
@@ -205,9 +223,25 @@ def test_a_refused_geometry_names_the_lengths_that_are_the_examples():
     taken = "; not in the file, so at the declared start value: c = 1.49248, hy = 1"
     with pytest.raises(InputError) as refusal:
         parse(text)
-    assert str(refusal.value).endswith(taken)
+    assert str(refusal.value).endswith(
+        f"{taken}; with all other values as they are, l = 3 m must be >= 1.126 m and <= 2.34 m"
+    )
     # with all given, nothing is taken over
     parse(f"{text}\nc = 2.98496\nhy = 2.0")
     with pytest.raises(InputError) as refusal:
         parse(f"{text}\nc = 1.49248\nhy = 1.0")
     assert "no value fits" in str(refusal.value) and "packaged" not in str(refusal.value)
+
+
+def test_a_sweep_of_chains_ends_at_twice_the_speed_or_beyond_the_resonance():
+    """A fifth beyond the lowest mode, where the crank turns below it; the file's own end counts before."""
+
+    def ends(text):
+        values = parse(f'organ = "chain"\n{text}')
+        modes = values.machine.chain_modes(values.feed.left, values.feed.right)
+        return values.chain.sweep_highest, float(modes.frequency[0])
+
+    highest, mode = ends("[run]\ncrank_speed = 1.57\n")
+    assert highest == pytest.approx(1.2 * mode) and highest > 2.0 * 1.57
+    assert ends("[run]\ncrank_speed = 4\n")[0] == 8.0
+    assert ends("[chain]\nsweep_highest = 15\n")[0] == 15.0

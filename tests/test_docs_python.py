@@ -1,4 +1,4 @@
-"""docs/python.md: its lines run in order, and print what it shows."""
+"""docs/python.md: its lines run in order, and print what it shows. README.md: its crank turns."""
 
 from __future__ import annotations
 
@@ -7,6 +7,13 @@ import io
 import re
 from pathlib import Path
 
+import numpy as np
+import pytest
+
+from chainunit import ChainUnitMachine, ChamberForces
+from chainunit.fmu.backends import export
+
+README = Path(__file__).parents[1] / "README.md"
 PAGE = Path(__file__).parents[1] / "docs" / "python.md"
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
@@ -42,3 +49,21 @@ def test_every_way_of_showing_is_seen():
     text = "```python\nx = 1\n```\n\n```python\nprint(x)\n```\n\n```text\n1\n```\n"
     assert list(sessions(text)) == [("x = 1\n", ""), ("print(x)\n", "1\n")]
     assert list(outputs(text)) == ["", "1\n"]
+
+
+def test_the_fmu_of_the_readme_turns(tmp_path, monkeypatch):
+    """Its rows are those of the machine in Python over a turn of the crank."""
+    monkeypatch.chdir(tmp_path)
+    (code,) = (code for code, _ in sessions(README.read_text("utf-8")) if "simulate_fmu" in code)
+    export(ChamberForces, tmp_path / "ChamberForces.fmu", fmi=3)
+    names: dict[str, object] = {}
+    exec(compile(code, README.name, "exec"), names)
+    rows = names["rows"]
+    # the outputs of a step are those of the inputs at its begin
+    phi, rows = 150.0 * rows["time"][:-1] / 50.0, rows[1:]
+    assert phi[-1] >= 1.99 * np.pi and len(rows) > 100
+    start = ChamberForces.Inputs()
+    alone = ChainUnitMachine().forces(phi, w=3.0, left=start.left, right=start.right)
+    assert np.ptp(alone.tau) > 50.0
+    for name, values in (("tau", alone.tau / 50.0), ("pivot.fx", alone.pivot.fx)):
+        assert rows[name] == pytest.approx(values, rel=1e-6, abs=1e-6 * np.max(np.abs(values)))

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
+import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from systems import component
 
-from chainunit import InputError, engines
+from chainunit import InputError, RunError, engines
 from chainunit.drives import cardan
 from chainunit.drives.cardan import ShaftLine, Twist
 from chainunit.drives.dc_motor import DcMotor
@@ -182,29 +185,65 @@ RISE = Profile(0.0, ((0.0, 0.4, 150.0),))
 SIGNALS = {"motor.w_ref": RISE}
 
 
+STEPS = (1e-3, 5e-4, 2.5e-4)
+READ = ("motor.w", "driveline.driven.w", "driveline.tau2", "driveline.tau3", "machine.tau")
+
+
+def errors_of(system, signals, stop, rtol=1e-9):
+    """The largest error of each variable of `READ` in parts of its range, a row for each of `STEPS`."""
+    exact = monolithic(system, signals, np.linspace(0.0, stop, round(stop / 2e-3) + 1), rtol=rtol)
+    errors = []
+    for step in STEPS:
+        with CoSimulation(system, signals) as simulation:
+            run = simulation.run(stop, step)
+        every = round(2e-3 / step)
+        differences = {name: run[name].values[::every] - exact[name].values for name in READ}
+        errors.append([np.max(np.abs(x)) / np.ptp(exact[name].values) for name, x in differences.items()])
+    return errors
+
+
+@pytest.mark.parametrize(
+    ("speed", "ramp", "order", "of_page"),
+    [
+        (0.0, 1.5, 1.0, "0.92 % 0.46 % 0.23 %"),
+        (0.0, 15.0, 1.0, "0.13 % 0.062 % 0.031 %"),
+        (150.0, 1.5, 2.0, "0.35 % 0.086 % 0.021 %"),
+    ],
+)
+def test_from_rest_the_coupling_is_of_first_order(system, speed, ramp, order, of_page):
+    """The table of docs/drives.md."""
+    turning = system.with_values({"motor.w_start": speed, "driveline.w_start": speed})
+    rise = {"motor.w_ref": Profile(speed, ((0.0, 0.4, speed + ramp),))}
+    errors = np.array(errors_of(turning, rise, 0.2, 1e-10))
+    np.testing.assert_allclose(np.log2(errors[:-1] / errors[1:]), order, atol=0.09)
+    page = (Path(__file__).parents[1] / "docs" / "drives.md").read_text()
+    shown = re.findall(r"\S+ %", of_page)
+    assert [f"{100.0 * each:.2g} %" for each in errors.max(axis=1)] == shown
+    assert all(f"| {each} |" in page for each in shown)
+
+
+def test_too_long_a_step_runs_away_and_no_fmu_can_tell(tmp_path):
+    """A rotor on a stiff line, whose k the FMUs do not know: as docs/drives.md says."""
+    line, motor = CardanDriveline.parameter_layout, DcMotor.parameter_layout
+    start = {v.name: v.quantity.start for v in (*line.variables, *motor.variables)}
+    stiffness = 1.0 / (1.0 / start["c2"] + 1.0 / start["c3"])
+    k = math.sqrt(stiffness * (1.0 / start["rotor.J"] + 1.0 / start["J4"]))
+    assert round(k, -1) == 1070 and f"{0.3 / k * 1e3:.2f}" == "0.28"
+    stiff, signals = export(driven(), tmp_path, "native")[0], {"motor.w_ref": 100.0}
+    exact = monolithic(stiff, signals, np.linspace(0.0, 0.4, 201), rtol=1e-5)["motor.w"].values
+    with CoSimulation(stiff, signals) as simulation:
+        run = simulation.run(0.4, 2e-3)["motor.w"].values
+    assert 25.0 < np.max(np.abs(run - exact)) / np.ptp(exact) < 40.0
+    with (
+        pytest.raises(RunError, match=r"the states left all bounds in the step from t = 0\.3"),
+        CoSimulation(stiff, signals) as simulation,
+    ):
+        simulation.run(0.4, 4e-3)
+
+
 def test_the_coupling_converges_to_the_monolithic_solution(system):
     """Of second order, through both ports, with the shafts turning and bent joints at 150 rad/s."""
-    exact = monolithic(system, SIGNALS, np.linspace(0.0, 0.8, 401), rtol=1e-9)
-    errors = []
-    for step in (1e-3, 5e-4, 2.5e-4):
-        with CoSimulation(system, SIGNALS) as simulation:
-            run = simulation.run(0.8, step)
-        every = round(2e-3 / step)
-        errors.append(
-            [
-                float(
-                    np.max(np.abs(run[name].values[::every] - exact[name].values))
-                    / np.ptp(exact[name].values)
-                )
-                for name in (
-                    "motor.w",
-                    "driveline.driven.w",
-                    "driveline.tau2",
-                    "driveline.tau3",
-                    "machine.tau",
-                )
-            ]
-        )
+    errors = errors_of(system, SIGNALS, 0.8)
     finer, finest = np.log2(np.array(errors[0]) / errors[1]), np.log2(np.array(errors[1]) / errors[2])
     assert np.all(finer > 1.7) and np.all(finest > 1.85), (errors, finer, finest)
     assert max(errors[0]) < 2e-2 and max(errors[2]) < 1e-3, errors

@@ -14,8 +14,10 @@ from chainunit.drives.induction_motor import InductionMotor
 from chainunit.errors import InputError
 from chainunit.quantities import Layout, Value, declaration, quantity
 from chainunit.study import config
+from chainunit.study.catalogue_drive import catalogue_drive
+from chainunit.study.cycle import cycle
 from chainunit.study.drive import Drive
-from chainunit.study.event import TYPES, Event, Role, Timing, in_groups
+from chainunit.study.event import TYPES, Event, Role, Timing, angle_of_begin, in_groups
 from chainunit.study.result import as_dict
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
@@ -224,13 +226,89 @@ def test_two_of_a_kind_run_beside_each_other(tmp_path):
     assert float(study.runs["jam_left"]["machine.left.processing_force"].max()) == pytest.approx(510.0)
     for name, angle in (("jam_left", 0.0), ("jam_left_2", 0.5 * math.pi)):
         phi = study.runs[name]["motor.phi"].interp(time=study.event[name])
-        assert math.remainder(float(phi) / 25.0 - angle, 2.0 * math.pi) == pytest.approx(0.0, abs=0.1)
+        assert math.remainder(float(phi) / 25.0 - angle, 2.0 * math.pi) == pytest.approx(0.0, abs=2e-4)
     result = as_dict(study)
     assert result["event"]["jam_left_2"]["force"] == {"value": 1500.0, "unit": "N"}
     assert result["events"]["jam_left_2"]["title"] == "a lump jams the left side (2)"
     assert (
         result["origins"]["event.jam_left.force"] == "file" and "event.jam_left.rise" not in result["origins"]
     )
+
+
+UNEVEN = """
+start = "direct"
+[system]
+motor = "IE3 6-pole 0.55 kW, 80M"
+[gear]
+ratio = 33
+[run]
+settle_turns = 1
+[[event]]
+type = "jam"
+side = "left"
+crank_angle = "180 deg"
+[[event]]
+type = "lumps"
+side = "right"
+crank_angle = "280 deg"
+[[event]]
+type = "blocked"
+crank_angle = "140 deg"
+"""
+
+
+def uneven():
+    """The rig of the compiled system."""
+    values = config.parse(UNEVEN)
+    bars = cycle(values.machine, values.run.crank_speed, values.feed)
+    return Rig(values, catalogue_drive(values, values.plate, bars.crank_torque), None)
+
+
+def test_an_event_begins_at_its_angle_however_uneven_the_turn_is():
+    """An induction motor without a flywheel: at the mean speed the crank would be elsewhere."""
+    rig = uneven()
+    values = rig.config
+    with rig.from_rest() as simulation:
+        run = rig.start_up(simulation, values.stop, lambda time: None, {}).run
+        saved, angle = simulation.save(), float(rig.drive.crank_motion(run)[0][-1])
+        turns = rig.drive.whole_turns(run.sel(time=slice(saved - 1.1 * values.turn, None)), 1)
+        speed = 2.0 * math.pi / np.ptp(turns["time"].values)
+        events = list(values.events.values())
+        errors, of_mean_speed = [], []
+        for event, lead in zip(events, rig.leads(simulation, events, angle, speed), strict=True):
+            branch = rig.follow(simulation, event, saved + lead, saved + lead + 0.5).run
+            time, phi = branch["time"].values, rig.drive.crank_motion(branch)[0]
+            errors.append(
+                math.remainder(np.interp(saved + lead, time, phi) - event.p.crank_angle, 2.0 * math.pi)
+            )
+            ahead = angle_of_begin(event, angle) - angle
+            assert 0.25 * math.pi <= ahead < 2.25 * math.pi
+            before = np.interp(saved + ahead / speed, time, phi)
+            of_mean_speed.append(math.remainder(before - event.p.crank_angle, 2.0 * math.pi))
+            begins = branch.sel(time=slice(saved + lead + 1e-6, None))
+            if event.kind == "jam":
+                # the force rises from that time on, and not before
+                name = "machine.left.processing_force"
+                assert float(branch[name].sel(time=slice(None, saved + lead)).max()) == 10.0
+                assert float(begins[name][1]) > 10.0
+    assert np.abs(errors) == pytest.approx(0.0, abs=1e-5)
+    assert np.max(np.abs(of_mean_speed)) > math.radians(0.3)
+
+
+def test_an_event_does_not_wait_for_a_crank_that_hardly_turns():
+    rig = uneven()
+    half = 0.5 * rig.config.run.crank_speed
+    assert (
+        rig.longest_lead(math.pi, 0.0)
+        == rig.longest_lead(math.pi, half)
+        == pytest.approx(2.0 * math.pi / half)
+    )
+    with rig.from_rest() as simulation:
+        # at rest, and soon after: no angle is passed in so short a time
+        simulation.run(0.001, 0.001)
+        simulation.save()
+        (lead,) = rig.leads(simulation, list(rig.config.events.values())[:1], 0.0, 1e4)
+    assert lead == pytest.approx(rig.longest_lead(math.pi, 1e4))
 
 
 @pytest.fixture

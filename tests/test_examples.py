@@ -46,7 +46,8 @@ def test_a_motor_is_picked(result):
     assert numbers["motor"]["kind"] == "InductionMotor"
     # the study goes on with it, at the speed that was asked
     steady = numbers["answers"]["steady"]
-    assert steady["speed_mean"]["value"] == pytest.approx(3.0, rel=0.01)
+    # a ratio of the series is at most 2.5 % off, and the slip the rest of the permitted 3 %
+    assert steady["speed_mean"]["value"] == pytest.approx(3.0, rel=0.03)
     assert steady["speed_ripple"]["value"] <= 0.04
     blocked = numbers["answers"]["blocked"]
     assert blocked["stall_time"]["value"] < 2.0 and 5.0 < blocked["thermal_trip_time"]["value"] < 20.0
@@ -59,9 +60,33 @@ def test_none_fits_and_the_reason_is_told(result):
     assert sizing["chosen"] is None and "No motor of the catalogue fits (18 of 18 were tried)" in message
     for i, c in enumerate(sizing["candidates"]):
         assert c["verdict"] == ("rejected" if i else "insufficient") and "torque of the gear" in c["reason"]
-        assert c["checks"]["gear"]["utilisation"]["value"] > 1.0
+        assert c["checks"]["gear_start"]["utilisation"]["value"] > 1.0
     # all that was asked is run with the nearest
     assert {"steady", "jam_left", "jam_right"} <= set(numbers["answers"]) and "insufficient" in message
+
+
+@pytest.mark.slow
+def test_the_heavy_mill_is_ordered_without_a_flywheel(result):
+    """As its first lines say: the smaller motor takes a disc of 29 kg, and 8 s to start."""
+    numbers, message, folder = result("heavy_mill")
+    sizing = numbers["sizing"]
+    small, chosen = (sizing["candidates"][i] for i in sizing["trade"])
+    assert sizing["chosen"] == sizing["trade"][1] and chosen["motor"].startswith("IE3 4-pole 0.75 kW")
+    assert small["motor"].startswith("IE3 4-pole 0.55 kW")
+    assert small["flywheel"]["mass"]["value"] == pytest.approx(29.0, abs=1.0)
+    assert small["checks"]["start"]["value"]["value"] == pytest.approx(8.0, abs=0.5)
+    assert "no flywheel; " in message and "A flywheel, or a larger motor." in message
+    assert "Order of preference among those that fit: 1. " in (folder / "result.md").read_text("utf-8")
+
+
+@pytest.mark.slow
+def test_the_beam_pump_gets_four_poles(result):
+    """As its first line says: with 2 poles the ratio would be 375, in two gears."""
+    numbers, message, _ = result("beam_pump")
+    sizing = numbers["sizing"]
+    assert "ratio 185 (three-stage helical gear, R80)" in message
+    (two,) = (c for c in sizing["candidates"] if c["motor"].startswith("IE3 2-pole 11 kW"))
+    assert two["ratio"]["value"] == 375.0 and two["gear"] == "two gear units" and two["criterion"] == "gear"
 
 
 def test_the_jam_trips_the_coupling(result):
@@ -98,8 +123,8 @@ def test_the_observer_notices_what_the_coupling_does_not(result):
     for run, device, carried in (
         ("feed_left", "observer", 1.64),
         ("feed_left", "safety_coupling", 1.67),
-        ("jam_right", "observer", 10.2),
-        ("hard_lump", "safety_coupling", 28.0),
+        ("jam_right", "observer", 10.13),
+        ("hard_lump", "safety_coupling", 28.6),
     ):
         assert found["notices"][run][device]["carried"]["value"] == pytest.approx(carried, rel=5e-3)
     assert "Who notices" in message and (folder / "observer.png").exists()

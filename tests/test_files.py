@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
+import secrets
 import signal
 import subprocess
 import sys
 import textwrap
 import time
+from pathlib import Path
 
 import pytest
+from command import chainunit
 
+from chainunit import ending, ledger
 from chainunit.errors import InputError, WriteError
-from chainunit.files import LOCK, claim, folder, whole
+from chainunit.files import LOCK, claim, clear, folder, refuse_foreign, whole
 
 SHORT = """
 event = []
@@ -244,7 +249,7 @@ def test_an_early_end_is_told_and_leaves_nothing(sent, status, command, at, tmp_
     with pytest.raises(SystemExit) as left:
         cli.main()
     assert left.value.code == status
-    assert capsys.readouterr().err.endswith("chainunit: interrupted before all was written\n")
+    assert capsys.readouterr().err.endswith("chainunit: interrupted; nothing was written\n")
     assert list(tmp_path.iterdir()) == [where]
 
 
@@ -258,3 +263,117 @@ def test_a_folder_that_was_there_or_holds_a_file_stays(tmp_path):
                 (path / "result").touch()
             raise KeyboardInterrupt
     assert sorted(p.name for p in tmp_path.rglob("*")) == ["fmu", "full", "old", "result"]
+
+
+def write(folder, text, *names, command="compare"):
+    with claim(folder, command, *names) as place:
+        for name in names:
+            with whole(place / name) as part:
+                part.write_text(text)
+
+
+def test_a_file_that_no_run_wrote_is_never_overwritten(tmp_path):
+    """Not where it was there before, nor where a user has changed it since, nor where it came in the meantime."""
+    out = tmp_path / "out"
+    out.mkdir()
+    mine = out / "report.html"
+    mine.write_text("mine")
+    with pytest.raises(InputError, match=r"out/report\.html: would be lost, as chainunit did not write it"):
+        write(out, "first", "comparison.json")
+    assert names(out) == ["report.html"] and mine.read_text() == "mine"
+    mine.unlink()
+    write(out, "first", "report.html", "comparison.json")
+    write(out, "second", "report.html", "comparison.json")
+    assert mine.read_text() == "second" and ledger.NAME in names(out)
+    mine.write_text("mine again")
+    (out / "notes.md").write_text("mine, too")
+    with pytest.raises(InputError) as refusal:
+        write(out, "third", "comparison.json", "notes.md")
+    assert [str(fault).split(":")[0] for fault in refusal.value.faults] == [str(mine), str(out / "notes.md")]
+    mine.unlink()
+    with claim(out, "compare") as place, pytest.raises(WriteError, match=r"notes\.md: stays as it is"):
+        clear(place, "notes.md")
+        with whole(place / "notes.md") as part:
+            part.write_text("third")
+    assert (out / "notes.md").read_text() == "mine, too"
+
+
+def test_the_list_of_files_is_that_of_sha256sum_and_goes_with_them(tmp_path):
+    write(tmp_path / "out", "text", "b.csv", "a.png")
+    lines = (tmp_path / "out" / ledger.NAME).read_text().splitlines()
+    digest = hashlib.sha256(b"text").hexdigest()
+    assert lines == [f"{digest}  a.png", f"{digest}  b.csv"]
+    # a process that was killed leaves the part of a line
+    with (tmp_path / "out" / ledger.NAME).open("a") as out:
+        out.write("0123")
+    with claim(tmp_path / "out", "compare") as place:
+        refuse_foreign(place, "a.png", "b.csv")
+        clear(place, "a.png", "b.csv")
+    assert names(tmp_path / "out") == []
+    (tmp_path / "out" / ledger.NAME).write_text("a list of my own\n")
+    with pytest.raises(InputError, match="is no list of files of chainunit"):
+        write(tmp_path / "out", "text", "b.csv")
+
+
+def test_a_command_leaves_a_foreign_page_alone(tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "report.html").write_text("mine")
+    press = Path(__file__).parents[1] / "examples" / "linkages" / "slider_crank_press.toml"
+    done = chainunit("linkage", press, "-o", "out", cwd=tmp_path)
+    assert done.returncode == 2 and done.stderr.startswith("chainunit: out/report.html: would be lost")
+    assert names(tmp_path / "out") == ["report.html"]
+
+
+KILLED = """
+import os, signal
+from pathlib import Path
+from chainunit.ending import temporary_folder
+print(temporary_folder("chainunit_fmu"), flush=True)
+(Path(os.environ["TMPDIR"]) / "more").mkdir()
+{end}
+"""
+
+
+@posix
+def test_folders_of_killed_processes_are_removed_at_the_next_start(tmp_path, monkeypatch):
+    """Those of living processes stay, and those of others."""
+    environment = os.environ | {"TMPDIR": str(tmp_path)}
+    killed = python(KILLED.format(end="os.kill(os.getpid(), signal.SIGKILL)"), tmp_path, env=environment)
+    left = Path(killed.communicate()[0].strip())
+    assert killed.returncode == -signal.SIGKILL and left.is_dir()
+    (tmp_path / "more").rmdir()
+    alive = python(KILLED.format(end="signal.pause()"), tmp_path, env=environment)
+    stays = Path(alive.stdout.readline().strip())
+    old, new, foreign = (tmp_path / f"chainunit_{c * 16}" for c in "abc")
+    for each in (old, new, foreign):
+        each.mkdir()
+    (foreign / "content").touch()
+    for each in (old, foreign):
+        os.utime(each, (1.0, 1.0))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    monkeypatch.setattr(ending, "_cleaned", set())
+    with ending.scratch() as own:
+        assert {p.name for p in tmp_path.glob("chainunit*")} == {p.name for p in (stays, new, foreign, own)}
+    assert not own.exists()
+    alive.terminate()
+    alive.communicate()
+
+
+def test_a_pipe_or_a_torn_line_in_place_of_the_list_of_files(tmp_path):
+    """A pipe would be waited for; a process that is killed leaves a part of a line, and so may the next one."""
+    ours = tmp_path / "a.txt"
+    ours.write_text("a")
+    ledger.Ledger(tmp_path).add(ours, ours)
+    file = tmp_path / ledger.NAME
+    for _ in range(2):
+        file.write_bytes(file.read_bytes() + b"0123abc")
+        known = ledger.Ledger(tmp_path)
+        assert known.wrote(ours)
+        other = tmp_path / "b.txt"
+        other.write_text(secrets.token_hex(4))
+        known.add(other, other)
+        assert ledger.Ledger(tmp_path).wrote(other) and ledger.Ledger(tmp_path).wrote(ours)
+    file.unlink()
+    os.mkfifo(file)
+    with pytest.raises(InputError, match="is no list of files of chainunit"):
+        ledger.Ledger(tmp_path)

@@ -10,6 +10,7 @@ import struct
 import subprocess
 import sys
 import textwrap
+import zlib
 from pathlib import Path
 
 import fmpy
@@ -18,6 +19,7 @@ import pytest
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Model, FMU2Slave
 from fmpy.fmi3 import FMU3Model, FMU3Slave
+from lxml import etree
 
 from chainunit.models import MODELS
 from chainunit.native.compilers import compiler
@@ -243,11 +245,8 @@ def test_the_order_of_an_input_and_its_derivative_does_not_matter(unit):
 
 
 def sealed(body):
-    """A serialized state with the checksum that belongs to it: FNV-1a by words."""
-    h = 14695981039346656037
-    for (word,) in struct.iter_unpack("<Q", body):
-        h = (h ^ word) * 1099511628211 % 2**64
-    return struct.pack("<Q", h) + body
+    """A serialized state with the checksum that belongs to it."""
+    return struct.pack("<Q", zlib.crc32(body)) + body
 
 
 def moved_to(one, time):
@@ -281,6 +280,38 @@ def test_a_step_that_model_exchange_takes_past_the_stop_time_is_an_error(unit, f
 def test_importers_are_asked_to_tell_each_step(native_fmus, name):
     """Else FMI 3.0 lets them leave the call out that finds a step past the stop time."""
     assert fmpy.read_model_description(native_fmus[name, 3][1]).modelExchange.needsCompletedIntegratorStep
+
+
+def reinitialized(description):
+    """Names of the variables with reinit="true" in a modelDescription.xml, which fmpy does not read."""
+    return {
+        node.get("name") or node.getparent().get("name")
+        for node in etree.fromstring(description).iter("Real", "Float64")
+        if node.get("reinit") == "true"
+    }
+
+
+@both
+@pytest.mark.parametrize("name", [name for name, model in MODELS.items() if model.state_layout])
+def test_states_that_an_event_changes_are_declared_with_reinit(unit, native_fmus, name, fmi):
+    """Those of a chain, whose end may not follow the rocker after a jump; no others."""
+    description = fmpy.read_model_description(native_fmus[name, fmi][1])
+    derivatives = [v.derivative for v in description.modelVariables if v.derivative]
+    one = unit(name, fmi, exchange=True).start()
+    n = len(derivatives)
+    before, after, nominal = ((ctypes.c_double * n)() for _ in range(3))
+    one.api.getContinuousStates(before, n)
+    one.api.getNominalsOfContinuousStates(nominal, n)
+    before[:] = [x + 1e-3 * size for x, size in zip(before, nominal, strict=True)]
+    one.api.enterContinuousTimeMode()
+    one.api.setContinuousStates(before, n)
+    one.api.enterEventMode()
+    values_changed = (one.api.newDiscreteStates if fmi == 2 else one.api.updateDiscreteStates)()[3]
+    one.api.getContinuousStates(after, n)
+    moved = {v.name for v, x, y in zip(derivatives, before, after, strict=True) if x != y}
+    text = Path(native_fmus[name, fmi][1], "modelDescription.xml").read_bytes()
+    assert reinitialized(text) == {v.name for v in derivatives if name == "ChainUnitFlexible"} >= moved
+    assert bool(moved) == bool(values_changed) == (name == "ChainUnitFlexible")
 
 
 @both
@@ -337,6 +368,38 @@ def test_a_serialized_state_with_any_flipped_bit_is_refused(unit, fmi):
     one.restore(raw)
     assert one.get("w", "armature.i") == kept
     assert one.refused(one.restore, raw[:-8]) == "saved state: its size is not this model's"
+
+
+@both
+def test_a_serialized_state_with_any_two_flipped_signs_is_refused(unit, fmi):
+    """And with any other two flipped bits: a CRC is linear, so that two bits pass together only if each alone
+    changes it alike."""
+    one = unit("DcMotor", fmi).start(w_ref=50.0)
+    one.step(0.0, 0.01)
+    raw = one.serialized()
+    words = np.frombuffer(raw, np.uint64)
+    tops = np.uint64(1) << np.uint64(63)
+    for i in range(len(words)):
+        for k in range(i):
+            both_signs = words.copy()
+            both_signs[[i, k]] ^= tops
+            assert one.refused(one.restore, both_signs.tobytes())
+    assert sealed(raw[8:]) == raw, "the FMU's checksum is the CRC-32 of zlib"
+    body, changes = bytearray(raw[8:]), [1 << bit for bit in range(32)]  # those of the checksum itself
+    for bit in range(8 * len(body)):
+        body[bit // 8] ^= 1 << bit % 8
+        changes.append(zlib.crc32(body) ^ zlib.crc32(raw[8:]))
+        body[bit // 8] ^= 1 << bit % 8
+    assert 0 not in changes and len(set(changes)) == len(changes)
+
+
+@both
+def test_a_step_without_end_is_refused(unit, fmi):
+    """Its end is no number, although its beginning and its length are."""
+    for name in ("ChamberForces", "DcMotor"):
+        one = unit(name, fmi).start(1.7e308)
+        assert "must be finite" in one.refused(one.step, 1.7e308, 1e308) and one.status == 3
+        one.restore(one.serialized())
 
 
 @both

@@ -299,6 +299,15 @@ def test_a_motor_out_of_bounds_is_refused(motor, name, tmp_path):
         export(MODELS["DcMotor"], tmp_path / "x.fmu", {name: -1.0})
 
 
+def test_a_number_that_is_none_before_the_initialization_is_forgotten(unpacked):
+    """The observer starts from the measured speed."""
+    fmu = unpacked("LoadObserver")
+    with Running(fmu, {"w": math.nan}) as unit:
+        assert math.isnan(unit.get(["speed"])[0])
+        unit.set(["w"], [0.7])
+        assert unit.get(["speed"]) == [0.7]
+
+
 def test_a_geometry_set_too_late_for_initialisation_is_seen(chamber):
     instance = Instance(chamber, "unit")
     instance.set(["r"], [0.9])
@@ -331,6 +340,16 @@ def test_a_step_that_is_none_is_discarded(motor, step):
         assert unit.get(["phi", "w"]) == before
         unit.step(0.0, 0.0)
         assert unit.get(["phi", "w"]) == before
+
+
+def test_a_step_without_end_is_discarded(motor):
+    """Its end is no number, although its beginning and its length are."""
+    unit = Instance(motor, "unit")
+    unit.initialize({}, 1.7e308)
+    unit.finish_initialization()
+    with pytest.raises(RunError, match=r"step of 1e\+308 s .*must be finite"):
+        unit.step(1.7e308, 1e308)
+    unit.close()
 
 
 @pytest.mark.parametrize(("name", "value"), [("w", 1e308), ("a", 1e308), ("left.material_mass", -50.0)])
@@ -508,6 +527,11 @@ def test_a_step_that_takes_too_long_is_discarded(motor):
         assert unit.get(["phi", "w"]) != before
 
 
+def sealed(text):
+    """A serialized state with the checksum that belongs to it."""
+    return binascii.crc32(text).to_bytes(4, "big") + text
+
+
 def test_a_damaged_state_is_refused(motor):
     """It leaves the instance without a state: neither numbers from before, nor a step."""
     with Running(motor, {"w_ref": 50.0}) as unit:
@@ -524,6 +548,14 @@ def test_a_damaged_state_is_refused(motor):
             flipped = bytearray(raw)
             flipped[bit // 8] ^= 1 << bit % 8
             assert refused(bytes(flipped))
+        # a CRC is linear: two flipped bits pass together only if each alone changes it alike
+        text = bytearray(raw[4:])
+        changes = [1 << bit for bit in range(32)]  # those of the checksum itself
+        for bit in range(8 * len(text)):
+            text[bit // 8] ^= 1 << bit % 8
+            changes.append(binascii.crc32(text) ^ binascii.crc32(raw[4:]))
+            text[bit // 8] ^= 1 << bit % 8
+        assert sealed(raw[4:]) == raw and 0 not in changes and len(set(changes)) == len(changes)
         with pytest.raises(RunError, match="saved state: it is damaged; not restored"):
             unit.step(0.02, 0.01)
         assert refused(unit._fmi.serializeFMUstate(unit.state()))
@@ -531,8 +563,8 @@ def test_a_damaged_state_is_refused(motor):
             (b" 9.5,", b" -9.5,", "armature.R = -"),
             (b'"x": [', b'"x": [], "y": [', "not a saved state of this model"),
         ):
-            text = raw[8:].replace(old, new)
-            assert refused(b"%08x" % binascii.crc32(text) + text)
+            text = raw[4:].replace(old, new)
+            assert refused(sealed(text))
             assert message in unit.messages[-1]
         unit.restore(unit._fmi.deSerializeFMUstate(raw))
         assert unit.get(["w", "phi", "tau"]) == kept
@@ -559,7 +591,7 @@ def test_calls_of_other_types_and_unknown_references_are_not_fatal(motor):
             unit.restore(api.deSerializeFMUstate(no_state))
             assert unit.messages[-1] == "saved state: it is damaged; not restored"
         for text in (b"no state at all", b"[]", b'{"of": "chainunit", "set": [1], "x": "y"}'):
-            unit.restore(api.deSerializeFMUstate(b"%08x" % binascii.crc32(text) + text))
+            unit.restore(api.deSerializeFMUstate(sealed(text)))
             assert unit.messages[-1].startswith("saved state: it ")
         unit.restore(state)
         assert unit.get(["w"]) == before

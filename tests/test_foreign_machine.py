@@ -259,7 +259,11 @@ def test_a_study_file_with_our_motor(folder):
         assert process.returncode == 2 and re.search(messages, process.stderr), process.stderr
 
 
-SIZED = STUDY.replace(f"ratio = {RATIO}\n", "") + MACHINE + "[sizing]\ncandidates = 1\ninertia_ratio = 1000\n"
+SIZED = (
+    STUDY.replace(f"ratio = {RATIO}\n", "")
+    + MACHINE
+    + "[sizing]\ncandidates = 1\ninertia_ratio = 1000\nratio_series = 'exact'\n"
+)
 
 
 def compare_with_pump(best):

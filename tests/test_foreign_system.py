@@ -401,7 +401,10 @@ def test_a_study_with_a_motor_of_somebody_else(folder):
         for quantity, answer in answers.items():
             other = foreign["answers"][name][quantity]
             assert other["unit"] == answer["unit"]
-            if answer["value"] is not None and other["value"] is None:
+            if quantity == "energy_gap" and name == "steady":
+                # the rotor of an FMU does not tell its energy
+                assert 0.0 <= other["value"] < 1e-3 and 0.0 <= answer["value"] < 1e-3
+            elif answer["value"] is not None and other["value"] is None:
                 absent.add(quantity)
             elif answer["value"] is not None:
                 assert other["value"] == pytest.approx(answer["value"], rel=1e-5, abs=1e-6), (name, quantity)

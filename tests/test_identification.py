@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from derivatives import check_derivatives
 from scipy.optimize import nnls
+from scipy.stats import f
 
 from chainunit import InputError, RunError
 from chainunit.drives.dc_motor import DcMotor
@@ -243,6 +244,70 @@ def test_the_statistic_of_noise_is_that_of_its_distribution():
     wave = rng.standard_normal(1500) + 0.9 * np.cos(3.0 * angle + 0.4)
     own = residuals.check(Comparison("run", "motor.i", wave, None, (), angle, 0.2), 0.99)
     assert own.orders[0] == (3, pytest.approx(0.18, abs=0.02)) and not own.is_noise
+
+
+def test_a_proposed_run_with_fewer_rows_tells_the_same(loaded, monkeypatch):
+    """Each row counts for those that it stands for, and a mark as before."""
+    problem, own = problem_of(without(loaded, "motor.count")), what_runs_tell._simulated
+    found, rows = [], []
+
+    def simulated(problem, run, z, workers):
+        rows.append(len(run.recording.time))
+        return own(problem, run, z, workers)
+
+    monkeypatch.setattr(what_runs_tell, "_simulated", simulated)
+    for step in (1e-2, 1e-6):
+        monkeypatch.setattr(what_runs_tell, "SPARSE", step)
+        proposals = information(problem, problem.starts).proposals
+        found.append({each.words: (each.factor, each.told) for each in proposals})
+    few, every = found
+    assert set(rows) == {len(loaded.time), len(loaded.time) // 2} and len(few) > 3
+    for words, (factor, told) in few.items():
+        assert every[words] == (pytest.approx(factor, rel=0.01), told), words
+
+
+def test_slow_changes_are_no_noise():
+    """Noise of any size is noise; slow changes that outweigh it are not, and their size is that of the change. Small
+    ones count as noise."""
+    rng, angle = np.random.default_rng(8), np.linspace(0.0, 60.0, 1500)
+    slow = np.sin(np.linspace(0.0, 23.0, 1500))
+
+    def checked(change, noise):
+        wave = change * slow + noise * rng.standard_normal(1500)
+        return residuals.check(Comparison("run", "motor.i", wave, None, (), angle, 0.2), 0.99)
+
+    loud = [checked(0.0, 5.0) for _ in range(300)]
+    assert np.mean([each.slow > each.slow_limit for each in loud]) < 0.03  # the limit is that of 1 %
+    assert np.mean([each.is_noise for each in loud]) > 0.96 and loud[0].noise == pytest.approx(5.0, rel=0.1)
+    assert checked(0.5, 1.0).is_noise and checked(0.5, 1.0).slow > checked(0.5, 1.0).slow_limit
+    own = checked(4.0, 1.0)
+    assert own.reason == "slow" and not own.is_noise and own.statistic < own.limit
+    assert own.changes == pytest.approx(0.2 * 4.0 / np.sqrt(2.0), rel=0.1)
+
+
+def test_the_residuals_of_a_swinging_machine_are_checked():
+    """Over a part of a turn the orders are nearly one another's sums, but the statistic of noise is that of its
+    distribution, and does not stand on the last digits of the angle."""
+    rng, swing = np.random.default_rng(7), 0.6 * np.exp(-np.linspace(0.0, 3.0, 1100))
+    angle = 4.0 + swing * np.cos(np.linspace(0.0, 40.0, 1100))
+    found = []
+    for _ in range(300):
+        noise = rng.standard_normal(1100)
+        own, near = (
+            residuals.check(Comparison("run", "crank.tau", noise, None, (), angle * factor, 0.2), 0.99)
+            for factor in (1.0, 1.0 + 1e-12)
+        )
+        assert near.statistic == pytest.approx(own.statistic, rel=1e-6) and near.limit == own.limit
+        assert own.noise == pytest.approx(1.0, abs=0.1)
+        found.append(own)
+    # the limit is that of 1 %; the mean is the number of combinations that the swing resolves
+    assert np.mean([each.is_noise for each in found]) > 0.97
+    (count,) = [k for k in range(1, 41) if abs(k * f.ppf(0.99, k, 1099 - k) - found[0].limit) < 1e-6]
+    assert 3 < count < 20
+    assert np.mean([each.statistic for each in found]) == pytest.approx(count, rel=0.1)
+    wrong = rng.standard_normal(1100) + 1.5 * np.cos(3.0 * angle)
+    own = residuals.check(Comparison("run", "crank.tau", wrong, None, (), angle, 0.2), 0.99)
+    assert not own.is_noise and own.statistic > 5.0 * own.limit
 
 
 def test_the_distribution_of_numbers_that_are_told_is_normal(loaded, empty):

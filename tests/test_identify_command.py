@@ -14,6 +14,8 @@ from command import chainunit
 from chainunit import InputError, Study
 from chainunit.machines.load_observer import LoadObserver
 from chainunit.native.compilers import compiler
+from chainunit.report import blocks
+from chainunit.report import identification as report
 from chainunit.study import config as study_files
 from chainunit.study.choice import choose
 from chainunit.study.false_loads import false_loads
@@ -246,7 +248,7 @@ def test_a_measured_shaft_needs_no_motor(tmp_path):
         ("motor_i", lambda x: -x, "the sign is reversed"),
         ("motor_i", lambda x: np.minimum(x, 0.8 * x.max()), "it is clipped"),
         ("motor_w", lambda x: np.where(np.arange(len(x)) > 500, x[500], x), "is stuck"),
-        ("motor_w", lambda x: 0.0 * x, "the machine stands"),
+        ("motor_w", lambda x: 0.0 * x, "although the mark is passed"),
     ],
 )
 def test_a_bad_recording_is_refused_by_its_column(column, change, words, tmp_path):
@@ -255,6 +257,34 @@ def test_a_bad_recording_is_refused_by_its_column(column, change, words, tmp_pat
     done = chainunit("identify", "mine.toml", "-o", "out", cwd=tmp_path)
     assert done.returncode == 2 and not (tmp_path / "out").exists()
     assert words in done.stderr and f"column {column.replace('_', '.')}" in done.stderr
+
+
+def test_a_speed_that_wanders_is_refused_where_its_changes_are_not_stated(tmp_path):
+    """Before the fit, which would take minutes; with its remedy."""
+    changes = ((-4.0, 1.0, 143.0), (3.0, 2.0, 160.0), (8.0, 1.0, 146.0))
+    write(tmp_path, "loaded.csv.gz", heads={}, w_ref=Profile(150.0, changes))
+    (tmp_path / "mine.toml").write_text(FILE, "utf-8")
+    done = chainunit("identify", "mine.toml", "-o", "out", cwd=tmp_path)
+    assert done.returncode == 2 and not (tmp_path / "out").exists()
+    words = " ".join(done.stderr.split())
+    assert "loaded.csv.gz, column mark [1]: the mean speed of the crank in a turn wanders from 2." in words
+    assert "state its changes (speeds), name a part in which it is steady (begin, end)" in words
+
+
+def test_further_runs_beside_numbers_that_are_all_determined():
+    """No run can determine one more of them."""
+
+    def shown(told):
+        numbers = {"told": told, "sought": 3.0, "told_at_start": 2.0}
+        proposals = [
+            {"text": "empty", "factor": {"value": 1.2, "unit": "1"}, "told": {"value": 2.0, "unit": "1"}}
+        ]
+        result = {name: {"value": x, "unit": "1"} for name, x in numbers.items()}
+        result |= {"blind": [], "combinations": [], "proposals": proposals}
+        return str(list(report._limits(blocks.Source(result))))
+
+    assert "None of these runs determines one more number" in shown(2.0) and "without one" in shown(2.0)
+    assert "None of these runs" not in shown(3.0) and "would make the numbers sharper" in shown(3.0)
 
 
 def test_a_wrong_gear_is_recognised(tmp_path):

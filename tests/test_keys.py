@@ -206,6 +206,9 @@ def test_the_commands(tmp_path):
     assert "web_share" in chainunit("keys", "ChamberForces", cwd=tmp_path).stdout
     refusal = chainunit("keys", "jams", cwd=tmp_path)
     assert refusal.returncode == 2 and "tables: system, machine" in refusal.stderr
+    for slip, meant in (("run.crankspeed", "run.crank_speed"), ("crankspeed", "crank_speed")):
+        near = chainunit("keys", slip, cwd=tmp_path)
+        assert near.returncode == 2 and f'no such key; was "{meant}" meant?' in near.stderr
     near = chainunit("keys", "knifedrive", cwd=tmp_path)
     assert near.returncode == 2 and 'was "KnifeDrive" meant?' in near.stderr
     assert chainunit("schema", cwd=tmp_path).returncode == 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import pytest
 from event_tables import event_line
@@ -64,9 +65,9 @@ def test_a_motor_that_burns_in_steady_running_is_no_good(tmp_path):
     assert warnings["no reserve"].quantities["over"][0] == -steady.torque_reserve > 0.1
     # steady running comes in each turn, a dip for a moment: one sentence, of the verdict as of the warning
     for when, where in (("in each turn", warnings["no reserve"].text), ("for a moment", verdict["text"])):
-        said = f"no reserve of torque: {when} it passes the largest torque of a steady state by "
-        assert said in where and "a moment the motor gives" not in where
-    assert ": a heavier load or a dip of the voltage stalls it; " in warnings["no reserve"].text
+        assert re.search(rf"overloaded {when}: .* above its largest steady torque", where)
+        assert "a moment the motor gives" not in where
+    assert "; a heavier load or a dip of the voltage stalls it; " in warnings["no reserve"].text
 
 
 STALLED = """event = {events}
@@ -93,9 +94,7 @@ def test_a_motor_below_its_breakdown_speed_stalls_under_the_load(tmp_path):
     T, w = float(study.steady["motor.stator.T"].mean()), below * study.drive.ratio
     slower, there, faster = (induction.steady(MATH, motor, w * x, T=T).tau for x in (0.9, 1.0, 1.1))
     assert there > max(slower, faster)
-    said = (
-        "no reserve of torque: in each turn it passes the largest torque of a steady state by 100 % or more"
-    )
+    said = "overloaded in each turn: 100 % or more above its largest steady torque"
     assert said in verdict["text"]
     # it is stalled already
     assert warnings["no reserve"].text.endswith(f"{said}; take a larger motor or a heavier flywheel.")

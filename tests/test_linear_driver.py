@@ -11,11 +11,14 @@ import pytest
 from command import chainunit
 from fmpy.validation import validate_fmu
 
+from chainunit.engines import MATH
 from chainunit.errors import InputError
 from chainunit.fmu.native.export import export
+from chainunit.integrate import controlled
 from chainunit.machines.linkages.file import description_of, read_linkage
 from chainunit.machines.linkages.model import machine_of
 from chainunit.machines.machine import Machine
+from chainunit.mechanism.end_stops import EndStops, stop_force
 from chainunit.native.compilers import compiler
 from chainunit.study import config
 
@@ -273,3 +276,56 @@ def test_what_is_no_cylinder_is_refused():
     links["barrel"]["points"] = {**links["barrel"]["points"], "C": [0.9, 0.0]}
     with pytest.raises(InputError, match="must be a cylinder: one of them on a pin of the ground"):
         machine_of(description_of({**JIB, "links": links}, "loose"))
+
+
+def test_a_driver_that_moves_by_itself_stays_in_its_range():
+    """Without a force it falls from the middle of its range onto its lower end stop, and rests there; with a large
+    one it goes to the upper one. No energy is lost but in the pins and the stops."""
+    model = read_linkage(LIFT.with_name("tipper.toml")).direct()
+    low, high = model.inverse.span
+    p, layout = model.check(model.Parameters()), model.state_layout
+    for tau, end, sign in ((0.0, low, -1.0), (1.5e5, high, 1.0)):
+        u, pace = model.Inputs(tau=tau), 0.0
+        start = model.start(MATH, p, u)
+        # the third state is the energy that the effort gives less the energy lost
+        states = [start.phi, start.w, 0.0]
+
+        def rates(t, v, u=u):
+            x = layout.instance(v[:2])
+            out = model.evaluate(MATH, p, u, x)[0]
+            return [*model.derivatives(MATH, p, u, x), out.power - out.dissipated_power]
+
+        way = []
+        for _ in range(24):
+            states, pace = controlled(rates, lambda t, v: v, states, 0.05, pace, 5e-3, 1e-6, [1.0, 1.0, 1e3])
+            way.append(states[0])
+        assert low - 0.01 < min(way) and max(way) < high + 0.01
+        assert states[0] == pytest.approx(end, abs=3e-4) and abs(states[1]) < 1e-3
+        before, after = (model.evaluate(MATH, p, u, x)[0] for x in (start, layout.instance(states[:2])))
+        gained = sum(s * (o.kinetic_energy + o.potential_energy) for s, o in ((1.0, after), (-1.0, before)))
+        assert gained == pytest.approx(states[2], rel=1e-4)
+        # at rest the stop carries the difference
+        assert after.end_stop_force == pytest.approx(tau - after.tau_bias, rel=1e-2)
+        assert sign * after.end_stop_force > 0.0
+
+
+def test_end_stops_push_and_never_pull():
+    law, span = EndStops(stiffness=1e6, damping=1e4), (0.2, 1.2)
+    for w in (-50.0, -1.0, 0.0, 1.0, 50.0):
+        assert all(stop_force(MATH, law, span, q, w) == 0.0 for q in (0.2, 0.7, 1.2))
+        assert stop_force(MATH, law, span, 1.21, w) >= 0.0 >= stop_force(MATH, law, span, 0.19, w)
+    assert stop_force(MATH, law, span, 1.21, 0.0) == pytest.approx(1e4, rel=0.02)
+    assert stop_force(MATH, law, span, 0.19, 0.0) == pytest.approx(-1e4, rel=0.02)
+
+
+@pytest.mark.skipif(compiler() is None, reason="no C compiler")
+@pytest.mark.parametrize("name", ["tipper", "cylinder_lift"])
+def test_the_fmu_of_a_cylinder_stays_in_its_range_in_its_default_experiment(name, tmp_path):
+    model = read_linkage(LIFT.with_name(f"{name}.toml")).direct()
+    low, high = model.inverse.span
+    file = export(model, tmp_path / "direct.fmu")
+    run = fmpy.simulate_fmu(str(file), output=["phi", "end_stop_force", "tau_bias"], output_interval=0.05)
+    assert run["time"][-1] == pytest.approx(10.0)
+    assert np.all(run["phi"] > low - 0.01 * (high - low)) and np.all(run["phi"] < high)
+    assert run["phi"][-1] == pytest.approx(low, abs=3e-4 * (high - low))
+    assert run["end_stop_force"][-1] == pytest.approx(-run["tau_bias"][-1], rel=1e-3)

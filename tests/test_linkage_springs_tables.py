@@ -9,9 +9,9 @@ import pytest
 
 from chainunit.engines import MATH, Dual, casadi_, dual, numpy_, slope
 from chainunit.machines.linkages.file import description_of
-from chainunit.machines.linkages.loads import CoordinateTable
 from chainunit.machines.linkages.model import machine_of
 from chainunit.machines.machine import Machine
+from chainunit.mechanism.curves import TableCurve
 
 R, L, K, FREE, C = 0.1, 0.4, 3000.0, 0.32, 45.0
 
@@ -110,7 +110,7 @@ PLACES, VALUES = [0.3, 1.0, 1.8, 3.0, 4.1, 5.5], [2.0, 5.0, 5.0, -1.0, 0.0, 3.0]
 
 
 def table(turns=True):
-    return CoordinateTable(PLACES, VALUES, turns)
+    return TableCurve(PLACES, VALUES, turns)
 
 
 @pytest.mark.parametrize("turns", [True, False])
@@ -141,7 +141,7 @@ def test_a_table_stays_between_its_points(turns):
 @pytest.mark.parametrize("turns", [True, False])
 def test_the_slope_of_a_table_is_continuous(turns, values):
     """At its points as elsewhere; what dual numbers give is the difference quotient, at the points, too."""
-    of, engine, h = CoordinateTable(PLACES, values, turns), dual(MATH), 1e-5
+    of, engine, h = TableCurve(PLACES, values, turns), dual(MATH), 1e-5
 
     def derivative(q):
         return slope(of.value(engine, Dual(q, 1.0)))
@@ -189,7 +189,7 @@ def test_the_slope_in_an_fmu_is_right_at_the_points_of_a_table():
     """A turn that begins at a point of the table: symbols differentiate a size at zero as zero."""
     import casadi
 
-    of = CoordinateTable(PLACES, [4.0, 5.0, 5.0, -1.0, 0.0, 3.0], True)
+    of = TableCurve(PLACES, [4.0, 5.0, 5.0, -1.0, 0.0, 3.0], True)
     q = casadi.SX.sym("q")
     derivative = casadi.Function("d", [q], [casadi.gradient(of.value(casadi_(), q), q)])
     for place in (*PLACES, PLACES[0] + 2.0 * math.pi):

@@ -13,9 +13,11 @@ from hypothesis import strategies as st
 from machines import random_loads, random_machine, random_state
 
 from chainunit import EMPTY, ChainUnitMachine, GeometryError, InputError, SideLoads, engines
+from chainunit.engines import numpy_
 from chainunit.machines.api import FREE
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.machines.crank_rocker import half_width_range
+from chainunit.machines.flexible import flexible
 from chainunit.machines.parts import Stop
 
 
@@ -269,7 +271,33 @@ def test_a_side_that_is_not_there_cannot_go_slack():
     one_sided = ChainUnitMachine({"right.wall_mass": 0.0, "right.web_mass": 0.0})
     assert 1.0 < one_sided.slack_speed() < 10.0
     bare = one_sided.replace({"left.wall_mass": 0.0, "left.web_mass": 0.0})
-    assert bare.slack_speed() == np.inf
+    assert bare.slack_speed() == bare.pushed_speed() == np.inf
+
+
+def test_a_web_is_slack_by_its_mean_pull_and_pushed_at_an_end_before():
+    """The mean of both ends is that of a chain of a single rod for web and wall; its equations are others."""
+    machine, feed = ChainUnitMachine(ratio=50.0), SideLoads(material_mass=300.0, processing_force=10.0)
+    model, xp = flexible(1, 1), numpy_()
+    undamped = {f"organ.{name}": 0.0 for name in ("eta", "end_damping", "fold_stiffness")}
+    p = model.parameter_layout.from_names(machine.by_name | undamped)
+    phi = np.linspace(0.0, 100.0 * np.pi, 90, endpoint=False)
+    for speed in (1.0, 4.0, 9.0):
+        u = model.Inputs(phi=phi, w=speed * 50.0, a=0.0, left=feed, right=feed)
+        sides = model.evaluate(xp, p, u, model.start(xp, p, u))[0]
+        rods = [getattr(getattr(sides, side), f"pull_{k}") for k in (2, 1) for side in ("left", "right")]
+        np.testing.assert_allclose(machine.mean_pulls(speed, feed, feed, 90), rods, rtol=1e-9, atol=1e-6)
+        out = machine.forces(phi, speed * 50.0, 0.0, feed, feed)
+        ends = machine.organ_pulls(out.rocker.psi, out.rocker.w, out.rocker.a, feed, feed)
+        np.testing.assert_allclose(np.minimum(*ends["left"]["web"].values()), out.left.web_pull, atol=1e-8)
+        np.testing.assert_allclose(
+            np.minimum(*ends["right"]["wall"].values()), out.right.wall_pull, atol=1e-8
+        )
+    # 300 kg a side: the web is pushed at B at rest already, and a chain is taut up to four fifths of its mode
+    assert machine.pushed_speed(feed, feed) == 0.0
+    slack = machine.slack_speed(feed, feed)
+    assert 4.0 < slack < 9.0
+    webs = machine.mean_pulls(np.array([0.999, 1.001]) * slack, feed, feed)[:2]
+    assert np.min(webs[:, 0]) > 0.0 > np.min(webs[:, 1])
 
 
 def test_frozen_declarations():

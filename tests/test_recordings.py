@@ -11,12 +11,17 @@ import pytest
 from chainunit import InputError
 from chainunit.study.config import parse
 from chainunit.study.identification.identification import read_runs
-from chainunit.study.identification.inspection import Expectation, inspect_columns, inspect_motion
+from chainunit.study.identification.inspection import (
+    Expectation,
+    inspect_columns,
+    inspect_motion,
+    inspect_steadiness,
+)
 from chainunit.study.identification.reading import PlannedRun
 from chainunit.study.identification.recording import Recording, read_part, read_recording, write_recording
 from chainunit.study.identification.watch import watch
 
-SPEED, RATIO = 3.0, 50.0
+SPEED, RATIO, RATE = 3.0, 50.0, 0.83
 EXPECTED = {
     "motor.i": Expectation(0.04, 5.3, "limit.i = 4.4 A"),
     "motor.u": Expectation(2.4, 290.0, "limit.v = 240 V"),
@@ -83,7 +88,10 @@ def test_a_good_recording_has_no_fault():
         ({"motor.i": np.clip(I, -0.7, 0.7)}, "motor.i [A]", "have its largest value, 0.7 A: it is clipped"),
         ({"motor.i": stuck()}, "motor.i [A]", "keeps the value"),
         ({"motor.i": U, "motor.u": I}, "motor.i [A]", "the two columns look swapped"),
-        ({"motor.w": 0.01 * (W - 150.0)}, "motor.w [rad/s]", "the machine stands"),
+        ({"motor.w": 0.01 * (W - 150.0), "mark": 0.0 * I}, "motor.w [rad/s]", "the machine stands"),
+        ({"motor.w": 0.01 * (W - 150.0)}, "motor.w [rad/s]", "of -0.001027 rad/s, although the mark is passed 4"),
+        ({"motor.w": I, "motor.i": W}, "motor.w [rad/s]", "and of motor.i [A] 149.9 A: the two columns look swapped"),
+        ({"motor.w": I, "motor.i": W, "mark": 0.0 * I}, "motor.w [rad/s]", "A: the two columns look swapped"),
         ({"mark": 0.0 * I}, "mark [1]", "is not passed in 5 turns"),
         ({"motor.i": 50.0 * I}, "motor.i [A]", "must be from 0.04 A to 5.3 A (limit.i = 4.4 A): check the sensor"),
     ],
@@ -91,6 +99,77 @@ def test_a_good_recording_has_no_fault():
 def test_a_fault_names_its_column(changes, column, words):
     (fault,) = faults(recorded(**changes))
     assert fault.startswith(f"run.csv, column {column}: ") and words in fault
+
+
+def wandering(share, **more):
+    """A recording whose speed changes by this share to both sides, in some seconds."""
+    angle = SPEED * (time := np.arange(40000) / 1000.0) + SPEED * share * np.sin(RATE * time) / RATE
+    noise = 1.0 + 0.01 * np.random.default_rng(6).standard_normal(len(time))
+    w = SPEED * RATIO * (1.0 + share * np.cos(RATE * time)) * noise
+    columns = {"motor.i": 0.5 + 0.6 * np.sin(angle), "motor.w": w, "mark": turned(angle)} | more
+    return Recording("run.csv", time, columns, GOOD.heads | {"motor.count": "motor.count [1]"}), angle
+
+
+def turned(angle):
+    return np.append(0.0, np.diff(np.floor(angle / (2.0 * np.pi))))
+
+
+def test_a_speed_that_wanders_is_told_before_a_fit():
+    """By the mark, by an encoder and by the speed alone, with its true range and spread; a motor that warms up, and a
+    gap, wander not."""
+    recording, angle = wandering(0.06)
+    names = [name for name in recording.columns if name != "mark"]
+    without = replace(recording, columns={name: recording.columns[name] for name in names})
+    counted = {
+        "motor.i": without.columns["motor.i"],
+        "motor.count": np.floor(angle * RATIO * 4096 / 2 / np.pi),
+    }
+    for each, name in ((recording, "mark [1]"), (replace(without, columns=counted), "motor.count [1]"),
+                       (without, "motor.w [rad/s]")):  # fmt: skip
+        (fault,) = map(str, inspect_steadiness(each, RATIO, follows=True))
+        words = fault.replace(",", "").split()
+        assert fault.startswith(
+            f"run.csv, column {name}: the mean speed of the crank in a turn wanders from "
+        )
+        low, high = (float(words[words.index(word) + 1]) for word in ("from", "to"))
+        # over a turn the mean of the change is less
+        half = RATE * np.pi / SPEED
+        mean = 0.06 * np.sin(half) / half
+        assert low == pytest.approx(SPEED * (1.0 - mean), rel=0.01)
+        assert high == pytest.approx(SPEED * (1.0 + mean), rel=0.01)
+        share = float(words[words.index("deviation") + 2])
+        assert share == pytest.approx(100.0 * mean / np.sqrt(2.0), rel=0.25)
+        assert "state its changes (speeds), name a part in which it is steady (begin, end)" in fault
+        assert "speeds" not in str(inspect_steadiness(each, RATIO)[0])
+    for each in (wandering(0.005)[0], GOOD, rows(GOOD, (GOOD.time < 2.0) | (GOOD.time > 4.5))):
+        assert inspect_steadiness(each, RATIO) == []
+    time = recording.time
+    warm = SPEED * time - SPEED * 0.03 * 10.0 * (time + 10.0 * (np.exp(-time / 10.0) - 1.0)) / 10.0
+    assert inspect_steadiness(wandering(0.0, mark=turned(warm))[0], RATIO) == []
+    # after the motor was switched off, the speed may fall
+    assert inspect_steadiness(recording, RATIO, off=6.0) == []
+
+
+def test_the_sign_of_a_machine_that_takes_hardly_any_energy():
+    """Its mean is that of an offset: the simulated course tells the sign, and a clear mean where there is none."""
+    rng = np.random.default_rng(1)
+    swing = 178.0 * np.sin(SPEED * GOOD.time) + rng.standard_normal(len(GOOD.time))
+    heads = {"time": "time [s]", "crank.tau": "crank.tau [N m]"}
+
+    def told(x, likeness):
+        recording = Recording("run.csv", GOOD.time, {"crank.tau": x}, heads)
+        found = inspect_columns(recording, {"crank.tau": Expectation(20.0, 700.0, "", likeness)})
+        return [str(each) for each in found]
+
+    swing -= np.mean(swing)
+    for mean in (-0.49, -15.0):
+        assert told(swing + mean, 0.0) == [] == told(swing + mean, 0.9)
+        (fault,) = told(swing + mean, -0.9)
+        assert (
+            f"mean of {mean:.4g} N m at an RMS of {np.hypot(mean, np.std(swing)):.4g} N m, although" in fault
+        )
+        assert "the sign is reversed" in fault
+    assert told(swing - 40.0, 0.0) and told(swing - 40.0, 0.9) == []
 
 
 def test_faults_of_the_rows():

@@ -70,11 +70,11 @@ def test_papers_dynamics():
         np.testing.assert_allclose(out.left.tangential_load / weight, reference, atol=6e-3)
 
 
-def test_slack_speed_of_the_papers_machine():
+def test_pushed_speed_of_the_papers_machine():
     """The pull at A2 reaches zero near 7.5 rad/s, and the limit scales as 1/sqrt(l1)."""
     machine = ChainUnitMachine.from_ratios(0.1, 2 / 3, 0.6, 0.5, {"rod_inertia": 0.0})
-    slack = machine.slack_speed()
+    slack = machine.pushed_speed()
     assert slack == pytest.approx(7.5, abs=0.15)
     assert machine.least_web_pull(slack * 0.999) > 0.0 > machine.least_web_pull(slack * 1.001)
     small = ChainUnitMachine.from_ratios(0.1, 2 / 3, 0.6, 0.5, {"rod_inertia": 0.0}, l=0.15, l1=0.135)
-    assert small.slack_speed() == pytest.approx(slack * 10**0.5, rel=1e-6)
+    assert small.pushed_speed() == pytest.approx(slack * 10**0.5, rel=1e-6)

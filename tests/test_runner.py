@@ -6,6 +6,7 @@ import contextlib
 import json
 import multiprocessing
 import os
+import re
 import shutil
 import signal
 import socket
@@ -118,7 +119,9 @@ def test_a_killed_run_goes_on(tmp_path):
     """SIGKILL of the main process, after some batches."""
     killed, whole = tmp_path / "killed", tmp_path / "whole"
     killed.mkdir(), whole.mkdir()
-    first = subprocess.Popen([sys.executable, HERE / "batches.py", killed, "400", "2", "slowly"])
+    first = subprocess.Popen(
+        [sys.executable, HERE / "batches.py", killed, "400", "2", "slowly"], start_new_session=True
+    )
     marks = killed / batches.job().store_name / CHECKS / "c"
     while not marks.exists() or len(list(marks.iterdir())) < 8:
         assert first.poll() is None
@@ -408,3 +411,25 @@ def test_a_wrong_declaration_is_refused(wrong):
     good = {name: getattr(batches.job(), name) for name in Job.__dataclass_fields__}
     with pytest.raises(ValueError):
         Job(**{**good, **wrong})
+
+
+def test_what_others_put_into_a_store_is_not_read(tmp_path, recwarn):
+    """A damaged array, a file and a folder beside the arrays of the job; a pipe in place of a chunk is named."""
+    made = runner.run(batches.job(), tmp_path, quiet, workers=1).file
+    for name, text in (("extra/zarr.json", "{damaged"), ("old/.zarray", "{"), ("note.txt", "hello")):
+        (made / name).parent.mkdir(exist_ok=True)
+        (made / name).write_text(text)
+    again = runner.run(batches.job(), tmp_path, quiet, workers=1)
+    assert again.earlier_points == 100 and set(again.dataset.load()) == {
+        v.name for v in batches.job().variables
+    }
+    assert not list(recwarn)
+    if hasattr(os, "mkfifo"):
+        for name in ("height/c/0", f"{CHECKS}/c/0", "zarr.json"):
+            content = (made / name).read_bytes()
+            (made / name).unlink()
+            os.mkfifo(made / name)
+            with pytest.raises(InputError, match=rf"{re.escape(name)}: is not a regular file"):
+                runner.run(batches.job(), tmp_path, quiet, workers=1)
+            (made / name).unlink()
+            (made / name).write_bytes(content)

@@ -69,7 +69,10 @@ BLOCKS = [
     if not refused(text)
 ]
 RIGHT = [
-    *(file.read_text("utf-8") for file in sorted((ROOT / "examples").glob("*.toml"))),
+    *(
+        file.read_text("utf-8").replace('"linkages/', f'"{ROOT.as_posix()}/examples/linkages/')
+        for file in sorted((ROOT / "examples").glob("*.toml"))
+    ),
     *map(example, EXAMPLES),
     commented(example("full")),
     *BLOCKS,
@@ -90,6 +93,7 @@ RIGHT = [
     "shaft3.outline = [[0, 0], ['9 cm', 0], [0, 0.1]]\nshaft3.holes = [[[0.01, 0.01], [0.02, 0.01], [0.01, 0.02]]]",
     "organ = 'chain'\n[chain]\nrods = 8.0",
     "start = 'soft'\n[sizing]\nambient = '-10 °C'",
+    "[sizing]\nmargin = '5 %'\nlarger = 1\ngear_kind = 'worm'\nratio_series = 'exact'\nratios = [10, 12.5]",
     "[observer]\nsignal_noise = '2 %'\nuncertainty = '500 g'\n[sizing]",
     "[system]\nmotor = 'IE3 4-pole 0.75 kW, 80M'\n[gear]\nefficiency = '96 %'",
     "start = 'soft'\n[system]\nmachine = 'KnifeDrive'",

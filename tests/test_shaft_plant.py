@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from derivatives import check_derivatives
@@ -12,6 +14,7 @@ from chainunit.native.compilers import compiler
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 from chainunit.study.identification.fit import fit
+from chainunit.study.identification.identification import inspect_runs
 from chainunit.study.identification.problem import Problem, RecordedRun, Sensor, Unknown
 from chainunit.study.identification.residuals import check_residuals
 from chainunit.study.identification.shaft import WAVES, MeasuredShaft
@@ -137,3 +140,16 @@ def test_what_such_a_shaft_does_not_have():
         MeasuredShaft(CONFIG.machine, ["motor.i"], ["machine.r"])
     with pytest.raises(InputError, match=r"motor\.rotor\.J: is no parameter or load of the machine"):
         MeasuredShaft(CONFIG.machine, ["crank.tau"], ["motor.rotor.J"])
+
+
+def test_a_machine_without_friction_has_no_reversed_sign():
+    """It takes no energy over a turn: the mean of its torque is the offset of the sensor, -1.1 N m, and its course
+    tells the sign."""
+    none = {name: 0.0 for name in TRUTH if name.endswith(("force", "friction", "damping"))}
+    recording = recorded(3, **none)
+    torque = recording.columns["crank.tau"]
+    assert np.mean(torque) == pytest.approx(-1.1, abs=0.5) and np.std(torque) > 20.0
+    inspect_runs(problem_of(RecordedRun("run", recording, 3.0)), 1)
+    other = replace(recording, columns={**recording.columns, "crank.tau": -torque - 3.0})
+    with pytest.raises(InputError, match=r"column crank\.tau .* the sign is reversed"):
+        inspect_runs(problem_of(RecordedRun("run", other, 3.0)), 1)

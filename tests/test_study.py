@@ -17,6 +17,7 @@ from fmpy.validation import validate_fmu
 from reports import write
 
 from chainunit import EMPTY, ChainUnitMachine, SideLoads
+from chainunit.ledger import NAME, Ledger
 from chainunit.machines.chain_unit import Feed
 from chainunit.report import study as study_report
 from chainunit.study.cycle import cycle
@@ -42,7 +43,9 @@ def done(tmp_path_factory):
     (folder / "short.toml").write_text(SHORT)
     # a picture of an earlier run
     (folder / "out dir").mkdir()
-    (folder / "out dir" / "reactions.png").write_text("old")
+    old = folder / "out dir" / "reactions.png"
+    old.write_text("old")
+    Ledger(old.parent).add(old, old)
     result = chainunit("study", "short.toml", "-o", "out dir", "--check", cwd=folder)
     assert result.returncode == 0, result.stderr
     return result, folder / "out dir"
@@ -58,6 +61,7 @@ def test_study_writes_numbers_series_plots_and_fmus(done):
         "load_cycle.csv",
         "fmu",
         "result.md",
+        NAME,
         *study_report.PICTURES,
     } - {
         "driveline.png",
@@ -69,6 +73,7 @@ def test_study_writes_numbers_series_plots_and_fmus(done):
         "resonance.png",
         "ratio.png",
         "observer.png",
+        "force_over_stroke.png",
     }
     for name in ("ChamberForces", "DcMotor"):
         assert validate_fmu(str(folder / "fmu" / f"{name}.fmu")) == []
@@ -296,15 +301,15 @@ def test_an_old_result_does_not_survive_a_new_run(tmp_path, done):
     assert (out / "reactions.png").read_bytes()[:4] == b"\x89PNG"
 
 
-def study_of(text, tmp_path):
+def study_of(text, tmp_path, status=0):
     (tmp_path / "mine.toml").write_text(SHORT + text)
     result = chainunit("study", "mine.toml", "-o", "out", cwd=tmp_path)
-    assert result.returncode == 0, result.stderr
+    assert result.returncode == status, result.stderr
     return result.stdout, json.loads((tmp_path / "out" / "result.json").read_text())
 
 
 def test_a_motor_that_cannot_reach_the_speed_is_told(tmp_path):
-    text, numbers = study_of("[motor]\nlimit = { v = 60 }", tmp_path)
+    text, numbers = study_of("[motor]\nlimit = { v = 60 }", tmp_path, status=1)
     assert "in place of 6 rad/s" in text and "does not return" not in text
     assert numbers["answers"]["jam_left"]["recovery_time"]["value"] is None
 

@@ -37,7 +37,7 @@ press_force = "2.5 kN"
 type = "surge"
 input = "press_force"
 factor = 3
-crank_angle = "90 deg"
+crank_angle = "230 deg"
 duration = "0.2 s"
 turns = 1
 [monte_carlo]
@@ -110,3 +110,12 @@ def test_wrong_surges(tmp_path, change, words):
     with pytest.raises(InputError) as caught:
         config.parse(STUDY.replace(*change), str(tmp_path / "mine.toml"))
     assert words in str(caught.value)
+
+
+def test_an_input_that_the_machine_has_not_is_refused_with_those_that_it_has():
+    with pytest.raises(InputError) as caught:
+        config.parse('[[event]]\ntype = "surge"\ninput = "left.material_mas"')
+    assert (
+        'has no input left.material_mas; was "left.material_mass" meant?; its inputs: left.material_mass'
+        in str(caught.value)
+    )

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from command import chainunit
 
-from chainunit import ChainUnitMachine
+from chainunit import ChainUnitMachine, ledger
 from chainunit.papers.two_bar import loads, statement, two_bar_error
 
 
@@ -74,7 +74,7 @@ def test_command(tmp_path):
     process = chainunit("two-bar-error", "-o", "out", cwd=tmp_path)
     assert process.returncode == 0, process.stderr
     assert {f.name for f in (tmp_path / "out").iterdir()} == {
-        "two_bar_error.json", "two_bar_error.md", "two_bar_error.png", "report.html"
+        "two_bar_error.json", "two_bar_error.md", "two_bar_error.png", "report.html", ledger.NAME
     }  # fmt: skip
     numbers = json.loads((tmp_path / "out" / "two_bar_error.json").read_text())
     assert numbers["error_t"]["unit"] == "1" and numbers["psi"]["unit"] == "rad"

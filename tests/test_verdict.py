@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from chainunit.study.pulls import LeastPull
 from chainunit.study.verdict import (
     CRANK_GOOD,
     RESIDUAL,
@@ -17,7 +18,16 @@ from chainunit.study.verdict import (
     two_bars,
 )
 
-PULLED = {"steady": (20.0, 50.0), "jam_left": (5.0, 0.0)}
+
+def least(web, wall, at=("B", "A1")):
+    """The least pulls of a run: at the ends half as large as in the mean, or half as small."""
+    return {
+        rod: LeastPull(pull - abs(pull) / 2.0, pin, pull)
+        for rod, pull, pin in zip(("web", "wall"), (web, wall), at, strict=True)
+    }
+
+
+PULLED = {"steady": least(20.0, 50.0), "jam_left": least(5.0, 0.0)}
 KEPT = {"steady": 1e-6, "jam_left": 1e-5}
 CALLED = {"steady": "steady running", "jam_left": "a lump jams"}
 
@@ -35,7 +45,7 @@ def test_two_bars_hold_where_nothing_speaks_against_them():
     assert verdict.holds == "true" and verdict.reasons == () and verdict.details(CALLED) == []
     assert verdict.text == "The model of the organs holds: two bars, the crank at 1.00 rad/s."
     # without weight or organs there is no mode, no slack speed and no pull
-    nothing = bars(6.0, math.inf, math.inf, {"steady": (math.inf, math.inf)}, {"steady": 0.0})
+    nothing = bars(6.0, math.inf, math.inf, {}, {"steady": 0.0})
     assert nothing.holds == "true"
 
 
@@ -44,22 +54,40 @@ def test_a_pull_below_zero_spoils_its_run(rod):
     """Of webs and of walls: in an overload the model holds in part, in steady running not at all."""
     for run, holds in (("jam_left", "in part"), ("steady", "false")):
         for pull in (0.0, -1e-9, -995.0):
-            pulls = PULLED | {run: tuple(pull if k == rod else 50.0 for k in (0, 1))}
+            pulls = PULLED | {run: least(*(pull if k == rod else 50.0 for k in (0, 1)))}
             verdict = bars(pulls=pulls)
             assert verdict.holds == ("true" if pull == 0.0 else holds)
             told = [(r.topic, r.quantity, r.run, r.value, r.limit) for r in verdict.reasons]
-            quantity = ("web_pull", "wall_pull")[rod]
+            quantity = ("web_mean_pull", "wall_mean_pull")[rod]
             assert told == ([] if pull == 0.0 else [("pushed", quantity, run, pull, 0.0)])
 
 
+def test_a_rod_of_which_only_an_end_is_pushed_is_no_slack_rod():
+    """A heavy web whose lower end is pushed, with a mean pull of 1.1 kN at least: a chain stays taut there."""
+    heavy = {"web": LeastPull(-341.0, "B", 1100.0), "wall": LeastPull(900.0, "B", 1500.0)}
+    verdict = bars(pulls={"steady": heavy, "jam_left": heavy})
+    assert verdict.holds == "in part" and verdict.caveat == ""
+    assert verdict.text.endswith("; an end of a bar is pushed, where a chain sags, in steady running, too.")
+    (line,) = verdict.details(CALLED)
+    assert line == (
+        "Bars that are pushed at an end, though pulled in the mean: a chain sags there, which changes the force in "
+        "that pin and hardly the torques: steady running (web at B -341 N); a lump jams (web at B -341 N)."
+    )
+    assert [(r["topic"], r["quantity"], r["place"]) for r in verdict.as_dict()["reasons"]] == [
+        ("end pushed", "web_pull", "B")
+    ] * 2
+    # once the mean pull is lost, the end is no news
+    assert [r.topic for r in bars(pulls={"steady": least(-1.0, 50.0)}).reasons] == ["pushed"]
+
+
 def test_a_pull_below_zero_in_the_start_up_is_told_by_name():
-    started = PULLED | {"start_up": (-1304.0, -433.0)}
+    started = PULLED | {"start_up": least(-1304.0, -433.0)}
     verdict = bars(pulls=started)
     assert verdict.holds == "in part" and "would go slack and snatch, in the start-up; take" in verdict.text
     assert verdict.details(CALLED | {"start_up": "start-up"}) == [
         "Bars that are pushed, where a chain would go slack and snatch: start-up (web -1304 N, wall -433 N)."
     ]
-    both = bars(pulls=started | {"jam_left": (-1.0, 1.0)})
+    both = bars(pulls=started | {"jam_left": least(-1.0, 1.0)})
     assert ", in the start-up and in overloads; " in both.text
 
 
@@ -88,10 +116,10 @@ def test_each_reason_has_its_own_remedy():
 
 
 def test_what_rests_on_a_model_that_does_not_hold_carries_a_caveat():
-    spoiled = bars(pulls=PULLED | {"steady": (-1.0, 1.0)})
+    spoiled = bars(pulls=PULLED | {"steady": least(-1.0, 1.0)})
     assert spoiled.caveat == spoiled.as_dict()["caveat"] == "for two bars, which do not hold here"
     assert bars().caveat == "" and bars().as_dict()["caveat"] is None
-    assert bars(pulls=PULLED | {"jam_left": (-1.0, 1.0)}).caveat == ""
+    assert bars(pulls=PULLED | {"jam_left": least(-1.0, 1.0)}).caveat == ""
 
 
 def test_the_speed_against_modes_and_slack():
@@ -153,7 +181,7 @@ def test_chains_at_their_limits():
 
 
 def test_words_and_data():
-    pulls = {"steady": (20.0, 50.0), "feed_left": (-44.3, -26.2), "jam_left": (5.0, -995.0)}
+    pulls = {"steady": least(20.0, 50.0), "feed_left": least(-44.3, -26.2), "jam_left": least(5.0, -995.0)}
     verdict = bars(3.0, 5.0, 4.5, pulls)
     assert verdict.text == (
         "The model of the organs holds in part: two bars, the crank at 3.00 rad/s; bars are pushed, where a chain "
@@ -164,15 +192,16 @@ def test_words_and_data():
     assert verdict.details(CALLED | {"feed_left": "feed to left"}) == [
         "Bars that are pushed, where a chain would go slack and snatch: feed to left (web -44.3 N, wall -26.2 N); "
         "a lump jams (wall -995 N).",
-        "Crank speed at which the rocker torque of two bars may be wrong by more than 10 %: 3.00 rad/s, limit "
-        "2.00 rad/s.",
+        "Crank speed too high for the rocker torque of two bars, which may be off by more than 10 %: 3.00 rad/s, "
+        "limit 2.00 rad/s.",
     ]
     data = verdict.as_dict()
     assert data["holds"] == "in part" and data["speed"] == {"value": 3.0, "unit": "rad/s", "kind": "speed"}
     assert data["reasons"][2] == {
         "topic": "pushed",
-        "quantity": "wall_pull",
+        "quantity": "wall_mean_pull",
         "run": "jam_left",
+        "place": None,
         "value": {"value": -995.0, "unit": "N"},
         "limit": {"value": 0.0, "unit": "N"},
     }

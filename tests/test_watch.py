@@ -12,10 +12,15 @@ import pytest
 from command import chainunit
 
 from chainunit import InputError, Study
+from chainunit.drives.dc_motor import DcMotor
 from chainunit.native.compilers import compiler
+from chainunit.study.config import parse
+from chainunit.study.drive import Drive
 from chainunit.study.identification import watch as watching
 from chainunit.study.identification.crank_motion import crank_motion
 from chainunit.study.identification.recording import Recording, read_recording, write_recording
+from chainunit.study.identification.synthetic import HiddenRun, Logger, synthetic
+from chainunit.system import Profile
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 EXAMPLES = Path(__file__).parents[1] / "examples" / "identification"
@@ -91,6 +96,30 @@ def test_a_shift_of_a_fifth_is_found_within_a_turn(watched):
     late = [x for t, x in zip(time, after, strict=True) if t > 80.0]
     assert np.mean(late) == pytest.approx(12.0, abs=1.0)
     assert result["learned"]["mark.angle"]["value"]["value"] == pytest.approx(-0.13, abs=0.01)
+
+
+def test_a_ramp_is_told_within_a_turn_of_its_threshold(tmp_path):
+    """A shift of 12 kg that comes in 10 s is seen as soon as the part that has come is beyond the threshold."""
+    config, speed = parse(study_text(TRUTH["machine"])), TRUTH["crank_speed"]
+    signs = {"left": 1.0, "right": -1.0}
+    ramps = {
+        f"machine.{side}.material_mass": Profile(30.0, ((30.0, 10.0, 30.0 + 6.0 * sign),))
+        for side, sign in signs.items()
+    }
+    forces = {f"machine.{side}.processing_force": 50.0 for side in signs}
+    run = HiddenRun(speed, 45.0, ramps | forces | {"motor.w_ref": speed * config.machine.ratio}, before=5.0)
+    logger = Logger(rate=200.0, offset={"motor.i": 0.02}, mark_angle=-0.1)
+    drive = Drive(DcMotor, config.motor, config.machine)
+    columns, rng = ("motor.i", "motor.u", "motor.w"), np.random.default_rng(3)
+    write_recording(synthetic(drive, columns, run, logger, rng), tmp_path / "ramp.csv.gz")
+    (tmp_path / "mine.toml").write_text(study_text(TRUTH["machine"], file="ramp.csv.gz"), "utf-8")
+    found = Study.from_file(tmp_path / "mine.toml").watch().watched
+    assert {each.side for each in found.alarms} == {"left"} and found.is_described
+    time, shift = found.recording.time, Profile(0.0, ((30.0, 10.0, 12.0),))
+    beyond = [shift(t) > x for t, x in zip(time, found.outputs["imbalance.feed_threshold"], strict=True)]
+    passed = float(time[beyond.index(True)])
+    assert 30.0 + 2.0 * TURN < passed < found.alarms[0].begin < passed + TURN
+    assert found.alarms[0].begin < 30.0 + 4.2 * TURN  # as the page has it
 
 
 def test_a_machine_that_does_not_describe_the_begin(tmp_path):

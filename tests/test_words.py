@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import re
+from html import unescape
+from pathlib import Path
 
 import pytest
+from command import chainunit
 from event_tables import event_line
 from reports import said_of
 
@@ -140,3 +144,65 @@ def test_decisive_values_that_the_file_leaves_out_are_named_once(text, said, tmp
     assert len(words) == (1 if said else 0)
     if said:
         assert words[0].startswith(said) and said_of(study).count("The file leaves out") == 1
+
+
+ROOT = Path(__file__).parents[1]
+WILD = "{A} {} {0} {{x}} {=run.turns} %s %(x)d %{y} $x^$ \\\\frac [red] [/b] <b>bold</b> */ &amp; `code`"
+
+
+def test_a_text_from_outside_is_no_template(tmp_path):
+    """Title and descriptions of a linkage and of its study stand in all results as they are."""
+    press = (ROOT / "examples" / "linkages" / "slider_crank_press.toml").read_text("utf-8")
+    titled, title = re.subn(r'^title = ".*"$', lambda _: f"title = {json.dumps(WILD)}", press, flags=re.M)
+    described, count = re.subn(
+        r'description = "[^"]*"', lambda _: f"description = {json.dumps(WILD)}", titled
+    )
+    assert title == 1 and count >= 3
+    (tmp_path / "press.toml").write_text(described, "utf-8")
+    (tmp_path / "study.toml").write_text(
+        f"title = {json.dumps('study ' + WILD)}\n[machine]\nlinkage = 'press.toml'\nratio = 20\n[run]\nturns = 1\n"
+        "settle_turns = 1\nstep = '4 ms'\ncrank_speed = '60 rpm'\n",
+        "utf-8",
+    )
+    for command, name in (("linkage", "linkage"), ("study", "result")):
+        file = "press.toml" if command == "linkage" else "study.toml"
+        done = chainunit(command, file, "-o", command, cwd=tmp_path)
+        assert done.returncode in (0, 1) and "Traceback" not in done.stderr, done.stderr
+        page = (tmp_path / command / "report.html").read_text("utf-8")
+        assert WILD in unescape(page) and "<b>bold" not in page
+        assert json.dumps(WILD, ensure_ascii=False)[1:-1] in (tmp_path / command / f"{name}.json").read_text(
+            "utf-8"
+        )
+        assert " ".join(WILD.split()) in " ".join(done.stdout.split())
+
+
+OUTSIDE = {"title", "titles", "title_of", "description", "designation", "noun", "source", "label"}
+"""Names of attributes and variables that hold texts of a user or of a foreign FMU."""
+TEMPLATES = {"line": 0, "warn": 1, "note": 1, "of": 2}
+"""By method that fills a template, the place of the template among its arguments."""
+
+
+def _interpolated(template):
+    """The names in the braces of an f-string that is a template, or a part of one."""
+    for part in ast.walk(template):
+        if isinstance(part, ast.FormattedValue):
+            for node in ast.walk(part.value):
+                if isinstance(node, ast.Name | ast.Attribute):
+                    yield node.id if isinstance(node, ast.Name) else node.attr
+
+
+def test_no_template_is_made_with_a_text_from_outside():
+    """Such a text is a part by its name: in the template itself its braces would be read."""
+    seen, wrong = 0, []
+    for file in sorted((ROOT / "src" / "chainunit").rglob("*.py")):
+        for node in ast.walk(ast.parse(file.read_text("utf-8"))):
+            if not isinstance(node, ast.Call):
+                continue
+            # the function `line` of the module lines joins pieces, and fills nothing
+            name = ast.unparse(node.func)
+            place = TEMPLATES.get(name.rpartition(".")[2]) if name != "line" else None
+            if place is not None and len(node.args) > place:
+                seen += 1
+                if OUTSIDE & set(_interpolated(node.args[place])):
+                    wrong.append(f"{file.name}:{node.lineno}")
+    assert seen > 150 and not wrong

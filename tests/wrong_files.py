@@ -219,7 +219,7 @@ FILES = [
     ),
     (
         "[feed]\nleft.material_mass = 0\nright.material_mass = 0\n[watch]\nfile = 'a.csv'\n",
-        [(4, "watch", "watches for a feed that moves to one side")],
+        [(4, "watch", "watches for a feed that moves to one side"), (5, "watch.file", "there is no such file")],
     ),
     ("[identify]", [(1, "identify.parameter", "is missing; add"), (1, "identify.run", "is missing; add")]),
     (
@@ -242,6 +242,7 @@ FILES = [
             (19, "identify.run.1.name", "must begin with a small letter"),
             (21, "identify.run.1.end", "must be > begin"),
             (23, "identify.run.1.columns.motor.current", "no such quantity"),
+            (25, "identify.run.2.file", "there is no such file"),
             (26, "identify.run.2.feed", 'must be "same" or "none"'),
             (29, "identify.sensor.1.column", "must be one of motor.i"),
             (32, "identify.sensor.2.offset", "a number in A"),
@@ -252,7 +253,10 @@ FILES = [
         "[[identify.run]]\nfile = 'a.csv'\nname = 'mark'\n"
         "[[identify.run]]\nfile = 'a.csv'\nname = 'b'\n[[identify.run]]\nfile = 'b.csv'\nname = 'b'\n",
         [
+            (6, "identify.run.1.file", "there is no such file"),
             (7, "identify.run.1.name", "stands for the mark of a turn"),
+            (9, "identify.run.2.file", "there is no such file"),
+            (12, "identify.run.3.file", "there is no such file"),
             (13, "identify.run.3.name", "is the name of another run"),
         ],
     ),

@@ -8,6 +8,13 @@
 #define CHECK(condition, what) \
     if (!(condition)) return (Result)complain(INSTANCE, ERROR, "%s: %s", __func__, what)
 #define NOT_NULL(pointer) CHECK(pointer, "null argument")
+/* for the functions of one kind of simulation */
+#define NEED_EXCHANGE(modes) \
+    NEED(modes);             \
+    CHECK(INSTANCE->model_exchange, "is for model exchange")
+#define NEED_STEPS(modes) \
+    NEED(modes);          \
+    CHECK(!INSTANCE->model_exchange, "is for co-simulation")
 
 /* A new instance, or NULL where the host means another FMU: `identifier` is the host's identifier, `own` that of this
  * FMU, and `word` the name of this identifier in messages. */
@@ -125,6 +132,7 @@ Result FMI(CompletedIntegratorStep)(Handle c, Boolean no_set, Boolean *enter_eve
     return (Result)status;
 }
 
+/* Importers set time and states in Event Mode, too, which the standard does not know. */
 Result FMI(SetTime)(Handle c, double time) {
     NEED(EVENT | CONTINUOUS);
     return (Result)set_time(INSTANCE, "time", time);
@@ -136,25 +144,25 @@ Result FMI(SetContinuousStates)(Handle c, const double x[], size_t n) {
 }
 
 Result FMI(GetContinuousStateDerivatives)(Handle c, double dx[], size_t n) {
-    NEED(INITIALIZATION | EVENT | CONTINUOUS);
+    NEED_EXCHANGE(STARTED);
     const Status status = derivatives(INSTANCE);
     return (Result)(status ? status : states_get(INSTANCE, INSTANCE->dx, dx, n, __func__));
 }
 
 Result FMI(GetEventIndicators)(Handle c, double z[], size_t n) {
     (void)z;
-    NEED(INITIALIZATION | EVENT | CONTINUOUS);
+    NEED_EXCHANGE(STARTED);
     CHECK(!n, "there are none");
     return (Result)OK;
 }
 
 Result FMI(GetContinuousStates)(Handle c, double x[], size_t n) {
-    NEED(INITIALIZATION | EVENT | CONTINUOUS);
+    NEED_EXCHANGE(STARTED);
     return (Result)states_get(INSTANCE, INSTANCE->x, x, n, __func__);
 }
 
 Result FMI(GetNominalsOfContinuousStates)(Handle c, double x[], size_t n) {
-    NEED(ANY);
+    NEED_EXCHANGE(ANY);
     return (Result)states_get(INSTANCE, model.nominal, x, n, __func__);
 }
 

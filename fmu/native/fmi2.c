@@ -100,7 +100,7 @@ NO_SUCH_TYPE(fmi2SetString, fmi2String, const)
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknown[], size_t n_unknown,
                                         const fmi2ValueReference known[], size_t n_known, const fmi2Real seed[],
                                         fmi2Real sensitivity[]) {
-    NEED(INITIALIZATION | RUNNING);
+    NEED(STARTED);
     NOT_NULL(unknown && known && seed && sensitivity);
     return (fmi2Status)forward(INSTANCE, unknown, n_unknown, known, n_known, seed, sensitivity);
 }
@@ -118,7 +118,7 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info) {
 
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
                                        const fmi2Integer order[], const fmi2Real value[]) {
-    NEED(INITIALIZATION | STEP);
+    NEED_STEPS(INSTANTIATED | INITIALIZATION | STEP);
     NOT_NULL(!n || (vr && order && value));
     begin_inputs(INSTANCE);
     for (size_t i = 0; i < n; ++i) {
@@ -133,7 +133,7 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
 
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
                                         const fmi2Integer order[], fmi2Real value[]) {
-    NEED(STEP);
+    NEED_STEPS(STEP | TERMINATED);
     NOT_NULL(!n || (vr && order && value));
     return (fmi2Status)first_derivatives(INSTANCE, vr, n, order, value);
 }
@@ -152,7 +152,7 @@ fmi2Status fmi2CancelStep(fmi2Component c) {
 /* The functions for the status of a step: `known` is the only kind of status that this FMU has. */
 #define GET_STATUS(name, type, known, answer)                                                                     \
     fmi2Status name(fmi2Component c, const fmi2StatusKind kind, type *value) {                                    \
-        NEED(ANY);                                                                                                \
+        NEED_STEPS(STEP | TERMINATED);                                                                            \
         NOT_NULL(value);                                                                                          \
         if ((int)kind != (known)) return (fmi2Status)complain(INSTANCE, DISCARD, "%s: not available", __func__);  \
         *value = answer;                                                                                          \

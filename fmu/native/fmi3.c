@@ -31,9 +31,13 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
                                          const fmi3ValueReference required[], size_t n_required,
                                          fmi3InstanceEnvironment environment, fmi3LogMessageCallback log,
                                          fmi3IntermediateUpdateCallback update) {
-    (void)resources, (void)visible, (void)logging, (void)events, (void)early, (void)required, (void)n_required;
+    (void)resources, (void)visible, (void)logging, (void)early, (void)required, (void)n_required;
     (void)update;
-    return instantiate(name, "token", token, model.guid, 0, environment, (void (*)(void))log);
+    Instance *c = instantiate(name, "token", token, model.guid, 0, environment, (void (*)(void))log);
+    if (!c || !events) return c;
+    complain(c, ERROR, "eventModeUsed must be false: there is no event mode in co-simulation");
+    instance_free(c);
+    return NULL;
 }
 
 fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token, fmi3String resources,
@@ -106,26 +110,32 @@ NO_SUCH_TYPE(String)
         NEED(ANY);                                         \
         CHECK(0, what);                                    \
     }
+/* as for the types of variables: a call for none of them is right */
+#define NONE_OF(what)                                      \
+    {                                                      \
+        NEED(ANY);                                         \
+        CHECK(!n, "there are no " what);                   \
+        return fmi3OK;                                     \
+    }
 #define V const fmi3ValueReference vr[], size_t n
 fmi3Status fmi3GetBinary(fmi3Instance c, V, size_t sizes[], fmi3Binary value[], size_t n_values)
-    NOT_THERE("there are no binary variables")
+    NONE_OF("binary variables")
 fmi3Status fmi3SetBinary(fmi3Instance c, V, const size_t sizes[], const fmi3Binary value[], size_t n_values)
-    NOT_THERE("there are no binary variables")
-fmi3Status fmi3GetClock(fmi3Instance c, V, fmi3Clock value[]) NOT_THERE("there are no clocks")
-fmi3Status fmi3SetClock(fmi3Instance c, V, const fmi3Clock value[]) NOT_THERE("there are no clocks")
+    NONE_OF("binary variables")
+fmi3Status fmi3GetClock(fmi3Instance c, V, fmi3Clock value[]) NONE_OF("clocks")
+fmi3Status fmi3SetClock(fmi3Instance c, V, const fmi3Clock value[]) NONE_OF("clocks")
 fmi3Status fmi3GetIntervalDecimal(fmi3Instance c, V, fmi3Float64 interval[], fmi3IntervalQualifier qualifier[])
-    NOT_THERE("there are no clocks")
+    NONE_OF("clocks")
 fmi3Status fmi3GetIntervalFraction(fmi3Instance c, V, fmi3UInt64 counter[], fmi3UInt64 resolution[],
-                                   fmi3IntervalQualifier qualifier[]) NOT_THERE("there are no clocks")
-fmi3Status fmi3GetShiftDecimal(fmi3Instance c, V, fmi3Float64 shift[]) NOT_THERE("there are no clocks")
-fmi3Status fmi3GetShiftFraction(fmi3Instance c, V, fmi3UInt64 counter[], fmi3UInt64 resolution[])
-    NOT_THERE("there are no clocks")
-fmi3Status fmi3SetIntervalDecimal(fmi3Instance c, V, const fmi3Float64 interval[]) NOT_THERE("there are no clocks")
+                                   fmi3IntervalQualifier qualifier[]) NONE_OF("clocks")
+fmi3Status fmi3GetShiftDecimal(fmi3Instance c, V, fmi3Float64 shift[]) NONE_OF("clocks")
+fmi3Status fmi3GetShiftFraction(fmi3Instance c, V, fmi3UInt64 counter[], fmi3UInt64 resolution[]) NONE_OF("clocks")
+fmi3Status fmi3SetIntervalDecimal(fmi3Instance c, V, const fmi3Float64 interval[]) NONE_OF("clocks")
 fmi3Status fmi3SetIntervalFraction(fmi3Instance c, V, const fmi3UInt64 counter[], const fmi3UInt64 resolution[])
-    NOT_THERE("there are no clocks")
-fmi3Status fmi3SetShiftDecimal(fmi3Instance c, V, const fmi3Float64 shift[]) NOT_THERE("there are no clocks")
+    NONE_OF("clocks")
+fmi3Status fmi3SetShiftDecimal(fmi3Instance c, V, const fmi3Float64 shift[]) NONE_OF("clocks")
 fmi3Status fmi3SetShiftFraction(fmi3Instance c, V, const fmi3UInt64 counter[], const fmi3UInt64 resolution[])
-    NOT_THERE("there are no clocks")
+    NONE_OF("clocks")
 fmi3Status fmi3ActivateModelPartition(fmi3Instance c, fmi3ValueReference clock, fmi3Float64 time)
     NOT_THERE("scheduled execution is not supported")
 fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance c, fmi3ValueReference vr, size_t *n)
@@ -143,7 +153,7 @@ fmi3Status fmi3ExitConfigurationMode(fmi3Instance c) NOT_THERE("there are no str
 fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference unknown[], size_t n_unknown,
                                         const fmi3ValueReference known[], size_t n_known, const fmi3Float64 seed[],
                                         size_t n_seed, fmi3Float64 sensitivity[], size_t n_sensitivity) {
-    NEED(INITIALIZATION | RUNNING);
+    NEED(STARTED);
     NOT_NULL(unknown && known && seed && sensitivity);
     CHECK(n_seed == n_known && n_sensitivity == n_unknown, "as many values as references are needed");
     return (fmi3Status)forward(INSTANCE, unknown, n_unknown, known, n_known, seed, sensitivity);
@@ -152,13 +162,13 @@ fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference
 /* -- model exchange */
 
 fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance c) {
-    NEED(INITIALIZATION | EVENT);
+    NEED(EVENT);
     return fmi3OK;
 }
 
 fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean *again, fmi3Boolean *terminate, fmi3Boolean *nominals,
                                     fmi3Boolean *values, fmi3Boolean *has_next, fmi3Float64 *next) {
-    NEED(EVENT | STEP);
+    NEED(EVENT);
     NOT_NULL(again && terminate && nominals && values && has_next && next);
     *again = *terminate = *nominals = *has_next = fmi3False;
     *next = 0.0;
@@ -169,14 +179,14 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean *again, fmi3Bool
 }
 
 fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance c, size_t *n) {
-    NEED(ANY);
+    NEED_EXCHANGE(ANY);
     NOT_NULL(n);
     *n = 0;
     return fmi3OK;
 }
 
 fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance c, size_t *n) {
-    NEED(ANY);
+    NEED_EXCHANGE(ANY);
     NOT_NULL(n);
     *n = (size_t)model.n_x;
     return fmi3OK;
@@ -184,16 +194,11 @@ fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance c, size_t *n) {
 
 /* -- co-simulation */
 
-fmi3Status fmi3EnterStepMode(fmi3Instance c) {
-    NEED(EVENT | STEP);
-    CHECK(!INSTANCE->model_exchange, "is for co-simulation");
-    INSTANCE->mode = STEP;
-    return fmi3OK;
-}
+fmi3Status fmi3EnterStepMode(fmi3Instance c) NOT_THERE("there is no event mode in co-simulation")
 
 fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3Int32 order[],
                                     fmi3Float64 value[], size_t n_values) {
-    NEED(STEP);
+    NEED_STEPS(STEP | TERMINATED);
     NOT_NULL(!n || (vr && order && value));
     CHECK(n == n_values, "as many values as references are needed");
     return (fmi3Status)first_derivatives(INSTANCE, vr, n, order, value);

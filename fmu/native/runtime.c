@@ -20,7 +20,8 @@ typedef enum {
     TERMINATED = 32
 } Mode;
 #define RUNNING (EVENT | CONTINUOUS | STEP)
-#define ANY (INSTANTIATED | INITIALIZATION | RUNNING | TERMINATED)
+#define STARTED (INITIALIZATION | RUNNING | TERMINATED) /* the states have values */
+#define ANY (INSTANTIATED | STARTED)
 
 typedef struct Instance Instance;
 typedef void (*Report)(const Instance *instance, Status status, const char *message);
@@ -367,9 +368,16 @@ static void begin_inputs(Instance *c) {
 
 static Status set(Instance *c, unsigned reference, double value) {
     if (reference >= c->n_references) return unknown_reference(c, reference);
-    const int i = (int)reference;
-    if (i >= model.n_p + model.n_u)
-        return complain(c, ERROR, OUTPUT_SET, reference);
+    const int i = (int)reference, state = i - model.n_p - model.n_u;
+    if (c->mode == CONTINUOUS && state >= 0 && state < model.n_x) {
+        if (!isfinite(value))
+            return complain(c, ERROR, "value reference %u, a state, = %g: must be " NUMBER, reference, value);
+        c->x[state] = value;
+        c->fresh = 0;
+        c->closed = 0;
+        return OK;
+    }
+    if (state >= 0) return complain(c, ERROR, OUTPUT_SET, reference);
     const Quantity *q = &model.declared[i];
     if (!isfinite(value)) return refuse(c, ERROR, "", i, value);
     const int before = c->mode & (INSTANTIATED | INITIALIZATION), good = admitted(q, value);
@@ -685,7 +693,7 @@ static Status controlled_steps(Instance *c, double time, double size, const Cour
 }
 
 static Status step(Instance *c, double time, double size) {
-    if (!isfinite(time) || !isfinite(size) || size < 0.0)
+    if (!isfinite(time) || !isfinite(size) || size < 0.0 || !isfinite(time + size))
         return complain(c, ERROR, STEP_SIZE, size, time);
     if (fabs(time - c->time) > SAME_TIME * size + ROUNDED * fabs(c->time))
         return complain(c, ERROR, STEP_BEGIN, time, c->time);
@@ -759,7 +767,7 @@ static Status completed(Instance *c, int *enter_event) {
 static Status project(Instance *c, int *moved) {
     *moved = 0;
     if (step_taken(c)) return ERROR;
-    if (!kernels.closed || !c->model_exchange) return OK;
+    if (!kernels.closed) return OK;
     if (judge_inputs(c)) return ERROR;
     for (int round = 0; round < 4; ++round) {
         const double share = off(c);
@@ -776,7 +784,7 @@ static Status project(Instance *c, int *moved) {
 /* -- saved states */
 
 typedef struct {
-    uint64_t sum;   /* checksum of all that follows: any flipped bit changes it */
+    uint64_t sum;   /* checksum of all that follows */
     uint64_t guard; /* checksum of the model and its version: a state of another one is refused */
     int mode, model_exchange, closed, spent;
     double time, stop, pace;
@@ -788,14 +796,20 @@ static uint64_t guard(void) {
     return h;
 }
 
-/* FNV-1a by words of 8 bytes: each step maps different sums to different sums, so that a change of one word is seen. */
+/* The CRC-32 of IEEE 802.3, four bits at a time: any two flipped bits change it. */
 static uint64_t sum_of(const void *memory, size_t size) {
-    uint64_t h = 14695981039346656037u, word;
-    for (size_t at = sizeof word; at < size; at += sizeof word) {
-        memcpy(&word, (const char *)memory + at, sizeof word);
-        h = (h ^ word) * 1099511628211u;
+    static const uint32_t of_four_bits[16] = {
+        0x00000000u, 0x1db71064u, 0x3b6e20c8u, 0x26d930acu, 0x76dc4190u, 0x6b6b51f4u, 0x4db26158u, 0x5005713cu,
+        0xedb88320u, 0xf00f9344u, 0xd6d6a3e8u, 0xcb61b38cu, 0x9b64c2b0u, 0x86d3d2d4u, 0xa00ae278u, 0xbdbdf21cu,
+    };
+    const unsigned char *bytes = memory;
+    uint32_t crc = ~0u;
+    for (size_t at = sizeof(uint64_t); at < size; ++at) {
+        crc ^= bytes[at];
+        crc = crc >> 4 ^ of_four_bits[crc & 15u];
+        crc = crc >> 4 ^ of_four_bits[crc & 15u];
     }
-    return h;
+    return ~crc;
 }
 
 /* size of the saved values: parameters, inputs and their derivatives, states, derived values; others are recomputed */

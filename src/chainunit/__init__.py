@@ -7,8 +7,6 @@ alone, for scripts and sweeps; ``ChamberForces`` is its model, which becomes an 
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from .errors import GeometryError, InputError, RunError
-
 __all__ = [
     "EMPTY",
     "BestResult",
@@ -27,6 +25,7 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
+    from .errors import GeometryError, InputError, RunError
     from .identifications import IdentificationResult, WatchResult
     from .machines.api import EMPTY, ChainUnitMachine
     from .machines.chain_unit import ChamberForces, SideLoads
@@ -35,13 +34,17 @@ if TYPE_CHECKING:
 
     __version__: str
 else:
-    # numpy and scipy take longer to import than a command takes to answer: import them when they are needed
+    # numpy and scipy take longer to import than a command takes to answer: import them when they are needed; a
+    # signal during the import of anything ends with the words of Python
     _HOMES = {
         "BestResult": ".studies",
         "EMPTY": ".machines.api",
         "ChainUnitMachine": ".machines.api",
         "ChamberForces": ".machines.chain_unit",
+        "GeometryError": ".errors",
         "IdentificationResult": ".identifications",
+        "InputError": ".errors",
+        "RunError": ".errors",
         "SideLoads": ".machines.chain_unit",
         "Study": ".studies",
         "StudyResult": ".studies",

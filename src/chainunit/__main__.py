@@ -1,5 +1,39 @@
-"""``python -m chainunit``: the command line."""
+"""The program ``chainunit``: the command line, in a process of its own.
 
-from .cli import main
+Signals are handled before the command line is imported, and until the process has ended.
+"""
 
-main()
+from __future__ import annotations
+
+import os
+
+
+def main() -> None:
+    """Run the command line; see `chainunit.cli.main`."""
+    status = 130
+    try:
+        from . import interrupts
+
+        interrupts.begin()
+        try:
+            from . import cli, console, ending
+        except Exception:
+            # a library may turn the interrupt of its import into another error
+            if interrupts.received() is None:
+                raise
+            raise KeyboardInterrupt from None
+        console.show_only_remarks()
+        try:
+            cli.main()
+        finally:
+            ending.remove_folders()
+            interrupts.ignore()
+    except KeyboardInterrupt:
+        if "interrupts" in locals():
+            status = interrupts.status()
+        os.write(2, b"chainunit: interrupted; nothing was written\n")
+        os._exit(status)
+
+
+if __name__ == "__main__":
+    main()

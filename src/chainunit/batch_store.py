@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 import re
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import AsyncIterator, Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +20,7 @@ import numpy as np
 
 from . import __version__
 from .errors import RunError
-from .files import whole, writing
+from .files import regular_bytes, whole, writing
 from .job import BATCH, CHECKS, Job, ResultVariable, text_array
 
 if TYPE_CHECKING:
@@ -54,8 +54,8 @@ class BatchStore:
 
     def _stored_points(self) -> int:
         try:
-            points = json.loads((self.path / _GROUP).read_bytes())["attributes"]["points"]
-        except (OSError, ValueError, KeyError, TypeError):
+            points = json.loads(regular_bytes(self.path / _GROUP) or b"")["attributes"]["points"]
+        except (ValueError, KeyError, TypeError):
             return 0
         return points if isinstance(points, int) and points > 0 else 0
 
@@ -132,10 +132,7 @@ class BatchStore:
 
     def _read(self, name: str, batch: int) -> bytes | None:
         """The bytes of a chunk; None where it has no file."""
-        try:
-            return self._file(name, batch).read_bytes()
-        except OSError:
-            return None
+        return regular_bytes(self._file(name, batch))
 
     def _mark(self, batch: int, chunks: list[bytes | None]) -> bytes | None:
         """The checksum of a batch as it is stored: of the declaration, the extent of the batch, and its chunks.
@@ -185,15 +182,11 @@ class BatchStore:
         return array.astype(variable.kind)
 
     def _put(self, file: Path, content: bytes, *, only_changes: bool = False) -> None:
-        if only_changes:
-            try:
-                if file.read_bytes() == content:
-                    return
-            except OSError:
-                pass
+        if only_changes and regular_bytes(file) == content:
+            return
         with writing(file):
             file.parent.mkdir(parents=True, exist_ok=True)
-        with whole(file) as part:
+        with whole(file, is_result=False) as part:
             part.write_bytes(content)
 
     def _remove_leftovers(self) -> None:
@@ -207,9 +200,25 @@ class BatchStore:
         of them, for more points than the memory holds."""
         import xarray as xr
 
-        dataset = xr.open_zarr(self.path, chunks=None, consolidated=False, decode_times=False)
+        own = _store_of(self.path, frozenset({*self._arrays, *(c.name for c in self.job.coordinates)}))
+        dataset = xr.open_zarr(own, chunks=None, consolidated=False, decode_times=False)
         dataset.attrs["points"] = self.job.points
         return dataset[self._names].isel({self.job.dimension: slice(0, self.job.points)})
+
+
+def _store_of(path: Path, names: frozenset[str]) -> Any:
+    """The store with its own arrays alone: what others have put beside them is not read."""
+    from zarr.storage import LocalStore, WrapperStore
+
+    class OwnArrays(WrapperStore):  # type: ignore[misc]
+        """A store that lists no other names."""
+
+        async def list_dir(self, prefix: str) -> AsyncIterator[str]:
+            async for name in super().list_dir(prefix):
+                if prefix or name in names:
+                    yield name
+
+    return OwnArrays(LocalStore(path, read_only=True))
 
 
 def made_anew(batches: int, points: str, store: str) -> str:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
-import signal
 import sys
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -16,11 +14,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 import typer.core
 
+from . import interrupts
 from .command_options import BackendOption
 from .console import finish, leave, progress_bar, study_file, terminal_console
 from .errors import InputError, InterruptedRunError, RunError, printable
 from .export_command import ExportCommand, export, export_ssp
-from .files import claim, clear, full
+from .files import claim, clear, full, refuse_foreign, written
 from .identify_command import identify
 from .sweep_command import sweep
 from .watch_command import watch
@@ -39,14 +38,14 @@ class Example(StrEnum):
 
 
 class _Commands(typer.core.TyperGroup):
-    """The group of all commands. It turns Ctrl-C and SIGTERM into an error of this package, as typer would
-    turn a KeyboardInterrupt into a bare exit status."""
+    """The group of all commands. It turns an interrupt into an error of this package, as typer would turn a
+    KeyboardInterrupt into a bare exit status."""
 
     def invoke(self, ctx: Any) -> Any:
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt:
-            raise InterruptedRunError("interrupted before all was written") from None
+            raise InterruptedRunError(_INTERRUPTED) from None
 
 
 app = typer.Typer(
@@ -121,7 +120,7 @@ def study(
     loaded = study_file(config)
     from .report import results
     from .report import study as contents
-    from .study.record import INSUFFICIENT
+    from .study.record import INSUFFICIENT, SPEED_MISSED
 
     with claim(output, "study"):
         errors = terminal_console(stderr=True)
@@ -142,13 +141,16 @@ def study(
         raise unwritten
     if record.insufficient:
         errors.print(INSUFFICIENT)
+    elif not record.reaches:
+        errors.print(SPEED_MISSED)
+    if record.insufficient or not record.reaches:
         raise typer.Exit(1)
 
 
 @app.command()
 def compare(
-    a: Annotated[Path, typer.Argument(help="Folder of a study, or its result.json.")],
-    b: Annotated[Path, typer.Argument(help="Another one.")],
+    first: Annotated[Path, typer.Argument(help="Folder of a study, or its result.json.")],
+    second: Annotated[Path, typer.Argument(help="Folder of the other study, or its result.json.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the comparison.")] = Path(
         "comparison"
     ),
@@ -161,7 +163,7 @@ def compare(
     from .study.comparison import compare as compared
     from .study.comparison import read_result
 
-    results = read_result(a), read_result(b)
+    results = read_result(first), read_result(second)
     with claim(output, "compare"):
         contents = comparison.comparison_report(compared(*results))
         clear(output, *files.names(comparison.NAME, ()))
@@ -195,7 +197,7 @@ def optimize(
 def _stopped_early(failure: RunError, output: Path, errors: Console) -> None:
     sentence = f"The run stopped early: {failure}. What was computed before is in {output}."
     errors.print(printable(sentence, 2000), soft_wrap=True)
-    raise typer.Exit(_status(failure))
+    sys.exit(_status(failure))
 
 
 app.command()(sweep)
@@ -267,7 +269,9 @@ def two_bar_error(
     with claim(output, "two-bar-error"):
         from .report import files
 
-        clear(output, *files.names(two_bar.NAME, (two_bar.PICTURE,)))
+        names = files.names(two_bar.NAME, (two_bar.PICTURE,))
+        refuse_foreign(output, *names)
+        clear(output, *names)
         with progress_bar(terminal_console(stderr=True)) as progress:
             progress("bars and catenaries", 0.0, 1.0)
             comparison = two_bar.two_bar_error(lambda done: progress("bars and catenaries", done, 1.0))
@@ -300,80 +304,101 @@ def linkage_command(
         from .report import files, linkage_report
         from .study.linkage_turn import linkage_findings
 
-        clear(output, *files.names(linkage_report.NAME, linkage_report.PICTURES))
+        names = files.names(linkage_report.NAME, linkage_report.PICTURES)
+        refuse_foreign(output, *names)
+        clear(output, *names)
         contents = linkage_report.linkage_report(linkage_findings(machine, rate), str(file))
         finish(contents, output, linkage_report.NAME)
 
 
-_end_signals: list[int] = []
-"""Signals that ended this process, except Ctrl-C."""
-
-
-def _end_in_order(number: int, frame: Any) -> None:
-    """Handle a signal as Ctrl-C is handled: the results so far are written, and temporary folders are
-    removed."""
-    _end_signals.append(number)
-    raise KeyboardInterrupt
-
-
-@contextmanager
-def _ending_in_order() -> Iterator[None]:
-    """Within the context SIGTERM ends the process in order, if this thread may set its handler."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    _end_signals.clear()
-    before = signal.signal(signal.SIGTERM, _end_in_order)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
-
-
 def _status(error: BaseException) -> int:
     """Exit status of a run that failed with `error`."""
-    if _end_signals:
-        return 128 + _end_signals[0]
-    if isinstance(error, InterruptedRunError | KeyboardInterrupt | typer.Abort):
-        return 130
+    if isinstance(error, InterruptedRunError):
+        return interrupts.status()
     return 2 if isinstance(error, InputError) else 1
 
 
 def main() -> None:
     """Run the command line. The exit status is 2 for bad input, with one line for each fault, 1 for a run
-    that failed or a file that could not be written, 130 for Ctrl-C, and 143 for SIGTERM."""
+    that failed or a file that could not be written, 130 for Ctrl-C, 143 for SIGTERM, and 129 for SIGHUP."""
+    written.clear()
+    with interrupts.remembered():
+        status, words = interrupts.status(), _INTERRUPTED
+        try:
+            status, words = _outcome()
+        except KeyboardInterrupt:  # a second one, while the first was told
+            pass
+        except Exception:
+            if interrupts.received() is None:
+                raise
+        interrupts.hold()
+        if interrupts.received() is not None and status != interrupts.status():
+            # a library has turned the interrupt into its own error, or has lost it
+            status, words = interrupts.status(), _INTERRUPTED
+        if words and status == interrupts.status():
+            words = f"{words}; {_told(written)}"
+        _tell(words)
+    sys.exit(status)
+
+
+_INTERRUPTED = "interrupted"
+
+
+def _told(files: Sequence[Path]) -> str:
+    """The files that were written before an interrupt, in words."""
+    there = list(dict.fromkeys(printable(str(file), 500) for file in files if file.exists()))
+    if not there:
+        return "nothing was written"
+    shown, more = there[:_MOST_FILES], len(there) - _MOST_FILES
+    return f"written: {', '.join(shown)}{f' and {more} more' if more > 0 else ''}"
+
+
+_MOST_FILES = 12
+"""Largest number of files that are named after an interrupt."""
+
+
+def _outcome() -> tuple[int, str]:
+    """Run the command; returns the exit status and the last words, a line for each fault."""
     try:
-        with _ending_in_order():
-            sys.exit(app(sys.argv[1:] or ["--help"], standalone_mode=False))
+        status = app(sys.argv[1:] or ["--help"], standalone_mode=False) or 0
+        # typer makes a bare status of an interrupt that comes before the command begins
+        return status, _INTERRUPTED if status == interrupts.status() else ""
+    except SystemExit as end:
+        return int(end.code or 0), ""
     except (InputError, RunError) as error:
-        _end(str(error), _status(error))
-    except (typer.Abort, KeyboardInterrupt) as error:
-        _end("interrupted", _status(error))
+        return _status(error), str(error)
+    except (typer.Abort, KeyboardInterrupt):
+        return interrupts.status(), _INTERRUPTED
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(1)
+        return 1, ""
     except OSError as error:
         where = error.filename or ("the output or the folder for temporary files" if full(error) else "")
-        _end(f"{where}: {error.strerror or error}", 1 if full(error) else 2)
+        return 1 if full(error) else 2, f"{where}: {error.strerror or error}"
     except Exception as error:
         # wrong usage: an unknown command or option, a missing argument
         if not hasattr(error, "format_message"):
             raise
-        _end(_usage(error), 2)
+        return 2, _usage(error)
 
 
 def _usage(error: Any) -> str:
     """The message of a wrong usage, with the command whose help shows the right one."""
     context = getattr(error, "ctx", None)
     command = f"chainunit {context.info_name}" if context and context.parent else "chainunit"
-    words = error.format_message().replace("Value error, ", "").removesuffix(".")
+    missing = error.param if hasattr(error, "param_type") else None
+    if missing is not None and missing.param_type_name == "argument":
+        words = f"{missing.name.upper()} is missing: {missing.help}"
+    else:
+        words = error.format_message().replace("Value error, ", "")
+    words = words.removesuffix(".")
     return f"{words} ({command} --help shows {'its options' if ' ' in command else 'the commands'})"
 
 
-def _end(message: str, status: int) -> None:
-    for line in message.splitlines():
-        print("chainunit: " + printable(" ".join(line.split()), 2000), file=sys.stderr)
-    sys.exit(status)
+def _tell(words: str) -> None:
+    with contextlib.suppress(OSError):
+        for line in words.splitlines():
+            print("chainunit: " + printable(" ".join(line.split()), 2000), file=sys.stderr)
 
 
 if __name__ == "__main__":

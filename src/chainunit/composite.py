@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 
 from .composition import Composition, SystemPoint, modules_of, referred
 from .errors import GeometryError, refusal_prefix
-from .model import Model, Part, keep
+from .model import About, Model, Part, keep
 from .quantities import Layout
 
 
@@ -243,6 +243,18 @@ def _composed(text: str, *models: type[Model]) -> type[CompositeModel]:
         "States": of.States if of.has_states else None,
         "required": of.required(lambda model: model.required),
         "start_required": of.required(lambda model: model.start_required),
+        "about": About(**of.data["about"]) if of.data["about"] is not None else None,
+        "repeated": {
+            f"{own}.{name}": f"{own}.{one}"
+            for own, model in of.models.items()
+            for name, one in model.repeated.items()
+        },
+        "constant": {
+            f"{own}.{name}": value
+            for own, model in of.models.items()
+            for name, value in model.constant.items()
+        },
+        "experiment": MappingProxyType(of.data["experiment"]),
         "terminals": of.terminals(),
         "derived": sum(model.derived for model in models),
         "input_rates": of.input_rates(),

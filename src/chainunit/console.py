@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from .errors import WriteError, printable
+from .errors import RemarkWarning, WriteError, printable
 from .files import write_all
 
 if TYPE_CHECKING:
@@ -71,11 +73,26 @@ def progress_bar(console: Console) -> Iterator[Callable[[str, float, float], Non
             bar.stop()
 
 
+def show_only_remarks() -> None:
+    """Show warnings as remarks. Those of libraries are for programmers: they are not shown, except where the user
+    asks Python for them (``python -W``)."""
+    if sys.warnoptions:
+        return
+    warnings.simplefilter("ignore")
+    warnings.simplefilter("default", RemarkWarning)
+    warnings.showwarning = lambda message, *_: show_remark(str(message))
+
+
+def show_remark(sentence: str) -> None:
+    """Show a remark beside the result."""
+    terminal_console(stderr=True).print(f"Remark: {printable(sentence, 2000)}", soft_wrap=True)
+
+
 def study_file(file: Path | None) -> Any:
     """The study of a file; a value that looks like a slip of a unit is named before any run."""
     from .study import config as configuration
 
     loaded = configuration.load(file)
     for slip in loaded.slips:
-        terminal_console(stderr=True).print(f"Remark: {slip.sentence}", soft_wrap=True)
+        show_remark(slip.sentence)
     return loaded

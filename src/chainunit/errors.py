@@ -42,6 +42,10 @@ class InputError(ValueError):
         return faults[0] if len(faults) == 1 else InputError("\n".join(map(str, faults)), faults=faults)
 
 
+class RemarkWarning(UserWarning):
+    """A remark for the user beside a result."""
+
+
 class GeometryError(InputError):
     """With these lengths the crank cannot make a full turn; `names` are the parameters that cause it."""
 

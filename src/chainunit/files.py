@@ -8,13 +8,15 @@ import json
 import os
 import re
 import secrets
+import stat
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
-from .errors import InputError, WriteError
+from .errors import Faults, InputError, WriteError
+from .ledger import Ledger
 
 LOCK = ".chainunit-lock"
 """Name of the file that stands in a folder while a process writes there."""
@@ -40,14 +42,19 @@ RESULTS: Mapping[str, _Kind] = {
     "reproduce": _Kind("the papers", "reproduction.json"),
     "two-bar-error": _Kind("the two-bar error", "two_bar_error.json"),
 }
-"""The kinds of results by their commands. All have a file report.html."""
+"""The kinds of results by their commands. All have a file report.html, and the numbers as text, too."""
+PAGE = "report.html"
+written: list[Path] = []
+"""The results that this process wrote by `whole`, in order."""
+_ledgers: list[Ledger] = []
+"""The lists of files of the folders that this process has claimed for a command."""
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
 
 
 @contextmanager
-def whole(file: Path) -> Iterator[Path]:
+def whole(file: Path, *, is_result: bool = True) -> Iterator[Path]:
     """A temporary path to write to in place of `file`. It is renamed to `file` at the end, and removed after
-    an error.
+    an error. A file that is no result, such as a part of a store, is in no list of files.
 
     Each call has a new temporary name, so that several processes may write the same file. The last one wins.
 
@@ -60,13 +67,44 @@ def whole(file: Path) -> Iterator[Path]:
     """
     if file.exists() and not file.is_file():
         raise InputError(f"{file}: is not a regular file; name another")
+    ledger = _ledger_of(file) if is_result else None
+    if ledger is not None and file.exists() and not ledger.wrote(file):
+        raise WriteError(f"{file}: stays as it is, {_FOREIGN}")
     part = file.with_name(f"{file.name}.{secrets.token_hex(8)}.part")
     try:
         with writing(file):
             yield part
+            if ledger is not None:
+                ledger.add(file, part)
             part.replace(file)
+            if is_result:
+                written.append(file)
     finally:
         part.unlink(missing_ok=True)
+
+
+_FOREIGN = "as chainunit did not write it, or it was changed since; move it, or name another folder"
+
+
+def _ledger_of(file: Path) -> Ledger | None:
+    """The list of the claimed folder in which a file lies."""
+    return next((ledger for ledger in reversed(_ledgers) if ledger.has(file)), None)
+
+
+def refuse_foreign(folder: Path, *names: str) -> None:
+    """Refuse a folder with files of these names that no earlier run wrote; they would be lost.
+
+    Raises
+    ------
+    InputError
+        with a line for each such file.
+    """
+    faults = Faults()
+    for file in dict.fromkeys(folder / name for name in names):
+        ledger = _ledger_of(file)
+        if ledger is not None and file.is_file() and not ledger.wrote(file):
+            faults.add([InputError(f"{file}: would be lost, {_FOREIGN}")])
+    faults.refuse()
 
 
 @contextmanager
@@ -107,6 +145,17 @@ def write_all(writers: Iterable[Callable[[], list[Path]]]) -> tuple[list[Path], 
     return paths, failure
 
 
+def regular_bytes(file: Path) -> bytes | None:
+    """The content of a regular file; None where there is none, or something else in its place, such as a pipe, for
+    which a reader would wait."""
+    try:
+        if not stat.S_ISREG(file.stat().st_mode):
+            return None
+        return file.read_bytes()
+    except OSError:
+        return None
+
+
 def full(error: OSError) -> bool:
     """Whether the disk, and not the name of the file, is the cause of the error."""
     return error.errno in _FULL
@@ -119,7 +168,7 @@ def leftovers(file: Path) -> list[Path]:
 
 
 def clear(folder: Path, *names: str) -> None:
-    """Remove the files of an earlier run.
+    """Remove the files of an earlier run; files that no run wrote stay.
 
     Raises
     ------
@@ -129,7 +178,9 @@ def clear(folder: Path, *names: str) -> None:
     for stale in (folder / name for name in names):
         if stale.exists() and not stale.is_file():
             raise InputError(f"{stale}: is not a regular file; name another folder")
-        stale.unlink(missing_ok=True)
+        ledger = _ledger_of(stale)
+        if ledger is None or (stale.exists() and ledger.wrote(stale)):
+            stale.unlink(missing_ok=True)
         for part in leftovers(stale):
             part.unlink(missing_ok=True)
 
@@ -176,9 +227,9 @@ def refuse_other_result(path: Path, command: str) -> None:
 
 
 @contextmanager
-def claim(path: Path, command: str = "") -> Iterator[Path]:
+def claim(path: Path, command: str = "", *names: str) -> Iterator[Path]:
     """The `folder` at `path`, for this process alone as long as the context lasts; for a `command` of `RESULTS` it
-    must not have the result of another one.
+    must not have the result of another one, nor files of `names` or of this kind that no earlier run wrote.
 
     A lock of the operating system on a file guards the folder. The file is removed at the end. The lock ends
     with the process, even if the process is killed. A file system without locks gives no protection. A folder
@@ -187,7 +238,7 @@ def claim(path: Path, command: str = "") -> Iterator[Path]:
     Raises
     ------
     InputError
-        where another process writes there; see also `refuse_other_result` and `folder`.
+        where another process writes there; see also `refuse_other_result`, `refuse_foreign` and `folder`.
     """
     if command:
         refuse_other_result(path, command)
@@ -196,7 +247,7 @@ def claim(path: Path, command: str = "") -> Iterator[Path]:
     while True:
         handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
         try:
-            if not _locked(handle):
+            if not take_lock(handle):
                 raise InputError(
                     f"{path}: another chainunit writes to this folder; wait until it ends, or name another folder "
                     "with -o"
@@ -210,7 +261,8 @@ def claim(path: Path, command: str = "") -> Iterator[Path]:
             raise
         os.close(handle)
     try:
-        yield path
+        with _listed(path, command, names) if command else contextlib.nullcontext():
+            yield path
     except BaseException:
         left_empty = ours
         raise
@@ -227,6 +279,21 @@ def claim(path: Path, command: str = "") -> Iterator[Path]:
             _remove_empty(path)
 
 
+@contextmanager
+def _listed(path: Path, command: str, names: Sequence[str]) -> Iterator[None]:
+    """Keep the list of the files of a claimed folder."""
+    ledger = Ledger(path)
+    _ledgers.append(ledger)
+    try:
+        numbers = RESULTS[command].file
+        refuse_foreign(path, PAGE, numbers, numbers.replace(".json", ".md"), *names)
+        yield
+    finally:
+        _ledgers.remove(ledger)
+        with contextlib.suppress(OSError):
+            ledger.close()
+
+
 def _remove_empty(path: Path) -> None:
     """Remove the folder and the folders in it; those that hold a file stay."""
     for inner in (inner for inner in path.iterdir() if inner.is_dir() and not inner.is_symlink()):
@@ -235,8 +302,9 @@ def _remove_empty(path: Path) -> None:
         path.rmdir()
 
 
-def _locked(handle: int) -> bool:
-    """Take the lock of an open file; False where another process has it."""
+def take_lock(handle: int, *, without_locks: bool = True) -> bool:
+    """Take the lock of an open file; False where another process has it. `without_locks` is the answer of a file
+    system that has no locks."""
     try:
         if sys.platform == "win32":
             import msvcrt
@@ -247,5 +315,5 @@ def _locked(handle: int) -> bool:
 
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
-        return error.errno not in (errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK)
+        return without_locks and error.errno not in (errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK)
     return True

@@ -27,7 +27,7 @@ def identify(
     from .study.identification.result import outlook
 
     console = terminal_console(stderr=True)
-    with claim(output, "identify"):
+    with claim(output, "identify", contents.FILE):
         with progress_bar(console) as progress:
             found = identified(loaded, progress, lambda *told: console.print(outlook(*told), soft_wrap=True))
         contents.prepare(output)

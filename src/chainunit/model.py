@@ -5,7 +5,6 @@ Standard library only: FMUs carry this file.
 
 from __future__ import annotations
 
-import copy
 import copyreg
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -61,13 +60,38 @@ class Requirement:
 class Terminal:
     """Variables that are connected together. `members` maps each name that both sides know to the model's own
     name; `flows` gives the flow variables with their direction ("inflow", "outflow"); only terminals of one
-    `kind` are joined."""
+    `kind` are joined. By the `rule` "plug" both sides have all members, by "bus" those are joined that both have."""
 
     name: str
     kind: str
     description: str
     members: Mapping[str, str]
     flows: Mapping[str, str] = field(default_factory=dict)
+    rule: str = "plug"
+
+
+@dataclass(frozen=True)
+class About:
+    """Who made a model and who may use it, as its FMU says it. Empty texts were not given."""
+
+    author: str = ""
+    copyright: str = ""
+    license: str = ""
+    version: str = ""
+
+
+Place = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Sketch:
+    """A machine as lines in a plane, x right and y up [m]: the places of its pins by name, its links with the names
+    of their pins, the link that is driven, and the pins in the ground."""
+
+    pins: Mapping[str, Place]
+    links: Mapping[str, Sequence[str]]
+    driven: str
+    ground: frozenset[str]
 
 
 class Part:
@@ -106,7 +130,9 @@ def keep(model: type[Model], *names: str) -> None:
     for name in names:
         of = getattr(model, name)
 
-        def reduced(instance: Any, of: type = of, name: str = name) -> tuple[Any, tuple[Any, ...]]:
+        def reduced(instance: Any, of: type = of, name: str = name) -> str | tuple[Any, ...]:
+            if type(instance) is not of:  # of another declaration with these fields
+                return copyreg.__newobj__, (type(instance),), vars(instance)  # type: ignore[attr-defined]
             return _kept, (model, name, Layout(of).values(instance), getattr(instance, "derived", None))
 
         of.__reduce__ = reduced
@@ -160,6 +186,17 @@ class Model(metaclass=ModelType):
     maker: ClassVar[tuple[Callable[..., Any], tuple[Any, ...]] | None] = None
     """The same call as function and arguments, by which another process gets the class."""
 
+    notes: ClassVar[str] = ""
+    """Further paragraphs of the documentation of its FMU, each behind an empty line: frame, signs, limits."""
+    about: ClassVar[About | None] = None
+    """Who made the model, where its user did; None for the models of this package."""
+    repeated: ClassVar[Mapping[str, str]] = {}
+    """Outputs that are another output under a further name, by their names: their FMU has one value for both."""
+    constant: ClassVar[Mapping[str, float]] = {}
+    """Outputs that never change, with their values by name."""
+    experiment: ClassVar[Mapping[str, float]] = {}
+    """``step`` and ``stop`` [s] of the default experiment of its FMU, where the maker of the model knows them."""
+
     parameter_layout: ClassVar[Layout]
     input_layout: ClassVar[Layout]
     state_layout: ClassVar[Layout | None]
@@ -187,8 +224,9 @@ class Model(metaclass=ModelType):
         """The parameters with the values of `derive`, or with the values `derived` in their place."""
         if not cls.derived:
             return p
-        ready = copy.copy(p)
-        object.__setattr__(ready, "derived", cls.derive(xp, p) if derived is None else derived)
+        # not `copy.copy`, which asks for the pickled form: that has no symbols and no values of a subclass
+        ready = object.__new__(type(p))
+        vars(ready).update(vars(p), derived=cls.derive(xp, p) if derived is None else derived)
         return ready
 
     @classmethod
@@ -319,6 +357,11 @@ class Model(metaclass=ModelType):
             p = cls.prepared(MATH, p)
         shared = cls.shared(xp, p, u, x)
         return tuple(part.equations(xp, p, u, x, shared) for part in cls.parts)
+
+    @classmethod
+    def sketch(cls) -> Sketch | None:
+        """The machine as lines, if it is a mechanism."""
+        return None
 
     @classmethod
     def further(cls, xp: Any, p: Any, u: Any, x: Any = None) -> list[tuple[Variable, Any]]:

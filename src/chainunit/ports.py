@@ -2,8 +2,8 @@
 
 The machine gives its torque at constant speed and its reflected inertia at one point, with their slopes. The
 driver solves for its own acceleration with the linearised load inside its step. So there is no algebraic
-loop, and the coupling is second order in the communication step. The port is seven plain signals, and ports
-can be chained.
+loop, and the coupling is second order in the communication step; through a driveline near rest it is first order
+(`chainunit.drives.driveline`). The port is seven plain signals, and ports can be chained.
 """
 
 from __future__ import annotations
@@ -102,8 +102,8 @@ def shaft_motion(load: LoadPort, phi: Any, w: Any, J: Any, tau: Any) -> tuple[An
 
 OWN = "org.chainunit"
 """Prefix of the names of this package's own kinds of terminals."""
-FLANGE, LOAD = f"{OWN}.flange", f"{OWN}.load"
-"""Kinds of terminals: of a shaft, and of a load port."""
+FLANGE, LOAD, MEASURED = f"{OWN}.flange", f"{OWN}.load", f"{OWN}.measured"
+"""Kinds of terminals: of a shaft, of a load port, and of the measured signals of a motor."""
 
 
 def flange(flow: str, prefix: str = "", name: str = "flange") -> Terminal:
@@ -119,6 +119,13 @@ def flanges(flow: str) -> tuple[Terminal, Terminal]:
     modelica = "Modelica.Mechanics.Rotational.Interfaces.Flange_a"
     members = {name: name for name in ("phi", "tau")}
     return own, Terminal("flange_a", modelica, f"{own.description}, as Modelica's", members, own.flows)
+
+
+def measured_terminal(**signals: str) -> Terminal:
+    """The terminal of the motion of a motor and of the `signals` that are measured at it: ``torque``, ``current``,
+    ``power``, with the names of their variables."""
+    members = {"phi": "phi", "w": "w", **signals}
+    return Terminal("measured", MEASURED, "the measured signals of the motor", members, rule="bus")
 
 
 def way_terminals(load: bool) -> tuple[Terminal, ...]:

@@ -79,13 +79,19 @@ def _converted(variable: Variable, text: str) -> float:
 
 
 def option_value(name: str, text: str, unit: str, description: str) -> float:
-    """The positive value of an option of the command line in `unit`.
+    """The positive value of an option of the command line in `unit`. A number without a unit is refused, as a reader
+    may take another unit for granted.
 
     Raises
     ------
     InputError
         in one line, with the range and an example.
     """
+    parts = units.split(text)
+    if parts is not None and parts[0] and not parts[1]:
+        others = {"rad/s": ("rev/min", "rad/s"), "m/s": ("m/s", "mm/s")}.get(unit, (unit.replace(".", " "),))
+        examples = " or ".join(f'"{parts[0]:g} {other}"' for other in others)
+        raise InputError(f"{name} {printable(text)}: has no unit; give it as {examples}")
     try:
         return to_number(
             Variable(name, description, Quantity(unit, description, low=0.0, open_low=True)), text

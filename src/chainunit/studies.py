@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from .ending import in_temporary_folder
-from .errors import InputError, RunError, WriteError, near_name, shown
-from .files import claim, clear, write_all
+from .errors import InputError, RemarkWarning, RunError, WriteError, near_name, shown
+from .files import claim, clear, whole, write_all
 from .fmu.backends import Backend
 from .identifications import IdentificationResult, WatchResult, make_identification, make_watch
 from .machines.machine import Machine
@@ -117,7 +117,7 @@ class Study:
             config = dataclasses.replace(config, source=f"{source} with {self._changed}")
         self.config = config
         for slip in config.slips:
-            warnings.warn(slip.sentence, stacklevel=3)
+            warnings.warn(slip.sentence, RemarkWarning, stacklevel=3)
         return self
 
     def with_values(self, values: Mapping[str, Any]) -> Self:
@@ -394,10 +394,13 @@ class StudyResult:
         InputError, WriteError
             as `Study.run`.
         """
-        with claim(Path(folder), "study") as place:
+        with claim(Path(folder), "study", *results.FILES) as place:
             if place.resolve() != self._folder.resolve():
                 clear(place, *results.FILES)
-                shutil.copytree(self._folder / "fmu", place / "fmu", dirs_exist_ok=True)
+                (place / "fmu").mkdir(exist_ok=True)
+                for fmu in (self._folder / "fmu").iterdir():
+                    with whole(place / "fmu" / fmu.name) as part:
+                        shutil.copyfile(fmu, part)
                 if self.record.monte_carlo is not None:
                     store = self.record.monte_carlo.file
                     shutil.copytree(store, place / store.name, dirs_exist_ok=True)

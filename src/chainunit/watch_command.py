@@ -23,7 +23,7 @@ def watch(
     from .report import watch as contents
     from .study.identification.watch import watch as watched
 
-    with claim(output, "watch"):
+    with claim(output, "watch", *contents.PICTURES):
         with progress_bar(terminal_console(stderr=True)) as progress:
             found = watched(loaded, progress)
         contents.prepare(output)

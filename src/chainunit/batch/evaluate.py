@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..errors import InputError, RunError
+from ..errors import InputError, RemarkWarning, RunError
 from ..model import Model
 from ..native.operations import ARGUMENT
 from ..quantities import Variable
@@ -250,12 +250,15 @@ class Grid:
         try:
             kernel = native_kernel(self._equations, varying, reductions)
         except RunError as error:
-            warnings.warn(f"the native engine is not available, numpy computes: {error}", stacklevel=4)
+            warnings.warn(
+                f"the native engine is not available, numpy computes: {error}", RemarkWarning, stacklevel=4
+            )
             return None
         if kernel is None:
             warnings.warn(
                 "no C compiler (cc, gcc, clang, or zig by pip install 'chainunit[cross]') found: numpy computes, "
                 "some twenty times slower",
+                RemarkWarning,
                 stacklevel=4,
             )
         return kernel

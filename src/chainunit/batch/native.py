@@ -10,15 +10,14 @@ import ctypes
 import itertools
 import math
 import os
-import tempfile
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..ending import scratch
 from ..native.compilers import Compiler, compile_code, compiler, for_this_processor
 from .equations import Equations
 from .reductions import REDUCTIONS
@@ -176,14 +175,10 @@ def load(source: str, compiler: Compiler) -> ctypes.CDLL:
     flags, libraries, files = for_this_processor(compiler)
     arguments = (*flags, "batch.c", "-o", "batch.so", *libraries)
     binary = compile_code(compiler, arguments, {"batch.c": source.encode(), **files}, "batch.so")
-    handle, name = tempfile.mkstemp(suffix=".so", prefix="chainunit_")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(binary)
-        return ctypes.CDLL(name)
-    finally:
-        if os.name == "posix":  # a loaded library stays usable
-            Path(name).unlink()
+    with scratch() as folder:  # a loaded library stays usable
+        file = folder / "batch.so"
+        file.write_bytes(binary)
+        return ctypes.CDLL(str(file))
 
 
 @lru_cache(maxsize=64)

@@ -1,8 +1,10 @@
 """Standard motors: the packaged table, and the rows of the user's file.
 
 The packaged table has cage motors for 400 V, 50 Hz, 0.55 to 75 kW, with 2, 4 and 6 poles, in the frames of
-EN 50347. Their efficiencies are the limits of class IE3 in IEC 60034-30-1. All other values are typical of such
-motors but belong to no maker: they vary smoothly with size, and take the place of a supplier's catalogue.
+EN 50347. Their efficiencies are the limits in IEC 60034-30-1 of the class that the regulation EU 2019/1781 asks of
+motors on the market: IE3, and IE4 from 75 kW on (since July 2023, up to 200 kW, with 2 to 6 poles). All other values
+are typical of such motors but belong to no maker: they vary smoothly with size, and take the place of a supplier's
+catalogue.
 
 A user's file has the same columns. In CSV a heading is the name of a value, with its unit in brackets where it
 has one ("power [kW]", "speed [rev/min]"); in TOML each motor is a table ``[[motor]]``, a number is in the
@@ -35,6 +37,7 @@ class CatalogueData(Nameplate):
     """A nameplate, and the other values of a catalogue."""
 
     mass: Value = quantity("kg", "mass; 0: unknown", default=0.0, min=0.0)
+    price: Value = quantity("1", "price, in one currency for all; 0: unknown", default=0.0, min=0.0, max=1e12)
     starts: Value = quantity(
         "1",
         "permitted starts direct on line in an hour, without load; 0: unknown",

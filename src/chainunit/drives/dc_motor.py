@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..engines import MATH
 from ..model import Part, Requirement
-from ..ports import LoadInput
+from ..ports import LoadInput, measured_terminal
 from ..quantities import Value, declaration, group, quantity
 from .motor import T_RATED, Motor, MotorOutputs, MotorParameters, MotorPoint, ShaftStates, friction_time
 
@@ -170,6 +170,7 @@ class DcMotor(Motor):
     States = States
     Point = DcMotorPoint
     current, temperature, winding = "armature.i", "armature.T", "armature"
+    terminals = (*Motor.terminals, measured_terminal(current="armature.i", power="supply_power"))
     limited_by: ClassVar[Mapping[str, float]] = {"w": 1e-9}
     required = (
         Requirement(

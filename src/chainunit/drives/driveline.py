@@ -39,7 +39,9 @@ from ..quantities import Value, declaration, group, quantity
 from .cardan import BENDS, RIGHT, ShaftLine, Twist, two_joints
 
 W_SMALL = 0.1
-"""Speed of the motor [rad/s] below which the slope by the angle tends to the plain derivative."""
+"""Speed of the motor [rad/s] below which the slope by the angle tends to the plain derivative. There the coupling is
+of first order in the step. A smaller speed would make this range shorter, but the slope along the motion, a quotient
+of two small numbers, larger without bounds where a vibrating motor turns back."""
 
 
 @declaration
@@ -174,8 +176,13 @@ class CardanDriveline(Model):
 
     Connect the motor's phi, w, a to the inputs of these names, and the port tau_bias ... w0 to the motor's load.
     Connect driven.phi, driven.w, driven.a to the machine's phi, w, a, and the machine's port to load. In a
-    co-simulation phi follows w, and w follows a, inside a step. The communication step must be well below the period
-    of the torsional vibration: at most 0.3/k, with the natural frequency k in rad/s.
+    co-simulation phi follows w, and w follows a, inside a step.
+
+    The communication step must be well below the period of the torsional vibration: at most 0.3/k, with the natural
+    frequency k in rad/s of the line between the inertias of both sides. No FMU checks this, as none knows the inertia
+    on the other side: in longer steps the vibration grows without end, while each step returns OK. The coupling is of
+    second order in the step where the motor turns. Below about 0.1 rad/s, as in a start from rest, it is of first
+    order, as the port does not follow the driven side there.
     """
 
     name = "CardanDriveline"

@@ -27,6 +27,18 @@ class Transmission:
     d: Value = quantity("N.m.s/rad", "drag that grows with speed, at the motor's shaft", default=0.0, min=0.0)
     J: Value = quantity("kg.m2", "inertia at the motor's shaft", default=0.0, min=0.0)
     torque_limit: Value = quantity("N.m", "permitted torque of the output", default=1e6, above=0.0)
+    start_factor: Value = quantity(
+        "1",
+        "permitted torque of the output in a start, over torque_limit; gears of catalogues commonly permit about 2",
+        default=1.0,
+        min=1.0,
+        max=10.0,
+    )
+
+    @property
+    def start_limit(self) -> float:
+        """Permitted torque of the output in a start [N m]."""
+        return float(self.torque_limit * self.start_factor)
 
 
 KINDS: Mapping[str, Transmission] = MappingProxyType(
@@ -34,9 +46,10 @@ KINDS: Mapping[str, Transmission] = MappingProxyType(
         "direct": Transmission(),
         "gear": Transmission(ratio=10.0, efficiency=0.96),
         "belt": Transmission(ratio=3.0, efficiency=0.95),
+        "worm": Transmission(ratio=50.0, efficiency=0.7),
     }
 )
-"""Typical start values by kind: a coupling, a two-stage helical gear, a V-belt."""
+"""Typical start values by kind: a coupling, a two-stage helical gear, a V-belt, a worm gear."""
 
 
 def motor_side(xp: Any, t: Transmission, torque: Any, w: Any) -> Any:

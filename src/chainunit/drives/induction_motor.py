@@ -26,7 +26,7 @@ from typing import Any, ClassVar, NamedTuple
 from ..engines import MATH
 from ..model import Part, Requirement
 from ..planar import Vec2
-from ..ports import LoadInput
+from ..ports import LoadInput, measured_terminal
 from ..quantities import Value, declaration, group, quantity
 from .motor import (
     T_RATED,
@@ -419,6 +419,7 @@ class InductionMotor(Motor):
     States = States
     Point = InductionMotorPoint
     current, temperature, winding = "i", "stator.T", "stator"
+    terminals = (*Motor.terminals, measured_terminal(current="i", power="supply_power"))
     limited_by: ClassVar[Mapping[str, float]] = {"v": 1e-3, "supply.frequency": 1e-3}
     required = (
         Requirement(

@@ -7,7 +7,7 @@ from collections.abc import Container, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..engines import MATH
-from ..model import Model
+from ..model import Model, Terminal
 from ..ports import LoadState, Start, flanges, load_terminal, shaft_motion
 from ..quantities import Value, declaration, group, quantity
 
@@ -96,7 +96,7 @@ class Motor(Model):
     and it has neither a speed loop nor known limits.
     """
 
-    terminals = (*flanges("outflow"), load_terminal("load."))
+    terminals: ClassVar[tuple[Terminal, ...]] = (*flanges("outflow"), load_terminal("load."))
     Point: ClassVar[Any]
     """The `MotorPoint` of the kind, called with xp, p, u, x."""
 

@@ -17,7 +17,7 @@ def companion_files(
     """Files by their path inside the FMU; `libraries` are the packages whose code the FMU contains: their licences
     are added."""
     model = interface.model
-    png, svg = (icon(model, kind).read_bytes() for kind in ("png", "svg"))
+    png, svg = icon(model, "png"), icon(model, "svg")
     files = {
         "documentation/index.html": page(interface, version).encode(),
         "documentation/licenses/license.txt": licence("chainunit", *libraries).encode(),

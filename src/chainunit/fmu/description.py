@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import cached_property, lru_cache
 from importlib import metadata
@@ -13,7 +13,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from ..engines import casadi_
 from ..errors import InputError
-from ..model import Model
+from ..model import About, Model
 from ..quantities import DISPLAY_UNITS, TYPES, Variable, base_units
 from ..trace import trace
 from .recipe import Experiment, script_of
@@ -74,6 +74,12 @@ class Interface:
                 value = None if causality == "output" else start.get(v.name, v.quantity.start)
                 self.signals.append(Signal(v, causality, value, len(self.signals)))
 
+    @cached_property
+    def repeated(self) -> dict[str, Signal]:
+        """The outputs that repeat another one, by name, with the signal of that one."""
+        own = {signal.name: signal for signal in self.of("output")}
+        return {name: own[of] for name, of in self.model.repeated.items()}
+
     def of(self, causality: str) -> list[Signal]:
         """Signals of one causality, in order."""
         return [s for s in self.signals if s.causality == causality]
@@ -132,6 +138,22 @@ class Interface:
                     f"{self.model.name}: {self.parameters[i].name} is tunable, but `derive` takes it"
                 )
         return rows
+
+    @property
+    def reinitialized(self) -> frozenset[str]:
+        """The states that an event may change: `Model.closed` gives others than the states themselves."""
+        return _shared(self.model)._reinitialized
+
+    @cached_property
+    def _reinitialized(self) -> frozenset[str]:
+        import casadi
+
+        if not (self.model.state_layout and self.model.controlled):
+            return frozenset()
+        _, p, u, x, *_ = self.trace
+        closed = self.model.closed(casadi_(), p, u, x)
+        pairs = zip(self.states, self.model.state_layout.values(x), closed, strict=True)
+        return frozenset(v.name for v, own, met in pairs if not casadi.is_equal(casadi.SX(met), own))
 
     def _influences(self, symbols: list[Any], rows: list[Any]) -> list[list[int]]:
         """Value references of the parameters, inputs and states on which each row depends, directly or through
@@ -195,6 +217,9 @@ def model_description(
     _definitions(root, interface, exchange, set(), add_type)
     variables = SubElement(root, "ModelVariables")
     for attributes, real, state in _variables(interface, exchange):
+        # an output that repeats another one has its value reference, but a place of its own
+        if (one := interface.repeated.get(attributes["name"])) is not None:
+            attributes["valueReference"] = str(one.reference)
         # FMI 2.0 counts variables from 1
         derivative = {} if state is None else {"derivative": str(state + 1)}
         SubElement(SubElement(variables, "ScalarVariable", attributes), "Real", {**real, **derivative})
@@ -224,19 +249,30 @@ def model_description_3(
 
     _definitions(root, interface, True, {"s"}, add_type)
     variables = SubElement(root, "ModelVariables")
+    elements: dict[str, Element] = {}
+    last = 0
     for attributes, real, state in _variables(interface, True):
+        last = int(attributes["valueReference"])
+        if attributes["name"] in interface.repeated:
+            continue
         derivative = {} if state is None else {"derivative": str(state)}
-        SubElement(variables, "Float64", {**attributes, **real, **derivative})
+        elements[attributes["name"]] = SubElement(variables, "Float64", {**attributes, **real, **derivative})
+    for signal in interface.of("output"):
+        if (one := interface.repeated.get(signal.name)) is not None:
+            SubElement(elements[one.name], "Alias", name=signal.name, description=signal.variable.description)
     time = {
         "name": "time",
-        "valueReference": str(len(variables)),
+        "valueReference": str(last + 1),
         "description": "time",
         "causality": "independent",
         "variability": "continuous",
     }
     SubElement(variables, "Float64", time | _unit("s"))
     structure = SubElement(root, "ModelStructure")
+    aliases = {signal.reference for signal in interface.signals if signal.name in interface.repeated}
     for kind, reference, influences in _structure(interface, True):
+        if reference in aliases:
+            continue
         SubElement(structure, kind, {"valueReference": str(reference), **_dependencies(influences)})
     return root
 
@@ -246,8 +282,14 @@ def _variables(
 ) -> Iterator[tuple[dict[str, str], dict[str, str], int | None]]:
     """For each variable, in the order of the value references: its attributes, the attributes of its type, and, for a
     derivative, the value reference of its state."""
+    reinitialized = interface.reinitialized if derivatives else frozenset[str]()
     for signal in interface.signals:
-        yield _attributes(signal), _real(signal), None
+        events = {"reinit": "true"} if signal.name in reinitialized else {}
+        if (value := interface.model.constant.get(signal.name)) is not None:
+            constant = {"variability": "constant", "initial": "exact"}
+            yield _attributes(signal) | constant, _real(replace(signal, start=value)), None
+        else:
+            yield _attributes(signal), _real(signal) | events, None
     first = len(interface.parameters) + len(interface.inputs)
     for i, state in enumerate(interface.states if derivatives else ()):
         attributes = {
@@ -269,8 +311,10 @@ def _structure(interface: Interface, derivatives: bool) -> Iterator[tuple[str, i
     unknowns = list(zip(kinds, [*outputs, *rates], interface.dependencies, strict=False))
     for kind, reference, (in_run, _) in unknowns:
         yield kind, reference, in_run
+    constant = {signal.reference for signal in interface.signals if signal.name in interface.model.constant}
     for _, reference, (_, at_start) in unknowns:
-        yield "InitialUnknown", reference, at_start
+        if reference not in constant:
+            yield "InitialUnknown", reference, at_start
 
 
 def _dependencies(references: Iterable[int]) -> dict[str, str]:
@@ -279,8 +323,12 @@ def _dependencies(references: Iterable[int]) -> dict[str, str]:
 
 
 def _root(model: type[Model], version: str, own: Mapping[str, str]) -> Element:
-    """The root element, with the attributes that are common to both versions of FMI."""
+    """The root element, with the attributes that are common to both versions of FMI. `version` is that of this
+    package."""
     fmi, identifier = own.items()
+    about = model.about or About(metadata.metadata("chainunit")["Author"], _copyright(), "MIT", version)
+    given = {"author": about.author, "version": about.version}
+    given |= {"copyright": about.copyright, "license": about.license}
     return Element(
         "fmiModelDescription",
         dict(
@@ -289,10 +337,7 @@ def _root(model: type[Model], version: str, own: Mapping[str, str]) -> Element:
                 ("modelName", model.name),
                 identifier,
                 ("description", model.description),
-                ("author", metadata.metadata("chainunit")["Author"]),
-                ("version", version),
-                ("copyright", _copyright()),
-                ("license", "MIT"),
+                *((name, text) for name, text in given.items() if text),
                 ("generationTool", f"chainunit {version}"),
                 ("generationDateAndTime", generation_time()),
                 ("variableNamingConvention", "structured"),
@@ -332,9 +377,9 @@ def generation_time() -> str:
 
 
 def _per_second(unit: str) -> str:
-    """The unit of a time derivative, in base units."""
-    if unit == "1":
-        return "1/s"
+    """The unit of a time derivative, in base units; that of an energy is W."""
+    if unit in ("1", "J"):
+        return {"1": "1/s", "J": "W"}[unit]
     powers = base_units(unit)
     powers["s"] = powers.get("s", 0) - 1
     top = ".".join(f"{b}{'' if n == 1 else n}" for b, n in powers.items() if n > 0)
@@ -428,7 +473,7 @@ def terminals(interface: Interface) -> Element:
             group,
             "Terminal",
             name=terminal.name,
-            matchingRule="plug",
+            matchingRule=terminal.rule,
             terminalKind=terminal.kind,
             description=terminal.description,
         )

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import inspect
+from dataclasses import fields
 from html import escape
 
+from ..model import About
 from .description import Interface, Signal
+from .pictures import drawing
 
 _STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 62rem; padding: 0 1rem; color: #1b1b1b; }
@@ -15,25 +18,44 @@ td.number { text-align: right; font-variant-numeric: tabular-nums; white-space: 
 code { font-family: ui-monospace, monospace; }
 """
 
+_FIGURE = "The machine with its start values: links, pins and supports by name; the driven link is coloured."
 _NOT_CONNECTED = "An input that is not connected keeps its start value."
-_MOTION = " Inputs phi, w and a belong together: give all of them. As declared, the shaft stands at phi = 0."
+_MOTION = (
+    " Inputs phi, w and a belong together: give all of them. As declared, the {what} stands at phi = {at:g}."
+)
 
 
 def page(interface: Interface, version: str) -> str:
     """A self-contained page: a description of the model, and tables of its parameters, inputs and outputs."""
     model = interface.model
-    text = escape(inspect.cleandoc(model.__doc__ or "")).replace("\n\n", "</p><p>")
+    text = escape(inspect.cleandoc(model.__doc__ or "") + model.notes).replace("\n\n", "</p><p>")
+    sketch = model.sketch()
+    picture = f"<figure>{drawing(sketch)}<figcaption>{_FIGURE}</figcaption></figure>\n" if sketch else ""
     tables = "".join(
         f"<h2>{title}</h2>\n{_table(interface.of(causality), causality)}"
         for title, causality in (("Parameters", "parameter"), ("Inputs", "input"), ("Outputs", "output"))
     )
-    has_motion = {"phi", "w", "a"} <= {signal.variable.name for signal in interface.of("input")}
-    inputs = _NOT_CONNECTED + (_MOTION if has_motion else "")
+    motion = {s.name: s for s in interface.of("input") if s.name in ("phi", "w", "a")}
+    inputs = _NOT_CONNECTED
+    if len(motion) == 3 and not motion["w"].start:
+        phi = motion["phi"]
+        inputs += _MOTION.format(
+            what="shaft" if phi.variable.unit == "rad" else "driver", at=phi.start or 0.0
+        )
     return (
         f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{model.name}</title>'
         f"<style>{_STYLE}</style></head>\n<body><h1>{model.name}</h1>\n<p>{escape(model.description)}</p>\n"
-        f"<p>{text}</p>\n<p>{inputs}</p>\n{tables}<p>Made by chainunit {version}, MIT licence.</p></body></html>\n"
+        f"{picture}<p>{text}</p>\n<p>{inputs}</p>\n{tables}{_origin(model.about)}"
+        f"<p>Made by chainunit {version}; its code in this FMU is under the MIT licence.</p></body></html>\n"
     )
+
+
+def _origin(about: About | None) -> str:
+    """Who made the machine, as far as it is known."""
+    texts = [
+        f"{field.name}: {text}" for field in fields(About) if about and (text := getattr(about, field.name))
+    ]
+    return f"<p>Of this machine: {escape('; '.join(texts))}.</p>\n" if texts else ""
 
 
 def _table(signals: list[Signal], causality: str) -> str:

@@ -10,7 +10,6 @@ import ast
 import hashlib
 import re
 import sys
-import tempfile
 import uuid
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping
@@ -21,6 +20,7 @@ from xml.etree.ElementTree import Element, tostring
 # imported here and not later: a Python FMU that runs in this process brings its own pythonfmu, without binaries
 from pythonfmu import FmuBuilder
 
+from ..ending import scratch
 from ..errors import InputError
 from ..files import folder, whole
 from ..model import Model
@@ -61,8 +61,7 @@ def export(model: type[Model], file: Path, start: dict[str, float] | None = None
     interface = interface_of(model, start)
     file = Path(file)
     folder(file.parent)
-    with tempfile.TemporaryDirectory(prefix="chainunit_") as scratch:
-        work = Path(scratch)
+    with scratch() as work:
         text = _script(model, start or {})
         script = work / f"{model.name}_{_hash(interface, _import_closure(text), model.name)}.py"
         script.write_text(text)

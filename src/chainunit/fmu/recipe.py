@@ -10,11 +10,11 @@ import runpy
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
-from importlib.resources.abc import Traversable
 from pathlib import Path
 
 from ..model import Model
 from ..ports import LOAD
+from . import pictures
 from .script import Script
 
 
@@ -48,6 +48,7 @@ def script_of(model: type[Model]) -> type[Script]:
         experiment = {k: min(x, experiment.get(k, x)) for k, x in (experiment | script.experiment).items()}
     inputs = set(model.input_layout.names)
     sizes = {f"{name}.{k}": x for name, script in own.items() for k, x in script.sizes.items()}
+    experiment |= model.experiment
     members = {"experiment": experiment, "sizes": {full: x for full, x in sizes.items() if full in inputs}}
     return type("SystemScript", (Script,), members)
 
@@ -69,11 +70,15 @@ def often(model: type[Model]) -> set[str]:
     return {name for terminal in model.terminals for name in terminal.members.values()}
 
 
-def icon(model: type[Model], kind: str) -> Traversable:
-    """The icon of a model, "svg" or "png": the file in `data/icons` with the model's name, else the general icon of a
-    motor (the model takes a load port), of a line (it takes one and gives one), or of a machine."""
+def icon(model: type[Model], kind: str) -> bytes:
+    """The icon of a model, "svg" or "png": for a user's machine its sketch; else the file in `data/icons` with the
+    model's name, else the general icon of a motor (the model takes a load port), of a line (it takes one and gives
+    one), or of a machine."""
+    sketch = None if model.about is None else model.sketch()
+    if sketch:
+        return pictures.icon_svg(sketch) if kind == "svg" else pictures.icon_png(sketch)
     folder = resources.files("chainunit") / "data" / "icons"
     takes = {t.members["tau_bias"] in model.input_layout.names for t in model.terminals if t.kind == LOAD}
     general = {frozenset({True}): "motor", frozenset({True, False}): "line"}.get(frozenset(takes), "machine")
     own = folder / f"{model.name}.{kind}"
-    return own if own.is_file() else folder / f"{general}.{kind}"
+    return (own if own.is_file() else folder / f"{general}.{kind}").read_bytes()

@@ -160,7 +160,7 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
             return False
 
     def _bad_step(self, time: float, size: float) -> str:
-        if not (math.isfinite(time) and 0.0 <= size < math.inf):
+        if not (math.isfinite(time) and 0.0 <= size < math.inf and time + size < math.inf):
             return refusals.STEP_SIZE.format(size=size, time=time)
         if abs(time - self._time) > SAME_TIME * size + ROUNDED * abs(self._time):
             return refusals.STEP_BEGIN.format(time=time, now=self._time)
@@ -227,8 +227,7 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
                 self._set[vr] = value
                 self._u = None
                 self._doubtful = True
-                if self.model.start_unknowns:
-                    self._start_anew()
+                self._start_anew()
                 self._touch()
             elif not self._initialized:
                 self._take(vr, value)
@@ -329,12 +328,11 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
         return self._refusal or self._unstarted
 
     def _start(self) -> None:
-        """Compute the states at the start, or keep why there are none; the inputs are checked only if the states
-        depend on them."""
+        """Compute the states at the start, or keep why there are none."""
         layout = self.model.state_layout
         assert layout is not None
         try:
-            if self.model.start_unknowns and (bad := self._bad_input()):
+            if bad := self._bad_input():
                 raise InputError(bad)
             self._x = layout.values(self.model.begin(self._p, self._inputs()))
             self._pace = 0.0
@@ -458,12 +456,12 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
     @staticmethod
     def _fmu_state_to_bytes(state: dict[str, Any]) -> bytes:
         text = json.dumps(state).encode()
-        return b"%08x" % binascii.crc32(text) + text
+        return binascii.crc32(text).to_bytes(4, "big") + text
 
     @staticmethod
     def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
-        checksum, text = state[:8], state[8:]
-        if checksum != b"%08x" % binascii.crc32(text):
+        checksum, text = state[:4], state[4:]
+        if checksum != binascii.crc32(text).to_bytes(4, "big"):
             return {"damaged": refusals.STATE_DAMAGED}
         try:
             saved = json.loads(text)

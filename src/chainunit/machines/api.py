@@ -16,7 +16,18 @@ from ..mechanism.models import InverseMachine
 from ..ports import PortSlopes
 from ..quantities import Quantity, Variable
 from . import chain_unit
-from .chain_unit import SIDES, Chamber, ChamberForces, Feed, Inputs, Outputs, Parameters, SideLoads
+from .chain_unit import (
+    RODS,
+    SIDES,
+    Chamber,
+    ChamberForces,
+    Feed,
+    Inputs,
+    Outputs,
+    Parameters,
+    Pulls,
+    SideLoads,
+)
 from .crank_rocker import rocker_extremes
 from .flexible import ChainedModel
 from .hanging import Hanging, Modes, modes, rods, split
@@ -245,11 +256,32 @@ class ChainUnitMachine(Machine):
             extremes.append((psi, math.atan2(sense * x, sense * y) % (2.0 * math.pi)))
         return extremes[0], extremes[1]
 
+    def organ_pulls(
+        self, psi: Any, w: Any = 0.0, a: Any = 0.0, left: SideLoads = EMPTY, right: SideLoads = EMPTY
+    ) -> Pulls:
+        """Axial pull in the rods just inside their pins [N] at a rocker angle `psi` [rad], with speed `w` and
+        acceleration `a` of the rocker; see `chain_unit.organ_pulls`."""
+        return chain_unit.organ_pulls(_XP, self.p, self._inputs(0.0, 0.0, 0.0, left, right), psi, w, a)
+
+    def mean_pulls(
+        self, crank_speed: Any, left: SideLoads = EMPTY, right: SideLoads = EMPTY, points: int = 720
+    ) -> Any:
+        """Mean pull in web and wall of each side with weight [N] over `points` angles of a crank turn at constant
+        `crank_speed` [rad/s]: shape (rods, ..., points), webs first; see `chain_unit.organ_pulls`."""
+        phi = np.linspace(0.0, 2.0 * math.pi * self.p.ratio, points, endpoint=False)
+        motor = np.asarray(crank_speed, float)[..., None] * self.p.ratio
+        rocker = self.forces(phi, motor, 0.0, left, right).rocker
+        pulls = self.organ_pulls(rocker.psi, rocker.w, rocker.a, left, right)
+        sides = [side for side in SIDES if side in self.loaded_sides(Feed(left=left, right=right))]
+        means = [sum(pulls[side][rod].values()) / 2.0 for rod in RODS for side in sides]
+        shape = np.broadcast_shapes(np.shape(motor), np.shape(phi))
+        return np.array([np.broadcast_to(mean, shape) for mean in means]).reshape(len(means), *shape)
+
     def least_web_pull(
         self, w: Any, left: SideLoads = EMPTY, right: SideLoads = EMPTY, points: int = 720
     ) -> Any:
-        """The least pull in the webs [N] over `points` angles of a crank turn at constant motor speed `w`, for each
-        speed in `w`; infinite where no side is loaded."""
+        """The least pull at an end of the webs [N] over `points` angles of a crank turn at constant motor speed `w`,
+        for each speed in `w`; infinite where no side is loaded."""
         phi = np.linspace(0.0, 2.0 * math.pi * self.p.ratio, points, endpoint=False)
         out = self.forces(phi, np.asarray(w, float)[..., None], 0.0, left, right)
         pulls = [getattr(out, side).web_pull for side in self.loaded_sides(Feed(left=left, right=right))]
@@ -269,26 +301,41 @@ class ChainUnitMachine(Machine):
     def slack_speed(
         self, left: SideLoads = EMPTY, right: SideLoads = EMPTY, highest: float = 1000.0
     ) -> float:
-        """Lowest crank speed [rad/s] at which a web loses its pull somewhere in the turn: 0 if a web has no pull at
-        rest, infinity if all webs keep their pull up to `highest`. Above this speed two rigid bars are no model of a
-        chain."""
-        from scipy.optimize import brentq
+        """Lowest crank speed [rad/s] at which a web goes slack somewhere in the turn, as its mean pull falls below
+        zero: 0 if a web is slack at rest, infinity if no web is up to `highest`. Above this speed two rigid bars are
+        no model of a chain. An end of a web may be pushed at a lower speed: there a chain sags."""
+        webs = len(self.loaded_sides(Feed(left=left, right=right)))
 
         def pull(crank_speed: Any) -> Any:
-            return self.least_web_pull(crank_speed * self.p.ratio, left, right)
+            means = self.mean_pulls(crank_speed, left, right)[:webs]
+            return np.min(means, axis=(0, -1)) if webs else np.full(np.shape(crank_speed), np.inf)
 
-        low, high = 0.0, 1.0
-        if pull(low) <= 0.0:
-            return 0.0
-        while low < highest:
-            # the pull may fall and rise again with the speed: the first loss counts
-            speeds = np.linspace(low, high, 33)
-            losses = np.flatnonzero(pull(speeds) <= 0.0)
-            if losses.size:
-                i = int(losses[0])
-                return float(brentq(pull, speeds[i - 1], speeds[i], xtol=1e-9))
-            low, high = high, 2.0 * high
-        return math.inf
+        return _first_loss(pull, highest)
+
+    def pushed_speed(
+        self, left: SideLoads = EMPTY, right: SideLoads = EMPTY, highest: float = 1000.0
+    ) -> float:
+        """Lowest crank speed [rad/s] at which an end of a web is pushed somewhere in the turn, as `slack_speed`;
+        there a chain sags."""
+        return _first_loss(lambda w: self.least_web_pull(w * self.p.ratio, left, right), highest)
+
+
+def _first_loss(pull: Callable[[Any], Any], highest: float) -> float:
+    """The lowest crank speed [rad/s] at which a least pull [N] falls to zero, see `ChainUnitMachine.slack_speed`."""
+    from scipy.optimize import brentq
+
+    low, high = 0.0, 1.0
+    if pull(low) <= 0.0:
+        return 0.0
+    while low < highest:
+        # the pull may fall and rise again with the speed: the first loss counts
+        speeds = np.linspace(low, high, 33)
+        losses = np.flatnonzero(pull(speeds) <= 0.0)
+        if losses.size:
+            i = int(losses[0])
+            return float(brentq(pull, speeds[i - 1], speeds[i], xtol=1e-9))
+        low, high = high, 2.0 * high
+    return math.inf
 
 
 def ratios(rho: float, lam: float, mu: float, zeta: float, l: float, l1: float) -> dict[str, float]:

@@ -14,7 +14,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple, TypeAlias
 
 from ..groups.body import Bar, Mass
 from ..groups.driver import Crank
@@ -32,6 +32,10 @@ from .parts import Force, Pin, Processing, Rod, Stop, force
 
 SideName = Literal["left", "right"]
 SIDES: tuple[SideName, ...] = ("left", "right")
+RodName = Literal["web", "wall"]
+RODS: tuple[RodName, ...] = ("web", "wall")
+Pulls: TypeAlias = dict[SideName, dict[RodName, dict[str, Any]]]
+"""Axial pulls in the rods of the organs [N] by side, rod and pin, see `organ_pulls`."""
 
 
 def other(side: SideName) -> SideName:
@@ -262,24 +266,34 @@ def resistances(p: Any, u: Any) -> dict[str, Resistance]:
 def _on_sides(xp: Any, p: Any, s: MachineState, reactions: Mapping[Any, Vec2], rocker: Link) -> Chamber:
     """Loads of the organs, and of the rocker."""
     sides = []
-    for a1, b, wall, web, processing, hand in NAMES.values():
+    pulls = _pulls(s, reactions)
+    for side, (a1, b, wall, web, _, hand) in NAMES.items():
         forces = reactions[a1, wall], reactions[b, wall], reactions["A2", web]
-        at_b = forces[1] - s.effects[processing].wrenches[0].force
         sides.append(
             Side(
                 **on_side(rocker, hand, forces),
-                web_pull=_pull(xp, s.m.links[web].u, forces[2], at_b),
-                wall_pull=_pull(xp, s.m.links[wall].u, forces[0], -forces[1]),
+                web_pull=xp.minimum(*pulls[side]["web"].values()),
+                wall_pull=xp.minimum(*pulls[side]["wall"].values()),
             )
         )
     left, right = sides
     return Chamber(rocker=RockerLoad(**rocker_load(p, left, right)), left=left, right=right)
 
 
-def _pull(xp: Any, axis: Vec2, begin: Vec2, end: Vec2) -> Any:
-    """The least pull in a rod along `axis`, from the force on it at its begin and minus the force on it at its
-    end."""
-    return xp.minimum(-axis.dot(begin), -axis.dot(end))
+def _pulls(s: MachineState, reactions: Mapping[Any, Vec2]) -> Pulls:
+    """See `organ_pulls`."""
+    pulls: Pulls = {}
+    for side, (a1, b, wall, web, processing, _) in NAMES.items():
+        of_wall, of_web = s.m.links[wall].u, s.m.links[web].u
+        at_b = reactions[b, wall]
+        pulls[side] = {
+            "web": {
+                "A2": -of_web.dot(reactions["A2", web]),
+                "B": -of_web.dot(at_b - s.effects[processing].wrenches[0].force),
+            },
+            "wall": {"A1": -of_wall.dot(reactions[a1, wall]), "B": of_wall.dot(at_b)},
+        }
+    return pulls
 
 
 def on_side(rocker: Link, hand: float, forces: tuple[Vec2, Vec2, Vec2]) -> dict[str, Any]:
@@ -309,14 +323,26 @@ def rocker_load(p: Any, left: Side, right: Side, at_a2: Any = 0.0) -> dict[str, 
 def chamber(xp: Any, p: Any, u: Any, psi: Any, psi_w: Any, psi_a: Any) -> Chamber:
     """Both organs on a rocker at angle `psi` with speed `psi_w` and acceleration `psi_a`, independent of the drive.
     The rocker is the crank of this linkage; its crank angle, from the upward vertical, falls as psi rises."""
+    s = _organs_on_rocker(xp, p, u, psi, psi_w)
+    return _on_sides(xp, p, s, s.reactions(-psi_a), s.m.links["rocker"])
+
+
+def organ_pulls(xp: Any, p: Any, u: Any, psi: Any, psi_w: Any, psi_a: Any) -> Pulls:
+    """Axial pull in each rod just inside its pins [N], with the arguments of `chamber`: by side, rod ("web", "wall")
+    and pin. Web: A2 and B; wall: A1 and B. Negative where the rod is pushed. The mean of both ends is the mean pull
+    of the rod: below zero a chain is slack."""
+    s = _organs_on_rocker(xp, p, u, psi, psi_w)
+    return _pulls(s, s.reactions(-psi_a))
+
+
+def _organs_on_rocker(xp: Any, p: Any, u: Any, psi: Any, psi_w: Any) -> MachineState:
     linkage = Linkage(
         {"C": ZERO, **supports(p)},
         Crank(Bar("rocker", "C", p.e), "A2"),
         tuple(organ(p, u, side) for side in SIDES),
         {"weight": Weight(p.g), **resistances(p, u)},
     )
-    s = MachineState(xp, Mechanism(xp, linkage, math.pi - psi), -psi_w)
-    return _on_sides(xp, p, s, s.reactions(-psi_a), s.m.links["rocker"])
+    return MachineState(xp, Mechanism(xp, linkage, math.pi - psi), -psi_w)
 
 
 ON_DRIVE = {
@@ -412,6 +438,11 @@ class ChamberForces(InverseMachine):
     """The inverse model: motion of the motor shaft in, torque and every reaction out."""
 
     name, noun, sides = "ChamberForces", "chain unit", SIDES
+    notes = (
+        "\n\nThe start values are those of the packaged study, with three exceptions: the shaft stands, "
+        "ratio is 1 (there 50), and the processing forces are 0 (there 10 N a side), which makes the rocker torque "
+        "some percent less."
+    )
     description = (
         "Forces in a chain unit: crank, coupler, rocker and two working organs; "
         "from motor angle and speed to torque, load port and every support reaction"

@@ -29,6 +29,7 @@ from typing import Any, ClassVar, NamedTuple
 from ..engines import Dual, dual, slope
 from ..mechanism.machine import MachineState, Mechanism
 from ..model import Model, Part
+from ..ports import measured_terminal
 from . import chain_unit
 from .chain_unit import ChamberForces, SideLoads
 from .load_declarations import (
@@ -324,6 +325,7 @@ class LoadObserver(Model):
     States = States
     parts: ClassVar[tuple[Part, ...]] = (Part(Outputs, _outputs),)
     required = ChamberForces.required
+    terminals = (measured_terminal(torque="torque", current="current", power="power"),)
 
     @staticmethod
     def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:

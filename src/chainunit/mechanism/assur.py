@@ -21,6 +21,10 @@ GROUND = "ground"
 REVOLUTE, PRISMATIC = "revolute", "prismatic"
 
 
+class FreeLinksError(InputError):
+    """Links of a linkage can move by themselves."""
+
+
 class JointOf(NamedTuple):
     """A joint as the decomposition sees it: its name, its kind, and the two links."""
 
@@ -178,7 +182,7 @@ def _freedoms(
         joined = any(lone[0] in (j.on, j.by) for j in joints)
         hint = f"; {lone[0]} has {'one joint' if joined else 'no joint'}"
     many = len(names) > 1
-    return InputError(
+    return FreeLinksError(
         f"too many degrees of freedom: {number + 1} where the driver gives one; the link{'s' * many} "
         f"{', '.join(names)} {'are' if many else 'is'} free to move{hint}; add a joint, or take out a link",
         key=(lone or names)[0],

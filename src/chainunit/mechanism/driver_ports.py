@@ -16,6 +16,13 @@ from ..ports import PortSlopes, PortValues, ShaftMotion, Start, flanges, load_te
 from ..quantities import Value, declaration, group, quantity
 
 
+class DriverWords(NamedTuple):
+    """The words for the effort that drives a driver, and for its place."""
+
+    effort: str
+    place: str
+
+
 class DriverPort(NamedTuple):
     """The declarations of a driver: its motion, the values and slopes of its load port; of the direct model its
     start, the inertia added to it, its states, the effort that drives it, and its answer; its terminals, with the
@@ -32,6 +39,7 @@ class DriverPort(NamedTuple):
     terminals: tuple[Terminal, ...]
     flanges: tuple[Terminal, ...]
     inertia: Requirement
+    words: DriverWords
     units: Mapping[str, str] = MappingProxyType({})
     """units of quantities at the driver, by those of a driver that turns, where they differ"""
 
@@ -89,6 +97,7 @@ ROTATING = DriverPort(
         "kg.m2",
         "at the dead points of the rocker nothing else carries the torque; give crank.I, crank.m or J_added",
     ),
+    DriverWords("motor torque", "angle"),
 )
 """A driver that a motor turns."""
 
@@ -161,6 +170,11 @@ class WayAnswer:
     a: Value = quantity("m/s2", "acceleration of the driver", nominal=10.0)
     tau_bias: Value = quantity("N", "force needed at constant speed of the driver", nominal=1000.0)
     J: Value = quantity("kg", "mass reflected to the driver")
+    end_stop_force: Value = quantity(
+        "N",
+        "force of the end stops against the driver: above 0 behind the upper end of its range",
+        nominal=1000.0,
+    )
 
 
 SLIDING = DriverPort(
@@ -179,6 +193,7 @@ SLIDING = DriverPort(
         "kg",
         "at a dead point nothing else carries the force; give the link a mass, or J_added",
     ),
+    DriverWords("force on the driver", "way"),
     MappingProxyType({"rad": "m", "rad/s": "m/s", "N.m": "N", "kg.m2": "kg"}),
 )
 """A driver that a cylinder pushes."""

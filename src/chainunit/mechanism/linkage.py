@@ -8,12 +8,13 @@ draw and the paths of the forces follow from these data.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 from ..groups.driver import Driver
 from ..groups.group import Group, Joint
 from ..planar import Vec2
+from .extremes import MotionExtreme
 
 
 class Connections(NamedTuple):
@@ -58,12 +59,13 @@ class Topology(NamedTuple):
 @dataclass
 class Linkage:
     """A mechanism with one driver. Places in the frame [m], others in the frame of their link; loads as
-    `chainunit.groups.loads.Acting` describes them."""
+    `chainunit.groups.loads.Acting` describes them; `extremes` of its motion that a load refers to."""
 
     ground: Mapping[str, Vec2]
     driver: Driver
     groups: tuple[Group, ...]
     loads: Mapping[str, Any]
+    extremes: tuple[MotionExtreme, ...] = field(default=(), kw_only=True)
 
     @property
     def topology(self) -> Topology:
@@ -87,9 +89,10 @@ class Linkage:
 
     @property
     def derived(self) -> int:
-        """The number of values that the groups derive from the lengths, once before a run."""
-        return sum(group.derived for group in self.groups)
+        """The number of values that follow from the lengths, once before a run: those of the groups, then the
+        extremes."""
+        return sum(group.derived for group in self.groups) + len(self.extremes)
 
     def before(self, group: int) -> Linkage:
-        """The linkage without the group of this index and all later ones, and without loads."""
-        return replace(self, groups=self.groups[:group], loads={})
+        """The linkage without the group of this index and all later ones, without loads and extremes."""
+        return replace(self, groups=self.groups[:group], loads={}, extremes=())

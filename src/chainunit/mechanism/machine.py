@@ -217,15 +217,20 @@ class LiftedMechanism:
         return self._of.carrier(pin)
 
 
-def _placed(xp: Any, linkage: Linkage, derived: Sequence[Any], q: float) -> Mechanism:
-    return Mechanism(xp, linkage, q, derived)
+def _placed(
+    xp: Any, linkage: Linkage, derived: Sequence[Any], q: Any, topology: Topology | None = None
+) -> Mechanism:
+    return Mechanism(xp, linkage, q, derived, topology)
 
 
 def derived_numbers(xp: Any, linkage: Linkage) -> list[Any]:
-    """Values that the groups derive from the lengths, once before a run."""
+    """Values that follow from the lengths, once before a run: those of the groups, then the extremes."""
     numbers: list[Any] = []
     for k, group in enumerate(linkage.groups):
         numbers += group.derive(xp, functools.partial(_placed, xp, linkage.before(k), tuple(numbers)))
+    if linkage.extremes:
+        placed = functools.partial(_placed, xp, linkage, tuple(numbers), topology=linkage.topology)
+        numbers += [each.value(xp, placed) for each in linkage.extremes]
     return numbers
 
 

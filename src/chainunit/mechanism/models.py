@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 
 from ..engines import MATH
 from ..groups.group import Joint
-from ..model import Model, Part
+from ..model import Model, Part, Sketch, keep
 from ..ports import PortSlopes, ShaftMotion
 from ..quantities import (
     Fields,
@@ -26,9 +26,11 @@ from ..quantities import (
     declaration,
     declared_class,
     fields_of,
+    group,
     quantity,
 )
 from .driver_ports import ROTATING, DriverPort, TurningStates
+from .end_stops import EndStops, stop_force
 from .linkage import Linkage, Topology
 from .machine import MachineState, Mechanism, derived_numbers
 
@@ -133,6 +135,8 @@ class InverseMachine(LinkageModel, MachineModel):
     """The declarations of its driver, which turns or slides."""
     turns: ClassVar[bool] = True
     """Whether its driver turns."""
+    end_stops: ClassVar[EndStops | None] = None
+    """The usual end stops of a driver that slides, at both ends of `span`."""
 
     def __init_subclass__(cls) -> None:
         own = vars(cls)
@@ -184,6 +188,16 @@ class InverseMachine(LinkageModel, MachineModel):
         )
 
     @classmethod
+    def sketch(cls) -> Sketch:
+        """See `chainunit.model.Model.sketch`; the driver is at a sixth of its `span`."""
+        from .sketch import sketch_of  # here, as FMUs do without it
+
+        low, high = cls.span
+        layout = cls.parameter_layout
+        p = cls.check(layout.instance([v.quantity.start for v in layout.variables]))
+        return sketch_of(cls.state(MATH, p, cls.Inputs(), low + (high - low) / (2.0 * math.pi), 0.0).m)
+
+    @classmethod
     def further(cls, xp: Any, p: Any, u: Any, x: Any = None) -> list[tuple[Variable, Any]]:
         """The effort at the driver, ``crank_torque``; the size of each force, ``force(pivot)``; and the places of all
         pins, ``x(A)`` and ``y(A)``. A machine whose outputs depend on states has no places here."""
@@ -214,7 +228,11 @@ class InverseMachine(LinkageModel, MachineModel):
         Its parameters are those of the machine, the inertia on its shaft and the start. Its inputs are the torque and
         the loads. Its outputs are those of the machine without `tau` and load port, and those of `DriverPort.answer`.
         """
-        return cls._turning(DirectMachine)
+        stops = cls.end_stops
+        if stops is None:
+            return cls._turning(DirectMachine)
+        more = ("end_stops", EndStops, group(EndStops, "end stops of the driver", default=stops))
+        return cls._turning(DirectMachine, [more])
 
     @classmethod
     def _turning(cls, base: type[DirectMachine], parameters: Fields = (), **more: Any) -> type[DirectMachine]:
@@ -225,13 +243,18 @@ class InverseMachine(LinkageModel, MachineModel):
         port = cls.driver_port
         members = {
             "__module__": cls.__module__,
-            "__doc__": f"The direct model of {cls.__name__}: motor torque in, motion out.",
+            "__doc__": f"The direct model of {cls.__name__}: {port.words.effort} in, motion out.",
             "name": cls.direct_name,
             "description": cls.direct_description
-            or f"{cls.name} that turns by itself: from motor torque to angle, speed, acceleration and every reaction",
+            or f"{cls.name} that moves by itself: from {port.words.effort} to {port.words.place}, speed, "
+            "acceleration and every reaction",
             "built_by": f"{cls.built_by or cls.__qualname__}.direct()",
             "maker": (direct_model, (cls,)),
             "inverse": cls,
+            "about": cls.about,
+            "notes": cls.notes,
+            "repeated": cls.repeated,
+            "constant": cls.constant,
             "terminals": port.flanges,
             "Parameters": declared_class(
                 "DirectParameters", (port.start, port.added, cls.Parameters), [*own, *parameters]
@@ -247,7 +270,10 @@ class InverseMachine(LinkageModel, MachineModel):
             "Outputs": declared_class("DirectOutputs", (), [*outputs, *fields_of(port.answer)]),
             **more,
         }
-        return type(f"Direct{cls.__name__}", (base,), members)
+        model = type(f"Direct{cls.__name__}", (base,), members)
+        if cls.built_by:
+            keep(model, "Parameters", "Inputs")
+        return model
 
 
 def running(s: MachineState, a: Any) -> dict[str, Any]:
@@ -282,6 +308,11 @@ class DirectMachine(LinkageModel):
         cls.required = (*cls.inverse.required, cls.inverse.driver_port.inertia)
         cls.parts = (Part(cls.Outputs, cls._outputs),)
         super().__init_subclass__()
+
+    @classmethod
+    def sketch(cls) -> Sketch:
+        """That of the inverse model."""
+        return cls.inverse.sketch()
 
     @classmethod
     def linkage(cls, xp: Any, p: Any, u: Any) -> Linkage:
@@ -332,22 +363,33 @@ class DirectMachine(LinkageModel):
     @classmethod
     def derivatives(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
         """Time derivatives of the states, in declared order."""
-        return [x.w, acceleration(p, u, cls.shared(xp, p, u, x))]
+        return [x.w, acceleration(p, u, cls.shared(xp, p, u, x), cls.stop_force(xp, p, x))]
+
+    @classmethod
+    def stop_force(cls, xp: Any, p: Any, x: Any) -> Any:
+        """The force of the end stops against the driver that slides; 0 for one that turns."""
+        if cls.inverse.end_stops is None:
+            return 0.0
+        return stop_force(xp, p.end_stops, cls.inverse.span, x.phi / p.ratio, x.w / p.ratio) / p.ratio
 
     @classmethod
     def _outputs(cls, xp: Any, p: Any, u: Any, x: Any, s: MachineState) -> Any:
-        a = acceleration(p, u, s)
+        stop = cls.stop_force(xp, p, x)
+        a = acceleration(p, u, s, stop)
         at_crank = a / p.ratio
         fields = running(s, at_crank) | cls.inverse.probes(xp, p, u, s, at_crank)
         # the motor also drives the inertia on its own shaft
         fields["kinetic_energy"] += 0.5 * p.J_added * (x.w * x.w)
         fields["power"] = u.tau * x.w
+        if cls.inverse.end_stops is not None:
+            fields["end_stop_force"] = stop
+            fields["dissipated_power"] += stop * x.w
         return cls.Outputs(a=a, tau_bias=s.bias / p.ratio, J=s.J / (p.ratio * p.ratio), **fields)
 
 
-def acceleration(p: Any, u: Any, s: MachineState) -> Any:
-    """Motor acceleration [rad/s2]: (J_added + J) a = tau - tau_bias, all at the motor shaft."""
-    return (u.tau - s.bias / p.ratio) / (p.J_added + s.J / (p.ratio * p.ratio))
+def acceleration(p: Any, u: Any, s: MachineState, stop: Any = 0.0) -> Any:
+    """Motor acceleration [rad/s2]: (J_added + J) a = tau - tau_bias - stop, all at the motor shaft."""
+    return (u.tau - s.bias / p.ratio - stop) / (p.J_added + s.J / (p.ratio * p.ratio))
 
 
 def direct_model(machine: type[InverseMachine]) -> type[DirectMachine]:

@@ -4,6 +4,11 @@ The code lies in the folder ``chainunit`` of the user's cache folder, under the 
 compiler. Deleting the folder empties the cache. The environment variable CHAINUNIT_CACHE names another parent folder,
 or is ``off``. If the folder cannot be read or written, there is no cache, but no error. Files of others in the folder
 are not deleted.
+
+The program runs the code, so that nobody else may be able to put it there. A folder that belongs to another user, or
+that others can write, is no cache, and is refused where the user named it; such a file is no entry. An entry has the
+hash of its content together with that of its sources: a renamed one is no entry, either. On Windows, which tells no
+owners and rights in this form, the folder must be one that only the user can write.
 """
 
 from __future__ import annotations
@@ -12,12 +17,13 @@ import contextlib
 import hashlib
 import os
 import re
+import stat
 import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
 
-from ..errors import WriteError
+from ..errors import InputError, WriteError
 from ..files import whole
 
 VARIABLE, OFF = "CHAINUNIT_CACHE", "off"
@@ -42,24 +48,88 @@ def folder() -> Path | None:
 
 
 def entry(key: bytes, make: Callable[[], bytes]) -> bytes:
-    """The cached result for this `key`, or else the result of `make`, which is then cached."""
+    """The cached result for this `key`, or else the result of `make`, which is then cached.
+
+    Raises
+    ------
+    InputError
+        where the folder that CHAINUNIT_CACHE names is not safe.
+    """
     place = folder()
-    if place is None:
+    if place is None or not _is_safe(place):
         return make()
-    file = place / hashlib.sha256(key).hexdigest()
-    with contextlib.suppress(OSError):
-        digest, content = (text := file.read_bytes())[:32], text[32:]
-        if hashlib.sha256(content).digest() == digest:
-            with contextlib.suppress(OSError):
-                os.utime(file)
+    name = hashlib.sha256(key).hexdigest()
+    if (stored := _read(place, name)) is not None:
+        mark, content = stored[:32], stored[32:]
+        if mark == _mark(name, content):
             return content
     content = make()
-    with contextlib.suppress(OSError, WriteError):
+    with contextlib.suppress(OSError, WriteError, InputError):
         place.mkdir(parents=True, exist_ok=True, mode=0o700)
-        with whole(file) as part:
-            part.write_bytes(hashlib.sha256(content).digest() + content)
+        with whole(place / name, is_result=False) as part:
+            part.touch(0o600)
+            part.write_bytes(_mark(name, content) + content)
         _shrink(place)
     return content
+
+
+def _mark(name: str, content: bytes) -> bytes:
+    """The hash of an entry: of its name, which is that of its sources, and of its content."""
+    return hashlib.sha256(name.encode() + content).digest()
+
+
+def _is_safe(place: Path) -> bool:
+    """Whether nobody else can put code into the folder, which may be missing yet."""
+    try:
+        trouble = _trouble(place.stat())
+    except OSError:
+        return True
+    if trouble and os.environ.get(VARIABLE):
+        raise InputError(
+            f"{VARIABLE}: its folder {place} {trouble}, so that others could put code there, which this program "
+            "would run; name a folder of your own, or off"
+        )
+    return not trouble
+
+
+def _trouble(about: os.stat_result) -> str:
+    """The reason why others could change a file or a folder; empty where only this user can."""
+    if not hasattr(os, "geteuid"):
+        return ""
+    if about.st_uid != os.geteuid():
+        return "belongs to another user"
+    return "can be written by other users" if about.st_mode & (stat.S_IWGRP | stat.S_IWOTH) else ""
+
+
+def _read(place: Path, name: str) -> bytes | None:
+    """The content of a file that only this user can change, in a folder of which this is true; else None."""
+    flags = (
+        os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+    )
+    with contextlib.ExitStack() as stack:
+
+        def opened(path: Path | str, flags: int, inside: int | None = None) -> tuple[int, os.stat_result]:
+            handle = os.open(path, flags, dir_fd=inside)
+            stack.callback(os.close, handle)
+            return handle, os.fstat(handle)
+
+        try:
+            if os.open in os.supports_dir_fd:
+                # what is read is then what was checked, also where somebody exchanges the folder
+                inside, about = opened(place, os.O_RDONLY)
+                if _trouble(about):
+                    return None
+                handle, about = opened(name, flags, inside)
+            else:
+                handle, about = opened(place / name, flags)
+            if not stat.S_ISREG(about.st_mode) or _trouble(about):
+                return None
+            with contextlib.suppress(OSError):
+                os.utime(place / name)
+            with os.fdopen(os.dup(handle), "rb") as file:
+                return file.read()
+        except OSError:
+            return None
 
 
 def _is_ours(file: Path) -> bool:

@@ -13,13 +13,13 @@ import platform
 import shutil
 import subprocess
 import sys
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from ..ending import scratch
 from ..errors import RunError
 from .cache import entry
 
@@ -90,12 +90,15 @@ def compile_code(
     """
 
     def make() -> bytes:
-        with tempfile.TemporaryDirectory(prefix="chainunit_") as scratch:
-            work = Path(scratch)
+        with scratch() as work:
             for name, content in files.items():
                 (work / name).write_bytes(content)
             process = subprocess.run(
-                [*compiler.command, *arguments], cwd=work, capture_output=True, text=True
+                [*compiler.command, *arguments],
+                cwd=work,
+                env=os.environ | {"TMPDIR": str(work)},  # a killed compiler leaves its own files there
+                capture_output=True,
+                text=True,
             )
             if process.returncode:
                 raise RunError(f"the C compiler {compiler.name} failed: {process.stderr.strip()}")

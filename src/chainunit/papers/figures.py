@@ -304,7 +304,7 @@ def slack() -> Figure:
     for look, mu in enumerate((0.45, 0.6, 0.75)):
         low, high = p0.zeta_range(math.radians(9.07), mu)
         zeta = np.linspace(low + 0.02, min(high, 1.0) - 0.02, 40)
-        speed = [p0.machine(1.0, float(z), mu).slack_speed() / math.sqrt(p0.G / p0.L1) for z in zeta]
+        speed = [p0.machine(1.0, float(z), mu).pushed_speed() / math.sqrt(p0.G / p0.L1) for z in zeta]
         items.append(Curve(f"mu = {mu:g}", zeta, np.array(speed), look))
     return _single(
         "two-bar-slack-speed",

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 from ..study.record import StudyRecord
-from . import blade, flywheels, notices, organs, torsion, turn
+from . import blade, flywheels, notices, organs, starts, torsion, turn
 from .blocks import Block, Source
 
 
@@ -25,5 +25,6 @@ ANALYSES: Mapping[str, Contents] = {
     "blade": Contents("The blade", blade.blocks, (blade.PICTURE,)),
     "flywheels": Contents("Flywheels", flywheels.blocks, (flywheels.PICTURE,)),
     "observer": Contents("Who notices an overload", notices.blocks, notices.PICTURES.files),
+    "starts": Contents("Starts", starts.blocks),
     "torsion": Contents("Torsion of the driveline in rotation", torsion.blocks, torsion.PICTURES),
 }

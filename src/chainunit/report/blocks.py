@@ -162,6 +162,8 @@ class Section:
     name: str
     heading: str
     blocks: tuple[Block, ...]
+    beside: bool = False
+    """whether its texts and tables stand beside each other where there is room"""
 
 
 @dataclass(frozen=True)
@@ -173,7 +175,7 @@ class Report:
     """the kind of the study, in words"""
     result: Mapping[str, Any]
     opening: tuple[Block, ...]
-    """the blocks on the question that the study answers"""
+    """the blocks before all sections"""
     sections: tuple[Section, ...]
     source: Line = ()
     failure: Line = ()

@@ -27,7 +27,7 @@ _OWN = (
     ("number of independent turns behind the quantile", ("independent_turns", "", "")),
     ("snatch: largest over least median of the starts", ("snatch_spread", "", "")),
     (
-        "share of the time with a slack rod (two bars: with a bar in compression)",
+        "share of the time with a slack rod (two bars: with a bar of negative mean pull)",
         ("slack_time", "", "two_bar_slack_time"),
     ),
     ("share of the rods that are slack, mean over time", ("slack_rods", "", "")),
@@ -214,7 +214,7 @@ def _over_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
         s.line(
             "The crank turns at constant speed; {=chain.starts} starts of {=chain.turns} turns each. Shaded: speeds "
             f"to avoid; dash-dotted: the speed of normal running; thin lines: critical speeds. {_ORDERS} Two bars do "
-            "not go slack: their curve shows the share of the time in which a bar is in compression."
+            "not go slack: their curve shows the share of the time in which the mean pull of a bar is negative."
         ),
         heights=(1.1, 1.1, 0.65),
     )

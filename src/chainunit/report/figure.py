@@ -24,6 +24,8 @@ class Axis:
     high: float | None = None
     step: float | None = None
     log: bool = False
+    ticks: tuple[float, ...] = ()
+    """places of the ticks in the unit that is shown, where they do not follow from `step`"""
     names: tuple[str, ...] = ()
     """names of the places 0, 1, .. from the top down, in place of numbers"""
     second: tuple[str, float] | None = None

@@ -16,9 +16,10 @@ from ..study.record import StudyRecord
 from ..text import forms, number
 from . import blocks as b
 from . import figure as fig
-from . import run_names
+from . import linkage_loads, load_figures, run_names
 from .pictures import Pictures
 from .shaft import TORQUE, shaft_torque
+from .study_motion import machine_state
 from .turn import angle_axis
 
 PICTURES = Pictures()
@@ -34,10 +35,10 @@ _CURRENT = fig.Axis("motor current", "A")
 def _torque_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
     """Torque over speed in a panel for the start and one for the overloads of each side, at scales of their own."""
     names, panels = run_names.motor_runs(study), []
-    for group in [
-        [name for name in names if not run_names.is_event(study, name)],
-        *run_names.groups(study, names),
-    ]:
+    # an event that is a start of its own would squeeze the loops of the others
+    starts = [name for name in names if run_names.event_time(study, name) is None]
+    overloads = run_names.groups(study, [name for name in names if name not in starts])
+    for group in [starts, *overloads]:
         # an overload is drawn from its event on: before, it is the steady running of the first panel
         runs = {
             name: study.runs[name].sel(time=slice(run_names.event_time(study, name), None)) for name in group
@@ -85,9 +86,9 @@ def _duty(s: b.Source, study: StudyRecord) -> Iterator[fig.Item]:
 
 def _group_title(study: StudyRecord, runs: list[str]) -> str:
     """The title of a panel with these runs."""
+    if run_names.event_time(study, runs[0]) is None:
+        return f"Start{'s' * (len(runs) > 1)} and steady running"
     sides = [study.config.events[run].loaded_side for run in runs if run_names.is_event(study, run)]
-    if not sides:
-        return "Start-up and steady running"
     return f"Overloads of the {sides[0]} side" if sides[0] else "Overloads"
 
 
@@ -114,10 +115,35 @@ def _turn(s: b.Source, study: StudyRecord) -> fig.Figure:
     )
 
 
+def _is_steady(study: StudyRecord) -> bool:
+    return "steady" in study.answers and load_figures.has_turn(study.drive, study.steady)
+
+
+@PICTURES.declare(_is_steady, "power_turn.png")
+def _power(s: b.Source, study: StudyRecord) -> fig.Figure:
+    return load_figures.power_over_turn(study.drive, study.steady, angle_axis(study))
+
+
+@PICTURES.declare(_is_steady, "load_histogram.png")
+def _histogram(s: b.Source, study: StudyRecord) -> fig.Figure:
+    return load_figures.load_histogram(study.drive, study.steady)
+
+
+@PICTURES.declare(lambda study: _is_steady(study) and not study.drive.outsider, "force_over_stroke.png")
+def _stroke(s: b.Source, study: StudyRecord) -> Iterator[fig.Figure]:
+    names = [name for name in run_names.motor_runs(study) if run_names.event_time(study, name) is not None]
+    parts = {"steady": study.steady} | {
+        name: study.runs[name].sel(time=slice(run_names.event_time(study, name), None)) for name in names
+    }
+    states = {name: machine_state(study, part) for name, part in parts.items()}
+    return linkage_loads.force_over_stroke(states, {name: run_names.title(study, name) for name in parts})
+
+
 @PICTURES.declare(lambda study: study.statics.loops, "speed_loop.png")
 def _speed_loop(s: b.Source, study: StudyRecord) -> fig.Figure:
     loops = list(enumerate(study.statics.loops.items()))
-    frequency = fig.Axis("frequency", "rad/s", log=True)
+    ends = [loop.frequency[k] for _, (_, loop) in loops for k in (0, -1)]
+    frequency = fig.Axis("frequency", "rad/s", low=float(min(ends)), high=float(max(ends)), log=True)
     narrowest = min(study.statics.loops.values(), key=lambda loop: loop.phase_margin)
     longest = 1.5 * max(loop.settling for loop in study.statics.loops.values())
     time = fig.Axis("time after a step of the load torque", "s", low=0.0, high=longest)
@@ -126,7 +152,7 @@ def _speed_loop(s: b.Source, study: StudyRecord) -> fig.Figure:
         (frequency, fig.Axis("phase", "deg", low=-270.0, high=0.0, step=45.0), "frequency", "phase", "Phase"),
         (
             time,
-            fig.Axis("deviation of the motor speed", "rad/(N.m.s)"),
+            fig.Axis("speed deviation", "rad/(N.m.s)"),
             "time",
             "deviation",
             "Disturbance step",
@@ -306,20 +332,33 @@ def _after(s: b.Source, study: StudyRecord, run: str) -> str:
 
 @PICTURES.declare(lambda study: study.pins, "reactions.png")
 def _reactions(s: b.Source, study: StudyRecord) -> fig.Figure:
-    runs, pins = list(study.pins), list(next(iter(study.pins.values())))
-    height = 0.84 / len(runs)
-    items = []
-    for look, name in enumerate(runs):
-        places = np.arange(len(pins)) - 0.42 + (look + 0.5) * height
-        peak = f"{study.title_of(name)}: peak"
-        for words, size, wide in ((peak, "peak", 0.92), ("dark inner bar: RMS", "rms", 0.34)):
-            sizes = [study.pins[name][pin][size] for pin in pins]
-            items.append(fig.Bars(words, places, sizes, wide * height, look, slim=size == "rms"))
+    reference = "steady" if "steady" in study.pins else next(iter(study.pins))
+    steady, pins = study.pins[reference], list(study.pins[reference])
+    largest = {pin: max(study.pins, key=lambda run: study.pins[run][pin]["peak"] or 0.0) for pin in pins}
+    of_run = run_names.title(study, reference)
+    places = np.arange(len(pins), dtype=float)
+    bars: list[tuple[str, float, list[float | None], float, int, bool, tuple[str, ...]]] = [
+        (f"{of_run}: peak", -0.2, [steady[pin]["peak"] for pin in pins], 0.38, 0, False, ()),
+        (f"{of_run}: RMS", -0.2, [steady[pin]["rms"] for pin in pins], 0.14, 0, True, ()),
+    ]
+    if len(study.pins) > 1:
+        words = tuple(study.title_of(largest[pin]) for pin in pins)
+        peaks = [study.pins[largest[pin]][pin]["peak"] for pin in pins]
+        bars.append(("largest peak of all runs", 0.2, peaks, 0.38, 1, False, words))
+    items = tuple(
+        fig.Bars(name, places + shift, sizes, height, look, slim=slim, words=beside)
+        for name, shift, sizes, height, look, slim, beside in bars
+    )
+    most = max(size or 0.0 for _, _, sizes, *_ in bars for size in sizes)
+    # beside the bars there is room for the names of runs
+    x = fig.Axis("reaction", "N", low=0.0, high=(1.6 if len(study.pins) > 1 else 1.05) * most or None)
     return fig.Figure(
         "reactions",
         "Forces in the pins",
-        "Bars of the reaction of every pin in every run: the wide bar is the peak, the dark bar inside it the RMS.",
-        ((fig.Panel(fig.Axis("reaction", "N", low=0.0), fig.Axis("pin", names=tuple(pins)), tuple(items)),),),
-        "Peak and RMS of the force in each pin; means are taken over whole crank turns.",
-        heights=(max(0.6, max(11, 20 - len(runs)) * len(runs) * len(pins) / 250.0),),
+        "Bars of the reaction of every pin: peak and RMS in steady running, and the largest peak of all runs.",
+        ((fig.Panel(x, fig.Axis("pin", names=tuple(pins)), items),),),
+        s.line(
+            f"Means are taken over whole crank turns of {of_run}. Beside a bar: the run of the largest peak."
+        ),
+        heights=(max(0.6, 38.0 * len(pins) / 250.0),),
     )

@@ -16,19 +16,22 @@ from importlib import resources
 from itertools import groupby
 from pathlib import Path
 
+from plotly.io.json import to_json_plotly  # type: ignore[import-untyped]
 from plotly.offline import get_plotlyjs  # type: ignore[import-untyped]
 
 from .. import __version__
-from ..files import whole
+from ..files import PAGE, whole
 from ..text import Units, forms
 from . import blocks as b
 from . import motion, page_figures
 from .figure import Figure
 from .lines import Aside, Line, Name, Number, Piece, Strong, Words, pieces
 
-NAME = "report.html"
+NAME = PAGE
 
 _SPACE = "\u00a0"  # before a unit
+_SHORT = 16
+"""Rows of a table that does not break across printed pages."""
 _POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; "
     "font-src data:"
@@ -63,7 +66,7 @@ def render(report: b.Report) -> str:
     ]
     title = report.title or report.kind
     figures = ",".join(
-        f"{json.dumps(figure.name)}:{page_figures.figure(figure, report.units).to_json()}"
+        f"{json.dumps(figure.name)}:{to_json_plotly(page_figures.page_figure(figure, report.units))}"
         for figure in report.figures
         if figure.on_page
     )
@@ -93,7 +96,7 @@ def render(report: b.Report) -> str:
             "<main>",
             *(
                 f'<section id="{section.name}" aria-labelledby="{section.name}-title">\n'
-                f'<h2 id="{section.name}-title">{section.heading}</h2>\n{content}\n</section>'
+                f'<h2 id="{section.name}-title">{section.heading}</h2>\n{_laid_out(section, content)}\n</section>'
                 for section, content in sections
             ),
             "</main>",
@@ -108,6 +111,11 @@ def render(report: b.Report) -> str:
             "</html>\n",
         ]
     )
+
+
+def _laid_out(section: b.Section, content: str) -> str:
+    """The content of a section, in two columns where its blocks stand beside each other."""
+    return f'<div class="asked">{content}</div>' if section.beside else content
 
 
 @cache
@@ -260,8 +268,10 @@ class _Page:
         rows = [self._row(row, columns) for row in table.rows if row.form != "short"]
         body = "".join(rows) if noted else f"<tbody>{''.join(rows)}</tbody>"
         css = "candidates" if noted else "numbers" if table.numeric else "words"
+        # on paper a short table stays on one page
+        whole = " data-short" if len(rows) <= _SHORT else ""
         return (
-            f'<div class="wide"><table class="{css}">'
+            f'<div class="wide"><table class="{css}"{whole}>'
             + (f"<caption>{self.line(table.title)}</caption>" if table.title else "")
             + (f"<thead><tr>{heads}</tr></thead>" if heads else "")
             + f"{body}</table></div>"
@@ -321,7 +331,7 @@ class _Page:
     # -- the head of the page
 
     def header(self, report: b.Report, title: str, names: Iterable[str]) -> str:
-        """Title, source, status, navigation, and the question that the study answers."""
+        """Title, source, status, navigation, and the blocks before all sections."""
         status = (
             '<p class="alarm"><strong>The run stopped early:</strong> '
             f"{self.line(report.failure)}. The page shows the results up to there.</p>"
@@ -337,11 +347,7 @@ class _Page:
             f'<p class="from">{source}{" · " if source else ""}status: '
             f"{'stopped early' if status else report.status}</p>\n"
             f'{status}\n<nav aria-label="Sections">{links}</nav>\n'
-            + (
-                f'<h2 id="asked">{report.opening_title}</h2>\n<div class="asked">{opening}</div>\n'
-                if opening
-                else ""
-            )
+            + (f'<h2 id="opening">{report.opening_title}</h2>\n{opening}\n' if opening else "")
             + "</header>"
         )
 

@@ -110,7 +110,7 @@ def _numbers(s: b.Source) -> Iterator[b.Block]:
     yield b.Text(
         "A number is determined where the recordings alone give it with less than half the standard deviation that "
         "was known before. The interval of 95 % of a number that is not determined is that of bounds, weighing and "
-        "recordings together: it stands or falls with the weighing. Before the fit, a number is at its start, such "
+        "recordings together: it is only as right as the weighing. Before the fit, a number is at its start, such "
         "as the middle of its bounds, and the noise is as stated: so the expected deviation may differ from the "
         "reached one.",
         "note",
@@ -169,14 +169,17 @@ def _limits(s: b.Source) -> Iterator[b.Block]:
         for k in range(len(s.result["proposals"]))
     ]
     if rows:
+        before = s.result["told_at_start"]["value"]
+        is_whole = s.result["told"]["value"] == s.result["sought"]["value"]
+        words = "Further runs, the best first; without one {=told_at_start} numbers can be determined"
         yield b.Table(
             tuple(rows),
             b.heads("further run", "deviations fall by the factor", "numbers determined"),
-            title=s.line(
-                "Further runs, the best first; without one {=told_at_start} numbers can be determined"
-            ),
+            title="Further runs that would make the numbers sharper, the best first"
+            if is_whole
+            else s.line(words),
         )
-        if all(each["told"]["value"] <= s.result["told_at_start"]["value"] for each in s.result["proposals"]):
+        if not is_whole and all(each["told"]["value"] <= before for each in s.result["proposals"]):
             yield b.Text(
                 "None of these runs determines one more number: weigh a part, or know a gain.", "note"
             )

@@ -1,4 +1,5 @@
-"""The parts of the picture of a linkage: links through pins, places, paths, supports, and reactions as arrows."""
+"""The parts of the picture of a linkage: links through pins, places, paths, supports, guides with their blocks, and
+reactions as arrows."""
 
 from __future__ import annotations
 
@@ -9,6 +10,8 @@ import numpy as np
 
 from ..mechanism.linkage import Linkage
 from ..mechanism.machine import Mechanism
+from ..mechanism.sketch import places as places
+from ..mechanism.sketch import shown_pins as shown_pins
 from .motion import Arrow, DrawnLink
 
 
@@ -21,20 +24,6 @@ def links(linkage: Linkage, looks: Mapping[str, str]) -> Iterator[DrawnLink]:
         crank, grounded = name == linkage.driver.bar.name, any(pin in linkage.ground for pin in pins)
         usual = "crank" if crank else "heavy" if grounded else "light"
         yield DrawnLink(name, pins, looks.get(name, usual), closed=len(pins) > 2)
-
-
-def shown_pins(linkage: Linkage) -> set[str]:
-    """The pins and points that are drawn: not those of the ground that only say where a rail lies, and not further
-    points of a link that meet a pin."""
-    topology = linkage.topology
-    joined = {pin for pin, _ in topology.joints}
-    return {pin for pin in (*joined, *topology.carries) if "." not in pin or pin in joined}
-
-
-def places(mechanism: Mechanism) -> dict[str, tuple[Any, Any]]:
-    """The places x, y of the pins and points of a mechanism that are drawn [m]."""
-    shown = shown_pins(mechanism.linkage)
-    return {name: (pin.p.x, pin.p.y) for name, pin in mechanism.pins.items() if name in shown}
 
 
 def rails(turn: Mechanism) -> dict[str, tuple[tuple[float, float], tuple[float, float]]]:
@@ -82,14 +71,28 @@ def hanging(turn: Mechanism) -> tuple[str, ...]:
     return tuple(pin for pin, ends in low.items() if ends and np.mean(ends) < at[pin][1] - 0.1 * span)
 
 
+def blocks(mechanism: Mechanism) -> dict[str, Any]:
+    """The angle of the line of each sliding block [rad], by its pin."""
+    return {pin: np.arctan2(slide.d.y, slide.d.x) for (pin, _), slide in mechanism.slides.items()}
+
+
+def labels(linkage: Linkage) -> dict[str, str]:
+    """The labels of pins that differ from their names: a further point of a link at a pin of its name has none."""
+    shown = shown_pins(linkage)
+    return {pin: "" for pin in shown if "." in pin and pin.rpartition(".")[2] in shown}
+
+
 def arrows(
     titles: Mapping[str, str],
     joints: Mapping[str, str],
     force: Callable[[str], tuple[Any, Any]],
     groups: Mapping[str, str] | None = None,
+    named: bool = False,
 ) -> Iterator[Arrow]:
     """An arrow for each output with a joint. `titles` gives the output of each title, `joints` its joint, `groups`
-    its group, `force` the components of its reaction [N]."""
+    its group, `force` the components of its reaction [N]. An arrow bears the name of its joint or, where it is
+    `named`, its title."""
     for title, output in titles.items():
         if output in joints:
-            yield Arrow(title, joints[output], *force(output), group=(groups or {}).get(output, ""))
+            group = (groups or {}).get(output, "")
+            yield Arrow(title, joints[output], *force(output), short=title if named else "", group=group)

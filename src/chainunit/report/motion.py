@@ -62,6 +62,8 @@ class Clip:
     arrows: tuple[Arrow, ...] = ()
     loads: Mapping[str, Any] = field(default_factory=dict)
     """the load on each link, shown as the width of a band along the link"""
+    blocks: Mapping[str, Any] = field(default_factory=dict)
+    """the angle of the line of each sliding block [rad], by its joint"""
     event: bool = False
     still: float = 0.0
     """time of the picture that the page shows before it plays [s]"""
@@ -85,6 +87,8 @@ class Animation:
     """the labels of joints whose label differs from their name"""
     paths: Mapping[str, tuple[Any, Any]] = field(default_factory=dict)
     """the paths of points of the linkage [m]"""
+    rails: Mapping[str, tuple[tuple[float, float], tuple[float, float]]] = field(default_factory=dict)
+    """the ends of the way of each block that slides in the ground, by its joint [m]"""
     form: ClassVar[str] = "long"
 
 
@@ -113,6 +117,9 @@ def pictures(animation: Animation, units: Units) -> dict[str, Any]:
             {"title": title, "x": _list(x, reach, 5), "y": _list(y, reach, 5)}
             for title, (x, y) in animation.paths.items()
         ],
+        "rails": [
+            [_list(x, reach, 5)[0] for place in ends for x in place] for ends in animation.rails.values()
+        ],
         "turn": animation.turn,
         "runs": [_run(run, reach, units) for run in animation.runs],
     }
@@ -131,6 +138,7 @@ def _run(run: Clip, reach: float, units: Units) -> dict[str, Any]:
             name: {"x": _list(x, reach, 5), "y": _list(y, reach, 5)} for name, (x, y) in run.joints.items()
         },
         "readings": [_reading(each, units) for each in run.readings],
+        "blocks": {name: _list(np.degrees(angle), 360.0, 5) for name, angle in run.blocks.items()},
         "loads": {name: _list(load, None, 3) for name, load in run.loads.items()},
         "largest": _list(largest, None, 4)[0],
         "forces": [

@@ -15,43 +15,68 @@
     script.textContent = await new Response(stream).text();
     document.head.appendChild(script);
   };
+  // panels that are too narrow beside each other stand below each other
+  const isNarrow = (figure, width) => figure.narrow && width < figure.below;
+  // the library changes figure.layout: the height of the wide layout is kept apart
+  const heightOf = (figure, width) => (isNarrow(figure, width) ? figure.narrow.height : figure.height);
+  const layoutFor = (figure, width) => (isNarrow(figure, width) ? figure.narrow : figure.wide) || {};
   const drawPlots = () => {
     for (const box of document.querySelectorAll(".plot")) {
       const figure = figures[box.dataset.figure];
+      figure.height = figure.layout.height;
+      box.style.height = heightOf(figure, box.clientWidth) + "px";
       Plotly.newPlot(box, figure.data, figure.layout, config);
-      plots.push([box, figure.layout.height]);
+      plots.push([box, figure]);
     }
+    fit();
     document.documentElement.dataset.plots = plots.length;
   };
+  const fit = () => {
+    for (const [box, figure] of plots) {
+      const narrow = Boolean(isNarrow(figure, box.clientWidth));
+      if (!figure.narrow || box.dataset.narrow === String(narrow)) continue;
+      box.dataset.narrow = narrow;
+      box.style.height = heightOf(figure, box.clientWidth) + "px";
+      Plotly.relayout(box, layoutFor(figure, box.clientWidth));
+    }
+  };
+  window.addEventListener("resize", fit);
   const boxes = document.querySelectorAll(".plot");
   if (boxes.length)
     loadPlotly().then(drawPlots, () => {
       for (const box of boxes) box.textContent = "This browser cannot unpack the plots; open the page in one of 2023 or later.";
     });
   // paper is narrower than a screen: a plot is laid out anew for it, so that its letters keep their size
-  const PAPER = { width: 690, height: 440, letters: 10.5 };
-  const resize = (box, width, height, letters) => {
-    const layout = { width, height, autosize: width === null, "font.size": letters };
+  const PAPER = { width: 690, most: 900, two: 415, letters: 10, titles: 9.5, as: 900 };
+  const resize = (box, figure, width, height, letters, titles, across) => {
+    const layout = { ...layoutFor(figure, across), width, height, autosize: width === null, "font.size": letters };
     for (const axis of Object.keys(box.layout).filter((name) => /^[xy]axis/.test(name))) {
-      layout[axis + ".title.font.size"] = letters;
+      layout[axis + ".title.font.size"] = titles;
     }
     box.style.height = height + "px";
     Plotly.relayout(box, layout);
   };
   window.addEventListener("beforeprint", () => {
-    for (const [box, height] of plots) {
-      // two on a page; what is tall for its many rows stays so
-      resize(box, PAPER.width, height > 1.6 * PAPER.height ? Math.min(height, 900) : PAPER.height, PAPER.letters);
+    for (const [box, figure] of plots) {
+      // two on a page; a plot that is tall for its many rows stays so
+      const height = Math.round(0.85 * figure.height);
+      resize(box, figure, PAPER.width, Math.min(PAPER.most, height < 1.6 * PAPER.two ? Math.min(height, PAPER.two) : height),
+        PAPER.letters, PAPER.titles, PAPER.as);
     }
   });
   window.addEventListener("afterprint", () => {
-    for (const [box, height] of plots) resize(box, null, height, 13);
+    for (const [box, figure] of plots) resize(box, figure, null, heightOf(figure, box.clientWidth), 13, 13, box.clientWidth);
   });
 
   /* tables and drawings that are wider than the screen say that they scroll */
   const wideBoxes = document.querySelectorAll(".wide, .drawing");
   const markWide = () => {
     for (const box of wideBoxes) {
+      // beside the text there may be free space
+      box.style.marginRight = "";
+      const free = window.innerWidth - box.getBoundingClientRect().right - 24;
+      const lacking = box.scrollWidth - box.clientWidth;
+      if (lacking > 1 && free > 24 && !box.closest(".given")) box.style.marginRight = -Math.min(lacking, free) + "px";
       const room = box.scrollWidth - box.clientWidth;
       box.classList.toggle("scrolls", getComputedStyle(box).overflowX === "auto" && room > 1);
       box.classList.toggle("at-end", box.scrollLeft > room - 2);
@@ -78,13 +103,6 @@
 
   const colour = (group) => "group-" + (motion.groups.indexOf(group) + 1);
   const labelOf = (joint) => (joint in motion.names ? motion.names[joint] : joint);
-  // the joints at the other ends of the links of a joint: its name stands on the opposite side
-  const beside = {};
-  for (const link of motion.links)
-    link.joints.forEach((joint, i) => {
-      const next = [link.joints[i - 1], link.joints[i + 1]].filter((other) => other !== undefined);
-      (beside[joint] = beside[joint] || []).push(...next);
-    });
   let run, frame, playTime, playing = false, last = null, parts, scale, origin, perNewton, height;
   const select = byId("run"), factor = byId("factor"), arrows = byId("arrows"), slider = byId("slider");
   motion.runs.forEach((r, i) => select.add(new Option(r.title, i)));
@@ -146,21 +164,32 @@
       const [[ox, oy], [px, py]] = motion.orbit.map(at);
       add(stage, "circle", { class: "orbit", cx: ox, cy: oy, r: Math.hypot(px - ox, py - oy) });
     }
+    for (const ends of motion.rails) {
+      const [ax, ay, bx, by] = ends.map((v, i) => origin[i % 2] + (i % 2 ? -scale : scale) * v);
+      const length = Math.hypot(bx - ax, by - ay) || 1, ux = (bx - ax) / length, uy = (by - ay) / length;
+      for (const side of [13, -13]) {
+        const strokes = [`M${ax - side * uy} ${ay + side * ux} L${bx - side * uy} ${by + side * ux}`];
+        for (let s = 4; s < length; s += 12) {
+          const x = ax + s * ux - side * uy, y = ay + s * uy + side * ux, out = Math.sign(side) * 7;
+          strokes.push(`M${x} ${y} l${-out * uy - 5 * ux} ${out * ux - 5 * uy}`);
+        }
+        add(stage, "path", { class: "rail", d: strokes.join("") });
+      }
+    }
     parts.loads = motion.links
       .filter((link) => link.name in run.loads)
       .map((link) => [link, add(stage, "polyline", { class: "material" })]);
     parts.links = motion.links.map((link) =>
       add(stage, link.closed ? "polygon" : "polyline", { class: `link ${link.look}${link.closed ? " closed" : ""}` }));
+    parts.blocks = Object.keys(run.blocks).map((joint) => [joint, add(stage, "rect", {
+      class: "block", x: -20, y: -10, width: 40, height: 20, rx: 2 })]);
     for (const path of motion.paths) {
       const points = path.x.map((px, i) => `${origin[0] + scale * px} ${origin[1] - scale * of(path.y, i)}`);
       add(add(stage, "path", { class: "path", d: "M" + points.join("L") }), "title", {}, path.title);
     }
     parts.joints = {};
     for (const name of Object.keys(run.joints)) {
-      parts.joints[name] = [
-        add(stage, "circle", { class: "joint", r: labelOf(name) ? 5 : 3 }),
-        add(stage, "text", { "text-anchor": "middle" }, labelOf(name)),
-      ];
+      parts.joints[name] = [add(stage, "circle", { class: "joint", r: labelOf(name) ? 5 : 3 })];
     }
     parts.forces = run.forces.map((force) => {
       const group = add(stage, "g", { class: `arrow ${colour(force.group)} ${force.kind}` });
@@ -171,6 +200,10 @@
         name: add(group, "text", { "text-anchor": "middle" }),
       };
     });
+    // names come last: no arrow covers them
+    for (const [name, part] of Object.entries(parts.joints)) {
+      part.push(add(stage, "text", { "text-anchor": "middle", class: "joint-name" }, labelOf(name)), null);
+    }
     parts.legend = add(stage, "g", { class: "arrow legend" });
     parts.legendLine = add(parts.legend, "path", { class: "force" });
     parts.legendHead = add(parts.legend, "path", { class: "head" });
@@ -217,8 +250,61 @@
     part.line.setAttribute("d", `M${x} ${y} L${bx} ${by}`);
     part.head.setAttribute("d", d);
     part.name.textContent = length > 34 ? label : "";
-    part.name.setAttribute("x", x + dx + (16 * dx) / length);
+    // a name is wide: beside a lying arrow it stands further off
+    const half = 4 * part.name.textContent.length;
+    part.name.setAttribute("x", x + dx + ((12 + half) * dx) / length);
     part.name.setAttribute("y", y + dy + (14 * dy) / length + 5);
+  }
+
+  // the distance of a point from a line between two points
+  const fromLine = (x, y, [ax, ay, bx, by]) => {
+    const dx = bx - ax, dy = by - ay, size = dx * dx + dy * dy || 1;
+    const s = Math.max(0, Math.min(1, ((x - ax) * dx + (y - ay) * dy) / size));
+    return Math.hypot(x - ax - s * dx, y - ay - s * dy);
+  };
+
+  // the name of each joint stands around it, clear of links, arrows and other names; it stays where it is clear
+  function nameJoints() {
+    const lines = [];
+    for (const link of motion.links)
+      link.joints.forEach((joint, i) => i && lines.push([...at(link.joints[i - 1]), ...at(joint)]));
+    const names = [];
+    run.forces.forEach((force, i) => {
+      const [x, y] = at(force.at), dx = perNewton * of(force.x, frame), dy = -perNewton * of(force.y, frame);
+      if (Math.hypot(dx, dy) < 3) return;
+      lines.push([x, y, x + dx, y + dy]);
+      const part = parts.forces[i].name;
+      if (part.textContent) names.push([Number(part.getAttribute("x")), Number(part.getAttribute("y")) - 5]);
+    });
+    for (const joint of motion.grounds) {
+      const [x, y] = at(joint), up = motion.hanging.includes(joint) ? -1 : 1;
+      lines.push([x, y, x, y + 24 * up]);
+    }
+    const letters = parseFloat(getComputedStyle(stage).getPropertyValue("--letters")) || 15;
+    for (const [name, part] of Object.entries(parts.joints)) {
+      const text = part[1];
+      if (!text.textContent) continue;
+      const [x, y] = at(name), half = 0.3 * letters * text.textContent.length;
+      const place = (k) => [x + (13 + half + 4) * Math.cos((k * Math.PI) / 6), y + (13 + 0.5 * letters) * Math.sin((k * Math.PI) / 6)];
+      const room = (k) => {
+        const [px, py] = place(k), ends = [-1, 0, 1].map((s) => px + s * half);
+        const clear = Math.min(...ends.map((ex) => Math.min(...lines.map((each) => fromLine(ex, py, each)))));
+        const apart = Math.min(99, ...names.map(([nx, ny]) => Math.max(Math.abs(nx - px) - half - 8, Math.abs(ny - py) - letters + 8)));
+        const inside = Math.min(px - half, WIDTH - px - half, py - 10, height - py - 10);
+        return Math.min(clear, apart, inside);
+      };
+      let best = part[2];
+      if (best === null || room(best) < 9) {
+        const rooms = Array.from({ length: 12 }, (_, k) => Math.min(room(k), 18));
+        const top = rooms.indexOf(Math.max(...rooms));
+        if (best === null || rooms[top] > rooms[best] + 3) best = top;
+        part[2] = best;
+      }
+      const [px, py] = place(best);
+      names.push([px, py]);
+      text.setAttribute("x", px);
+      text.setAttribute("y", py + 0.36 * letters);
+    }
   }
 
   const digits = (x, n) => {
@@ -234,23 +320,14 @@
       band.setAttribute("points", points(link));
       band.setAttribute("stroke-width", (34 * of(run.loads[link.name], frame)) / heaviest);
     }
-    for (const [name, [dot, text]] of Object.entries(parts.joints)) {
+    for (const [joint, block] of parts.blocks) {
+      const [x, y] = at(joint);
+      block.setAttribute("transform", `translate(${x} ${y}) rotate(${-of(run.blocks[joint], frame)})`);
+    }
+    for (const [name, [dot]] of Object.entries(parts.joints)) {
       const [x, y] = at(name);
       dot.setAttribute("cx", x);
       dot.setAttribute("cy", y);
-      let dx = 0, dy = 0;
-      for (const other of beside[name] || []) {
-        const [ox, oy] = at(other), length = Math.hypot(x - ox, y - oy) || 1;
-        dx += (x - ox) / length;
-        dy += (y - oy) / length;
-      }
-      const length = Math.hypot(dx, dy);
-      // beside the support
-      if (motion.grounds.includes(name)) [dx, dy] = [dx > 0 ? 1.1 : -1.1, 0];
-      else if (length < 0.3) [dx, dy] = length ? [-dy / length, dx / length] : [1, 0];
-      else [dx, dy] = [dx / length, dy / length];
-      text.setAttribute("x", x + 24 * dx);
-      text.setAttribute("y", y + 22 * dy + 6);
     }
     perNewton = run.largest > 0 ? (parts.arrow * Number(arrows.value)) / run.largest : 0;
     run.forces.forEach((force, i) => {
@@ -258,6 +335,7 @@
       arrow(parts.forces[i], x, y, perNewton * fx, -perNewton * fy, force.short || labelOf(force.at));
       parts.rows[i].textContent = Math.hypot(fx, fy).toFixed(0) + " N";
     });
+    nameJoints();
     if (perNewton) {
       const newton = roundForce((0.75 * parts.arrow) / perNewton), x = 20, y = height - 18;
       const [bx, by, d] = head(x, y, newton * perNewton, 0);

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import pairwise
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -69,6 +71,16 @@ _MOST = 6000  # samples of a line
 _ROW, _HALF_ROW, _ENDS = 250, 190, 75  # heights [px]
 
 
+_COLUMN = 300
+"""Width below which a column of panels is too narrow beside others [px]; then all panels stand below each other."""
+_LEAST, _LINE = 430, 40
+"""Width below which the title of an axis has lines [px], and the letters of a line."""
+_DECADES = 300.0
+"""Ratio of the ends of a logarithmic axis from which only powers of ten have ticks."""
+_PHONE = 340
+"""Width for which the rows of a legend are counted where panels stand below each other [px]."""
+
+
 def height(figure: Figure) -> int:
     """Height on the page [px]."""
     row = _HALF_ROW if figure.half else _ROW
@@ -76,8 +88,31 @@ def height(figure: Figure) -> int:
     return round(_ENDS + _above(figure) + _legend_rows(figure) + row * sum(heights))
 
 
+def page_figure(spec: Figure, units: Units) -> dict[str, Any]:
+    """The figure for the script of the page: traces and layout of plotly and, where panels stand beside each other,
+    the changes of the layout for a `narrow` box and back to a `wide` one, and the width `below` which a box is
+    narrow [px]."""
+    drawing = _drawn(spec, units)
+    embedded: dict[str, Any] = drawing.figure.to_plotly_json()
+    narrow = drawing.narrow()
+    if narrow:
+        wide = {key: _at(embedded["layout"], key) for key in narrow}
+        embedded |= {"narrow": narrow, "wide": wide, "below": max(_LEAST, _COLUMN * len(spec.panels[0]))}
+    return embedded
+
+
+def _at(layout: Any, key: str) -> Any:
+    for name in key.split("."):
+        layout = layout[name]
+    return layout
+
+
 def figure(spec: Figure, units: Units) -> Any:
     """The figure as a figure of plotly."""
+    return _drawn(spec, units).figure
+
+
+def _drawn(spec: Figure, units: Units) -> _Drawing:
     drawing = _Drawing(in_units(spec, units))
     for place in drawing.spec.all_panels():
         drawing.panel(*place)
@@ -91,7 +126,7 @@ def figure(spec: Figure, units: Units) -> Any:
         hovermode="closest" if by_point else "x unified",
         hoversubplots="axis",
     )
-    return drawing.figure
+    return drawing
 
 
 def _hovers_by_point(panel: Panel) -> bool:
@@ -109,10 +144,13 @@ def _above(figure: Figure) -> int:
     return words + (18 if any(panel.title for panel in panels) else 0)
 
 
-def _legend_rows(figure: Figure) -> int:
-    """Room for the second and further rows of the legend [px]."""
+def _legend_rows(figure: Figure, width: float = 0.0) -> int:
+    """Room for the second and further rows of the legend [px]; with a `width` [px], as many names stand in a row as
+    it takes, else four."""
     items = (item for _, _, panel in figure.all_panels() for item in panel.items)
-    return 18 * (len({getattr(item, "name", "") for item in items} - {""}) // 4)
+    names = {getattr(item, "name", "") for item in items} - {""}
+    beside = max(1, int(width / (50.0 + 7.0 * max(map(len, names), default=0)))) if width else 4
+    return 18 * ((len(names) - (1 if width else 0)) // beside)
 
 
 def _small(x: Any) -> Any:
@@ -137,7 +175,7 @@ class _Drawing:
         panels = list(spec.all_panels())
         one_axis = all(len(spec.sharing(r, c)) == rows for r, c, _ in panels)
         gap = (22.0 if one_axis else 66.0) + (22.0 if any(panel.title for _, _, panel in panels) else 0.0)
-        self.columns = _domains(spec.widths or (1.0,) * columns, 0.09 if columns > 2 else 0.1)
+        self.columns = _domains(spec.widths or (1.0,) * columns, 0.12 if columns > 2 else 0.1)
         domains = _domains(spec.heights or (1.0,) * rows, gap / (height(spec) - _ENDS))
         self.rows = [(1.0 - last, 1.0 - first) for first, last in domains]
         self.samples = _thin_groups(spec)
@@ -145,6 +183,40 @@ class _Drawing:
         self.y_axes: dict[int, list[str]] = {}
         self.axes: dict[str, dict[str, Any]] = {}
         self.legend_names: set[str] = set()
+        self.places: dict[tuple[int, int], tuple[str, str]] = {}
+
+    def narrow(self) -> dict[str, Any]:
+        """The changes of the layout for a narrow box: all panels below each other, long titles in two lines; empty
+        where nothing changes."""
+        spec = self.spec
+        titles = {name: self.axes[name]["title"]["text"] for name in map(_long, self.x_axes.values())}
+        changes: dict[str, Any] = {
+            f"{name}.title.text": "<br>".join(wrap(text, _LINE))
+            for name, text in titles.items()
+            if len(text) > _LINE
+        }
+        if len(spec.panels[0]) == 1:
+            return changes and {"height": height(spec), **changes}
+        places = sorted(self.places, key=lambda place: (place[1], place[0]))
+        heights = spec.heights or (1.0,) * len(spec.panels)
+        row = _HALF_ROW if spec.half else _ROW
+        sizes = [row * min(heights[r], 1.1) for r, _ in places]
+        titled = 22.0 if any(panel.title for _, _, panel in spec.all_panels()) else 0.0
+        gaps = [
+            (22.0 if self.places[a][0] == self.places[b][0] else 66.0) + titled
+            for a, b in pairwise(places)
+        ]  # fmt: skip
+        room, begin = sum(sizes) + sum(gaps), 0.0
+        legend = _legend_rows(spec, _PHONE)
+        changes["height"] = round(room + _ENDS + _above(spec) + legend)
+        changes["margin.b"] = 52 + legend
+        for place, size, gap in zip(places, sizes, (*gaps, 0.0), strict=True):
+            x, y = self.places[place]
+            changes[f"{_long(x)}.domain"] = [0.0, 1.0]
+            ends = 1.0 - (begin + size) / room, 1.0 - begin / room
+            changes[f"{_long(y)}.domain"] = [max(0.0, ends[0]), ends[1]]
+            begin += size + gap
+        return changes
 
     def panel(self, r: int, c: int, panel: Panel) -> None:
         """Draw a panel into its place."""
@@ -154,6 +226,7 @@ class _Drawing:
         x = self.x_axes.setdefault(
             (c, self.spec.sharing(r, c)[0]), f"x{len(self.x_axes) + 1 if self.x_axes else ''}"
         )
+        self.places[r, c] = x, y
         across = self.axes.setdefault(_long(x), {"domain": self.columns[c], **_axis(panel.x)})
         if r == self.spec.sharing(r, c)[-1]:
             across |= {"anchor": y, "title": {"text": panel.x.label}}
@@ -298,11 +371,15 @@ def _axis(axis: Axis) -> dict[str, Any]:
         ticks = {"tickvals": list(range(len(axis.names))), "ticktext": list(axis.names), "ticks": ""}
         return {**ticks, "showgrid": False, "range": [len(axis.names) - 0.45, -0.55]}
     layout: dict[str, Any] = {"type": "log", "dtick": "D2"} if axis.log else {}
+    if axis.log and axis.low and axis.high and axis.high > _DECADES * axis.low:
+        layout["dtick"] = 1
     if axis.low is not None and axis.high is not None:
         ends = [axis.low, axis.high]
         layout["range"] = [float(np.log10(end)) for end in ends] if axis.log else ends
     elif axis.low == 0.0 and not axis.log:
         layout["rangemode"] = "tozero"
+    if axis.ticks:
+        return layout | {"tickvals": list(axis.ticks)}
     return layout | ({} if axis.step is None else {"dtick": axis.step})
 
 

@@ -136,7 +136,9 @@ def _scale(axis: Any, spec: Axis, side: str) -> None:
         axis.ticklabel_format(axis=side, useOffset=False)
     if spec.low is not None or spec.high is not None:
         getattr(axis, f"set_{side}lim")(spec.low, spec.high)
-    if spec.step is not None and spec.low is not None and spec.high is not None:
+    if spec.ticks:
+        which.set_ticks(list(spec.ticks))
+    elif spec.step is not None and spec.low is not None and spec.high is not None:
         which.set_ticks(np.arange(spec.low, spec.high + 0.5 * spec.step, spec.step))
 
 

@@ -67,7 +67,7 @@ def keys_of(name: str) -> Report:
     if not tables:
         table_names = dict.fromkeys(table.name for table in key_tables() if table.name)
         kinds = dict.fromkeys(_kind(table) for table in (*key_tables(), catalogue_columns()) if table.of)
-        near = near_name(name, (*table_names, *kinds)) or ";"
+        near = near_name(name, (*table_names, *kinds, *_key_names())) or ";"
         raise InputError(
             f"{name}: no such table and no such key{near} tables: {', '.join(table_names)}; tables of single types: "
             f"{', '.join(kinds)}"
@@ -87,6 +87,14 @@ def _with_key(name: str) -> Iterator[KeyTable]:
         keys = tuple(key for key in table.keys if any(f"{key.name}.".startswith(f"{each}.") for each in own))
         if keys:
             yield dataclasses.replace(table, keys=keys)
+
+
+def _key_names() -> Iterator[str]:
+    """The names of all keys as in a study file, and by themselves."""
+    for table in key_tables():
+        for key in table.keys:
+            yield f"{table.name}.{key.name}" if table.name else key.name
+            yield key.name
 
 
 def _block(table: KeyTable, title: str = "") -> Table:

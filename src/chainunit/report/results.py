@@ -6,7 +6,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
-from ..files import clear
+from ..files import clear, refuse_foreign
 from ..fmu.backends import Backend
 from ..progress import Report as Progress
 from ..reading import in_file
@@ -45,6 +45,7 @@ def compute(
         check_files(config)
     if scheduler is not None:
         check_workers(config, scheduler)
+    refuse_foreign(folder, *FILES)
     clear(folder, *FILES)
     if progress is not None:
         progress("the machine at constant speed", 0.0, 1.0)

@@ -17,6 +17,7 @@ import xarray as xr
 
 from .. import __version__
 from ..files import netcdf, whole
+from ..interrupts import stoppable
 from ..study.record import LOAD_CYCLE, StudyRecord
 from .run_names import title
 
@@ -55,7 +56,8 @@ def write(study: StudyRecord, folder: Path) -> list[Path]:
         files.append(_load_cycle(study, study.steady, folder / LOAD_CYCLE))
     if study.runs:
         file = folder / SERIES
-        with whole(file) as part, netcdf():
+        # an interrupt inside the library leaves its locks taken
+        with stoppable(), whole(file) as part, netcdf():
             tree(study).to_netcdf(part, engine="netcdf4")
         files.append(file)
     return files

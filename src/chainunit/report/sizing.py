@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from ..study.candidate import Standing
 from ..study.record import StudyRecord
-from ..study.sizing import Standing
 from . import blocks as b
 from .lines import Aside, Line, Number, Strong, capital, line, spoken
 
@@ -24,10 +24,10 @@ def answer(s: b.Source) -> Iterator[b.Block]:
     motor, ratio = s.words(f"{path}.motor"), s.number(f"{path}.ratio", digits=4, as_given=True)
     cards = [
         b.Card("Motor", ((motor, str(b.at(s.result, f"{path}.verdict"))),)),
-        b.Card("Gear ratio", ((ratio, "motor turns per crank turn"),)),
+        b.Card("Gear ratio", ((ratio, "motor turns per crank turn"),), tuple(_gear(s, path))),
         *(
-            b.Card(capital(name), ((size, title),), tuple(_relay(s)) if name == "protection" else ())
-            for name, title, size in _sizes(s)
+            b.Card(capital(name), ((size or "none", title),), tuple(more(s)))
+            for (name, title, size), more in zip(_sizes(s), (_disc, _relay), strict=False)
         ),
     ]
     yield b.Cards(tuple(cards))
@@ -48,13 +48,32 @@ def _best_path(s: b.Source) -> str | None:
     return None if best is None else f"sizing.candidates.{best}"
 
 
-def _sizes(s: b.Source) -> Iterator[tuple[str, str, Number]]:
-    """The leading numbers of the flywheel and of the protection: section, title, number."""
+def _sizes(s: b.Source) -> Iterator[tuple[str, str, Number | None]]:
+    """The leading numbers of the flywheel and of the protection: section, title, number; None where there is no
+    flywheel or no coupling."""
     for section in ("flywheel", "protection"):
         leading = _leading(s.result["sizing"].get(section))
         if leading:
-            title = s.result["sizing"][section][leading].get("title", spoken(leading))
-            yield section, title, s.number(f"sizing.{section}.{leading}", none="none")
+            size = s.number(f"sizing.{section}.{leading}")
+            yield (
+                section,
+                s.result["sizing"][section][leading].get("title", spoken(leading)),
+                size if size.value else None,
+            )
+
+
+def _gear(s: b.Source, candidate: str) -> Iterator[Line]:
+    """The gear unit of a candidate, and the series of its ratio."""
+    if b.at(s.result, f"{candidate}.gear"):
+        series = b.at(s.result, f"{candidate}.series")
+        yield line(s.words(f"{candidate}.gear"), *((", ", s.words(f"{candidate}.series")) if series else ()))
+
+
+def _disc(s: b.Source, flywheel: str = "sizing.flywheel") -> Iterator[Line]:
+    """The steel disc of a flywheel."""
+    mass = b.at(s.result, f"{flywheel}.mass")
+    if mass and mass["value"] is not None:
+        yield s.line(f"steel disc {{{flywheel}.mass}}, {{{flywheel}.diameter}} in diameter")
 
 
 def _relay(s: b.Source) -> Iterator[Line]:
@@ -86,6 +105,8 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         yield from _best(s, best, "Motor" if choice is not None else "Insufficient motor")
     if "coupling" in section.get("protection", {}):
         yield b.Text(s.words("sizing.protection.coupling"))
+        ways = section["protection"]["alternatives"]
+        yield from (b.Text(s.words(f"sizing.protection.alternatives.{k}.words")) for k in range(len(ways)))
     yield from (b.Text(each, form="long") for each in s.lines("sizing.notes"))
     if candidates:
         if "tried" in section:
@@ -93,11 +114,15 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
             trials = "Tried: {=sizing.tried} of {=sizing.motors} motors of the catalogue"
             yield b.Text(s.line(f"{trials}{weak}."))
         row_count = int(study.config.sizing.candidates) if study.config.sizing else len(candidates)
+        yield from _trade(s)
         yield _candidates(s, row_count)
         if len(candidates) > row_count:
             yield b.Text(
                 f"{len(candidates) - row_count} more were tried; report.html lists them.", form="short"
             )
+    if "order" in section:
+        order = "; ".join(f"{i}. {words}" for i, words in enumerate(section["order"], 1))
+        yield b.Text(f"Order of preference among those that fit: {order}.", form="long")
     tables = []
     # a machine without sides has no one-sided feed
     side_keys = () if study.config.machine.model.sides else ("one_sided_share", "torque_peak_one_sided")
@@ -118,9 +143,12 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
 def _best(s: b.Source, path: str, word: str) -> Iterator[b.Block]:
     """The sentences on the motor of all runs and on the reason for it."""
     ratio = s.number(f"{path}.ratio", digits=4, as_given=True)
-    sentence = line(f"{word}: ", s.words(f"{path}.motor"), ", ratio ", ratio)
-    for _, title, size in _sizes(s):
-        sentence += line("; no safety coupling" if size.value is None else line(f"; {title} ", size))
+    sentence = line(f"{word}: ", s.words(f"{path}.motor"), ", ratio ", ratio, _aside(_gear(s, path)))
+    for name, title, size in _sizes(s):
+        if size is None:
+            sentence += line("; no flywheel" if name == "flywheel" else "; no safety coupling")
+        else:
+            sentence += line(f"; {title} ", size, _aside(_disc(s)) if name == "flywheel" else ())
     sentence = line(sentence, *(line("; ", relay) for relay in _relay(s)))
     model = s.result["verdict"]["model"]
     doubt = s.line(" ({verdict.model.caveat})") if model is not None and model["caveat"] else ()
@@ -169,9 +197,10 @@ def _candidates(s: b.Source, row_count: int) -> b.Table:
         verdict = candidate["verdict"]
         motor = line(s.words(f"{path}.motor"), Aside(s.line(f"ratio {{={path}.ratio:4}}")))
         cells = (_check(s, f"{path}.checks.{name}") if name in candidate["checks"] else "" for name in checks)
+        parts = (_flywheel(s, path), _mass(s, path)) if "flywheel" in candidate else ()
         rows.append(
             b.TableRow(
-                (motor, s.words(f"{path}.verdict"), *cells),
+                (motor, s.words(f"{path}.verdict"), *parts, *cells),
                 line(f"{_SIGN.get(verdict, '')} ", s.words(f"{path}.reason")),
                 _SEVERITY.get(verdict, "bad"),
                 "both" if i < row_count else "long",
@@ -180,13 +209,47 @@ def _candidates(s: b.Source, row_count: int) -> b.Table:
     title = (
         "Candidates, best first. Cell: the share of its limit that a check takes; line in the bar: the limit."
     )
-    columns = (*b.heads("motor", "verdict"), *(b.Column(title, form="long") for title in checks.values()))
+    more = ("flywheel", "mass") if "flywheel" in candidates[0] else ()
+    long = (b.Column(title, form="long") for title in (*more, *checks.values()))
+    columns = (*b.heads("motor", "verdict"), *long)
     return b.Table(tuple(rows), columns, title=title, note_title="because", numeric=False)
+
+
+def _trade(s: b.Source) -> Iterator[b.Block]:
+    """The smallest drive that fits with a flywheel, beside the next larger motor without one."""
+    rows = []
+    for i in s.result["sizing"].get("trade") or ():
+        path = f"sizing.candidates.{i}"
+        start = s.number(f"{path}.checks.start.value")
+        motor = line(s.words(f"{path}.motor"), Aside(s.line(f"ratio {{={path}.ratio:4}}")))
+        rows.append(
+            b.TableRow((motor, _flywheel(s, path), start, _mass(s, path), s.words(f"{path}.verdict")))
+        )
+    if rows:
+        title = "A flywheel, or a larger motor. Mass: of motor and flywheel."
+        yield b.Table(tuple(rows), b.heads("motor", "flywheel", "start", "mass", "verdict"), title=title)
+
+
+def _flywheel(s: b.Source, candidate: str) -> Line:
+    path = f"{candidate}.flywheel"
+    return line(s.number(f"{path}.J"), _aside(_disc(s, path))) if s.value(f"{path}.J") else "none"
+
+
+def _mass(s: b.Source, candidate: str) -> Line:
+    return s.number(f"{candidate}.numbers.mass")
+
+
+def _aside(lines: Iterator[Line]) -> Line:
+    return tuple(Aside(each) for each in lines)
 
 
 def _check(s: b.Source, path: str) -> b.Share:
     check = b.at(s.result, path)
     size = check["utilisation"]["value"]
     of = s.line(f"{{{path}.value}} of {{{path}.limit}}") if "value" in check and "limit" in check else ()
+    if "forbidden" in check:
+        return b.Share(
+            s.number(f"{path}.utilisation", none="none permitted", over=True), s.words(f"{path}.forbidden")
+        )
     over = size is not None and size > 1.0
     return b.Share(s.number(f"{path}.utilisation", none="no value", over=over), of)

@@ -1,4 +1,4 @@
-"""The report on a study: the question, the sections of results, the basis of the results, the given values."""
+"""The report on a study: the answer, the question, the results, their basis, the given values."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .drawing import drawing
 from .lines import Line, capital, join, line, spoken
 from .study_motion import motion
 
-DRAWING = "machine.svg"
+DRAWING, QUESTION = "machine.svg", "question"
 _DRAWING_CAPTION = "Pins and links, and dimensions by their names in a study file. φ is the crank angle, {}."
 _VERSIONS = ("numpy", "casadi", "fmpy", "plotly")
 
@@ -30,7 +30,7 @@ def report(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Rep
     s = b.Source(as_dict(study) if result is None else result)
     with shown_in(study.config.units):
         sections = [
-            b.Section(name, each.heading, tuple(each.blocks(s, study)))
+            b.Section(name, each.heading, tuple(each.blocks(s, study)), beside=name == QUESTION)
             for name, each in _SECTIONS.items()
             if name in study.findings or name not in ANALYSES
         ]
@@ -38,7 +38,7 @@ def report(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Rep
             study.config.title,
             study.kind,
             s.result,
-            wording.of_machine(tuple(_opening(s, study)), study.turning),
+            (),
             wording.of_machine(tuple(sections), study.turning),
             source=_head(s),
             failure=s.words("failure") if study.failure is not None else (),
@@ -82,13 +82,14 @@ def _motion(study: StudyRecord) -> list[b.Block]:
 # -- the question
 
 
-def _opening(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+def _question(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     noun = study.noun
     question = s.line(
-        f"Which motor, gear and flywheel does this {noun} need? Its crank turns at {{=run.crank_speed:4}}."
+        "Which motor, gear and flywheel does this {noun} need? Its crank turns at {=run.crank_speed:4}."
         if "sizing" in s.result
-        else f"What does the motor of this {noun} have to give? It turns the crank through a gear of ratio "
-        "{=machine.ratio}, in normal running at {=run.crank_speed:4}."
+        else "What does the motor of this {noun} have to give? It turns the crank through a gear of ratio "
+        "{=machine.ratio}, in normal running at {=run.crank_speed:4}.",
+        noun=noun,
     )
     if study.answers:
         question += s.line(
@@ -197,9 +198,9 @@ def _certificate(
         if name.endswith(DIFFERENCE):
             text = (
                 f"Difference of {name.removesuffix(DIFFERENCE)} to the monolithic solution, in parts of its "
-                f"peak: at most {most} ({titles[run]}), {len(compared_runs)} runs compared."
+                f"peak: at most {most} ({{title}}), {len(compared_runs)} runs compared."
             )
-        yield b.Text(s.line(text), form="short")
+        yield b.Text(s.line(text, title=titles[run]), form="short")
 
 
 def _version(name: str) -> str:
@@ -211,6 +212,7 @@ def _version(name: str) -> str:
 
 _SECTIONS: Mapping[str, Contents] = {
     "answer": Contents("The answer", answer.blocks),
+    QUESTION: Contents("The question", _question),
     "sizing": Contents("The drive", sizing.blocks),
     "runs": Contents("Every run in numbers", runs.blocks),
     "shaft": Contents("The driveline", shaft.blocks, shaft.PICTURES.files),

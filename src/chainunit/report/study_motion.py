@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from ..mechanism.machine import MachineState
 from ..mechanism.models import CrankMotion, names_of
 from ..study.record import StudyRecord
-from . import linkage, run_names
+from . import linkage, linkage_loads, run_names
 from .edge_motion import EdgeMotion
 from .lines import capital
 from .motion import Animation, Clip, DrawnLink, Reading
@@ -22,7 +23,8 @@ _PER_SECOND = 60
 _PER_TURN = 90
 MOST = 7000
 """The largest number of pictures of all runs together; a longer study is shown at a lower rate."""
-_CAPTION = "An arrow is the force on a part of the machine from its support or neighbour{}."
+_CAPTION = "An arrow is the force on a part of the machine from its support or neighbour{}{}."
+_LOADS = "; a dotted one is a force of the loads"
 
 
 def motion(study: StudyRecord) -> Animation:
@@ -37,18 +39,20 @@ def motion(study: StudyRecord) -> Animation:
     angles = np.linspace(0.0, 2.0 * math.pi, _PER_TURN + 1)
     whole = machine.state(machine.inputs({"phi": angles * machine.ratio})).m
     paths, crank = linkage.paths(whole), whole.linkage.driver
+    loads = _LOADS if linkage_loads.has_loads(whole.linkage) else ""
     thin = f"; a thin line is the {', the '.join(paths)}" if paths else ""
     return Animation(
         tuple(_links(whole, supplement)),
         tuple(pin for pin in whole.linkage.ground if pin in linkage.shown_pins(whole.linkage)),
         tuple(_run(study, name, interval, supplement) for name in run_names.in_order(study)),
         turn,
-        supplement.caption or _CAPTION.format(thin),
+        supplement.caption or _CAPTION.format(loads, thin),
         hanging=linkage.hanging(whole),
         orbit=(crank.bar.pin, crank.end),
         groups=tuple(dict.fromkeys(supplement.groups.values())),
-        names=supplement.names,
+        names=linkage.labels(whole.linkage) | dict(supplement.names),
         paths=paths,
+        rails=linkage.rails(whole),
     )
 
 
@@ -61,19 +65,32 @@ def _links(whole: Any, supplement: Supplement) -> Iterator[DrawnLink]:
     )
 
 
+def _loads(study: StudyRecord, part: Any) -> dict[str, Any]:
+    """The inputs of the machine in rows of a run, besides the motion of its shaft, by name."""
+    return {
+        v.name: part[f"machine.{v.name}"].values
+        for v in study.drive.machine.model.input_layout.variables
+        if f"machine.{v.name}" in part and v.name not in names_of(CrankMotion)
+    }
+
+
+def machine_state(study: StudyRecord, part: Any) -> MachineState:
+    """The machine in rows of a run, at the place and speed that the crank has there."""
+    machine = study.drive.machine
+    angle, speed = study.drive.crank_motion(part)
+    motion = {"phi": angle * machine.ratio, "w": speed * machine.ratio}
+    return machine.state(machine.inputs({**motion, **_loads(study, part)}))
+
+
 def _run(study: StudyRecord, name: str, interval: float, supplement: Supplement) -> Clip:
     run, drive = study.runs[name], study.drive
-    machine, model = drive.machine, drive.machine.model
+    model = drive.machine.model
     time = run["time"].values
     instants = np.arange(time[0], time[-1] + 0.5 * interval, interval)
     part = run.isel(time=np.unique(np.minimum(np.searchsorted(time, instants), len(time) - 1)))
     angle, speed = drive.crank_motion(part)
-    loads = {
-        v.name: part[f"machine.{v.name}"].values
-        for v in model.input_layout.variables
-        if f"machine.{v.name}" in part and v.name not in names_of(CrankMotion)
-    }
-    state = machine.state(machine.inputs({"phi": angle * machine.ratio, "w": speed * machine.ratio, **loads}))
+    loads = _loads(study, part)
+    state = machine_state(study, part)
     details = supplement.details(part, state)
     joints = {output: pin for output, (pin, _) in model.joints.items() if output not in supplement.hidden}
     forces = linkage.arrows(
@@ -81,6 +98,7 @@ def _run(study: StudyRecord, name: str, interval: float, supplement: Supplement)
         joints,
         lambda output: (part[f"machine.{output}.fx"].values, part[f"machine.{output}.fy"].values),
         supplement.groups,
+        named=hasattr(model, "described_by"),
     )
     has_motor = name in run_names.motor_runs(study)
     readings = (
@@ -100,8 +118,9 @@ def _run(study: StudyRecord, name: str, interval: float, supplement: Supplement)
         part["time"].values - (event or 0.0),
         {**linkage.places(state.m), **details.joints},
         readings,
-        (*forces, *details.arrows),
+        (*forces, *linkage_loads.load_arrows(state), *details.arrows),
         details.loads,
+        linkage.blocks(state.m),
         event is not None,
         still=study.steady_begin if event is None else 0.0,
     )

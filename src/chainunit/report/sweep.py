@@ -26,10 +26,10 @@ def report(summary: SweepSummary) -> b.Report:
     findings = summary.findings
     with shown_in(findings.config.units):
         sections = (
+            b.Section("influences", "Which parameter moves what", tuple(_influences(s, summary))),
             b.Section("best", "Points in order", tuple(_best(s, summary))),
             b.Section("extremes", "Extremes", tuple(_extremes(s, summary))),
             b.Section("maps", "Results over the parameters", tuple(sweep_figures.over_parameters(summary))),
-            b.Section("influences", "Which parameter moves what", tuple(_influences(s, summary))),
             b.Section("spread", _spread_heading(summary), tuple(_spread(s, summary))),
             b.Section("basis", "Basis of the numbers", tuple(_basis(s, summary))),
         )

@@ -182,7 +182,8 @@ def tornado(summary: SweepSummary) -> Iterator[fig.Figure]:
             words = tuple("" if x is None else f"{100.0 * x:.0f} %" for x in shares)
             ranks = [table[each].rank for each in order]
             bars = fig.Bars("rank correlation", np.arange(len(order)), ranks, 0.7, 1, words=words)
-            x = fig.Axis("rank correlation", low=-1.5, high=1.5, step=0.5)
+            # beside the longest bars there is room for the words
+            x = fig.Axis("rank correlation", low=-1.3, high=1.3, ticks=(-1.0, -0.5, 0.0, 0.5, 1.0))
             panels.append(
                 fig.Panel(x, fig.Axis("parameter", names=tuple(order)), (bars, fig.Mark(0.0)), name)
             )

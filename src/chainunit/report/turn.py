@@ -26,9 +26,12 @@ def angle_axis(study: StudyRecord) -> fig.Axis:
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The tables and the figure of a turn at constant speed."""
     turn: TurnFindings = study.findings["constant_speed"]
-    lead = s.line("Inverse dynamics at {=run.crank_speed:4} of the crank, without a motor.")
+    bars = ", of two bars in place of the chains" if study.drive.chain is not None else ""
+    lead = s.line("Inverse dynamics at {=run.crank_speed:4} of the crank, without a motor" + bars + ".")
     yield b.Text(lead, "lead", "long")
-    yield b.Table(s.rows(Turn, "constant_speed", none="none"), title="A turn at constant speed", form="long")
+    yield b.Table(
+        s.rows(Turn, "constant_speed", none="none"), title=f"A turn at constant speed{bars}", form="long"
+    )
     if turn.pins:
         names = Layout(Reaction).names
         rows = (
@@ -36,20 +39,19 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
             for pin in turn.pins
         )
         heads = b.heads("pin", "peak, with feed", "at", "peak, without feed", "at")
-        yield b.Table(
-            tuple(rows), heads, title="Largest forces in the pins over a turn at constant speed", form="long"
-        )
-    yield _figure(turn, angle_axis(study))
+        title = f"Largest forces in the pins over a turn at constant speed{bars}"
+        yield b.Table(tuple(rows), heads, title=title, form="long")
+    yield _figure(turn, angle_axis(study), bars)
 
 
-def _figure(turn: TurnFindings, angle: fig.Axis) -> fig.Figure:
+def _figure(turn: TurnFindings, angle: fig.Axis, bars: str) -> fig.Figure:
     inertia = fig.Curve("inertia", turn.loaded.angle, turn.inertia, in_legend=False)
     panels = [fig.Panel(angle, fig.Axis("reflected inertia", "kg.m2", low=0.0), (inertia,))]
     if turn.pins:
         panels.append(_reactions(turn))
     return fig.Figure(
         "turn-at-constant-speed",
-        "Inertia and largest reactions over a turn at constant speed",
+        f"Inertia and largest reactions over a turn at constant speed{bars}",
         "The inertia reflected to the crank over the crank angle; bars of the largest reaction of every pin, with "
         "feed and without it, with the crank angle at which it comes.",
         tuple((panel,) for panel in panels),

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..files import clear
-from ..study.identification.result import LOUD
+from ..study.identification.residuals import LOUD
 from ..study.identification.watch import WatchedRecording
 from ..study.identification.watch_result import as_dict
 from ..text import shown_in

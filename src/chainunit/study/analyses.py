@@ -5,8 +5,10 @@ from __future__ import annotations
 from .analysis import Analysis
 from .blade import BladeAnalysis
 from .flywheels import FlywheelAnalysis
+from .gear_loss import GearAnalysis
 from .notices import ObserverAnalysis
 from .organs import OrganAnalysis
+from .starts import StartAnalysis
 from .torsion_findings import TorsionAnalysis
 from .turn import TurnAnalysis
 
@@ -15,6 +17,8 @@ ANALYSES: tuple[type[Analysis], ...] = (
     TurnAnalysis,
     BladeAnalysis,
     FlywheelAnalysis,
+    GearAnalysis,
     TorsionAnalysis,
+    StartAnalysis,
     ObserverAnalysis,
 )

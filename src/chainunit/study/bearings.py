@@ -1,4 +1,4 @@
-"""The loads of the machine's pins in a run."""
+"""The loads of the machine's pins and guides in a run."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ from .drive import Drive
 from .window import mean, whole_turns
 
 
-def pin_loads(drive: Drive, run: xr.Dataset) -> dict[str, dict[str, float]]:
-    """Peak, RMS and equivalent load (mean of ISO 281 over the angle that the pin turns) of the reaction of
-    every pin [N]; empty for a machine that is a foreign FMU."""
+def pin_loads(drive: Drive, run: xr.Dataset) -> dict[str, dict[str, float | None]]:
+    """Peak, RMS and equivalent load (mean of ISO 281 over the angle that the pin turns) of the reaction of every pin
+    and guide [N]; a guide, which does not turn, has no equivalent load. Empty for a machine that is a foreign FMU."""
     if drive.outsider:
         return {}
-    table, turns = {}, whole_turns(drive, run)
+    table: dict[str, dict[str, float | None]] = {}
+    turns = whole_turns(drive, run)
     machine = drive.simulated_machine
     angles = machine.pin_turns(drive.machine_series(turns))
     for title, name in machine.model.pins.items():
@@ -27,7 +28,7 @@ def pin_loads(drive: Drive, run: xr.Dataset) -> dict[str, dict[str, float]]:
         table[title] = {
             "peak": float(np.max(forces)),
             "rms": math.sqrt(mean(turns, forces_of_turns**2)),
-            "equivalent": mean_load(forces_of_turns, angles[name]),
+            "equivalent": mean_load(forces_of_turns, angles[name]) if name in angles else None,
         }
     return table
 

@@ -12,20 +12,28 @@ import numpy as np
 from ..drives.catalogue import CatalogueMotor
 from ..drives.gearing import motor_side
 from ..drives.induction_motor import Inverter
+from ..drives.nameplate import Nameplate
 from ..engines import numpy_
 from .config import Config
 from .drive import Drive
+from .sections import Starter
 
 
 def catalogue_drive(
-    config: Config, motor: CatalogueMotor, crank_torque: Any, ambient: float | None = None
+    config: Config,
+    motor: CatalogueMotor,
+    crank_torque: Any,
+    ambient: float | None = None,
+    gear_ratio: float | None = None,
 ) -> Drive:
     """The motor with the gear ratio at which the crank has its speed, or with the ratio that the file gives.
 
     Parameters
     ----------
     crank_torque : crank torque over a turn at that speed [N m], shape (points,), or (turns, points) for
-        chains ambient : temperature of the surroundings [K]; by default that of the motor's declaration
+        chains
+    ambient : temperature of the surroundings [K]; by default that of the motor's declaration
+    gear_ratio : the ratio, where it is chosen already
 
     Raises
     ------
@@ -36,25 +44,21 @@ def catalogue_drive(
     model, p = motor.model()
     synchronous, rated_speed, rated_torque = plate.synchronous, plate.speed, plate.torque
     follows = config.start == "inverter"
-    given = "gear.ratio" in config.given
-    ratio = gear.ratio if given else rated_speed / w
+    if gear_ratio is None and "gear.ratio" in config.given:
+        gear_ratio = gear.ratio
+    ratio = rated_speed / w if gear_ratio is None else gear_ratio
     speed, drag = rated_speed, gear.d
     for _ in range(3):
         shaft = motor_side(numpy_(), dataclasses.replace(gear, ratio=ratio), crank_torque, speed)
         mean = float(np.mean(shaft))
         # the slip is proportional to the torque; an inverter compensates it
         speed = rated_speed if follows else synchronous - (synchronous - rated_speed) * mean / rated_torque
-        if not given:
+        if gear_ratio is None:
             ratio = speed / w
         drag = (mean - float(np.mean(crank_torque)) / ratio) / speed
-    soft = config.starter.soft_start if config.start == "soft" else p.soft_start
-    slip_hz = (synchronous - rated_speed) * plate.poles / (4.0 * math.pi)
-    control = dataclasses.asdict(config.starter.inverter)
-    if follows:
-        control["slip"] = control["slip"] or slip_hz / rated_torque
-    inverter = Inverter(on=float(follows), **control)
-    surroundings = p.ambient if ambient is None else dataclasses.replace(p.ambient, T=ambient)
-    p = dataclasses.replace(p, soft_start=soft, inverter=inverter, ambient=surroundings)
+    p = with_starter(p, plate, config.start, config.starter)
+    if ambient is not None:
+        p = dataclasses.replace(p, ambient=dataclasses.replace(p.ambient, T=ambient))
     machine = config.machine.replace({"ratio": ratio})
     return Drive(
         model,
@@ -66,3 +70,14 @@ def catalogue_drive(
         gear_inertia=gear.J,
         gear_friction=drag,
     )
+
+
+def with_starter(p: Any, plate: Nameplate, start: str, starter: Starter) -> Any:
+    """The parameters `p` of a motor that starts on line, with its starter: `start` is one of `sections.STARTS`."""
+    control = dataclasses.asdict(starter.inverter)
+    follows = start == "inverter"
+    if follows:
+        slip_hz = (plate.synchronous - plate.speed) * plate.poles / (4.0 * math.pi)
+        control["slip"] = control["slip"] or slip_hz / plate.torque
+    soft = starter.soft_start if start == "soft" else p.soft_start
+    return dataclasses.replace(p, soft_start=soft, inverter=Inverter(on=float(follows), **control))

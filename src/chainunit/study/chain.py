@@ -20,15 +20,13 @@ from typing import Any
 
 import numpy as np
 
-from ..engines import numpy_
 from ..errors import InterruptedRunError, RunError
+from ..interrupts import stoppable
 from ..machines.api import ChainUnitMachine
-from ..machines.chain_unit import SIDES, ChamberForces, Feed
-from ..machines.flexible import flexible
+from ..machines.chain_unit import SIDES, Feed
 from ..progress import Progress, Report
 from ..quantities import Layout, Value, declaration, quantity
 from ..system.instance import Fmu, Instance
-from ..system.simulation import stoppable
 from ..text import entries, entry, number
 from .arrays import peak
 from .config import Config
@@ -276,22 +274,6 @@ def duty(fmu: Fmu, drive: Drive, crank_speed: float, feed: Feed) -> Cycle:
     return Cycle(sample.angle, tau * drive.driven_machine.p.ratio, SimpleNamespace(J=J, tau=tau))
 
 
-def two_bar_pulls(machine: ChainUnitMachine, angle: Any, crank_speed: float, feed: Feed) -> Any:
-    """Mean axial pull [N] in wall and web of both sides, with two bars, at crank angles `angle` [rad], shape
-    (4, n). It is computed as for two rods without damping, so that slack means the same for bars and
-    chains."""
-    model, xp = flexible(1, 1), numpy_()
-    values = ChamberForces.parameter_layout.by_name(machine.p) | {
-        f"organ.{name}": 0.0 for name in ("eta", "end_damping", "fold_stiffness")
-    }
-    p = model.parameter_layout.from_names(values)
-    ratio = machine.p.ratio
-    u = model.Inputs(phi=angle * ratio, w=crank_speed * ratio, a=0.0, left=feed.left, right=feed.right)
-    sides = model.evaluate(xp, p, u, model.start(xp, p, u))[0]
-    pulls = [getattr(getattr(sides, side), f"pull_{k}") for side in SIDES for k in (1, 2)]
-    return np.array([np.broadcast_to(pull, np.shape(angle)) for pull in pulls])
-
-
 def numbers_at(
     fmu: Fmu,
     drive: Drive,
@@ -333,7 +315,7 @@ def numbers_at(
         snatch.append(peaks(size) / rest)
         two_bar_snatch.append(np.max(np.hypot(bars.fx, bars.fy)) / two_bar_rest)
     snatches = np.maximum(*snatch)
-    is_pushed = two_bar_pulls(drive.chain_unit, two.angle, crank_speed, feed) < 0.0
+    is_pushed = drive.chain_unit.mean_pulls(crank_speed, feed.left, feed.right) < 0.0
     duration = 2.0 * math.pi / crank_speed * turns
     energy = float(np.min(np.mean(np.abs(values["power"]), axis=(1, 2)))) * duration
     gap = max(float(np.max(np.ptp(values[f"{side}.energy_residual"], axis=(1, 2)))) for side in SIDES)

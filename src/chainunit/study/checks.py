@@ -93,7 +93,12 @@ def _company(data: Mapping[str, Any], parts: Parts) -> Iterator[tuple[str, str]]
         if name in data:
             yield from ((name, words) for words in _unfit_for_recordings(data, foreign))
     if "watch" in data and not parts.machine.sides:
-        yield ("watch", f"is of the chain unit, and the machine is {parts.machine.name}; leave it out")
+        yield (
+            "watch",
+            f"is of the chain unit, and the machine is {parts.machine.name}: the observer compares the feed and the "
+            "force of two sides, which this machine does not have; leave it out. chainunit identify finds the loads "
+            "of this machine from its recordings",
+        )
     if "observer" in data:
         yield from (("observer", words) for words in _unfit_for_observer(data, parts, foreign))
     if "torsion" in data and "driveline" not in data:
@@ -123,7 +128,7 @@ def _unfit_for_observer(data: Mapping[str, Any], parts: Parts, foreign: Mapping[
     if foreign["motor"]:
         yield "needs a model of the motor, which is an FMU; leave it out"
     if "driveline" in data:
-        yield "takes the shaft between motor and machine for rigid; leave out [driveline], or leave it out"
+        yield "takes the shaft between motor and machine for rigid; leave out [driveline] or [observer]"
 
 
 def _sweep_company(data: Mapping[str, Any], foreign: Mapping[str, bool]) -> Iterator[tuple[str, str]]:

@@ -10,9 +10,11 @@ from typing import Any
 
 from ..drives.cardan import check
 from ..drives.catalogue import CatalogueMotor
+from ..drives.gear_ratios import EFFICIENCY
 from ..drives.gearing import Transmission
 from ..drives.motor import Motor
 from ..errors import Faults, GeometryError, InputError, each_refusal, refusal_prefix
+from ..machines.admissible import cause
 from ..machines.api import machine_of, ratios
 from ..machines.chain_unit import SideName
 from ..machines.machine import Machine
@@ -25,12 +27,13 @@ from .checks import check_order
 from .event import Event
 from .event_table import RandomEvent, read_events, read_random_event
 from .events import OneSidedFeed
-from .first_checks import check_values, independent, plate_of, without
+from .first_checks import check_values, independent, missing_recordings, plate_of, without
 from .foreign_machine import ForeignMachine, ForeignModel
 from .identification.reading import IdentificationPlan, WatchPlan, read_identification, read_watch
 from .observer_table import ObserverTable
 from .optimum.table import read_wishes
 from .optimum.wishes import Wishes
+from .organ_limits import highest_of_sweep
 from .parts import Parts, beside, example, over_example, with_linkage
 from .run_checks import endless, loads_beyond, without_feed
 from .sections import (
@@ -44,10 +47,10 @@ from .sections import (
     MonteCarlo,
     Ratios,
     Run,
-    Sizing,
     Starter,
     TorsionTable,
 )
+from .sizing_table import Sizing
 from .sweep_plan import SweepPlan
 from .sweep_reading import Sweepable, read_plan
 
@@ -67,8 +70,6 @@ class Config:
     run: Run
     events: Mapping[str, Event]
     coupling: Coupling | None
-    held_in_start: bool
-    """whether the coupling is held shut in the start"""
     monte_carlo: MonteCarlo
     random: RandomEvent
     feed_forward: bool
@@ -221,6 +222,16 @@ def of_tables(data: Mapping[str, Any], source: str) -> Config:
             "in [machine], and chainunit linkage FILE shows it",
             "links",
         )
+    try:
+        return _of_tables(data, source)
+    except InputError as error:
+        # the commands read the recordings; a missing one is told beside the faults of the file
+        if missing := list(missing_recordings(data, source)):
+            raise InputError.of([*error.faults, *missing]) from error
+        raise
+
+
+def _of_tables(data: Mapping[str, Any], source: str) -> Config:
     in_system = with_linkage(data)
     parts, faults = check_values(in_system, source)
     if parts is None:
@@ -293,7 +304,10 @@ def _config(
     if "sizing" in data and checked.start != "inverter" and "inertia_ratio" not in tables["sizing"]:
         # for motors on the line only where the file gives it
         of_study["sizing"] = dataclasses.replace(of_study["sizing"], inertia_ratio=math.inf)
-    own_motors = None
+    if "sizing" in data and "efficiency" not in tables["gear"]:
+        typical = EFFICIENCY[checked.sizing.gear_kind]
+        of_study["gear"] = dataclasses.replace(of_study["gear"], efficiency=typical)
+    chain, own_motors = values["chain"] if checked.organ == "chain" else None, None
     with faults.collected(), refusal_prefix("catalogue = ", "catalogue"):
         own_motors = beside(checked.catalogue, source) if checked.catalogue else None
     machine: Any = None
@@ -312,6 +326,9 @@ def _config(
         random = read_random_event(checked.monte_carlo.event, "monte_carlo.event")
     of_study |= _tasks(data, checked, parts, machine, values, events, source, faults)
     faults.refuse()
+    if chain is not None and "sweep_highest" not in tables["chain"]:
+        highest = highest_of_sweep(machine, values["feed"], values["run"].crank_speed)
+        chain = dataclasses.replace(chain, sweep_highest=max(highest, chain.sweep_lowest))
     config = Config(
         title=checked.title,
         machine=machine,
@@ -323,7 +340,6 @@ def _config(
         random=random,
         feed_forward=checked.feed_forward,
         empty_start=checked.empty_start,
-        held_in_start=checked.coupling.held_in_start,
         start=checked.start,
         simulation=checked.simulation,
         catalogue=own_motors,
@@ -331,7 +347,7 @@ def _config(
         joint=checked.torsion.joint,
         damping_ratios=tuple(sorted(set(checked.torsion.damping_ratios))),
         damping_ratio=checked.driveline.damping_ratio,
-        chain=values["chain"] if checked.organ == "chain" else None,
+        chain=chain,
         foreign=ForeignMotor(beside(parts.file, source), given_values(checked.system.motor_names))
         if parts.file
         else None,
@@ -472,6 +488,7 @@ def _machine(parts: Parts, given: dict[str, float], of_papers: Mapping[str, floa
         names = error.names if isinstance(error, GeometryError) else ()
         key = next((f"machine.{name}" for name in names if name in given), "machine")
         line = f"machine: {error}{_taken_over(error, parts.machine, given)}"
+        line += cause(parts.machine, given) if isinstance(error, GeometryError) and not of_papers else ""
         raise InputError(line, key="ratios" if of_papers else key) from error
 
 

@@ -3,35 +3,20 @@ drive."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from typing import Any
 
-import xarray as xr
-
+from ..quantities import variables
 from ..text import number
-from .arrays import peak
-from .drive import Drive
 from .event import Role
-from .protection import MARGIN, Obstacle, Setting
+from .event_torques import peaks_in_events, running_torque
+from .protection import MARGIN, Alternative, Obstacle, Setting, Way, WayNumbers
+from .ram_force import TIMES, rams
 from .record import StudyRecord
+from .starts import StartAnalysis
+from .torques import on_coupling
 from .window import BURNT
-
-
-def on_coupling(drive: Drive, run: xr.Dataset) -> float:
-    """Peak torque in a run on a coupling that sits on the motor shaft, reduced to the crank [N m]."""
-    return peak(run["motor.tau"].values) * drive.ratio
-
-
-def peaks_on_coupling(study: StudyRecord, *roles: Role) -> dict[str, float]:
-    """Peak torque on the coupling in each event with one of these `roles`, or in every event without `roles`,
-    at the crank [N m]. A start direct on line is left out, as it is judged apart."""
-    events = study.config.events
-    return {
-        name: on_coupling(study.drive, study.runs[name].sel(time=slice(begin, None)))
-        for name, begin in study.event.items()
-        if name in study.runs
-        and not (study.start_apart and events[name].from_rest)
-        and (not roles or events[name].role in roles)
-    }
 
 
 def recommended_setting(study: StudyRecord) -> Setting | None:
@@ -39,18 +24,27 @@ def recommended_setting(study: StudyRecord) -> Setting | None:
     motor was chosen, where the file gives a coupling, or where the study ended before steady running."""
     if not study.sizing or study.insufficient or study.config.coupling or "steady" not in study.answers:
         return None
-    best, drive = study.sizing.best, study.drive
-    lasting = peaks_on_coupling(study, Role.DUTY).values()
-    normal = [on_coupling(drive, study.steady), best.duty_torque, *lasting]
-    if not study.start_apart:
-        normal.append(on_coupling(drive, study.runs["start_up"]))
     return Setting(
-        normal=max(normal),
+        running=running_torque(study),
+        start=max(peak for peak, _ in start_peaks(study)),
         motor=pull_out(study),
         gear=study.config.gear.torque_limit,
-        overloads=peaks_on_coupling(study, Role.SHOCK),
-        disturbances=peaks_on_coupling(study, Role.DISTURBANCE),
+        overloads=peaks_in_events(study, Role.SHOCK),
+        disturbances=peaks_in_events(study, Role.DISTURBANCE),
     )
+
+
+def start_peaks(study: StudyRecord) -> list[tuple[float, str]]:
+    """The largest torques on the coupling, at the crank [N m], in the parts of the start, each with its title: the
+    start-up with the settling under a feed that comes later, starts from other crank angles, starts under load."""
+    events, peaks = study.config.events, peaks_in_events(study)
+    run = study.runs["start_up"].sel(time=slice(None, study.steady_begin))
+    parts = [(on_coupling(study.drive, run), "start-up")]
+    if findings := study.findings.get(StartAnalysis.name):
+        parts += [
+            (start.coupling_torque, f"start from {number(start.angle, 'rad')}") for start in findings.starts
+        ]
+    return parts + [(peak, study.title_of(name)) for name, peak in peaks.items() if events[name].from_rest]
 
 
 def pull_out(study: StudyRecord) -> float:
@@ -67,10 +61,16 @@ def _list_of(study: StudyRecord, peaks: Mapping[str, float]) -> str:
     return ", ".join(f"{study.title_of(name)} ({_torque(peak)})" for name, peak in peaks.items())
 
 
-def _starts_above(study: StudyRecord, torque: float) -> dict[str, float]:
-    """The parts of the start in which the coupling carries more than `torque` [N m], with their peaks [N
-    m]."""
-    return {name: peak for name, peak in study.start_torques.items() if peak > torque}
+_OBSTACLES = {
+    Obstacle.START: "No safety coupling protects this drive as it starts now: {start} puts {start_torque} on it, so "
+    "that it has to open above {least}, and {bound}. For running alone {least_in_running} would do.",
+    Obstacle.MOTOR: "No safety coupling protects this drive: it has to open above {above}, and the motor gives at "
+    "most {motor} at the crank.",
+    Obstacle.GEAR: "No safety coupling protects this drive: it has to open above {above}, and the gear may carry "
+    "{gear}.",
+    Obstacle.OVERLOADS: "No safety coupling is recommended: it has to open above {above}, and {bound}.",
+}
+"""By obstacle, the sentence on it."""
 
 
 def coupling_sentence(study: StudyRecord) -> str:
@@ -79,24 +79,20 @@ def coupling_sentence(study: StudyRecord) -> str:
     setting = study.setting
     assert setting is not None
     caveat = f" ({study.verdict.caveat})" if study.verdict and study.verdict.caveat else ""
-    above = f"{_torque(setting.least)}, {MARGIN:g} times the {_torque(setting.normal)} of normal duty"
-
-    if setting.obstacle is Obstacle.MOTOR:
-        return (
-            f"No safety coupling protects this drive: it has to open above {above}, and the motor gives at most "
-            f"{_torque(setting.motor)} at the crank."
-        )
-    if setting.obstacle is Obstacle.GEAR:
-        return (
-            f"No safety coupling protects this drive: it has to open above {above}, and the gear may carry "
-            f"{_torque(setting.gear)}."
-        )
-    if setting.obstacle is Obstacle.OVERLOADS:
-        most = max(setting.overloads.values(), default=0.0)
-        return f"No safety coupling is recommended: it has to open above {above}, and " + (
-            f"the jams, lumps and blocks of this study put {_torque(most)} on it at most."
-            if setting.overloads
-            else "this study has no jam, lump or block that could open it."
+    start_torque, start = max(start_peaks(study))
+    start = f"the {start}" if start == "start-up" else f"a {start}" if start.startswith("start") else start
+    of = f"that {start} puts on it" if setting.start_decides else "of normal duty"
+    above = f"{_torque(setting.least)}, {MARGIN:g} times the {_torque(setting.normal)} {of}"
+    if setting.obstacle is not None:
+        return _OBSTACLES[setting.obstacle].format(
+            start=start,
+            start_torque=_torque(start_torque),
+            least=_torque(setting.least),
+            least_in_running=_torque(setting.least_in_running),
+            above=above,
+            motor=_torque(setting.motor),
+            gear=_torque(setting.gear),
+            bound=_bound(setting),
         )
     shut = {name: peak for name, peak in setting.overloads.items() if name not in setting.opens}
     text = (
@@ -111,11 +107,73 @@ def coupling_sentence(study: StudyRecord) -> str:
     if setting.nuisances:
         nuisances = _list_of(study, setting.nuisances)
         text += f" A nuisance trip, which protects nothing: it opens, too, where {nuisances}."
-    if starts := _starts_above(study, setting.least):
-        text += (
-            f" A start direct on line puts more on it: {_list_of(study, starts)}; it has to be held shut in the "
-            "start (coupling.held_in_start = true)."
-        )
+    if setting.start_decides:
+        text += f" For running alone {_torque(setting.least_in_running)} would do."
+    return text
+
+
+def _bound(setting: Setting) -> str:
+    """The reason why a coupling of the least setting protects nothing, in words."""
+    if setting.obstacle is Obstacle.START and setting.least >= setting.gear:
+        return f"the gear may carry {_torque(setting.gear)}"
+    if not setting.overloads:
+        return "this study has no jam, lump or block that could open it"
+    most = _torque(max(setting.overloads.values()))
+    return f"the jams, lumps and blocks of this study put {most} on it at most"
+
+
+_WAYS = {
+    Way.SOFT_STARTER: 'With a soft starter (start = "soft"; starter.soft_start: voltage = "{voltage}", '
+    'time = "{ramp}") a start puts at most {start} on it and takes {start_time}: {set}.',
+    Way.INVERTER: 'With an inverter (start = "inverter"; run.ramp = "{ramp}") a start puts at most {start} on it, '
+    "running {running}: {set}.",
+    Way.SLIP_CLUTCH: "With a slip clutch, set to {setting}, the motor starts on line, and the clutch slips for "
+    "{slip_time} in each start, which makes {slip_energy} of heat. It slips, too, where {opens}: a switch has to "
+    "stop the motor then, as the slip makes {slip_power} of heat.",
+    Way.HIGHER: "With the start direct on line and a higher setting: {set}.",
+    Way.BEFORE_FLYWHEEL: "Between motor and flywheel in place of behind the flywheel: a start puts {start} on it, "
+    "running {running}: {set}. There it does not protect the machine from the energy of the flywheel.",
+}
+"""By way, its sentence; the values in quotes are those of a study file."""
+
+
+_FAILURES = {
+    Way.SOFT_STARTER: "No soft starter that was tried brings the crank to its speed from every angle within the "
+    "locked-rotor time of the motor.",
+    Way.INVERTER: "An inverter with the boost of this study (starter.inverter.boost) does not bring the crank to its "
+    "speed from every angle with any ramp that was tried.",
+    Way.SLIP_CLUTCH: "A slip clutch that running alone permits slips on in the start and does not bring the machine "
+    "to its speed.",
+}
+"""By way, the sentence on one with which the machine does not start."""
+
+
+def way_words(study: StudyRecord, each: Alternative) -> str:
+    """The sentence on a way to a safety coupling that a start does not open."""
+    if each.numbers.start is None:
+        return _FAILURES[each.way]
+    numbers = {
+        v.name: number(value, v.unit, v.kind, full=v.name not in ("voltage", "ramp"))
+        for v in variables(WayNumbers)
+        if (value := getattr(each.numbers, v.name)) is not None
+    }
+    return _WAYS[each.way].format(**numbers, opens=_list_of(study, each.opens), set=_set(study, each))
+
+
+def _set(study: StudyRecord, each: Alternative) -> str:
+    """The setting of a way and what it protects, in words."""
+    gear = study.config.gear.torque_limit
+    if each.numbers.setting is None:
+        return f"no setting is left below the {_torque(gear)} that the gear may carry"
+    text = f"set to {_torque(each.numbers.setting)} it opens "
+    if not each.opens:
+        return text + "in no overload of this study and protects nothing"
+    text += f"where {_list_of(study, each.opens)}"
+    assert study.setting is not None
+    if shut := {n: p for n, p in study.setting.overloads.items() if n not in each.opens}:
+        text += f", but stays shut where {', '.join(map(study.title_of, shut))}"
+    if each.numbers.rocker is not None:
+        text += f"; the rocker sees up to {_torque(each.numbers.rocker)}"
     return text
 
 
@@ -123,25 +181,19 @@ def remark_on_coupling(study: StudyRecord, trip: float) -> None:
     """Warn where a given coupling, set to `trip` [N m], does not protect the drive as it should."""
     # the limit of a foreign motor is not known
     most = None if study.drive.foreign else pull_out(study)
-    peaks, shocks = peaks_on_coupling(study), peaks_on_coupling(study, Role.SHOCK)
+    peaks, shocks = peaks_in_events(study), peaks_in_events(study, Role.SHOCK)
     amounts = {"trip": (trip, "N.m")} | ({} if most is None else {"motor": (most, "N.m")})
     warn = study.warn
-    if starts := study.start_torques:
-        above = _starts_above(study, trip)
-        hardest = max(starts, key=starts.__getitem__)
-        text = (
-            "The safety coupling opens at {trip}, and starting puts more on it: {where}. It is held shut in the "
-            "start (coupling.held_in_start)."
-            if above
-            else "Starting puts {start} on the safety coupling at most ({where}), which opens at {trip}: it is held "
-            "shut in the start (coupling.held_in_start), which is not needed."
-        )
-        (warn if above else study.note)(
-            "coupling held shut",
-            text,
-            *(above or [hardest]),
-            where=_list_of(study, above) if above else study.title_of(hardest),
-            start=(starts[hardest], "N.m"),
+    above = [(peak, title) for peak, title in start_peaks(study) if peak > trip]
+    if above:
+        start, title = max(above)
+        warn(
+            "coupling opens in start",
+            "The safety coupling opens at {trip}, and a start puts up to {start} on it ({where}): it opens in some "
+            'of the starts. Set it higher, or start softer (start = "soft" or "inverter").',
+            "start_up",
+            where=title,
+            start=(start, "N.m"),
             **amounts,
         )
     openings = [name for name in peaks if study.answers[name].coupling_trip_time is not None]
@@ -171,4 +223,45 @@ def remark_on_coupling(study: StudyRecord, trip: float) -> None:
             "The safety coupling is set to {trip} and the motor gives {motor} at most: a load that rises "
             "slowly stalls the motor and does not open it.",
             **amounts,
+        )
+
+
+_RAM = (
+    "A coupling that opens at {trip} does not limit the force on the link {ram} near its dead centre, at a crank "
+    "angle of {dead}: the setting stands for {fastest} where the link is fastest, for {thirty} at 30 deg and {ten} "
+    "at 10 deg before the dead centre; at the dead centre the force has no limit. In running the pin pushes with "
+    "{working} at most; "
+)
+_RAM_WITHIN, _RAM_ALWAYS = "within {angle}, the last {way}, ", "at every angle "
+_RAM_END = (
+    "it can push with more than {times} times that while the coupling stays shut. A device at the link protects it "
+    "there, such as a hydraulic overload cushion or a shear plate."
+)
+
+
+def remark_on_rams(study: StudyRecord) -> None:
+    """Note for each ram of a linkage what the setting of the coupling means at it."""
+    if study.config.coupling is not None:
+        torque = study.config.coupling.trip_torque
+    elif study.setting is not None:
+        torque = study.setting.torque or study.setting.least_in_running
+    else:
+        return
+    for ram in rams(study):
+        overloaded = ram.overloaded(torque)
+        quantities: dict[str, Any] = {}
+        if overloaded is not None:
+            quantities = {"angle": (overloaded[0], "rad"), "way": (overloaded[1], "m", "millimetres")}
+        study.note(
+            "coupling at ram",
+            _RAM + (_RAM_WITHIN if quantities else _RAM_ALWAYS) + _RAM_END,
+            trip=(torque, "N.m"),
+            ram=ram.ram,
+            dead=(float(ram.angle[ram.dead]), "rad"),
+            fastest=(ram.least(torque), "N"),
+            thirty=(ram.before(torque, math.radians(30.0)), "N"),
+            ten=(ram.before(torque, math.radians(10.0)), "N"),
+            working=(ram.working, "N"),
+            times=f"{TIMES:g}",
+            **quantities,
         )

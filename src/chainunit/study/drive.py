@@ -279,8 +279,17 @@ class Drive:
     def crank_speed(self) -> tuple[str, float]:
         """Name of the speed output that turns the machine in a run, and the ratio of that speed to the
         crank's."""
+        return self._turned_by("w")
+
+    @property
+    def crank_angle(self) -> tuple[str, float]:
+        """Name of the angle output that turns the machine in a run, and the ratio of that angle to the
+        crank's."""
+        return self._turned_by("phi")
+
+    def _turned_by(self, quantity: str) -> tuple[str, float]:
         bond = self._last_bond
-        return f"{bond.driver}.{bond.flanges[0].members['w']}", self.driven_machine.ratio / self.gear
+        return f"{bond.driver}.{bond.flanges[0].members[quantity]}", self.driven_machine.ratio / self.gear
 
     def crank_motion(self, run: xr.Dataset) -> tuple[Any, Any]:
         """Angle [rad] and speed [rad/s] of the crank in a run, shape (time,), also for a machine without its

@@ -1,12 +1,17 @@
-"""Values of entries of a study file whose quantity another key names, such as the ends of a swept parameter."""
+"""Types of values of a study file: entries whose quantity another key names, such as the ends of a swept
+parameter, and lists of a declared quantity."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator
+from pydantic import BeforeValidator, Field
 from pydantic_core import PydanticCustomError
+
+from ..quantities import variables
+from ..reading import to_number
 
 
 def _admitted(given: Any) -> Any:
@@ -19,3 +24,12 @@ def _admitted(given: Any) -> Any:
 
 Entered = Annotated[Any, BeforeValidator(_admitted)]
 """A number, or a text with a unit."""
+
+
+def numbers(declaration: type, quantity_name: str, name: str, most: int) -> Any:
+    """The type of a list of at most `most` values of a quantity of the `declaration`; a refusal calls the
+    list `name`."""
+    variable = next(v for v in variables(declaration) if v.name == quantity_name)
+    variable = dataclasses.replace(variable, name=name)
+    value = Annotated[float, BeforeValidator(lambda entry: to_number(variable, entry))]
+    return Annotated[list[value], Field(max_length=most), variable]

@@ -10,6 +10,7 @@ inputs its system does not have.
 from __future__ import annotations
 
 import copyreg
+import math
 from collections import defaultdict
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -64,8 +65,7 @@ class Timing:
 
     crank_angle: Value = quantity(
         "rad",
-        "crank angle at which the event begins; the rocker of a chain unit is at its fastest at 0, to the right, "
-        "and near 180 deg, to the left",
+        "crank angle at which the event begins",
         default=0.0,
         usual=(0.0, 6.3),
     )
@@ -199,6 +199,13 @@ class Event(metaclass=EventType):
     def assumption(self, peaks: Mapping[str, tuple[float, float]]) -> str:
         """A sentence on the effect of the assumption, from the range of each peak over the variants [N m]."""
         return ""
+
+
+def angle_of_begin(event: Event, angle: float) -> float:
+    """The crank angle [rad] at which the event begins, counted on from the present `angle` [rad], at least an eighth
+    of a turn ahead."""
+    ahead = (getattr(event.p, "crank_angle", 0.0) - angle) % (2.0 * math.pi)
+    return float(angle + ahead + (2.0 * math.pi if ahead < 0.25 * math.pi else 0.0))
 
 
 def on_side(text: str, side: AnySide) -> str:

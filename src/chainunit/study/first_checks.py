@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+import contextlib
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from ..drives.catalogue import CatalogueMotor, catalogue, motor_of_catalogue
 from ..drives.motors import MOTORS
-from ..errors import Faults, InputError, refusal_prefix
+from ..errors import Faults, InputError, refusal_prefix, shown
 from ..models import MACHINES
 from ..reading import read_table
 from ..text import chosen_units
@@ -64,6 +65,21 @@ def _check_catalogue(data: Mapping[str, Any], source: str) -> None:
     motor = named_table(data, "system").get("motor")
     if isinstance(motor, str) and is_designation(motor):
         plate_of(motor, file)
+
+
+def missing_recordings(data: Mapping[str, Any], source: str) -> Iterator[InputError]:
+    """The refusals of recordings that are not there."""
+    runs, watched = named_table(data, "identify").get("run"), named_table(data, "watch").get("file")
+    names = {f"identify.run.{k}.file": each.get("file") for k, each in enumerate(_tables_of(runs), 1)}
+    for key, name in {**names, "watch.file": watched}.items():
+        with contextlib.suppress(InputError):
+            if isinstance(name, str) and name and not beside(name, source).exists():
+                yield InputError(f"{key} = {shown(name)}: there is no such file", key)
+
+
+def _tables_of(entries: Any) -> list[Mapping[str, Any]]:
+    """The tables among the entries of a list of a file."""
+    return [each for each in entries if isinstance(each, Mapping)] if isinstance(entries, list) else []
 
 
 def plate_of(designation: str, file: Path | None) -> CatalogueMotor | None:

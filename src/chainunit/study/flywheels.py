@@ -329,7 +329,6 @@ _TROUBLES = (
         "flywheel not settled",
         lambda wheel: not wheel.is_settled,
         "the turns do not close with a flywheel of {where}: raise run.settle_turns.",
-        "cycle_gap",
     ),
 )
 

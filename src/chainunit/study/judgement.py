@@ -14,7 +14,7 @@ from .organs import OrganAnalysis
 from .quantiles import runs_needed
 from .record import StudyRecord
 from .rig import worst_residual
-from .verdict import RESIDUAL, STEADY, Holds, Verdict
+from .verdict import RESIDUAL, STEADY, Holds, Verdict, shown_speed
 
 
 def model_verdict(study: StudyRecord) -> Verdict:
@@ -39,7 +39,7 @@ def model_verdict(study: StudyRecord) -> Verdict:
             speed,
             organs.limits.chain_resonance,
             organs.limits.slack_speed,
-            {name: (a.web_pull_least, a.wall_pull_least) for name, a in runs.items()},
+            study.pulls,
             residuals,
             empty={""} if always else empty,
             actual=mean,
@@ -91,7 +91,7 @@ def no_reserve(run: str, reserve: float) -> str:
     0."""
     over = number(-reserve, "1", "percent") + (" or more" if reserve <= -1.0 else "")
     when = "in each turn" if run == STEADY else "for a moment"
-    return f"no reserve of torque: {when} it passes the largest torque of a steady state by {over}"
+    return f"overloaded {when}: {over} above its largest steady torque"
 
 
 def motor_verdict(study: StudyRecord) -> dict[str, Any] | None:
@@ -112,7 +112,7 @@ def motor_verdict(study: StudyRecord) -> dict[str, Any] | None:
     }
     run = min(reserves, key=lambda name: float(reserves[name]), default=None)
     reserve = None if run is None else reserves[run]
-    speed = number(steady.speed_mean, "rad/s", "speed", beside=False)
+    speed = number(shown_speed(steady.speed_mean, requested), "rad/s", "speed", beside=False)
     requested_text = number(requested, "rad/s", "speed", full=False, beside=False)
     if keeps_speed:
         text = f"The motor keeps the crank at {speed}"

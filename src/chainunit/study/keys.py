@@ -30,8 +30,9 @@ from .sections import CHOICES, SECTIONS, Ratios, SystemTable
 from .sweep_table import SweepEntry
 
 _FOLLOWS = {
-    "gear.ratio": "the one with which the crank has its speed under the mean load",
+    "gear.ratio": "the one that gives the crank its speed under the mean load; with [sizing] the nearest on offer",
     "sizing.inertia_ratio": '10 with start = "inverter", else none',
+    "chain.sweep_highest": "twice run.crank_speed, or 1.2 times the lowest mode of an organ if that is more",
     "motor.speed_control.kp": "tuned",
     "motor.speed_control.ki": "tuned",
     "motor.current_control.kp": "tuned",

@@ -37,6 +37,8 @@ class Check:
     limit: float
     unit: str
     kind: str = ""
+    forbidden: str = ""
+    """the reason, in words, why the limit is 0"""
 
     @property
     def utilisation(self) -> float | None:
@@ -44,7 +46,9 @@ class Check:
         any value where nothing is permitted."""
         if self.value is None:
             return None
-        return self.value / self.limit if self.limit > 0.0 else math.inf
+        if self.limit > 0.0:
+            return self.value / self.limit
+        return math.inf if self.value > 0.0 else 0.0
 
     @property
     def over(self) -> bool:
@@ -54,6 +58,8 @@ class Check:
     @property
     def excess(self) -> str:
         """Words on a limit that is exceeded."""
+        if self.limit <= 0.0 and self.forbidden:
+            return self.forbidden
         value, limit = (number(x, self.unit, self.kind, full=False) for x in (self.value, self.limit))
         share = number(self.utilisation, "1", "used")
         return f"{self.title} {value}, {share}{' of' if share.endswith('%') else ''} the permitted {limit}"
@@ -65,7 +71,7 @@ class Check:
             "utilisation": entry(self.utilisation, "1", "used"),
             "value": entry(self.value, self.unit, self.kind),
             "limit": entry(self.limit, self.unit, self.kind),
-        }
+        } | ({"forbidden": self.forbidden} if self.limit <= 0.0 and self.over and self.forbidden else {})
 
 
 def heating(temperature: float, ambient: float, permitted: float) -> Check:

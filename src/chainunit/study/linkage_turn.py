@@ -1,7 +1,11 @@
-"""A linkage over the way of its driver at constant speed, by inverse dynamics: motion, torque, inertia, reactions."""
+"""A linkage over the way of its driver at constant speed, by inverse dynamics: motion, torque, inertia, reactions.
+
+Extremes are those of the whole way, not those at the `PLACES` of the curves."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,10 +15,14 @@ from ..engines import numpy_
 from ..machines.linkages.model import LinkageDescription
 from ..machines.linkages.structure import CYLINDER
 from ..machines.machine import Machine
+from ..mechanism.assur import PRISMATIC
 from ..quantities import Value, declaration, quantity
 from .arrays import rms
+from .peaks import largest, roots
 
 PLACES = 361
+STANDS = 1e-9
+"""A way [m] or an angle [rad] over which a part moves, below which it stands."""
 
 
 @declaration
@@ -48,10 +56,36 @@ class JointTurn:
     moment: Value = quantity("N.m", "largest moment of a guide, about the point of its block")
 
 
+@declaration
+class Stroke:
+    """The motion of a sliding joint between its two ends."""
+
+    least: Value = quantity("m", "least way of the block along its line")
+    least_at: Value = quantity("rad", "place of the driver there")
+    largest: Value = quantity("m", "largest way of the block along its line")
+    largest_at: Value = quantity("rad", "place of the driver there")
+    range: Value = quantity("m", "stroke")
+    forth: Value = quantity("rad", "angle of the driver from the least to the largest way")
+    time_ratio: Value = quantity("1", "time of the slower way over that of the faster one")
+
+
+@declaration
+class Swing:
+    """The motion of a link that swings between two ends."""
+
+    least: Value = quantity("rad", "least angle")
+    least_at: Value = quantity("rad", "place of the driver there")
+    largest: Value = quantity("rad", "largest angle")
+    largest_at: Value = quantity("rad", "place of the driver there")
+    range: Value = quantity("rad", "swing")
+    forth: Value = quantity("rad", "angle of the driver from the least to the largest angle")
+    time_ratio: Value = quantity("1", "time of the slower way over that of the faster one")
+
+
 @dataclass(frozen=True)
 class LinkageFindings:
     """The findings on a linkage: `q` are the places of the driver [rad], shape (n,), `outputs` the outputs there by
-    name, and the summaries by the names of groups and joints."""
+    name, and the summaries by the names of groups, joints and links."""
 
     machine: Machine
     speed: float
@@ -61,6 +95,14 @@ class LinkageFindings:
     turn: LinkageTurn
     groups: dict[str, GroupTurn]
     joints: dict[str, JointTurn]
+    strokes: dict[str, Stroke]
+    """of each sliding joint that is not the driver"""
+    swings: dict[str, Swing]
+    """of each link that swings"""
+    dead_centres: dict[str, list[float]]
+    """places of the driver at which each of these joints and links turns back, by the name of its variables"""
+    limits: dict[str, tuple[float, float]]
+    """least and largest value of the angle of each link and of each place of a point, by output"""
 
     @property
     def description(self) -> LinkageDescription:
@@ -80,47 +122,152 @@ class LinkageFindings:
         return " + ".join(parts)
 
 
+class _Way:
+    """A linkage at any places of its driver, at constant speed with the loads of normal running."""
+
+    def __init__(self, machine: Machine, speed: float) -> None:
+        self.machine, self.speed = machine, speed
+        self.feed = machine.model.feed_layout.by_name(machine.model.Feed())
+
+    def state(self, q: Any) -> tuple[Any, dict[str, Any]]:
+        """The machine at the places `q` [rad, m], and its outputs by name, each of the shape of `q`."""
+        machine = self.machine
+        u = machine.inputs({"phi": q * machine.ratio, "w": self.speed * machine.ratio, **self.feed})
+        state, part = machine.state(u), machine.model.parts[0]
+        given = part.layout.by_name(part.equations(numpy_(), machine.p, u, None, state))
+        return state, {name: np.broadcast_to(x, q.shape) for name, x in given.items()}
+
+    def outputs(self, names: Iterable[str]) -> Callable[[Any], Any]:
+        """The function that gives outputs at places, shape (names, n)."""
+        kept = tuple(names)
+
+        def values(q: Any) -> Any:
+            given = self.state(q)[1]
+            return np.array([given[name] for name in kept]).reshape(-1, len(q))
+
+        return values
+
+
 def linkage_findings(machine: Machine, speed: float) -> LinkageFindings:
     """The linkage over its way at a constant `speed` of the driver [rad/s], with the loads of normal running."""
     description: LinkageDescription = machine.model.described_by  # type: ignore[attr-defined]
-    low, high = description.span
-    q = np.linspace(low, high, PLACES)
-    feed = machine.model.feed_layout.by_name(machine.model.Feed())
-    u = machine.inputs({"phi": q * machine.ratio, "w": speed * machine.ratio, **feed})
-    state = machine.state(u)
-    part = machine.model.parts[0]
-    given = part.equations(numpy_(), machine.p, u, None, state)
-    outputs = {name: np.broadcast_to(x, q.shape) for name, x in part.layout.by_name(given).items()}
+    q = np.linspace(*description.span, PLACES)
+    way = _Way(machine, speed)
+    state, outputs = way.state(q)
+    joints = {name: description.variable("joint", name) for name in description.structure.joints}
+    moving = [name for name in outputs if name.endswith((".angle", ".x", ".y"))]
+    moments = [f"{joint}.moment" for joint in joints.values() if f"{joint}.moment" in outputs]
+    groups = [", ".join(group.links) for group in description.structure.groups]
+
+    def sizes(q: Any) -> Any:
+        """All quantities of which the largest value counts, in the order of `names`."""
+        state, at = way.state(q)
+        bias, inertia = (np.broadcast_to(x, q.shape) for x in (state.bias, state.J))
+        margins = [np.broadcast_to(np.abs(margin), q.shape) for margin in state.m.margins()]
+        forces = [np.hypot(at[f"{joint}.fx"], at[f"{joint}.fy"]) for joint in joints.values()]
+        return np.array(
+            [np.abs(bias), inertia, -inertia, *(-margin for margin in margins), *forces,
+             *(np.abs(at[name]) for name in moments), *(at[name] for name in moving),
+             *(-at[name] for name in moving)]
+        )  # fmt: skip
+
+    names = [
+        "torque", "inertia", "-inertia", *(f"-margin {name}" for name in groups),
+        *(f"force {name}" for name in joints), *moments, *moving, *(f"-{name}" for name in moving),
+    ]  # fmt: skip
+    turns = machine.model.turns
+    places, values = largest(sizes, q, around=turns)
+    at = {name: _folded(float(place), turns) for name, place in zip(names, places, strict=True)}
+    top = dict(zip(names, map(float, values), strict=True))
     torque = np.broadcast_to(state.bias, q.shape)
-    inertia = np.broadcast_to(state.J, q.shape)
-    losses = sum(effect.dissipative for load, effect in state.effects.items() if load in ("pins", "guides"))
-    gap = np.abs(state.torque_by_reactions(0.0) + losses - torque)
-    groups = {}
-    for group, margin in zip(description.structure.groups, state.m.margins(), strict=True):
-        size = np.broadcast_to(np.abs(margin), q.shape)
-        k = int(np.argmin(size))
-        groups[", ".join(group.links)] = GroupTurn(margin=float(size[k]), margin_at=float(q[k]))
-    joints = {}
-    for name in description.structure.joints:
-        variable = description.variable("joint", name)
-        force = np.hypot(outputs[f"{variable}.fx"], outputs[f"{variable}.fy"])
-        k = int(np.argmax(force))
-        moment = outputs.get(f"{variable}.moment")
-        largest = None if moment is None else float(np.max(np.abs(moment)))
-        joints[name] = JointTurn(peak=float(force[k]), peak_at=float(q[k]), rms=_rms(force), moment=largest)
     mean = float(np.mean(torque[:-1]))
     # the mean of a torque without losses is rounding
     mean = mean if abs(mean) > 1e-12 * np.max(np.abs(torque)) else 0.0
+    losses = sum(effect.dissipative for load, effect in state.effects.items() if load in ("pins", "guides"))
+    gap = np.abs(state.torque_by_reactions(0.0) + losses - torque)
+    sign = np.sign(np.broadcast_to(way.state(places[:1])[0].bias, 1)[0])
     turn = LinkageTurn(
-        torque_peak=float(torque[np.argmax(np.abs(torque))]),
+        torque_peak=float(sign * top["torque"]),
         torque_rms=_rms(torque),
         torque_mean=mean,
         power_mean=mean * speed,
-        inertia_least=float(np.min(inertia)),
-        inertia_largest=float(np.max(inertia)),
+        inertia_least=-top["-inertia"],
+        inertia_largest=top["inertia"],
         energy_gap=float(np.max(gap) / max(np.max(np.abs(torque)), 1e-300)),
     )
-    return LinkageFindings(machine, speed, q, outputs, turn, groups, joints)
+    motions = list(_motions(description, way, q))
+    return LinkageFindings(
+        machine,
+        speed,
+        q,
+        outputs,
+        turn,
+        {name: GroupTurn(margin=-top[f"-margin {name}"], margin_at=at[f"-margin {name}"]) for name in groups},
+        {
+            name: JointTurn(
+                peak=top[f"force {name}"],
+                peak_at=at[f"force {name}"],
+                rms=_rms(np.hypot(outputs[f"{variable}.fx"], outputs[f"{variable}.fy"])),
+                moment=top.get(f"{variable}.moment"),
+            )
+            for name, variable in joints.items()
+        },
+        {name: motion for name, motion, _ in motions if isinstance(motion, Stroke)},
+        {name: motion for name, motion, _ in motions if isinstance(motion, Swing)},
+        {
+            description.variable("joint" if isinstance(motion, Stroke) else "link", name): back
+            for name, motion, back in motions
+        },
+        {name: (-top[f"-{name}"], top[name]) for name in moving},
+    )
+
+
+def _motions(
+    description: LinkageDescription, way: _Way, q: Any
+) -> Iterator[tuple[str, Stroke | Swing, list[float]]]:
+    """The motion of each sliding joint besides the driver and of each link that swings, each with its name and with
+    the places of the driver at which it turns back."""
+    structure, turns = description.structure, way.machine.model.turns
+    parts = [
+        (name, Stroke, f"{description.variable('joint', name)}.s", f"{description.variable('joint', name)}.v")
+        for name, joint in structure.joints.items()
+        if joint.kind == PRISMATIC and name != structure.driver.joint
+    ] + [
+        (
+            name,
+            Swing,
+            f"{description.variable('link', name)}.angle",
+            f"{description.variable('link', name)}.w",
+        )
+        for name in structure.links
+        if description.turning[name][0] == 0.0
+    ]
+    _, outputs = way.state(q)
+    parts = [each for each in parts if np.ptp(outputs[each[2]]) > STANDS]
+    dead_centres = roots(way.outputs(rate for *_, rate in parts), q, around=turns) if parts else []
+    for (name, of, output, _), back in zip(parts, dead_centres, strict=True):
+        # a driver that slides has ends of its own
+        places = back if turns and len(back) else np.array([q[0], *back, q[-1]])
+        course = way.outputs([output])(places)[0]
+        low, high = int(np.argmin(course)), int(np.argmax(course))
+        whole = 2.0 * math.pi
+        forth = float(places[high] - places[low]) % whole if turns else None
+        motion = of(
+            least=float(course[low]),
+            least_at=_folded(float(places[low]), turns),
+            largest=float(course[high]),
+            largest_at=_folded(float(places[high]), turns),
+            range=float(course[high] - course[low]),
+            forth=forth,
+            time_ratio=max(forth, whole - forth) / min(forth, whole - forth) if forth else None,
+        )
+        yield name, motion, sorted(_folded(float(x), turns) for x in back)
+
+
+def _folded(q: float, turns: bool) -> float:
+    """A place of the driver; the angle of one that turns from 0 to a whole turn."""
+    folded = q % (2.0 * math.pi) if turns else q
+    return 0.0 if turns and 2.0 * math.pi - folded < STANDS else folded
 
 
 def _rms(x: Any) -> float:

@@ -15,7 +15,7 @@ from . import protection
 from .arrays import peak
 from .drive import AbsentError
 from .limits import reaches
-from .stored import stored_shares
+from .stored import energy_gap, energy_held, stored_shares
 from .window import Phase, Window, drift, end_gap
 
 CREEPS = 0.5
@@ -123,7 +123,7 @@ def _lent(w: Window) -> tuple[float | None, float | None]:
     """See `stored_shares`; None of a machine that does not cut."""
     if "machine.blade.cut_fx" not in w.run:
         return None, None
-    return stored_shares(w.turns, w.drive.rotor_inertia)
+    return stored_shares(w.turns, energy_held(w.drive, w.turns))
 
 
 def _standstill(w: Window) -> float | None:
@@ -184,6 +184,10 @@ class Answers:
     - `torque_reserve`: the least remaining share of the driving torque that the warm motor can give at an instant, at
       its speed, voltage and frequency: 0 at the limit, negative where a transient exceeds it, None in a start
     - `winding_temperature`: the final temperature of the winding if the steady turns go on for ever
+    - `power_mean`, `supply_power_mean` of steady running: without the power that the moving masses take up, where the
+      turns have not settled
+    - `energy_gap`: the energy that the moving masses take up over the steady turns, over the energy that passes the
+      motor's shaft to and fro
     - `cycle_gap`: the difference between the ends of the steady turns, of speed or torque, over the largest value
     - `speed_drift`: the change of the speed between these ends over its ripple, 0 where it hardly changes
     - `energy_after_trip`: the energy that passes the safety coupling while it opens
@@ -209,10 +213,18 @@ class Answers:
         card=True,
     )
     power_mean: Value = measure(
-        "W", "mean", lambda w: w.mean(w.drive.shaft_power), of="shaft power", minor=True
+        "W",
+        "mean",
+        lambda w: w.mean(w.drive.shaft_power) - w.taken_up[0],
+        of="shaft power",
+        minor=True,
     )
     supply_power_mean: Value = measure(
-        "W", "mean", lambda w: w.mean("motor.supply_power"), of="electric power", minor=True
+        "W",
+        "mean",
+        lambda w: w.mean("motor.supply_power") - w.taken_up[1],
+        of="electric power",
+        minor=True,
     )
     current_peak: Value = measure(
         "A", "peak", lambda w: w.largest(w.current), during=_ALL, of="motor current", card=True
@@ -263,8 +275,16 @@ class Answers:
     )
     speed_drift: Value = measure(
         "1",
-        "change of the speed over the steady turns, over its ripple",
+        "speed drift, share of the ripple",
         lambda w: drift(w.drive, w.turns),
+        kind="percent",
+        during=_STEADY,
+        minor=True,
+    )
+    energy_gap: Value = measure(
+        "1",
+        "energy that the masses take up, share of the energy that passes",
+        lambda w: energy_gap(w.drive, w.turns),
         kind="percent",
         during=_STEADY,
         minor=True,
@@ -285,7 +305,7 @@ class Answers:
     fold_largest: Value = measure("rad", "largest angle between two rods", _fold, during=_ALL)
     shaft_share: Value = measure(
         "1",
-        "shaft over motor torque",
+        "shaft/motor peak torque",
         lambda w: w.largest("motor.tau") / w.largest("motor.air_gap_tau"),
         kind="percent",
     )

@@ -43,7 +43,7 @@ class OverloadFactors:
     crank_torque: Value = quantity("1", "crank torque, organ alone, ratio of cycle maxima")
     rocker_torque: Value = quantity("1", "rocker torque, organ alone, ratio of cycle maxima")
     static_at_extreme: Value = quantity(
-        "1", "R/(R - R of the other organ), at rest at the extreme where it is least"
+        "1", "static overload factor of the papers, at the extreme where it is least"
     )
 
 

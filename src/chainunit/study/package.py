@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
 from ..drives.driveline import CardanDriveline
 from ..drives.motor import Motor
-from ..errors import InputError, RunError
+from ..ending import scratch
+from ..errors import InputError, RunError, printable
 from ..fmu.backends import Backend
 from ..machines.chain_organs import LEAST, MOST
 from ..machines.chain_unit import ChamberForces
@@ -17,7 +17,7 @@ from ..machines.flexible import ChainedModel, flexible
 from ..machines.hanging import split
 from ..machines.machine import Machine
 from ..mechanism.models import DirectMachine
-from ..model import Model
+from ..model import About, Model
 from ..models import model_named
 from ..quantities import Layout
 from ..reading import file_text, toml
@@ -146,8 +146,20 @@ def whole_system(
     system = study_system(config, drive)
     machine = system.components["machine"]
     name = machine.model.name if isinstance(machine, ModelComponent) else machine.title
-    part = compiled(system, f"{name}System", config.title)
+    labels = {key: printable(config.labels.get(key, ""), 1000) for key in ("author", "revision")}
+    part = compiled(
+        system,
+        f"{name}System",
+        config.title,
+        about=About(author=labels["author"], version=labels["revision"]),
+        experiment={"step": config.run.step, "stop": _running(config)},
+    )
     return part.model, part.start | input_starts(system, part.model)
+
+
+def _running(config: Config) -> float:
+    """The time of start-up and steady running [s]."""
+    return config.steady_begin + config.run.turns * config.turn
 
 
 def left_out(config: Config) -> str:
@@ -195,8 +207,8 @@ def _machine(config: Config, model: type[Model], machine: Machine) -> dict[str, 
 
 
 def _drive(config: Config, backend: Backend | None, report: Callable[[str], None]) -> Drive:
-    with tempfile.TemporaryDirectory(prefix="chainunit_") as scratch:
-        choice = choose(config, Path(scratch), lambda what, done, todo: report(what), backend)
+    with scratch() as folder:
+        choice = choose(config, folder, lambda what, done, todo: report(what), backend)
     if choice.sizing is not None and choice.sizing.chosen_candidate is None:
         raise RunError(f"[sizing]: {choice.sizing.answer}")
     return with_observer(config, choice.drive)
@@ -218,15 +230,13 @@ def export_study(
         see `chainunit.system.ssp.export`; also where sizing finds no motor, or the motor is a foreign FMU.
     """
     drive = _drive(config, backend, report)
-    run = config.run
-    stop = config.steady_begin + run.turns * config.turn
     return export(
         study_system(config, drive),
         file,
         name="ChainUnitDrive",
         description=config.title,
-        stop=stop,
-        step=run.step,
+        stop=_running(config),
+        step=config.run.step,
         backend=backend,
         report=report,
     )

@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from ..quantities import Value, declaration, quantity, variables
+
 TRIP_CLASS = 10.0
 """Time in which a relay of this class trips at 7.2 times its setting, from cold [s] (IEC 60947-4-1)."""
 _PICK_UP = 1.1  # middle of the range 1.05 .. 1.2 in which such a relay has to trip
@@ -57,9 +59,15 @@ MARGIN = 1.25
 """Ratio of the setting of a safety coupling to the largest torque of normal duty."""
 
 
+_MARKED = 1.1
+"""Ratio of the torque of a start to that of running from which on the start decides the setting."""
+
+
 class Obstacle(StrEnum):
     """Why no setting of a safety coupling protects a drive."""
 
+    START = "the start"
+    """a start puts more on it than the gear may carry, or than any overload does"""
     MOTOR = "the motor"
     """the motor cannot give the torque of the setting"""
     GEAR = "the gear"
@@ -72,19 +80,25 @@ class Obstacle(StrEnum):
 class Setting:
     """A safety coupling between motor and gear, judged by the torques in a study; all at the crank [N m].
 
-    The setting is `MARGIN` times the largest torque of `normal` duty. It has to be below the limit of the
-    `gear`, and below the peak of at least one of the `overloads` (peaks by name), the shocks that a coupling
-    is for. Otherwise `obstacle` says why there is no setting. The largest torque of the `motor` in steady
-    running may be less than the setting, as rotor and flywheel also give torque in a shock; then a load that
-    rises slowly stalls the motor. `disturbances` are the peaks, by name, in which the coupling should stay
+    A coupling has to carry `running` and every `start`: the setting is `MARGIN` times the larger of the two. It has
+    to be below the limit of the `gear`, and below the peak of at least one of the `overloads` (peaks by name), the
+    shocks that a coupling is for. Otherwise `obstacle` says why there is no setting. The largest torque of the
+    `motor` in steady running may be less than the setting, as rotor and flywheel also give torque in a shock; then a
+    load that rises slowly stalls the motor. `disturbances` are the peaks, by name, in which the coupling should stay
     shut, such as a dip of the voltage.
     """
 
-    normal: float
+    running: float
+    start: float
     motor: float
     gear: float
     overloads: Mapping[str, float]
     disturbances: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def normal(self) -> float:
+        """The largest torque of normal duty, starts included."""
+        return max(self.running, self.start)
 
     @property
     def least(self) -> float:
@@ -92,13 +106,33 @@ class Setting:
         return MARGIN * self.normal
 
     @property
+    def least_in_running(self) -> float:
+        """The least torque at which a coupling may open if starts put no more on it than running does."""
+        return MARGIN * self.running
+
+    @property
+    def start_decides(self) -> bool:
+        """Whether a start puts markedly more on the coupling than running does."""
+        return self.start > _MARKED * self.running
+
+    def opened_by(self, setting: float) -> dict[str, float]:
+        """The overloads in which a coupling of that setting opens, with their peaks."""
+        return {name: peak for name, peak in self.overloads.items() if peak > setting}
+
+    def _protects(self, setting: float) -> bool:
+        return setting < self.gear and bool(self.opened_by(setting))
+
+    @property
     def obstacle(self) -> Obstacle | None:
         """The reason why there is no setting; None where there is one."""
+        if self._protects(self.least):
+            return None
+        if self.start_decides and self._protects(self.least_in_running):
+            return Obstacle.START
         if self.least >= self.gear:
             return Obstacle.GEAR
-        if self.opens:
-            return None
-        return Obstacle.MOTOR if self.least >= self.motor else Obstacle.OVERLOADS
+        weak = self.overloads and self.least_in_running >= self.motor
+        return Obstacle.MOTOR if weak else Obstacle.OVERLOADS
 
     @property
     def torque(self) -> float | None:
@@ -108,7 +142,7 @@ class Setting:
     @property
     def opens(self) -> dict[str, float]:
         """The overloads in which a coupling of the least setting opens, with their peaks."""
-        return {name: peak for name, peak in self.overloads.items() if peak > self.least}
+        return self.opened_by(self.least)
 
     @property
     def stalls(self) -> bool:
@@ -119,6 +153,52 @@ class Setting:
     def nuisances(self) -> dict[str, float]:
         """The disturbances in which the coupling opens, too, with their peaks; it protects nothing there."""
         return {name: peak for name, peak in self.disturbances.items() if peak > self.least}
+
+
+class Way(StrEnum):
+    """A way to a safety coupling that stays shut in a start which puts more on it than running does."""
+
+    SOFT_STARTER = "soft starter"
+    INVERTER = "inverter"
+    SLIP_CLUTCH = "slip clutch"
+    HIGHER = "higher setting"
+    BEFORE_FLYWHEEL = "between motor and flywheel"
+
+
+@declaration
+class WayNumbers:
+    """The numbers of a way, each from the runs of its own simulation; None where a number has no meaning for it;
+    all but `running` are None for a way with which the machine does not start. Torques are those at the crank."""
+
+    setting: Value = quantity("N.m", "trip torque")
+    running: Value = quantity("N.m", "largest torque of running on the coupling")
+    start: Value = quantity("N.m", "largest torque of a start on the coupling")
+    start_time: Value = quantity("s", "longest start-up")
+    voltage: Value = quantity("1", "share of the voltage at the start", kind="percent")
+    ramp: Value = quantity("s", "ramp of the voltage or of the speed")
+    slip_time: Value = quantity("s", "time for which the clutch slips in a start")
+    slip_energy: Value = quantity("J", "heat of the slip in a start")
+    slip_power: Value = quantity("W", "heat of the slip while the machine is blocked and the motor runs on")
+    rocker: Value = quantity("N.m", "largest rocker torque in the overloads until the coupling opens")
+
+    @classmethod
+    def of(cls, **numbers: float | None) -> WayNumbers:
+        """These numbers; all others are None."""
+        return cls(**{v.name: numbers.get(v.name) for v in variables(cls)})
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """A way with its numbers, and the peaks of the overloads in which its coupling opens or slips, by name."""
+
+    way: Way
+    numbers: WayNumbers
+    opens: Mapping[str, float]
+
+    @property
+    def holds(self) -> bool:
+        """Whether the coupling has a setting that the start does not reach, and opens in an overload."""
+        return self.numbers.setting is not None and bool(self.opens)
 
 
 def stall(time: Any, speed: Any, requested: float, share: float = 0.1) -> float | None:

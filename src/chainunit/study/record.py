@@ -11,6 +11,7 @@ import xarray as xr
 from ..drives.speed_control import Tuning
 from ..errors import RunError
 from ..fmu.backends import Origin
+from ..machines.chain_unit import RodName
 from ..text import entry, number
 from . import verdict
 from .chain import ChainResult
@@ -20,7 +21,8 @@ from .limits import reaches
 from .measures import Answers, not_known
 from .monte_carlo import MonteCarloResult
 from .parts import LENGTHS
-from .protection import Setting
+from .protection import Alternative, Setting
+from .pulls import LeastPull
 from .shaft import Cycles, ShaftAnswers
 from .sizing import SizingResult
 from .statics import DriveStatics
@@ -33,6 +35,8 @@ LOAD_CYCLE = "load_cycle.csv"
 
 INSUFFICIENT = "No motor of the catalogue fits; all runs are with the nearest, which is insufficient."
 """The sentence on a study whose sizing found no motor that fits."""
+SPEED_MISSED = "The motor does not keep the speed asked for."
+"""The sentence on a study whose crank does not turn at the requested speed."""
 
 Amount: TypeAlias = (
     tuple[float | None, str] | tuple[float | None, str, str] | tuple[float | None, str, str, int]
@@ -116,8 +120,10 @@ class StudyRecord:
     """answers of the start-up, once the machine ran steadily"""
     settling: Answers | None = None
     """answers of a machine that starts empty, from the coming of its feed until it runs steadily"""
-    pins: dict[str, dict[str, dict[str, float]]] = field(default_factory=dict)
+    pins: dict[str, dict[str, dict[str, float | None]]] = field(default_factory=dict)
     """by run and pin: peak, RMS and equivalent (ISO 281) load [N]"""
+    pulls: dict[str, dict[RodName, LeastPull]] = field(default_factory=dict)
+    """by run and kind of rod, the least pulls of two bars"""
     certificate: dict[str, dict[str, float]] = field(default_factory=dict)
     shaft: dict[str, ShaftAnswers] = field(default_factory=dict)
     """answers of the driveline in each run, where there is a driveline"""
@@ -125,12 +131,11 @@ class StudyRecord:
     """rainflow cycles of the torque in shaft 2, by run"""
     spreads: dict[str, Spread] = field(default_factory=dict)
     """the spread of each event that rests on an assumption"""
-    start_torques: dict[str, float] = field(default_factory=dict)
-    """peak on the coupling at the crank [N m] in each part of the start that is judged apart: in the
-    start-up, in the settling under the feed, and in each start under load"""
     setting: Setting | None = None
     """the recommended safety coupling of a sized drive; None where the file gives a coupling, as that one
     cuts off the peaks from which the setting follows"""
+    alternatives: tuple[Alternative, ...] = ()
+    """ways to a coupling that a start does not open, where the start is more than running"""
     ripple_without: float | None = None
     """fluctuation of the speed in steady running without the study's feed-forward"""
     findings: dict[str, Any] = field(default_factory=dict)
@@ -254,21 +259,6 @@ class StudyRecord:
     def insufficient(self) -> bool:
         """Whether sizing found no motor that fits, so that all is run with the nearest."""
         return self.sizing is not None and self.sizing.chosen_candidate is None
-
-    @property
-    def start_apart(self) -> bool:
-        """Whether the start is judged apart: a motor that is switched to the line gives, for a moment, more
-        torque than it ever does in running. A given coupling is held shut in the start if the file says so; a
-        recommended one has to be."""
-        config = self.config
-        if config.coupling is not None:
-            return config.held_in_start
-        return config.sizing is not None and config.start == "direct"
-
-    @property
-    def start_torque(self) -> float | None:
-        """Largest of `start_torques` [N m]; None where no start is judged apart."""
-        return max(self.start_torques.values(), default=None)
 
     @property
     def not_known(self) -> frozenset[str]:

@@ -10,7 +10,8 @@ import numpy as np
 from ..drives.cardan import two_joints
 from ..engines import numpy_
 from ..text import number
-from .coupling import peaks_on_coupling, remark_on_coupling
+from .coupling import remark_on_coupling, remark_on_rams
+from .event_torques import peaks_in_events
 from .events import Jam
 from .judgement import model_verdict, motor_limits, no_reserve
 from .measures import STARTED, Answers
@@ -19,8 +20,8 @@ from .record import LOAD_CYCLE, Amount, StudyRecord
 from .sections import ChainOrgans
 from .shaft import AMPLIFIED, UNEVEN, remedies
 from .torsion_findings import TorsionAnalysis
-from .verdict import RESIDUAL, START, STEADY
-from .window import CLOSED, DRIFT
+from .verdict import RESIDUAL, START, STEADY, shown_speed
+from .window import CLOSED, DRIFT, STORED
 
 
 def conclude(study: StudyRecord) -> None:
@@ -36,11 +37,12 @@ def conclude(study: StudyRecord) -> None:
         )
     elif study.drive.outsider:
         own = (
-            f"The machine is an FMU, {study.drive.outsider.model.description}. Values that the study file does not "
+            "The machine is an FMU, {description}. Values that the study file does not "
             "name are the start values of this FMU, which alone computes the turn at constant speed. Its bearings "
             "and its motion behind an open coupling are not known."
         )
-    note("assumed", own)
+    outsider = study.drive.outsider
+    note("assumed", own, description=outsider.model.description if outsider else "")
     if any(value for name, value in study.drive.machine.by_name.items() if name.endswith("friction")):
         note(
             "smoothed friction",
@@ -71,6 +73,7 @@ def conclude(study: StudyRecord) -> None:
             study.warn("insufficient motor", "{answer}. All runs are with it.", answer=answer)
     if config.coupling is not None and STEADY in study.answers:
         remark_on_coupling(study, config.coupling.trip_torque)
+    remark_on_rams(study)
     _on_runs(study)
     _on_inverter(study)
     remark_on_random_overloads(study)
@@ -161,10 +164,10 @@ def _on_limits(study: StudyRecord) -> None:
         )
     if steady.torque_reserve is not None and steady.torque_reserve < 0.0:
         turns = _stall_speed(study, steady) is None
-        stalls = ": a heavier load or a dip of the voltage stalls it" if turns else ""
+        stalls = "; a heavier load or a dip of the voltage stalls it" if turns else ""
         warn(
             "no reserve",
-            "steady running: the motor has {passes}{stalls}; take a larger motor or a heavier flywheel.",
+            "steady running: the motor is {passes}{stalls}; take a larger motor or a heavier flywheel.",
             STEADY,
             stalls=stalls,
             passes=no_reserve(STEADY, steady.torque_reserve),
@@ -204,7 +207,7 @@ def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
             "speed missed",
             "steady running: the crank turns at {speed_mean} in place of {wanted}; {why}.{branched}",
             STEADY,
-            speed_mean=(steady.speed_mean, "rad/s", "speed"),
+            speed_mean=(shown_speed(steady.speed_mean, requested), "rad/s", "speed"),
             asked=(requested, "rad/s", "speed"),
             wanted=number(requested, "rad/s", "speed", full=False),
             why=why,
@@ -230,11 +233,21 @@ def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
         warn(
             "speed drifts",
             "steady running: the machine still {moves}: the change of its speed over the evaluated turns is "
-            "{speed_drift} of the ripple, so that ripple, power and RMS are not those of steady running; raise "
+            "{speed_drift} of the ripple, so that ripple and RMS are not those of steady running; raise "
             "run.settle_turns.",
             STEADY,
             moves="speeds up" if steady.speed_drift > 0.0 else "slows down",
             speed_drift=(abs(steady.speed_drift), "1", "percent"),
+        )
+    elif abs(steady.energy_gap) > STORED and not study.config.chain:
+        warn(
+            "energy taken up",
+            "steady running: the moving masses {take}, over the evaluated turns {energy_gap} of the energy that "
+            "passes the motor's shaft. Mean powers are told without it; peaks, RMS and ripple are not those of "
+            "steady running: raise run.settle_turns.",
+            STEADY,
+            take="still take up energy" if steady.energy_gap > 0.0 else "still give energy",
+            energy_gap=(abs(steady.energy_gap), "1", "percent"),
         )
     if steady.winding_temperature is not None and not math.isfinite(steady.winding_temperature):
         warn(
@@ -295,7 +308,7 @@ def _happenings(study: StudyRecord, name: str) -> Iterator[tuple[str, str, dict[
     largest = study.drive.motor.current_limit(study.motor)
     if largest is not None and answers.current_peak > 0.999 * largest:
         yield "current limit", "", {}
-    peak = peaks_on_coupling(study).get(name, 0.0)
+    peak = peaks_in_events(study).get(name, 0.0)
     if "gear.torque_limit" in config.given and peak > config.gear.torque_limit:
         yield "gear passed", number(peak, "N.m"), {"torque": (peak, "N.m")}
     if answers.stall_time is not None:

@@ -8,7 +8,7 @@ from .. import __version__
 from ..drives.catalogue import CatalogueMotor
 from ..quantities import variables
 from ..text import entries, entry, shown_in, turning
-from .coupling import coupling_sentence
+from .coupling import coupling_sentence, way_words
 from .given import given_sections
 from .judgement import motor_verdict
 from .measures import measures_of
@@ -197,8 +197,9 @@ def _protection(study: StudyRecord) -> dict[str, Any]:
         "normal_torque": torque(
             setting.normal, "largest torque of normal duty on the coupling, at the crank"
         ),
+        "running_torque": torque(setting.running, "largest torque of running on the coupling"),
+        "start_torque": torque(setting.start, "largest torque of a start on the coupling"),
         "breakdown_torque": torque(setting.motor, "most that the motor gives at the crank"),
-        "start_torque": torque(study.start_torque, "largest torque of a start on the coupling"),
         "overloads": {
             name: torque(
                 peak, f"{study.title_of(name)}: {'opens it' if name in setting.opens else 'leaves it shut'}"
@@ -212,6 +213,15 @@ def _protection(study: StudyRecord) -> dict[str, Any]:
             )
             for name, peak in setting.disturbances.items()
         },
+        "alternatives": [
+            {
+                "way": each.way,
+                "words": way_words(study, each),
+                **entries(each.numbers, with_titles=True),
+                "opens": {name: entry(peak, "N.m") for name, peak in each.opens.items()},
+            }
+            for each in study.alternatives
+        ],
     }
 
 

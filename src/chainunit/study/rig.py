@@ -3,8 +3,7 @@ open coupling."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -32,9 +31,9 @@ from ..system import (
 from .config import Config
 from .cycle import no_feed
 from .drive import Drive
-from .event import Event, OverTime, Signals, Values
+from .event import Event, OverTime, Signals, Values, angle_of_begin
 from .measures import STARTED
-from .window import is_settled, whole_turns
+from .window import is_settled, time_at, whole_turns
 
 _LONGEST_START = 30.0
 """Time after the ramp at which an empty machine is fed, unless it would reach its speed in `_LONGEST_RISE`
@@ -46,6 +45,8 @@ FEED_RISE = 0.1
 PATIENCE = 20.0
 """Number of turns, at the requested speed, for which a study runs on until the motor has settled and made its
 turns; for a fast machine at least the time `_SETTLES`."""
+_UNEVEN = 2.0
+"""Ratio of the time that a crank takes to an angle over the time at its mean speed, up to which an event waits."""
 _SETTLES = 5.0
 """Time in which every drive settles, whatever the speed of its crank [s]."""
 
@@ -190,14 +191,26 @@ class Rig:
         with refusal_prefix('simulation = "me": '):
             return ModelExchange(system, signals, begin)
 
-    def lead(self, event: Event, angle: float, speed: float) -> float:
-        """Time of steady running at `speed` [rad/s] from the crank angle `angle` [rad] until the crank angle
-        at which the event begins, at least an eighth of a turn [s]. The event does not wait for a crank that
-        hardly turns."""
-        ahead = (getattr(event.p, "crank_angle", 0.0) - angle) % (2.0 * math.pi)
-        if ahead < 0.25 * math.pi:
-            ahead += 2.0 * math.pi
-        return float(ahead / max(speed, 0.5 * self.config.run.crank_speed))
+    def leads(
+        self, simulation: Simulation, events: Sequence[Event], angle: float, speed: float
+    ) -> list[float]:
+        """Time from the saved state to the begin of each event [s]: the machine is followed without an event until
+        its crank, now at the `angle` [rad] with the mean `speed` [rad/s], passes their angles."""
+        if not events:
+            return []
+        simulation.restore()
+        simulation.signals = self.signals()
+        begin, (name, ratio) = simulation.time, self.drive.crank_angle
+        targets = [angle_of_begin(event, angle) for event in events]
+        limits = [self.longest_lead(target - angle, speed) for target in targets]
+        run = simulation.run(begin + max(limits), self.step, guards={name: max(targets) * ratio})
+        times = (time_at(self.drive, run, target) for target in targets)
+        return [limit if time is None else time - begin for time, limit in zip(times, limits, strict=True)]
+
+    def longest_lead(self, ahead: float, speed: float) -> float:
+        """Time in which a crank of the mean `speed` [rad/s] passes the angle `ahead` [rad], however uneven its turn
+        is [s]. An event does not wait longer, as the crank may hardly turn."""
+        return float(_UNEVEN * ahead / max(speed, 0.5 * self.config.run.crank_speed))
 
     def start_empty(
         self, simulation: Simulation, progress: Progress, guards: Mapping[str, float]
@@ -332,8 +345,12 @@ class Rig:
         signals: dict[str, Any] = dict(self.signals(profiles, ramp=start is None))
         if transient:
             signals |= transient.jumps
-        rows = np.unique(np.append(np.arange(0, run.sizes["time"], 10), run.sizes["time"] - 1))
-        reference = monolithic(self.graph, signals, run["time"].values[rows], start=start)
+        time = run["time"].values
+        rows = np.unique(np.append(np.arange(0, len(time), 10), len(time) - 1))
+        if transient and transient.jumps:
+            # at the jump itself the torque has two values
+            rows = rows[time[rows] != transient.begin]
+        reference = monolithic(self.graph, signals, time[rows], start=start)
         differences = {}
         for of in ("machine.tau", "motor.w"):
             difference = np.abs(run[of].values[rows] - reference[of].values)

@@ -23,19 +23,24 @@ from .bearings import pin_loads
 from .chain import study_chain
 from .choice import choose
 from .config import Config
-from .coupling import on_coupling, recommended_setting
+from .coupling import recommended_setting
+from .coupling_alternatives import alternatives
 from .event import Event
 from .measures import read_answers, read_measure
 from .monte_carlo import Task
 from .monte_carlo import run as run_monte_carlo
 from .observation import with_observer
+from .pulls import least_pulls
 from .record import Spread, StudyRecord
 from .remarks import conclude
 from .rig import Rig, Transient
 from .shaft import shaft_answers, with_rigid
 from .statics import statics
+from .torques import on_coupling
 from .window import Phase, Trip, whole_turns
 
+_AFTER_TRIP = 1.0
+"""Time for which a start in which the coupling opens is followed without it [s]: the first swings are the largest."""
 _PEAKS = ("crank_torque", "motor_torque", "rocker_torque")
 """The peaks that are given over the range of an assumption."""
 
@@ -100,6 +105,8 @@ def _run_study(
             task = Task(config, replace(drive, observer=None), files, runner.stop, runner.rig.fed_from)
             study.monte_carlo = run_monte_carlo(task, folder, report, scheduler=scheduler)
         _analyse(study, runner.rig, report, needs_runs=True)
+        study.setting = recommended_setting(study)
+        study.alternatives = alternatives(study, runner.rig, report)
     except RunError as error:
         if error.partial is not None:
             study.runs["unfinished"] = error.partial
@@ -107,7 +114,7 @@ def _run_study(
     except KeyboardInterrupt:
         # Ctrl-C came between two runs, or in a run that is not a co-simulation
         study.failure = InterruptedRunError("interrupted")
-    study.setting = recommended_setting(study)
+    study.setting = study.setting or recommended_setting(study)
     if drive.chain is not None and not isinstance(study.failure, InterruptedRunError):
         _chains(study, files["machine"], report)
     conclude(study)
@@ -161,7 +168,6 @@ class Runner:
         self.starts = [event for event in taken if event.from_rest]
         self.total = self.stop * (1 + len(self.starts))
         self.total += sum(config.turn + event.follow(config.turn) for event in self.events)
-        self.start_guards = {} if study.start_apart else rig.guards
         self._coasting: Path | None = None
 
     def run(self, check: bool, coasting: Callable[[], Path | None]) -> None:
@@ -175,8 +181,8 @@ class Runner:
             begin, speed = simulation.save(), self.study.answers["steady"].speed_mean
             angle = float(self.rig.drive.crank_motion(self.study.runs["start_up"])[0][-1])
             progress, transients = 0.0, []
-            for event in self.events:
-                lead = self.rig.lead(event, angle, speed)
+            leads = self.rig.leads(simulation, self.events, angle, speed)
+            for event, lead in zip(self.events, leads, strict=True):
                 transients.append(self._event(simulation, event, begin + lead, progress))
                 progress += lead + event.follow(self.study.config.turn)
             for transient in transients:
@@ -208,7 +214,11 @@ class Runner:
         for event in self.study.config.events.values():
             if event not in (*self.events, *self.starts):
                 self.study.note(
-                    "event left out", f"{event.title}: it was left out, as {event.without}.", event.name
+                    "event left out",
+                    "{title}: it was left out, as {reason}.",
+                    event.name,
+                    title=event.title,
+                    reason=event.without,
                 )
 
     def _start_up(self, simulation: Simulation) -> None:
@@ -221,18 +231,15 @@ class Runner:
         """
         study, rig, config = self.study, self.rig, self.study.config
         progress = self._progress("start-up and steady running", 0.0)
-        start_up = rig.start_up(simulation, self.stop, progress, self.start_guards)
+        start_up = rig.start_up(simulation, self.stop, progress, rig.guards)
         run, study.steady_from, self.stop = start_up.run, start_up.steady_from, start_up.stop
         self.rig = rig = start_up.rig
         self._certify("start_up", run)
         if simulation.time < self.stop - 0.5 * rig.step:
-            raise RunError(
-                f"the safety coupling opens in the start-up, at t = {simulation.time:.3g} s; coupling.trip_torque "
-                "must be above what starting takes, or the coupling held shut in it (coupling.held_in_start = true)"
-            )
+            raise RunError(self._opens_in_start(simulation.time))
         steady = study.steady
         study.answers["steady"] = read_answers(study.window(Phase.STEADY, steady))
-        self._bearings("steady", steady)
+        self._pins_and_pulls("steady", steady)
         # the start of an empty machine ends where the feed comes
         begin = steady["time"].values[0]
         end = begin if rig.fed_from is None else rig.fed_from
@@ -242,13 +249,11 @@ class Runner:
         start_time = read_measure("start_time", whole)
         study.start = replace(read_answers(study.window(Phase.START_UP, start)), start_time=start_time)
         study.fed_from = rig.fed_from
-        self._bearings(verdict.START, start)
-        self._held_shut(verdict.START, start)
+        self._pins_and_pulls(verdict.START, start)
         if rig.fed_from is not None:
             settling = run.sel(time=slice(end, begin))
             study.settling = read_answers(study.window(Phase.SETTLING, settling))
-            self._bearings(verdict.SETTLING, settling)
-            self._held_shut(verdict.SETTLING, settling)
+            self._pins_and_pulls(verdict.SETTLING, settling)
         torque = on_coupling(rig.drive, steady)
         if config.coupling and torque > config.coupling.trip_torque:
             raise RunError(
@@ -266,10 +271,9 @@ class Runner:
     def _loaded_start(self, event: Event, before: float, check: bool) -> None:
         with self.rig.from_rest(event) as simulation:
             progress = self._progress(event.title, before)
-            run = simulation.run(self.stop, self.rig.step, progress, guards=self.start_guards)
+            run = simulation.run(self.stop, self.rig.step, progress, guards=self.rig.guards)
             transient = Transient(event, 0.0, run, self.rig.event_signals(event, 0.0, {}), {})
             self._close(simulation, transient, self.stop, Phase.LOADED_START)
-            self._held_shut(event.name, run)
         if check:
             self.report(f"monolithic reference: {event.title}", self.total, self.total)
             self._compare(event.name, transient)
@@ -291,14 +295,27 @@ class Runner:
         self._certify(name, run, transient.lead)
         after = run.sel(time=slice(transient.begin, None))
         study.answers[name] = read_answers(study.window(phase, after, transient.begin, trip))
-        self._bearings(name, after)
+        self._pins_and_pulls(name, after)
 
-    def _held_shut(self, name: str, run: xr.Dataset) -> None:
-        """Record the torque that a coupling has to carry if it is held shut in the start."""
-        if self.study.start_apart:
-            self.study.start_torques[name] = on_coupling(self.rig.drive, run)
+    def _opens_in_start(self, time: float) -> str:
+        """The reason why a study ends whose coupling opens in the start-up, at `time` [s]."""
+        coupling = self.study.config.coupling
+        assert coupling is not None
+        with self.rig.from_rest() as simulation:
+            run = simulation.run(time + _AFTER_TRIP, self.rig.step)
+        start, trip = on_coupling(self.rig.drive, run), coupling.trip_torque
+        return (
+            f"the safety coupling opens in the start-up, at t = {time:.3g} s: it is set to {number(trip, 'N.m')}, "
+            f"and this start puts up to {number(start, 'N.m')} on it; coupling.trip_torque must be above that, or "
+            'the start softer (start = "soft" or "inverter"); without [coupling] a study with [sizing] compares the '
+            "ways"
+        )
 
-    def _bearings(self, name: str, run: xr.Dataset) -> None:
+    def _pins_and_pulls(self, name: str, run: xr.Dataset) -> None:
+        """Record the loads of the pins and the pulls in the rods."""
+        drive = self.rig.drive
+        if pulls := least_pulls(drive, run, drive.machine.loaded_sides(self.study.config.feed)):
+            self.study.pulls[name] = pulls
         if loads := pin_loads(self.rig.drive, run):
             self.study.pins[name] = loads
 
@@ -370,7 +387,7 @@ class Runner:
                 runs[event.name] = rig.follow(simulation, event, begin, stop, guards=rig.guards).run
         for event in self.starts:
             with rig.from_rest(event) as simulation:
-                runs[event.name] = simulation.run(self.stop, rig.step, guards=self.start_guards)
+                runs[event.name] = simulation.run(self.stop, rig.step, guards=rig.guards)
         return runs
 
     def _line(self, rigid: dict[str, xr.Dataset]) -> None:

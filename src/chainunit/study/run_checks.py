@@ -41,9 +41,11 @@ def loads_beyond(config: Any) -> Iterator[InputError]:
         if not needed <= set(inputs):
             asked = config.monte_carlo.runs or where != "monte_carlo.event"
             if asked and config.foreign is None and not needed <= {*inputs, *of_motors}:
+                loads = Layout(model.Feed).names
+                near = "".join(near_name(name, loads) for name in needed)
                 yield InputError(
-                    f"{where}: the {model.name} has no {' or '.join(sorted(needed))}; leave it out"
-                    + "".join(near_name(name, inputs) for name in needed),
+                    f"{where}: the {model.name} has no input {' or '.join(sorted(needed))}{near}; its inputs: "
+                    f"{', '.join(loads)}",
                     key=key,
                 )
             # an input of the motor: the study checks whether the motor has it

@@ -6,9 +6,9 @@ import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool, create_model
+from pydantic import BaseModel, ConfigDict, Field, StrictBool, create_model
 
 from ..drives.driveline import Mounted
 from ..drives.gearing import KINDS, Transmission
@@ -17,12 +17,14 @@ from ..drives.line_table import Damping, form, line_values
 from ..drives.motor import Motor
 from ..machines.chain_organs import LEAST, MOST, OrganLaw
 from ..mechanism.models import MachineModel
-from ..quantities import Value, declaration, group, quantity, variables
-from ..reading import given_values, schema, to_number
+from ..quantities import Value, declaration, group, quantity
+from ..reading import given_values, schema
 from ..system import NAMES
+from .entry_values import numbers
 from .identification import table as identify_table
 from .observer_table import ObserverTable
 from .optimum import table as optimize_table
+from .sizing_table import SIZING_KEYS, Sizing
 from .sweep_table import FIELDS, WHOLE, SweepTable
 
 
@@ -103,53 +105,6 @@ class MonteCarlo:
         "s", "time that is followed after the event", default=2.0, min=0.05, max=1e4, usual=(0.05, 600.0)
     )
     seed: Value = quantity("1", "seed of the random numbers", default=1.0, min=0.0, max=1e9)
-
-
-@declaration
-class Sizing:
-    """The demands on a motor from the catalogue."""
-
-    one_sided_share: Value = quantity(
-        "1",
-        "share of the running time with all feed on one side",
-        default=0.1,
-        min=0.0,
-        max=1.0,
-        kind="percent",
-    )
-    starts_per_hour: Value = quantity("1", "starts per hour", default=2.0, min=0.0, max=1000.0)
-    fluctuation: Value = quantity(
-        "1",
-        "permitted fluctuation of the crank speed, (largest - least)/mean",
-        default=0.05,
-        above=0.0,
-        max=1.0,
-        kind="percent",
-    )
-    breakdown_margin: Value = quantity(
-        "1", "factor between the peak torque and the breakdown torque", default=1.25, min=1.0, max=10.0
-    )
-    inertia_ratio: Value = quantity(
-        "1",
-        "permitted ratio of all other inertia at the motor shaft, flywheel included, to that of the rotor; of motors "
-        "on the line only where it is given",
-        default=10.0,
-        above=0.0,
-        max=1000.0,
-    )
-    ambient: Value = quantity("K", "temperature of the surroundings", default=313.15, min=230.0, max=340.0)
-    temperature: Value = quantity(
-        "K", "permitted temperature of the winding", default=393.15, min=330.0, max=500.0
-    )
-    poles_least: Value = quantity("1", "least number of poles", default=2.0, min=2.0, max=48.0)
-    poles_most: Value = quantity("1", "largest number of poles", default=6.0, min=2.0, max=48.0)
-    candidates: Value = quantity(
-        "1",
-        "least number of motors that are tried; more follow until one fits",
-        default=9.0,
-        min=1.0,
-        max=200.0,
-    )
 
 
 @declaration
@@ -245,15 +200,6 @@ class ChainOrgans(OrganLaw):
     turns: Value = quantity(
         "1", "crank turns that are evaluated of each start: at least 30", default=30.0, min=30.0, max=1e4
     )
-
-
-def numbers(declaration: type, quantity_name: str, name: str, most: int) -> Any:
-    """The type of a list of at most `most` values of a quantity of the `declaration`; a refusal calls the
-    list `name`."""
-    variable = next(v for v in variables(declaration) if v.name == quantity_name)
-    variable = dataclasses.replace(variable, name=name)
-    value = Annotated[float, BeforeValidator(lambda entry: to_number(variable, entry))]
-    return Annotated[list[value], Field(max_length=most), variable]
 
 
 ORGANS = ("two-bar", "chain")
@@ -371,17 +317,7 @@ class FileSection:
 
 SECTIONS: Mapping[str, FileSection] = {
     "run": FileSection(Run, whole=("turns",), title="Run"),
-    "coupling": FileSection(
-        Coupling,
-        optional=True,
-        keys={
-            "held_in_start": (
-                StrictBool,
-                Field(False, description="whether it is held shut in the start, until running is steady"),
-            )
-        },
-        title="Safety coupling",
-    ),
+    "coupling": FileSection(Coupling, optional=True, title="Safety coupling"),
     "monte_carlo": FileSection(
         MonteCarlo,
         whole=("runs", "seed"),
@@ -398,7 +334,7 @@ SECTIONS: Mapping[str, FileSection] = {
         is_used=lambda config: config.monte_carlo.runs > 0,
         apart=True,
     ),
-    "sizing": FileSection(Sizing, optional=True, title="Demands on the motor", apart=True),
+    "sizing": FileSection(Sizing, optional=True, keys=SIZING_KEYS, title="Demands on the motor", apart=True),
     "flywheel": FileSection(
         FlywheelTable,
         optional=True,

@@ -10,46 +10,29 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from enum import StrEnum
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from ..drives.catalogue import CatalogueMotor, catalogue
+from ..drives.gear_ratios import UNITS, gear_unit, ratio_on_offer
 from ..errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
 from ..native.compilers import compiler
 from ..progress import Report
-from ..quantities import Value, declaration, quantity
 from ..text import entries, number
+from .candidate import Candidate, Standing
 from .catalogue_drive import catalogue_drive
 from .chain import HIGH
 from .config import Config
-from .drive import Drive
 from .duty import CycleNumbers, Duty, duty_of
-from .limits import Check
+from .limits import SPEED_DEVIATION
+from .preference import ORDER, choice, poles_rank, rank
+from .sizing_table import SIZING_KEYS
+from .start_class import CLASSES
 from .trial import try_motor
-
-
-@declaration
-class Flywheel:
-    """The flywheel of the chosen motor."""
-
-    J: Value = quantity("kg.m2", "flywheel on the motor shaft")
-    fluctuation: Value = quantity("1", "fluctuation of the crank speed in the run", kind="percent")
-
-
-class Standing(StrEnum):
-    """The result of a candidate."""
-
-    CHOSEN = "chosen"
-    FITS = "fits"
-    INSUFFICIENT = "insufficient"
-    """the nearest candidate, where none fits; the study goes on with it"""
-    REJECTED = "rejected"
-
 
 _EVENED = ("speed", "rms_torque", "peak_torque", "temperature")
 """Checks that a flywheel improves: it evens the speed, and with it the torque of a varying load."""
@@ -57,53 +40,9 @@ _WORSE_WITH_INERTIA = ("start", "inertia")
 """Checks that a flywheel makes worse."""
 _SMALL = 0.1
 """Inertia of a flywheel, relative to all other inertia, below which it hardly evens the speed."""
-_NEAR = 0.2
-"""Relative difference of flywheels up to which they count as equal in the ranking, as the search finds each
-flywheel only to about a tenth."""
-_ALIKE = 0.05
-"""Difference of utilisations up to which they count as equal in the ranking, as the search for a flywheel
-ends where a limit is used by 90 to 100 %."""
-
-
-@dataclass
-class Candidate:
-    """A motor behind a gear, with the results of its runs."""
-
-    motor: CatalogueMotor
-    drive: Drive
-    checks: dict[str, Check]
-    peak_torque: float = math.nan
-    """largest torque at the crank, in the start and in steady running with either load [N m]"""
-    breakdown_torque: float = math.nan
-    """breakdown torque of the motor [N m]"""
-    duty_torque: float = math.nan
-    """peak torque at the crank in steady running, and while all feed moves to either side and stays there [N
-    m]"""
-    fluctuation: float = math.nan
-    verdict: Standing | None = None
-    """None until the candidate is judged or ranked"""
-    reason: str = ""
-
-    @property
-    def sizes(self) -> dict[str, float]:
-        """Utilisation by check; infinite where the candidate does not get so far."""
-        return {n: math.inf if c.utilisation is None else c.utilisation for n, c in self.checks.items()}
-
-    @property
-    def violation(self) -> float:
-        """Largest utilisation of all checks; infinite where the run of the candidate failed."""
-        return max(self.sizes.values(), default=math.inf)
-
-    @property
-    def flywheel_at_crank(self) -> float:
-        """Inertia of the flywheel reduced to the crank [kg m2]: a measure of its energy, whatever the
-        gear."""
-        return float(self.drive.flywheel * self.drive.ratio**2)
-
-    @property
-    def fits(self) -> bool:
-        """Whether every check is within its limit."""
-        return self.violation <= 1.0
+_TOLERANCE = SPEED_DEVIATION - 0.005
+"""Relative deviation of the crank speed up to which a ratio of a series is taken; the rest of the permitted
+deviation is for the slip in the run."""
 
 
 @dataclass
@@ -137,44 +76,56 @@ class SizingResult:
         count = f"{len(self.candidates)} of {self.motors} were tried"
         if self.weak:
             count += f", {self.weak} {'is' if self.weak == 1 else 'are'} too weak by the nameplate"
-        if self.chosen_candidate:
-            return f"{self.best.motor.designation} is {self.best.reason} ({count})"
+        best = f"{self.best.motor.designation}: {self.best.reason}"
         return (
-            f"no motor of the catalogue fits ({count}); {self.best.motor.designation} is {self.best.reason}"
+            f"{best} ({count})"
+            if self.chosen_candidate
+            else f"no motor of the catalogue fits ({count}); {best}"
         )
+
+    @property
+    def trade(self) -> tuple[Candidate, Candidate] | None:
+        """The smallest motor that fits with a flywheel, and the next larger one that fits without; None where
+        the candidates do not have both."""
+        fitting = [c for c in self.candidates if c.fits]
+        fitting.sort(key=lambda c: (not c.keeps_margin, c.power, poles_rank(c.motor.nameplate.poles)))
+        with_one = next((c for c in fitting if c.drive.flywheel), None)
+        if with_one is None:
+            return None
+        bare = (c for c in fitting if not c.drive.flywheel and c.power >= with_one.power)
+        without = next(bare, None)
+        return None if without is None else (with_one, without)
 
     def as_dict(self) -> dict[str, Any]:
         """Ready for JSON, each number with its unit."""
         best = self.best
         assert self.config.sizing is not None
         return {
-            "asked": entries(self.config.sizing, with_titles=True),
+            "asked": entries(self.config.sizing, with_titles=True) | _words_asked(self.config),
             **self.duty.as_dict(),
-            "flywheel": entries(
-                Flywheel(J=best.drive.flywheel, fluctuation=best.fluctuation), with_titles=True
-            ),
+            "flywheel": entries(best.flywheel_numbers(), with_titles=True),
             "tried": {"value": len(self.candidates), "unit": "1"},
             "motors": {"value": self.motors, "unit": "1"},
             "weak": {"value": self.weak, "unit": "1"},
-            "candidates": [
-                {
-                    "motor": c.motor.designation,
-                    "ratio": {"value": c.drive.ratio, "unit": "1"},
-                    "verdict": c.verdict,
-                    "reason": c.reason,
-                    "checks": {name: check.as_dict() for name, check in c.checks.items()},
-                }
-                for c in self.candidates
-            ],
+            "candidates": [c.as_dict() for c in self.candidates],
+            "order": list(ORDER.values()),
+            "trade": None if self.trade is None else [self.candidates.index(c) for c in self.trade],
             "chosen": self.candidates.index(self.chosen_candidate) if self.chosen_candidate else None,
             "nearest": None if self.chosen_candidate else self.candidates.index(best),
             "notes": self.notes,
         }
 
 
+def _words_asked(config: Config) -> dict[str, Any]:
+    """The words and lists of the table [sizing], by key, without empty ones."""
+    words = {key: config.choices[f"sizing.{key}"] for key in SIZING_KEYS}
+    return {key: x for key, x in words.items() if x}
+
+
 def size(config: Config, folder: Path, report: Report, backend: Backend | None = None) -> SizingResult:
     """Choose a motor of the catalogue for the study. At least `sizing.candidates` motors are tried, from
-    small to large, and then more until one fits or the catalogue ends.
+    small to large, and then more until one fits with the margin, and none that follows could be preferred to
+    it, or the catalogue ends.
 
     Parameters
     ----------
@@ -207,7 +158,7 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
     # the search begins below the power that the cycle needs, so that the first motor that fits is the
     # smallest
     power = max(numbers.power_mean, numbers.torque_rms * config.run.crank_speed)
-    motors.sort(key=lambda m: (m.nameplate.power, abs(m.nameplate.poles - 4.0)))
+    motors.sort(key=lambda m: (m.nameplate.power, poles_rank(m.nameplate.poles)))
     if not motors:
         raise InputError(
             f"sizing.poles_least = {limits.poles_least:g}, sizing.poles_most = {limits.poles_most:g}: the catalogue "
@@ -223,7 +174,7 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
     candidates: list[Candidate] = []
     files: Mapping[str, Path] | None = {}
     for k, motor in enumerate(strong):
-        if len(candidates) >= limits.candidates and any(c.fits for c in candidates):
+        if len(candidates) >= limits.candidates and _is_settled(candidates, motor, limits.larger):
             break
         report(f"simulating {motor.designation}", float(k), float(len(strong)))
         candidate = proposal(config, motor, duty)
@@ -232,8 +183,77 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
         elif not files:
             files, _ = candidate.drive.export(folder, backend, partial(_exporting, report))
         candidates.append(with_flywheel(config, candidate, duty, files))
-    rank(candidates)
+    rank(candidates, limits.larger)
+    if candidates[0].fits and candidates[0].drive.flywheel:
+        report("a larger motor without a flywheel", 0.0, 1.0)
+        if (larger := _without_flywheel(config, strong, candidates, duty, files)) is not None:
+            candidates.append(larger)
+            rank(candidates, limits.larger)
+    notes += _needs(candidates[0], config)
     return SizingResult(config, duty, candidates, notes, len(motors), len(motors) - len(strong))
+
+
+def _needs(best: Candidate, config: Config) -> Iterator[str]:
+    """What has to be ordered beside the usual parts: a relay for a heavy start, a second gear unit."""
+    if best.start_class and best.start_class > CLASSES[0][0]:
+        relay = (
+            f"of class {best.start_class}" if best.start_class <= CLASSES[-1][0] else "heavier than class 30"
+        )
+        yield f"The start takes an overload relay {relay}; one of class {CLASSES[0][0]} may trip in it."
+    if best.unit is None and "gear.ratio" not in config.given:
+        largest = UNITS[config.choices["sizing.gear_kind"]][-1]
+        yield (
+            f"A ratio of {best.drive.ratio:g} takes two gear units: a {largest.title} ends at about "
+            f"{largest.largest:g}."
+        )
+
+
+def _is_settled(candidates: list[Candidate], following: CatalogueMotor, larger: float) -> bool:
+    """Whether a candidate keeps the margin, and neither the `following` motor nor a larger one could be
+    preferred to the best."""
+    keeping = [c for c in candidates if c.keeps_margin]
+    if not keeping:
+        return False
+    best, _ = choice(keeping, larger)
+    is_light = best.unit is not None and (best.start_class or 0) <= CLASSES[0][0] and not best.drive.flywheel
+    if is_light and poles_rank(best.motor.nameplate.poles) <= poles_rank(following.nameplate.poles):
+        return best.power < following.nameplate.power
+    return following.nameplate.power > larger * min(c.power for c in keeping)
+
+
+def _without_flywheel(
+    config: Config,
+    motors: list[CatalogueMotor],
+    candidates: list[Candidate],
+    duty: Duty,
+    files: Mapping[str, Path] | None,
+) -> Candidate | None:
+    """The next larger motor that fits without a flywheel, of the best candidate's number of poles; None where
+    the candidates have one, or the `motors` none."""
+    best = candidates[0]
+    if any(c.keeps_margin and not c.drive.flywheel and c.power >= best.power for c in candidates):
+        return None
+    tried = {c.motor.designation for c in candidates}
+    poles = best.motor.nameplate.poles
+    rest = [
+        m
+        for m in motors
+        if m.nameplate.poles == poles and m.nameplate.power > best.power and m.designation not in tried
+    ]
+
+    def bare(motor: CatalogueMotor) -> Candidate:
+        candidate = proposal(config, motor, duty)
+        judge(config, candidate, duty, files)
+        return candidate
+
+    # a larger motor runs more evenly, so that the motors that fit are the last ones of the list
+    if not rest or not (least := bare(rest.pop())).keeps_margin:
+        return None
+    while rest:
+        middle = len(rest) // 2
+        candidate = bare(rest[middle])
+        least, rest = (candidate, rest[:middle]) if candidate.keeps_margin else (least, rest[middle + 1 :])
+    return least
 
 
 def _exporting(report: Report, what: str) -> None:
@@ -265,7 +285,7 @@ def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[st
     mean = duty.numbers.torque_mean / bare.drive.ratio
     if heavy_enough(first) or mean > bare.motor.nameplate.torque:
         return first
-    inertia = duty.numbers.inertia_wanted / bare.drive.ratio**2
+    inertia = duty.numbers.inertia_wanted / bare.drive.ratio**2 / (1.0 - bare.margin)
     whole = max(inertia, torque_evening_inertia(first, duty.numbers, config.run.crank_speed)) - there
     if whole < _SMALL * there:
         return first
@@ -301,7 +321,9 @@ def torque_evening_inertia(c: Candidate, numbers: CycleNumbers, crank_speed: flo
     mean, rms = numbers.torque_mean / ratio, numbers.torque_rms / ratio
     peak = max(numbers.torque_peak, numbers.torque_peak_one_sided or 0.0) / ratio
     limits = {
-        name: c.checks[name].limit for name in ("rms_torque", "peak_torque") if c.sizes.get(name, 0.0) > 1.0
+        name: (1.0 - c.margin) * c.checks[name].limit
+        for name in ("rms_torque", "peak_torque")
+        if c.exceeds(name)
     }
     # the parts of load and limit above the mean
     beyond = []
@@ -315,26 +337,32 @@ def torque_evening_inertia(c: Candidate, numbers: CycleNumbers, crank_speed: flo
 
 
 def is_even(c: Candidate) -> bool:
-    """Whether the candidate keeps every limit that a flywheel improves."""
-    return not any(1.0 < c.sizes.get(name, 0.0) < math.inf for name in _EVENED)
+    """Whether the candidate keeps every limit that a flywheel improves, with the margin."""
+    return not any(c.exceeds(name) and c.sizes[name] < math.inf for name in _EVENED)
 
 
 def too_heavy(c: Candidate) -> bool:
     """Whether the candidate exceeds a limit that a flywheel makes worse, or its run failed."""
-    sizes = {name: c.sizes.get(name, 0.0) for name in (*_WORSE_WITH_INERTIA, "starts", "temperature")}
     # a winding that is too hot from running alone permits no starts, too
     return (
         not c.checks
-        or any(sizes[name] > 1.0 for name in _WORSE_WITH_INERTIA)
-        or sizes["starts"] > 1.0 >= sizes["temperature"]
+        or any(map(c.exceeds, _WORSE_WITH_INERTIA))
+        or (c.exceeds("starts") and not c.exceeds("temperature"))
     )
 
 
 def proposal(config: Config, motor: CatalogueMotor, duty: Duty) -> Candidate:
-    """A candidate without a flywheel, with the gear ratio at which the crank has its speed."""
-    assert config.sizing is not None
-    drive = catalogue_drive(config, motor, duty.normal.crank_torque, config.sizing.ambient)
-    return Candidate(motor, drive, {})
+    """A candidate without a flywheel, with the ratio that the file gives, or the ratio on offer that is nearest to
+    the one at which the crank has its speed."""
+    limits, kind, series = config.sizing, config.choices["sizing.gear_kind"], ""
+    assert limits is not None
+    torque = duty.normal.crank_torque
+    drive = catalogue_drive(config, motor, torque, limits.ambient)
+    if "gear.ratio" not in config.given:
+        offer = config.choices["sizing.ratio_series"], config.choices["sizing.ratios"]
+        ratio, series = ratio_on_offer(drive.ratio, *offer, _TOLERANCE)
+        drive = catalogue_drive(config, motor, torque, limits.ambient, ratio)
+    return Candidate(motor, drive, {}, limits.margin, gear_unit(kind, drive.ratio), series)
 
 
 def judge(config: Config, c: Candidate, duty: Duty, files: Mapping[str, Path] | None) -> None:
@@ -347,66 +375,5 @@ def judge(config: Config, c: Candidate, duty: Duty, files: Mapping[str, Path] | 
         c.reason = f"its run failed: {error}"
         return
     c.checks, c.fluctuation = trial.checks(), trial.fluctuation
-    c.peak_torque, c.duty_torque = trial.peak_torque, trial.duty_torque
-    c.breakdown_torque = trial.breakdown_torque
-
-
-def rank(candidates: list[Candidate]) -> None:
-    """Order the candidates by rank and set their reasons. First come those that fit, see `in_rank`, then
-    those that do not fit, by their largest utilisation; among those that do not start at all a larger motor
-    comes first."""
-    for c in candidates:
-        over = [check for name, check in c.checks.items() if c.sizes[name] > 1.0]
-        if c.fits:
-            most = max(c.checks.values(), key=lambda check: check.utilisation or 0.0)
-            c.verdict, c.reason = (
-                Standing.FITS,
-                f"most used: {most.title}, {number(c.violation, '1', 'used')}",
-            )
-        elif not c.checks:
-            # the run failed, and the reason is already set
-            c.verdict = Standing.REJECTED
-        elif math.isinf(c.violation):
-            c.verdict, c.reason = Standing.REJECTED, "it does not bring the machine up to speed"
-        else:
-            c.verdict, c.reason = Standing.REJECTED, "; ".join(check.excess for check in over)
-        if c.drive.flywheel:
-            c.reason += f", with a flywheel of {number(c.drive.flywheel, 'kg.m2')}"
-    others = [c for c in candidates if not c.fits]
-    others.sort(key=lambda c: (c.violation, -c.motor.nameplate.power, c.motor.designation))
-    candidates[:] = in_rank([c for c in candidates if c.fits]) + others
-    best = candidates[0]
-    if not best.fits:
-        best.verdict = Standing.INSUFFICIENT
-        best.reason = f"the nearest of those that do not fit; {best.reason}"
-        return
-    best.verdict, best.reason = Standing.CHOSEN, f"the smallest that fits; {best.reason}"
-    for c in candidates[1:]:
-        if c.fits:
-            c.reason = f"{_behind(c, best)}; {c.reason}"
-
-
-def in_rank(fitting: list[Candidate]) -> list[Candidate]:
-    """Candidates that fit, best first: by smaller power, then by lighter flywheel if they differ by more than
-    `_NEAR`, then by smaller utilisation if they differ by more than `_ALIKE`, then by designation."""
-    rest, ranking = sorted(fitting, key=lambda c: c.motor.designation), []
-    while rest:
-        power = min(c.motor.nameplate.power for c in rest)
-        small = [c for c in rest if c.motor.nameplate.power == power]
-        lightest = min(c.flywheel_at_crank for c in small)
-        light = [c for c in small if c.flywheel_at_crank <= (1.0 + _NEAR) * lightest]
-        least = min(c.violation for c in light)
-        ranking.append(next(c for c in light if c.violation <= least + _ALIKE))
-        rest.remove(ranking[-1])
-    return ranking
-
-
-def _behind(c: Candidate, best: Candidate) -> str:
-    """The reason why a candidate that fits comes after the best one."""
-    if c.motor.nameplate.power > best.motor.nameplate.power:
-        return "larger than needed"
-    if c.flywheel_at_crank > (1.0 + _NEAR) * best.flywheel_at_crank:
-        return "takes more flywheel at the crank than the chosen one"
-    if c.violation > best.violation + _ALIKE:
-        return "more used than the chosen one"
-    return "as good as the chosen one"
+    c.breakdown_torque, c.duty_torque = trial.breakdown_torque, trial.duty_torque
+    c.start_class = trial.start_class

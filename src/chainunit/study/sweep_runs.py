@@ -24,13 +24,13 @@ from ..system import Profile
 from ..system.compiled_simulation import LONGEST, CompiledSystem
 from .cycle import no_feed
 from .drive import Drive
-from .event import Event
+from .event import Event, angle_of_begin
 from .event_block import kept_outputs
 from .measures import read_measure
 from .rig import FEED_RISE, PATIENCE, Rig
 from .sweep_plan import SweepPlan
 from .sweep_reading import SPEED
-from .window import Phase, Trip, Window, is_settled, whole_turns
+from .window import Phase, Trip, Window, is_settled, time_at, whole_turns
 
 REASONS_OF_RUNS = (
     "the states of the drive left all bounds",
@@ -149,7 +149,7 @@ class SweepBlock:
             self.outputs,
             varying=list(self._varying),
             driven=self._driven,
-            guarded=[self._rig.drive.motor_torque],
+            guarded=[self._rig.drive.motor_torque, self._rig.drive.crank_angle[0]],
             changes=self._changes,
         )
 
@@ -285,14 +285,16 @@ class _BlockWork:
 
     def windows(self, states: Any, steady: Sequence[xr.Dataset]) -> list[Window | None]:
         """The runs with the event, each from its event on; None for one whose states left all bounds."""
-        before, begins = [], []
+        before = []
         for point, run in zip(self._points, steady, strict=True):
             turns = whole_turns(point.drive, run, self._rig.config.run.turns)
-            window = Window(Phase.STEADY, turns, point.drive, (), point.speed)
-            before.append(window)
-            angle = float(point.drive.crank_motion(run)[0][-1])
-            begins.append(point.rig.lead(point.event, angle, window.speed_mean))
-        lead = self._run(states, [self._constant(p) for p in self._points], begins, self._step)
+            before.append(Window(Phase.STEADY, turns, point.drive, (), point.speed))
+        angles = [
+            float(p.drive.crank_motion(run)[0][-1]) for p, run in zip(self._points, steady, strict=True)
+        ]
+        begins = self._begins(states, angles, [window.speed_mean for window in before])
+        constant = [self._constant(point) for point in self._points]
+        lead = self._run(states, constant, begins, self._step)
         signals, stops = [], []
         for k, point in enumerate(self._points):
             row = int(lead.count[k]) - 1
@@ -302,7 +304,7 @@ class _BlockWork:
             }
             signals.append(self._constant(point) | point.rig.event_signals(point.event, 0.0, read))
             stops.append(point.event.follow(point.turn))
-        limits = np.array([[self._limit(point) for point in self._points]])
+        limits = np.array([[self._limit(point), math.inf] for point in self._points]).T
         runs = self._run(lead.states, signals, stops, self._step, limits)
         windows: list[Window | None] = []
         for k, point in enumerate(self._points):
@@ -315,6 +317,24 @@ class _BlockWork:
             run = self._series(runs, k)
             windows.append(Window(Phase.EVENT, run, point.drive, (), point.speed, 0.0, before[k], trip))
         return windows
+
+    def _begins(self, states: Any, angles: Sequence[float], speeds: Sequence[float]) -> list[float]:
+        """Time to the begin of the event of each point [s], from these `states` with its crank at the angle [rad] and
+        the mean speed [rad/s]: the points are followed without the event until their cranks pass its angle."""
+        targets = [
+            angle_of_begin(point.event, angle) for point, angle in zip(self._points, angles, strict=True)
+        ]
+        limits = [
+            point.rig.longest_lead(target - angle, speed)
+            for point, target, angle, speed in zip(self._points, targets, angles, speeds, strict=True)
+        ]
+        ends = [[math.inf, a * p.drive.crank_angle[1]] for a, p in zip(targets, self._points, strict=True)]
+        constant = [self._constant(point) for point in self._points]
+        runs = self._run(states, constant, limits, self._step, np.array(ends).T)
+        times = [
+            time_at(point.drive, self._series(runs, k), targets[k]) for k, point in enumerate(self._points)
+        ]
+        return [limit if time is None else time for time, limit in zip(times, limits, strict=True)]
 
     def _limit(self, point: _PointRun) -> float:
         """The torque of the motor's shaft at which a safety coupling opens [N m]."""

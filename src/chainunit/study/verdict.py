@@ -13,7 +13,9 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from ..machines.chain_unit import RodName
 from ..text import entry, number
+from .pulls import LeastPull
 
 ROCKER_GOOD, ROCKER_GOOD_EMPTY, CRANK_GOOD = 0.4, 0.2, 0.6
 """Crank speeds, relative to the lowest natural frequency of the organ, up to which two bars give the rocker
@@ -46,6 +48,12 @@ _TOPICS = {
         "Bars that are pushed, where a chain would go slack and snatch",
         _CHAINS,
     ),
+    "end pushed": (
+        "an end of a bar is pushed, where a chain sags",
+        "Bars that are pushed at an end, though pulled in the mean: a chain sags there, which changes the force in "
+        "that pin and hardly the torques",
+        "",
+    ),
     "slack speed": (
         "the crank turns faster than the speed at which a web goes slack",
         "Crank speed at or above the speed at which a web goes slack",
@@ -53,13 +61,13 @@ _TOPICS = {
     ),
     "crank torque": (
         "the torques of rocker and crank may be off by more than 10 %, as a chain resonates",
-        "Crank speed at which the crank torque of two bars may be wrong by more than 10 %; the limit for the rocker "
-        "torque is lower",
+        "Crank speed too high for the crank torque of two bars, which may be off by more than 10 %; the limit for "
+        "the rocker torque is lower",
         _CHAINS,
     ),
     "rocker torque": (
         "the rocker torque may be off by more than 10 %, as a chain resonates",
-        "Crank speed at which the rocker torque of two bars may be wrong by more than 10 %",
+        "Crank speed too high for the rocker torque of two bars, which may be off by more than 10 %",
         _CHAINS,
     ),
     "energy": (
@@ -105,12 +113,15 @@ class Reason:
     kind: str = ""
     grave: bool = False
     """whether it makes every number of normal running wrong"""
+    place: str = ""
+    """the pin at which it is, if it is at one"""
 
     @property
     def numbers(self) -> str:
         """The value in words, with the limit if the words of the topic do not give it."""
-        rod = {"web_pull": "web ", "wall_pull": "wall "}.get(self.quantity, "")
-        names_limit = self.topic in ("pushed", "slack")
+        rod = f"{self.quantity.partition('_')[0]} " if self.quantity.endswith("_pull") else ""
+        rod += f"at {self.place} " if self.place else ""
+        names_limit = self.topic in ("pushed", "end pushed", "slack")
         value, limit = (number(x, self.unit, self.kind, beside=False) for x in (self.value, self.limit))
         limit = "" if names_limit else f", limit {limit}"
         if self.topic == "slack speed" and self.limit == 0.0:
@@ -146,7 +157,7 @@ class Verdict:
 
     @property
     def _turns(self) -> str:
-        return _speed(self.speed if self.actual is None else self.actual)
+        return _speed(self.speed if self.actual is None else shown_speed(self.actual, self.speed))
 
     @property
     def _is_at_requested_speed(self) -> bool:
@@ -221,12 +232,22 @@ class Verdict:
                     "topic": r.topic,
                     "quantity": r.quantity,
                     "run": r.run,
+                    "place": r.place or None,
                     "value": entry(r.value, r.unit, r.kind),
                     "limit": entry(r.limit, r.unit, r.kind),
                 }
                 for r in self.reasons
             ],
         }
+
+
+_STANDS = 1e-3
+"""Share of the requested speed below which a crank stands."""
+
+
+def shown_speed(speed: float, requested: float) -> float:
+    """A speed of the crank as a sentence gives it [rad/s]: 0 for a crank that stands."""
+    return speed if abs(speed) >= _STANDS * requested else 0.0
 
 
 def _speed(speed: float) -> str:
@@ -295,7 +316,7 @@ def two_bars(
     speed: float,
     mode: float,
     slack_speed: float,
-    pulls: Mapping[str, tuple[float, float]],
+    pulls: Mapping[str, Mapping[RodName, LeastPull]],
     residuals: Mapping[str, float],
     *,
     empty: Collection[str] = (),
@@ -308,17 +329,21 @@ def two_bars(
     speed : crank speed at which the model is judged [rad/s]
     mode : lowest natural frequency of an organ as a chain [rad/s], infinite where there is none
     slack_speed : crank speed at which a web first goes slack [rad/s], infinite where none does
-    pulls : by run, the least pull in a web and in a wall [N], negative where it is pushed
+    pulls : by run and kind of rod, the least pulls [N]. A rod whose mean pull is negative is pushed, and a chain
+        would be slack; a rod of which only an end is pushed is told with its pin.
     residuals : by run, the energy residual over the energy moved
     empty : runs in which a side carries no material; "" stands for all runs
     actual : crank speed in the runs, if that is another [rad/s]
     """
-    reasons = [
-        Reason("pushed", name, pull, 0.0, "N", run, grave=run == STEADY)
-        for run, both in pulls.items()
-        for name, pull in zip(("web_pull", "wall_pull"), both, strict=True)
-        if pull < 0.0
-    ]
+    reasons = []
+    for run, rods in pulls.items():
+        for rod, pull in rods.items():
+            if pull.mean < 0.0:
+                reasons.append(
+                    Reason("pushed", f"{rod}_mean_pull", pull.mean, 0.0, "N", run, grave=run == STEADY)
+                )
+            elif pull.end < 0.0:
+                reasons.append(Reason("end pushed", f"{rod}_pull", pull.end, 0.0, "N", run, place=pull.pin))
     passed = passed_limits(speed_limits(slack_speed, mode), speed)
     reasons += [_at_speed(each.topic, speed, each.speed, grave=each.grave) for each in passed]
     if all(each.topic == "slack speed" for each in passed):

@@ -37,6 +37,7 @@ class FlywheelAnswers:
     stored_share_most: Value = same_measure("stored_share_most")
     cycle_gap: Value = same_measure("cycle_gap")
     speed_drift: Value = same_measure("speed_drift")
+    energy_gap: Value = same_measure("energy_gap")
     residual: Value = quantity("1", "energy residual", kind="percent")
 
 
@@ -62,7 +63,8 @@ class Wheel:
     @property
     def is_settled(self) -> bool:
         """Whether the turns of its run close."""
-        return closes(self.answers.cycle_gap or 0.0, self.answers.speed_drift or 0.0)
+        own = self.answers
+        return closes(own.cycle_gap or 0.0, own.speed_drift or 0.0, own.energy_gap or 0.0)
 
     @property
     def excesses(self) -> list[str]:

@@ -11,9 +11,11 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from scipy.interpolate import CubicHermiteSpline
 
 from .arrays import peak
 from .drive import Drive
+from .stored import energy_behind, energy_gap, energy_held
 
 BURNT = 2000.0
 """Temperature that stands for a winding without a thermal steady state [K]."""
@@ -22,6 +24,9 @@ CLOSED = 0.01
 DRIFT = 0.1
 """Change of the speed over the steady turns, relative to its ripple, up to which the speed counts as
 steady."""
+STORED = 0.002
+"""Energy that the moving masses take up over the steady turns, relative to the energy that passes the motor's shaft,
+up to which the turns count as steady."""
 _EVEN = 1e-4
 """Relative change of the speed over the steady turns that counts as none."""
 
@@ -129,6 +134,17 @@ class Window:
         """Mean over the time of whole turns, of a variable or of a value read from them."""
         return mean(self.turns, of(self.turns) if callable(of) else self.drive.series(self.turns, of))
 
+    @cached_property
+    def taken_up(self) -> tuple[float, float]:
+        """Mean power [W] that the moving masses take up over the steady turns: those of the machine, and all of them
+        with rotor and flywheel. 0 for a run that does not repeat its turns, and where the crank makes none."""
+        if self.phase is not Phase.STEADY or self.drive.whole_turns(self.run) is None:
+            return 0.0, 0.0
+        time = self.turns["time"].values
+        held = energy_behind(self.turns), energy_held(self.drive, self.turns)
+        machine, whole = (float(x[-1] - x[0]) / float(time[-1] - time[0]) for x in held)
+        return machine, whole
+
     def rms(self, of: str | Callable[[xr.Dataset], Any]) -> float:
         """RMS over the time of whole turns."""
         return math.sqrt(
@@ -164,6 +180,20 @@ def whole_turns(drive: Drive, run: xr.Dataset, most: float = math.inf) -> xr.Dat
     return run if turns is None else turns
 
 
+def time_at(drive: Drive, run: xr.Dataset, angle: float) -> float | None:
+    """Time [s] at which the crank passes the `angle` [rad] in a run, by a cubic between two rows; None where it does
+    not get there."""
+    angles, speeds = drive.crank_motion(run)
+    row = int(np.argmax(angles >= angle))
+    if row == 0:
+        return None
+    around = slice(row - 1, row + 1)
+    angles, speeds, times = angles[around], speeds[around], run["time"].values[around]
+    if np.min(speeds) <= 0.0:
+        return float(np.interp(angle, angles, times))
+    return float(CubicHermiteSpline(angles, times, 1.0 / speeds)(angle))
+
+
 def end_gap(drive: Drive, turns: xr.Dataset) -> float:
     """Difference between the ends of `turns` over the largest value: the larger one of crank speed and
     torque."""
@@ -180,13 +210,13 @@ def drift(drive: Drive, turns: xr.Dataset) -> float:
     return change / float(np.ptp(speed)) if abs(change) > _EVEN * float(np.max(np.abs(speed))) else 0.0
 
 
-def closes(gap: float, drifts: float) -> bool:
-    """Whether turns close, by their `end_gap` and `drift`. A heavy flywheel that still speeds up hardly
+def closes(gap: float, drifts: float, energy: float) -> bool:
+    """Whether turns close, by their `end_gap`, `drift` and `energy_gap`. A heavy flywheel that still speeds up hardly
     changes its speed in a turn, but may take more power for that than the machine. So the change has to be
-    small beside the ripple, too."""
-    return gap <= CLOSED and abs(drifts) <= DRIFT
+    small beside the ripple, and the energy that it takes small beside the energy that passes the shaft."""
+    return gap <= CLOSED and abs(drifts) <= DRIFT and abs(energy) <= STORED
 
 
 def is_settled(drive: Drive, turns: xr.Dataset) -> bool:
     """Whether `turns` close."""
-    return closes(end_gap(drive, turns), drift(drive, turns))
+    return closes(end_gap(drive, turns), drift(drive, turns), energy_gap(drive, turns))

@@ -11,7 +11,7 @@ import json
 import keyword
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -24,11 +24,19 @@ from ..fmu.backends import Backend, Origin
 from ..fmu.backends import export as export_fmu
 from ..fmu.description import Interface
 from ..integrate import MAX_STEPS
-from ..model import Model
-from .graph import Connection, ModelComponent, System, hold_loads, order
+from ..model import About, Model, Terminal
+from ..ports import MEASURED
+from .graph import Component, Connection, ModelComponent, System, hold_loads, order
 
 
-def compiled(system: System, name: str = "System", title: str = "") -> ModelComponent:
+def compiled(
+    system: System,
+    name: str = "System",
+    title: str = "",
+    *,
+    about: About | None = None,
+    experiment: Mapping[str, float] | None = None,
+) -> ModelComponent:
     """One model of a system of models, with the values of its parameters.
 
     Its names are the full names of the system: of parameters ("motor.armature.R"), states and outputs. Its inputs are
@@ -41,6 +49,9 @@ def compiled(system: System, name: str = "System", title: str = "") -> ModelComp
     system : its components are all models
     name : name of the model and of its FMU: letters, digits and _
     title : description of the model, before that of the components
+    about : who made the system, as its FMU says it
+    experiment : ``step`` and ``stop`` [s] of the default experiment of its FMU, in place of the least ones of the
+        components
 
     Raises
     ------
@@ -64,7 +75,9 @@ def compiled(system: System, name: str = "System", title: str = "") -> ModelComp
         raise InputError(
             f"{shown(name)}: the name of a model must be of letters, digits and _, and begin with a letter"
         )
-    model = composed(json.dumps(_description(system, models, name, printable(title)), sort_keys=True))
+    description = _description(system, models, name, printable(title))
+    description |= {"about": about and asdict(about), "experiment": dict(experiment or {})}
+    model = composed(json.dumps(description, sort_keys=True))
     values = system.values
     layout = model.parameter_layout
     limits = {own: [values[full] for each in models if (full := f"{each}.{own}") in values] for own in SOLVER}
@@ -167,8 +180,8 @@ def _passed_on(
 
 
 def _free_terminals(system: System) -> list[str]:
-    """The terminals, by full name, none of whose variables is connected or belongs to a joined terminal. A load port
-    needs the free shaft to which it belongs."""
+    """The terminals, by full name, none of whose variables is connected or belongs to a joined terminal, and those of
+    measured signals that it gives. A load port needs the free shaft to which it belongs."""
     taken = {full for connection in system.connections for full in connection}
     for joint in system.joints:
         for full in joint:
@@ -180,12 +193,19 @@ def _free_terminals(system: System) -> list[str]:
             terminal
             for terminal in component.terminals.values()
             if not taken & {f"{name}.{variable}" for variable in terminal.members.values()}
+            or _gives_signals(component, terminal)
         ]
         # who gives the motion takes the load
-        shafts = {component.connectors[t.members["phi"]].causality for t in own if "phi" in t.members}
+        moved = [t.members["phi"] for t in own if t.kind != MEASURED and "phi" in t.members]
+        shafts = {component.connectors[name].causality for name in moved}
         ports = {t.name: component.connectors[t.members["tau_bias"]] for t in own if "tau_bias" in t.members}
         free += [f"{name}.{t.name}" for t in own if t.name not in ports or shafts - {ports[t.name].causality}]
     return free
+
+
+def _gives_signals(component: Component, terminal: Terminal) -> bool:
+    """Whether it is a terminal of measured signals that the component gives: any number of others may read them."""
+    return terminal.kind == MEASURED and component.connectors[terminal.members["w"]].causality == "output"
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,8 @@
 """The master of a co-simulation: fixed communication step, all signals consistent at every communication point.
 
-With a load port the driver sees the linearised load inside its step, and the coupling is of second order. An external
-signal that varies within a step acts with its value at the middle of the step, which is of second order, too.
+With a load port the driver sees the linearised load inside its step, and the coupling is of second order (through a
+driveline near rest of first order, see `chainunit.drives.driveline`). An external signal that varies within a step
+acts with its value at the middle of the step, which is of second order, too.
 """
 
 from __future__ import annotations

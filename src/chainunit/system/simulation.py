@@ -7,11 +7,9 @@ states first, then the outputs that depend on them. So every recorded row belong
 from __future__ import annotations
 
 import math
-import signal
-import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import nullcontext
 from pathlib import Path
 from types import TracebackType
 from typing import Any, ClassVar, Self
@@ -21,6 +19,7 @@ import xarray as xr
 
 from ..errors import InputError, InterruptedRunError, RunError
 from ..files import whole
+from ..interrupts import stoppable
 from ..progress import Progress
 from . import rows
 from .graph import FmuComponent, System, direct_inputs, order
@@ -29,40 +28,6 @@ from .signals import Profile, at_time
 
 Watch = tuple[Instance, Any, list[float]]
 """An instance, the handle of its guarded outputs, and their limits."""
-
-
-@contextmanager
-def stoppable() -> Iterator[Callable[[], bool]]:
-    """Hold a KeyboardInterrupt back, since it would be a fatal error inside an FMU, and give a function that tells,
-    between steps, whether one came. It may come from Ctrl-C, or from a handler of SIGTERM that raises it. An
-    interrupt after the last call of the function is raised at the end of the context."""
-    interrupts: list[KeyboardInterrupt] = []
-    reports: list[bool] = []
-    if threading.current_thread() is not threading.main_thread():
-        yield lambda: False
-        return
-
-    def later(number: int, frame: Any) -> None:
-        try:
-            previous[number](number, frame)
-        except KeyboardInterrupt as error:
-            interrupts.append(error)
-
-    def stopped() -> bool:
-        reports.extend([True] * len(interrupts))
-        return bool(reports)
-
-    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    previous: dict[int, Any] = {number: handler for number, handler in handlers.items() if callable(handler)}
-    for number in previous:
-        signal.signal(number, later)
-    try:
-        yield stopped
-    finally:
-        for number, handler in previous.items():
-            signal.signal(number, handler)
-        if interrupts and not reports:
-            raise interrupts[0]
 
 
 class Simulation(ABC):

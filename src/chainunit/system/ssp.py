@@ -10,13 +10,13 @@ connectors of the system itself: inputs without connection stay open, with their
 from __future__ import annotations
 
 import math
-import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
+from ..ending import scratch
 from ..errors import InputError, refusal_prefix
 from ..files import folder, whole
 from ..fmu.backends import Backend
@@ -78,7 +78,7 @@ def export(
     sources: dict[str, str] = {}
     origins: list[str] = []
     paths: dict[tuple[object, ...], str] = {}
-    with tempfile.TemporaryDirectory(prefix="chainunit_") as scratch:
+    with scratch() as made:
         for name_of, part in parts.items():
             alike = (part.of, *sorted(part.start.items()))
             if alike not in paths:
@@ -88,7 +88,7 @@ def export(
                     fmu = part.of
                     origins.append(f"{fmu.name} as it is")
                 else:
-                    fmu = Path(scratch) / f"{part.title}.fmu"
+                    fmu = made / f"{part.title}.fmu"
                     origins.append(str(export_fmu(part.of, fmu, part.start, backend=backend, report=report)))
                 contents[paths[alike]] = fmu.read_bytes()
             sources[name_of] = paths[alike]

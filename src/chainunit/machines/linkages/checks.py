@@ -5,12 +5,13 @@ from __future__ import annotations
 import keyword
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+import unicodedata
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from ...errors import InputError
-from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE
-from ...mechanism.expressions import CONSTANTS, FUNCTIONS
+from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE, FreeLinksError
+from ...mechanism.expressions import CONSTANTS, WORDS
 from .loads import MOTION
 from .structure import DriverEntry, JointEntry, groups_of
 
@@ -39,6 +40,20 @@ def name_fault(name: str) -> str:
     if keyword.iskeyword(name):
         return f"{name} is a word of programming languages; choose another name, such as {name}_1"
     return ""
+
+
+def model_name(stem: str) -> str:
+    """The name of a machine whose file states none, from the name of the file: ``60 kN press`` gives
+    ``linkage_60_kN_press``, ``größer`` gives ``grosser``. It is an identifier of C, as FMUs need one."""
+    plain = unicodedata.normalize("NFKD", stem.replace("ß", "ss"))
+    name = re.sub(r"[^A-Za-z0-9_]", "_", "".join(c for c in plain if not unicodedata.combining(c)))
+    return f"linkage_{name}" if name_fault(name) else name
+
+
+def guide_faults(data: Mapping[str, Any], joints: Entries) -> Iterator[Fault]:
+    """The fault of a table of guides where no joint slides."""
+    if "guides" in data and not any(each["type"] == PRISMATIC for each in joints):
+        yield "guides", "no joint of the linkage slides; leave the table out"
 
 
 def study_fault(data: Mapping[str, Any]) -> None:
@@ -71,7 +86,7 @@ def quantity_names(
     ]
     for kind, name in (*names, *(("tables", name) for name in tables)):
         key = f"{kind}.{name}"
-        if name in (*FUNCTIONS, *CONSTANTS, *MOTION):
+        if name in (*WORDS, *CONSTANTS, *MOTION):
             yield key, "the name has a meaning in expressions; choose another one"
         elif name in own or (kind != "tables" and name in reserved):
             yield key, "is a variable of every linkage; choose another name"
@@ -96,13 +111,47 @@ def spring_faults(loads: Entries, joints: Entries) -> Iterator[Fault]:
             yield key, f"both ends are in the joint {pins[ends]}; give points that move apart"
 
 
-def freedom_faults(links: Entries, joints: Entries, driver: Mapping[str, Any]) -> Iterator[Fault]:
-    """Too many or too few degrees of freedom, and groups of a class that is not covered."""
+def alike_points(points: Mapping[str, Iterable[str]], used: set[tuple[str, ...]]) -> str:
+    """Words on a point that nothing joins, whose name looks like that of a point of another link: a pin that was
+    meant. `used` are the points that joints, loads and masses name, by link."""
+    owners: dict[str, list[str]] = {}
+    for link, names in points.items():
+        for point in names:
+            owners.setdefault(point, []).append(link)
+    for link, names in points.items():
+        for point in names:
+            if owners[point] != [link] or (link, point) in used:
+                continue
+            for other, those in owners.items():
+                if those != [link] and other != point and _alike(point, other):
+                    return (
+                        f"; the names of the points {link}.{point} and {those[0]}.{other} look alike: a pin joins "
+                        "points of one name"
+                    )
+    return ""
+
+
+def _alike(one: str, other: str) -> bool:
+    """Whether two names may be meant to be one: but for capitals and signs between, or a letter more."""
+    a, b = (name.replace("_", "").lower() for name in (one, other))
+    if a == b:
+        return True
+    digits = [re.sub(r"\D", "", name) for name in (a, b)]
+    short, long = sorted((a, b), key=len)
+    return digits[0] == digits[1] and len(long) == len(short) + 1 and long.startswith(short)
+
+
+def freedom_faults(
+    links: Entries, joints: Entries, driver: Mapping[str, Any], hint: str = ""
+) -> Iterator[Fault]:
+    """Too many or too few degrees of freedom, and groups of a class that is not covered; the `hint` follows a refusal
+    of too many."""
     entries = [JointEntry(j["name"], j["type"], tuple(j["on"]), tuple(j["by"])) for j in joints]
     try:
         groups_of([link["name"] for link in links], entries, DriverEntry(**driver))
     except InputError as error:
-        yield f"links.{error.key}" if error.key in {link["name"] for link in links} else "joints", str(error)
+        text = f"{error}{hint if isinstance(error, FreeLinksError) else ''}"
+        yield f"links.{error.key}" if error.key in {link["name"] for link in links} else "joints", text
 
 
 Places = Mapping[str, Mapping[str, tuple[float, float]]]

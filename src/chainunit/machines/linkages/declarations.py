@@ -9,7 +9,7 @@ from typing import Any
 from ...mechanism.driver_ports import AddedInertia
 from ...mechanism.models import names_of
 from ...ports import LoadInput, PortSlopes, PortValues, ShaftMotion, Start
-from ...quantities import Layout, Value, declaration, declared_class, group, quantity
+from ...quantities import Layout, Value, declaration, declared_class, fields_of, group, quantity
 from ..parts import Force, GuideLaw, Pin
 
 
@@ -22,12 +22,21 @@ class PinLaw(Pin):
 
 @declaration
 class CommonParameters:
-    """Parameters that every linkage has."""
+    """Parameters that every linkage has; `guides` only one in which a joint slides."""
 
     g: Value = quantity("m/s2", "gravity, against y", default=9.81, min=0.0, tunable=True)
     ratio: Value = quantity("1", "gear ratio, motor turns per driver turn", default=1.0, above=0.0, max=1e6)
     pins: PinLaw = group(PinLaw, "pins", default=PinLaw(friction=0.0, diameter=0.05))
     guides: GuideLaw = group(GuideLaw, "guides", default=GuideLaw())
+
+
+@declaration
+class WayParameters(CommonParameters):
+    """Those of a linkage whose driver slides."""
+
+    ratio: Value = quantity(
+        "1", "ratio of the way phi to the way of the driver", default=1.0, above=0.0, max=1e6
+    )
 
 
 @declaration
@@ -109,6 +118,15 @@ class WayRunning(Energies):
     tau: Value = quantity("N", "force needed at the driver, J a + tau_bias", nominal=1000.0)
 
 
+def common_parameters(linear: bool, guides: bool, starts: Mapping[str, float]) -> type:
+    """The parameters that a linkage has whatever its file says: of a driver that slides (`linear`) or turns, with
+    `guides` or without, and with the given start values by name."""
+    of = WayParameters if linear else CommonParameters
+    if not guides:
+        of = declared_class(of.__name__, (), fields_of(of, without=("guides",)))
+    return with_starts(of, starts)
+
+
 def field_of(entry: Mapping[str, Any]) -> tuple[str, Any, Any]:
     """A quantity of the user's as a field of a declaration."""
     bounds = {key: entry[key] for key in ("min", "max") if entry.get(key) is not None}
@@ -152,6 +170,6 @@ RESERVED = frozenset(
         AddedInertia,
         LoadInput,
     )
-    for name in names_of(of)
+    for name in (*names_of(of), "end_stops", "end_stop_force")
 )
 """Names of variables that every machine has."""

@@ -6,7 +6,7 @@ import ast
 from collections.abc import Mapping
 
 from ...errors import InputError, shown
-from ...mechanism.expressions import CONSTANTS
+from ...mechanism.expressions import CONSTANTS, EXTREMES
 from ...quantities import base_units
 
 Dimension = tuple[tuple[str, float], ...]
@@ -20,8 +20,7 @@ def dimension_of_unit(unit: str) -> Dimension:
 
 def checked_dimension(text: str, units: Mapping[str, str | None], unit: str | None) -> None:
     """Refuse an expression that is not of the dimension of `unit`, or, without it, adds what does not fit together;
-    `units` are those of the names in it, None for one
-    that is not known yet.
+    `units` are those of the names, extremes and tables in it, None for one that is not known yet.
 
     Raises
     ------
@@ -55,6 +54,13 @@ def _dimension(node: ast.AST, known: Mapping[str, Dimension | None], text: str) 
                 if (a is not None or b is not None)
                 else None
             )
+        case ast.Call(func=ast.Name(id=name), args=[place]) if name in EXTREMES:
+            return known[f"{'max' if name == 'stroke' else name}({ast.unparse(place)})"]
+        case ast.Compare(left=left, comparators=[right]):
+            return _same(_dimension(left, known, text), _dimension(right, known, text), node, text)
+        case ast.Call(func=ast.Name(id="table"), args=[x, ast.Name(id=name)]):
+            _same(_dimension(x, known, text), known[f"x of {name}"], node, text)
+            return known[f"table {name}"]
         case ast.Call(func=ast.Name(id=name), args=args):
             inside_all = [_dimension(each, known, text) for each in args]
             return _of_function(name, inside_all, node, text)
@@ -67,6 +73,15 @@ def _of_function(name: str, args: list[Dimension | None], node: ast.AST, text: s
         return None if first is None else tuple((unit, 0.5 * k) for unit, k in first)
     if name == "abs":
         return first
+    if name == "table":  # of numbers, which take any dimension
+        return None
+    if name in ("step", "positive", "ramp"):
+        for each in args[1:]:
+            first = _same(first, each, node, text)
+        return first if name == "positive" else ()
+    if name == "where":
+        _same(first, args[3], node, text)
+        return _same(args[1], args[2], node, text)
     if name in ("min", "max"):
         return _same(first, args[1], node, text)
     if name == "atan2":

@@ -7,26 +7,27 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from itertools import pairwise
+from dataclasses import fields
 from typing import Any
 
 from ... import units
-from ...errors import Faults, InputError, meant, near_name, refusal_prefix, shown
-from ...mechanism.expressions import CONSTANTS, FUNCTIONS, expression
+from ...errors import Faults, InputError, meant, near_name, printable, refusal_prefix, shown
+from ...mechanism.expressions import CONSTANTS, WORDS, Expression, expression
+from ...model import About
 from ...quantities import Layout, base_units
 from .checks import name_fault, words
 from .declarations import CommonParameters
 from .dimensions import checked_dimension
-from .loads import MOTION
+from .loads import MOTION, OF_POINT
 
 UNITS = (
     "1", "m", "rad", "kg", "kg.m2", "N", "N.m", "N/m", "N.s/m", "N.m/rad", "N.m.s/rad", "m2", "m3", "kg/m", "kg/m3",
     "N/m2", "m/s", "m/s2", "rad/s", "s", "W", "J",
 )  # fmt: skip
 """Units of parameters and inputs, in the order in which they are tried on a text."""
-_MOTION_UNITS: dict[str, str | None] = {
-    "phi": "rad", "w": "rad/s", "x": "m", "y": "m", "vx": "m/s", "vy": "m/s", "angle_rate": "rad/s",
-}  # fmt: skip
+
+
+Known = Mapping[str, str | None]
 
 
 class EntryReader:
@@ -36,7 +37,6 @@ class EntryReader:
         self.data, self.faults = data, Faults()
         self.name = name
         self.inputs = self.table("inputs")
-        self.table_units: dict[str, str | None] = {}
         self.units: dict[str, str | None] = {}
         self.derived: dict[str, str] = {}
         self.used: set[str] = set()
@@ -68,9 +68,9 @@ class EntryReader:
         for key, message in faults:
             self.fault(key, message)
 
-    def text(self, key: str, default: str) -> str:
-        """A text of the file."""
-        given = self.data.get(key, default)
+    def text(self, key: str, default: str, table: Mapping[str, Any] | None = None) -> str:
+        """A text of the file, or of one of its tables by the last name of its `key`."""
+        given = (self.data if table is None else table).get(key.rpartition(".")[2], default)
         if not isinstance(given, str):
             self.fault(key, f"is {shown(given)}; must be a text")
             return default
@@ -121,22 +121,24 @@ class EntryReader:
             raise InputError(f"is {shown(given)}; must be finite")
         return value
 
-    def entry(self, key: str, given: Any, unit: str, motion: bool = False, inputs: bool = False) -> Any:
-        """A number in SI units, or the text of an expression, with its unit checked; 0 where it is wrong."""
+    def entry(
+        self, key: str, given: Any, unit: str, motion: Known | None = None, inputs: bool = False
+    ) -> Any:
+        """A number in SI units, or the text of an expression, with its unit checked; 0 where it is wrong. `motion`
+        are the units of the names that a load knows beside parameters and inputs."""
         with self.at(key):
             if not isinstance(given, str) or _is_quantity(given):
                 return self.number(key, given, unit)
             if self.refused & words(given):  # the name itself is faulted where it is given
                 return 0.0
-            known = {**self.units, **(_MOTION_UNITS | self.table_units if motion else {})}
+            known = {**self.units, **(motion or {})}
             self.used |= words(given) & {*self.derived}
             given = self.expanded(given)
             each = expression(given)
+            known |= self.further(each, motion is not None)
             for name in each.names:
                 if name not in known:
-                    where = " a load" if name in MOTION else ""
-                    note = f"; {name} is known in{where} alone" if where else near_name(name, known)
-                    raise InputError(f"is {shown(given)}; {name} is no parameter{note}")
+                    raise InputError(f"is {shown(given)}; {name} is no parameter{self.note(name, known)}")
                 if name in self.inputs and not inputs:
                     raise InputError(
                         f"is {shown(given)}; {name} is an input, and lengths cannot change in a run; use a parameter"
@@ -148,8 +150,28 @@ class EntryReader:
             return given
         return 0.0
 
+    def further(self, given: Expression, in_load: bool) -> dict[str, str | None]:
+        """The units of extremes and tables of an expression, by name.
+
+        Raises
+        ------
+        InputError
+            in one line, where the entry cannot have them.
+        """
+        if given.extremes or given.tables:
+            raise InputError(
+                f"is {shown(given.text)}; extremes and tables over x belong into the force or torque of a load"
+            )
+        return {}
+
+    def note(self, name: str, known: Iterable[str]) -> str:
+        """A hint on a name that is not known in an expression."""
+        if name in MOTION:
+            return f"; {name} is known in a {'force' if name in OF_POINT else 'load'} alone"
+        return near_name(name, known)
+
     def vector(
-        self, key: str, given: Any, unit: str, motion: bool = False, inputs: bool = False
+        self, key: str, given: Any, unit: str, motion: Known | None = None, inputs: bool = False
     ) -> list[Any]:
         """Two entries."""
         if not isinstance(given, list) or len(given) != 2:
@@ -187,10 +209,18 @@ class EntryReader:
                     common[name] = declared[name].quantity.within_bounds(x)
         return common
 
+    def about(self) -> dict[str, str]:
+        """Who made the machine, as its FMUs say it."""
+        table = self.table("about")
+        names = tuple(field.name for field in fields(About))
+        self.keys("about", table, names)
+        return {key: printable(self.text(f"about.{key}", "", table), 1000) for key in table if key in names}
+
     def expanded(self, text: str) -> str:
         """An expression without parameters that are expressions of others: these stand in it in brackets."""
         for name in words(text) & {*self.derived}:
-            text = re.sub(rf"\b{name}\b", f"({self.derived[name]})", text)
+            # no function, and no link or point, of the same name
+            text = re.sub(rf"(?<![\w.]){name}\b(?!\s*[.(])", f"({self.derived[name]})", text)
         return text
 
     def checked_parameter(self, key: str, given: Any, text: str) -> str:
@@ -202,6 +232,7 @@ class EntryReader:
                 self.keys(key, given, ("value", "description"))
             self.used |= words(text) & {*self.derived}
             whole = self.expanded(text)
+            self.further(expression(whole), False)
             for each in expression(whole).names:
                 if each not in self.units or each in self.inputs:
                     raise InputError(f"is {shown(text)}; {each} is no parameter{near_name(each, self.units)}")
@@ -242,7 +273,7 @@ class EntryReader:
             if kind == "parameters" and is_expression(given):
                 continue
             key = f"{kind}.{name}"
-            if name in (*FUNCTIONS, *CONSTANTS, *MOTION):
+            if name in (*WORDS, *CONSTANTS, *MOTION):
                 self.refused.add(name)
             whole = given if isinstance(given, Mapping) else {"value": given}
             self.keys(key, whole, ("value", "unit", "min", "max", "description", "tunable"))
@@ -292,35 +323,6 @@ class EntryReader:
                     continue
             raise InputError(f"is {shown(given)}; the unit is not known; write it as in {_like('m')}")
         return self.number("", given, "1"), None
-
-    def curves(self) -> dict[str, Any]:
-        """Tables over the coordinate."""
-        curves = {}
-        given = self.table("tables")
-        self.named("tables", given)
-        linear = "joint" in self.table("driver")
-        for name in given:
-            key = f"tables.{name}"
-            table = self.table(key, given)
-            self.keys(key, table, ("phi", "value"))
-            self.refused.add(name)
-            with self.at(key):
-                phi, value = table.get("phi"), table.get("value")
-                if (
-                    not isinstance(phi, list)
-                    or not isinstance(value, list)
-                    or not 3 <= len(phi) == len(value)
-                ):
-                    raise InputError("must have phi and value, two lists of one length, of 3 or more")
-                at = [self.number(key, x, "m" if linear else "rad") for x in phi]
-                values = [self.with_unit(x, None) for x in value]
-                if any(b <= a for a, b in pairwise(at)) or (not linear and at[-1] - at[0] >= 2.0 * math.pi):
-                    raise InputError("phi must rise, within less than one turn: the table repeats itself")
-                curves[name] = {"places": at, "values": [x for x, _ in values]}
-                self.table_units[name] = values[0][1]
-                if not name_fault(name):
-                    self.refused.discard(name)
-        return curves
 
 
 def is_expression(given: Any) -> bool:

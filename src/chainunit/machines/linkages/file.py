@@ -7,22 +7,24 @@ Each entry that is a quantity is a number in SI units, a text with a unit ("80 m
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from ... import places
 from ...engines import MATH
-from ...errors import InputError, each_refusal, meant, near_name, shown
+from ...errors import InputError, each_refusal, meant, near_name, printable, shown
 from ...mechanism.assur import DYADS, GROUND, PRISMATIC, REVOLUTE
 from ...mechanism.expressions import expression
 from ...mechanism.models import InverseMachine
 from ...reading import file_text, in_file, toml
 from .checks import (
     POINT_NAMES,
+    alike_points,
     freedom_faults,
+    guide_faults,
     length_faults,
+    model_name,
     name_fault,
     quantity_names,
     spring_faults,
@@ -30,25 +32,20 @@ from .checks import (
     words,
 )
 from .declarations import RESERVED
-from .entries import EntryReader, is_given
+from .entries import is_given
+from .load_entries import LoadReader
 from .model import machine_of
 from .shared_pins import shared_pins
 from .start import StartPose
 from .structure import CYLINDER, JointEntry
 
 TABLES = (
-    "title", "name", "gravity", "ratio", "parameters", "inputs", "tables", "ground", "driver", "links", "joints",
-    "loads", "pins", "guides", "start", "groups",
+    "title", "name", "about", "gravity", "ratio", "parameters", "inputs", "tables", "ground", "driver", "links",
+    "joints", "loads", "pins", "guides", "start", "groups",
 )  # fmt: skip
 _LINK_KEYS = ("points", "mass", "inertia", "centroid", "masses", "bar")
 _JOINT_KEYS = ("type", "on", "by", "toward", "angle", "length")
 _DRIVER_KEYS = ("link", "joint", "zero", "positive", "range")
-_LOADS = {
-    "force": ("type", "on", "force"),
-    "follower": ("type", "on", "force"),
-    "torque": ("type", "on", "torque"),
-    "spring": ("type", "on", "by", "stiffness", "length", "damping"),
-}
 
 
 def read_linkage(file: Path) -> type[InverseMachine]:
@@ -61,24 +58,25 @@ def read_linkage(file: Path) -> type[InverseMachine]:
     """
     text = file_text(file)
     with in_file(str(file), lambda: places.lines_of(text)):
-        description = description_of(toml(text), file.stem)
+        description = description_of(toml(text), file.stem, file.parent)
         # what is wrong of a group is told at its first link
         with each_refusal(lambda fault: InputError(f"{fault.key or 'links'}: {fault}", fault.key or "links")):
             return machine_of(description)
 
 
-def description_of(data: Mapping[str, Any], name: str) -> str:
-    """The description of a machine from the tables of a file; `name` is that of the machine where the file has none.
+def description_of(data: Mapping[str, Any], name: str, folder: Path = Path()) -> str:
+    """The description of a machine from the tables of a file in a `folder`; `name` is that of the machine where the
+    file has none.
 
     Raises
     ------
     InputError
         with a line for each fault, which names the key.
     """
-    return _LinkageReader(data, name).description()
+    return _LinkageReader(data, name, folder).description()
 
 
-class _LinkageReader(EntryReader):
+class _LinkageReader(LoadReader):
     """The reader of one file."""
 
     def description(self) -> str:
@@ -86,7 +84,7 @@ class _LinkageReader(EntryReader):
         data = self.data
         study_fault(data)
         self.keys("", data, TABLES)
-        name, title = self.text("name", re.sub(r"\W", "_", self.name)), self.text("title", "")
+        name, title = self.text("name", model_name(self.name)), printable(self.text("title", ""))
         if "name" in data and (wrong := name_fault(name)):
             self.fault("name", f"is {shown(name)}; {wrong}")
         parameters = self.quantities("parameters")
@@ -98,17 +96,19 @@ class _LinkageReader(EntryReader):
         joints = self.joints()
         driver, span = self.driver(joints)
         loads = [self.load(name, given) for name, given in self.table("loads").items()]
-        common, groups = self.common(), self.groups()
+        common, groups, about = self.common(), self.groups(), self.about()
         self.unused(parameters, inputs, tables)
         self.all(quantity_names(parameters, inputs, self.table("tables"), RESERVED, links))
-        self.all(spring_faults(loads, joints))
+        self.all([*spring_faults(loads, joints), *guide_faults(data, joints)])
         self.faults.refuse()
-        self.all(freedom_faults(links, joints, driver))
+        alike = alike_points(self.points, self.named_points(links, loads))
+        self.all(freedom_faults(links, joints, driver, alike))
         start = self.start(parameters, links, joints, driver)
         self.faults.refuse()
         described = {
             "name": name,
             "title": title,
+            "about": about,
             "common": common,
             "parameters": parameters,
             "inputs": inputs,
@@ -123,6 +123,16 @@ class _LinkageReader(EntryReader):
             "start": start,
         }
         return json.dumps(described, sort_keys=True)
+
+    def named_points(self, links: list[dict[str, Any]], loads: list[dict[str, Any]]) -> set[tuple[str, ...]]:
+        """The points that joints of the file, loads and masses name, by link."""
+        given = [each for each in self.table("joints").values() if isinstance(each, Mapping)]
+        ends = [each.get(key) for each in given for key in ("on", "by")]
+        named = {tuple(end.split(".")) for end in ends if isinstance(end, str)}
+        named |= {tuple(load[key]) for load in loads for key in ("on", "by") if key in load}
+        named |= {(link["name"], point) for link in links for point in link["masses"]}
+        lines = [str(each["toward"]).rpartition(".")[2] for each in given if "toward" in each]
+        return named | {(link, line) for link in self.points for line in lines}
 
     def groups(self) -> list[Any]:
         """The groups that the file lists, each with its kind, if it is given, and its links."""
@@ -241,24 +251,6 @@ class _LinkageReader(EntryReader):
         middle = [f"0.5 * (({a}) + ({b}))" for a, b in ((ax, bx), (ay, by))]
         return {"mass": mass, "inertia": f"{mass} * {square} / 12.0", "centroid": middle}
 
-    def end(self, key: str, given: Any) -> list[str]:
-        """A point of a link, as "link.point" or a list of two."""
-        if given is None:
-            raise InputError('is missing; must be a link and its point, such as "rod.A"')
-        parts = given.split(".") if isinstance(given, str) else given
-        if not isinstance(parts, list) or len(parts) != 2 or not all(isinstance(x, str) for x in parts):
-            raise InputError(f'is {shown(given)}; must be a link and its point, such as "rod.A"')
-        link, point = parts
-        if link not in self.points:
-            raise InputError(f"is {shown(given)}; {link} is no link{near_name(link, self.points)}")
-        if point not in self.points[link]:
-            known = ", ".join(self.points[link]) or "none"
-            raise InputError(
-                f"is {shown(given)}; {point} is no point of {link}{meant(point, self.points[link])} its points: "
-                f"{known}"
-            )
-        return [link, point]
-
     def joints(self) -> list[dict[str, Any]]:
         """The joints: those that are named, and a revolute one for each further link in a point of the same name."""
         joints = []
@@ -375,38 +367,6 @@ class _LinkageReader(EntryReader):
             if not span[0] < span[1]:
                 raise InputError("must rise")
         return {"joint": joint["name"], "link": link, "linear": True}, span
-
-    def load(self, name: str, given: Any) -> dict[str, Any]:
-        """A load."""
-        key = f"loads.{name}"
-        table = self.table(key, self.table("loads"))
-        kind = table.get("type", "force")
-        if kind not in _LOADS:
-            self.fault(
-                f"{key}.type", f"is {shown(kind)}{meant(str(kind), _LOADS)} must be {', '.join(_LOADS)}"
-            )
-            return {}
-        self.keys(key, table, _LOADS[kind])
-        load: dict[str, Any] = {"name": name, "type": kind}
-        if kind == "torque":
-            on = table.get("on")
-            if on not in self.points or on == GROUND:
-                self.fault(f"{key}.on", f"{is_given(on)}; must be a link{near_name(str(on), self.points)}")
-            return load | {
-                "on": [on],
-                "torque": self.entry(f"{key}.torque", table.get("torque"), "N.m", True, True),
-            }
-        for each in ("on", "by") if kind == "spring" else ("on",):
-            with self.at(f"{key}.{each}"):
-                load[each] = self.end(f"{key}.{each}", table.get(each))
-                if kind != "spring" and load[each][0] == GROUND:
-                    raise InputError("acts on the ground; give a point of a link")
-        if kind == "spring":
-            for each, unit in (("stiffness", "N/m"), ("length", "m"), ("damping", "N.s/m")):
-                load[each] = self.positive(f"{key}.{each}", table.get(each, 0.0), unit)
-        else:
-            load["force"] = self.vector(f"{key}.force", table.get("force"), "N", True, True)
-        return load
 
     # the start pose
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import cache, cached_property
 from typing import Any, cast
 
@@ -20,46 +20,37 @@ from ...errors import GeometryError, InputError
 from ...groups.loads import GuideLosses, PinLosses, Weight
 from ...groups.triad import MOST_MISFIT
 from ...mechanism.assur import GROUND, PRISMATIC
+from ...mechanism.curves import TableCurve
 from ...mechanism.driver_ports import ROTATING, SLIDING
-from ...mechanism.expressions import value_of
+from ...mechanism.end_stops import EndStops, usual_stops
+from ...mechanism.expressions import expression, value_of
+from ...mechanism.extremes import MotionExtreme
 from ...mechanism.linkage import Linkage
 from ...mechanism.machine import MachineState, Mechanism, derived_numbers
 from ...mechanism.models import InverseMachine
-from ...model import Requirement, keep
-from ...planar import Vec2
+from ...model import About, Requirement, keep
+from ...planar import ZERO
 from ...quantities import Value, declared_class, group, quantity
 from ...refusals import unit_behind
-from ..parts import Force, force
+from .closing import dead_group, gap_hint, open_group
 from .declarations import (
-    RESERVED,
-    CommonParameters,
-    GuideReaction,
     LinkageMotion,
     LinkBody,
-    LinkTurning,
-    PointMotion,
-    Running,
-    WayRunning,
+    common_parameters,
     field_of,
-    with_starts,
 )
-from .loads import CoordinateTable, ForceLaw, SpringDamper, TorqueLaw, name_of_load
+from .loads import ForceLaw, LinkAngle, SpringDamper, TorqueLaw, extremes_of, name_of_load, place_of
 from .narrow import check_triads, lesser, lows, turns_of_triads
+from .outputs import DescribedLinkage, LinkageOutputs
 from .parts import LinkageParts
-from .probes import guide_reaction, own_axis, point_motion
+from .probes import constant_outputs, notes_on, own_axis, repeated_outputs
 from .structure import check_groups, structure_of
 
 ANGLES = 48
 """Places of the driver at which a linkage is checked to close."""
+STANDARD_GRAVITY = 9.81
 LEAST_MARGIN = 1e-3
 """Least margin of a group: closer to a dead position its forces have no limit."""
-
-
-@dataclass
-class DescribedLinkage(Linkage):
-    """A linkage with the parts that it was made from."""
-
-    parts: LinkageParts
 
 
 def machine_of(text: str) -> type[InverseMachine]:
@@ -78,7 +69,7 @@ def _machine_of(text: str) -> type[InverseMachine]:
     return LinkageDescription(json.loads(text), text).model()
 
 
-class LinkageDescription:
+class LinkageDescription(LinkageOutputs):
     """The description of a linkage with its structure: what all values of its parameters share."""
 
     def __init__(self, data: Mapping[str, Any], text: str) -> None:
@@ -86,10 +77,14 @@ class LinkageDescription:
         self.structure = structure_of(data)
         driver = self.structure.driver
         check_groups(self.structure, data.get("groups", ()))
-        self.tables = {
-            name: CoordinateTable(each["places"], each["values"], not driver.linear)
-            for name, each in data.get("tables", {}).items()
+        tables = data.get("tables", {})
+        self.curves = {
+            name: TableCurve(each["places"], each["values"], each["over"] == "phi" and not driver.linear)
+            for name, each in tables.items()
         }
+        self.tables = {name: self.curves[name] for name, each in tables.items() if each["over"] == "phi"}
+        self.extremes = extremes_of(data["loads"])
+        self.turning: dict[str, tuple[float, float]] = {}
         self.Parameters = self._parameters()
         inputs = [field_of(each) for each in data.get("inputs", ())]
         self.port, motion = ROTATING, cast("type", LinkageMotion)
@@ -108,6 +103,7 @@ class LinkageDescription:
         self.sides = dict(LinkageParts(MATH, self.structure, self.values(p, u)).sides)
         self.sides |= turns_of_triads(self.linkage(MATH, p, u))
         self.turning = self._followed(p, u)
+        self._check_extremes()
 
     # declarations
 
@@ -118,13 +114,9 @@ class LinkageDescription:
             if own:
                 name, words = self.variable("link", link["name"]), f"link {link['name']}"
                 fields.append((name, LinkBody, group(LinkBody, words, default=LinkBody(**own))))
-        return declared_class("Parameters", (with_starts(CommonParameters, self.data["common"]),), fields)
-
-    def variable(self, kind: str, name: str) -> str:
-        """The name under which the variables of a link or a joint stand: with its kind where the name has another
-        meaning already."""
-        shared = kind == "joint" and name in self.structure.links
-        return f"{name}_{kind}" if shared or name in RESERVED else name
+        guides = any(j.kind == PRISMATIC for j in self.structure.joints.values())
+        common = common_parameters(self.structure.driver.linear, guides, self.data["common"])
+        return declared_class("Parameters", (common,), fields)
 
     def values(self, p: Any, u: Any) -> dict[str, Any]:
         """The quantities that expressions may name."""
@@ -134,6 +126,10 @@ class LinkageDescription:
             for quantity_name in link.get("own", {}):
                 own = getattr(p, self.variable("link", link["name"]))
                 values[f"{quantity_name}_of_{link['name']}"] = getattr(own, quantity_name)
+        # before the extremes are derived, nothing needs them
+        derived = getattr(p, "derived", ())
+        values |= zip(self.extremes, derived[-len(self.extremes) :], strict=False) if self.extremes else ()
+        values |= {f"table {name}": curve for name, curve in self.curves.items()}
         return values | {"g": p.g, "ratio": p.ratio}
 
     # the linkage
@@ -156,12 +152,46 @@ class LinkageDescription:
                 if "length" in each
             }
             loads["guides"] = GuideLosses(p.guides, p.guides.damping, lengths)
-        return DescribedLinkage(parts.ground, parts.driver, parts.groups, loads, parts)
+        extremes = tuple(self._extreme(name, parts) for name in self.extremes)
+        return DescribedLinkage(parts.ground, parts.driver, parts.groups, loads, parts, extremes=extremes)
+
+    def _extreme(self, name: str, parts: LinkageParts) -> MotionExtreme:
+        """An extreme of the motion, by its name in expressions."""
+        kind, link, point, axis = place_of(name)
+        frame, ends = parts.frames[link], self.structure.driver.linear
+        at = frame.of(parts.point(link, point) if point else ZERO)
+
+        def course(xp: Any, m: Any) -> tuple[Any, Any, Any]:
+            moving = m.links[link]
+            if axis == "angle":
+                return self.angle(xp, link, own_axis(moving.u, frame), m.q), moving.t1, moving.t2
+            k = moving.beside(at.x, at.y)
+            return getattr(k.p, axis), getattr(k.p1, axis), getattr(k.p2, axis)
+
+        return MotionExtreme(course, self.places(), 1.0 if kind == "max" else -1.0, ends)
+
+    def _check_extremes(self) -> None:
+        """Refuse extremes of the angle of a link that turns round.
+
+        Raises
+        ------
+        InputError
+            in one line.
+        """
+        for name in self.extremes:
+            _, link, _, axis = place_of(name)
+            if axis == "angle" and self.turning[link][0]:
+                raise InputError(
+                    f"{name}: {link} turns all the way round, and its angle has no extremes; take those of a "
+                    "point, or of a link that swings",
+                    key=f"links.{link}",
+                )
 
     def _load(self, load: Mapping[str, Any], parts: LinkageParts) -> Any:
-        kind = load["type"]
+        kind, link = load["type"], load["on"][0]
         if kind == "torque":
-            return TorqueLaw(load["on"][0], load["torque"], parts.values, self.tables)
+            angle = self._angle_for([load["torque"]], link, parts)
+            return TorqueLaw(link, load["torque"], parts.values, self.tables, angle)
         if kind == "spring":
             ends = [
                 (None if link == GROUND else link, parts.pin_on(link, point))
@@ -171,10 +201,18 @@ class LinkageDescription:
                 parts.number(load[key]) for key in ("stiffness", "length", "damping")
             )
             return SpringDamper((ends[0], ends[1]), stiffness, length, damping)
-        link, point = load["on"]
+        pin = parts.pin_on(link, load["on"][1])
         axis = parts.frames[link].axis if kind == "follower" else None
         fx, fy = load["force"]
-        return ForceLaw(link, parts.pin_on(link, point), (fx, fy), axis, parts.values, self.tables)
+        angle = self._angle_for([fx, fy], link, parts)
+        return ForceLaw(link, pin, (fx, fy), axis, parts.values, self.tables, angle)
+
+    def _angle_for(self, entries: Sequence[float | str], link: str, parts: LinkageParts) -> LinkAngle | None:
+        """The angle of a link for a load; None where the load does not depend on it."""
+        if not any(isinstance(each, str) and "angle" in expression(each).names for each in entries):
+            return None
+        frame = parts.frames[link]
+        return lambda xp, m: self.angle(xp, link, own_axis(m.links[link].u, frame), m.q)
 
     # the rotation of links over the turn
 
@@ -210,7 +248,8 @@ class LinkageDescription:
         InputError
             where the linkage does not close, or passes a dead position, with the place of the driver.
         """
-        linkage = self.linkage(MATH, p, u)
+        # extremes depend on what is looked for here
+        linkage = replace(self.linkage(MATH, p, u), extremes=())
         parts = linkage.parts
         try:
             derived = derived_numbers(MATH, linkage)
@@ -232,7 +271,7 @@ class LinkageDescription:
             courses.append([margin * sign for margin, sign in zip(margins, signs, strict=True)])
             for each, margin in zip(self.structure.groups, courses[-1], strict=True):
                 if not margin > LEAST_MARGIN:
-                    raise self._dead(each.links, q)
+                    raise dead_group(each.links, self._at(q))
             for name in self.structure.links:
                 axis = own_axis(m.links[name].u, parts.frames[name])
                 angle = math.atan2(axis.y, axis.x)
@@ -246,7 +285,9 @@ class LinkageDescription:
         for k, q, least in lows(margins_at, courses, around):
             links = self.structure.groups[k].links
             if not least > LEAST_MARGIN:
-                raise self._open(links, q) if math.isnan(least) else self._dead(links, q)
+                if math.isnan(least):
+                    raise open_group(links, self._at(q), self._gap(linkage, k, derived, q))
+                raise dead_group(links, self._at(q))
         turning = {}
         for name, course in angles.items():
             course = course[1:]
@@ -268,21 +309,15 @@ class LinkageDescription:
             return f"{error}{f' ({given})' * bool(given)}"
         return ""
 
-    def _open(self, links: Sequence[str], q: float) -> InputError:
-        text = f"the group of {', '.join(links)} cannot close at {self._at(q)}: change its lengths"
-        return InputError(text, key=f"links.{links[0]}")
-
-    def _dead(self, links: Sequence[str], q: float) -> InputError:
-        return InputError(
-            f"the group of {', '.join(links)} comes to a dead position at {self._at(q)}: there its forces have no "
-            "limit; change its lengths",
-            key=f"links.{links[0]}",
-        )
-
     def _at(self, q: float) -> str:
         if self.data["driver"]["linear"]:
             return f"{self.data['driver']['joint']} = {q:.6g} m"
         return f"{math.degrees(q) % 360.0:.4g} deg of {self.data['driver']['link']}"
+
+    def _gap(self, linkage: Linkage, k: int, derived: Sequence[Any], q: float) -> str:
+        """Words on the gap in the group `k` of the structure; see `gap_hint`."""
+        number = k - (len(self.structure.groups) - len(linkage.groups))
+        return gap_hint(linkage, number, derived, q, self.span) if number >= 0 else ""
 
     def _closing(self, linkage: Linkage, derived: Sequence[Any]) -> InputError:
         """The refusal with the first place at which the linkage does not close, and the group that does not."""
@@ -295,20 +330,34 @@ class LinkageDescription:
                 try:
                     Mechanism(MATH, part, q, derived[: part.derived])
                 except (ArithmeticError, ValueError, IndexError):
-                    return self._open(each.links, q)
+                    return open_group(each.links, self._at(q), self._gap(linkage, k, derived, q))
         return InputError("the linkage does not close: change its lengths", key="links")
 
     # the model
+
+    def end_stops(self) -> EndStops | None:
+        """The usual end stops of a driver that slides, for its start values; None for one that turns."""
+        if not self.structure.driver.linear:
+            return None
+        p = self.Parameters()
+        u = self.Inputs()
+        linkage = self.linkage(MATH, p, u)
+        derived = derived_numbers(MATH, linkage)
+        object.__setattr__(p, "derived", derived)
+        linkage = self.linkage(MATH, p, u)
+        states = [MachineState(MATH, Mechanism(MATH, linkage, q, derived), 0.0) for q in self.places()]
+        mass = max(state.J for state in states)
+        low, high = self.span
+        # a driver that nothing loads still stops its own weight
+        force = max(mass * STANDARD_GRAVITY, *(abs(state.bias) for state in states))
+        return usual_stops(force, mass, high - low)
 
     def model(self) -> type[InverseMachine]:
         """The model."""
         data, described = self.data, self
         parts = self.parts(MATH, self.Parameters(), self.Inputs())
-        bearings = {
-            self.variable("joint", name): parts.receivers[name][0]
-            for name, j in self.structure.joints.items()
-            if j.kind != PRISMATIC
-        }
+        bearings = {self.variable("joint", name): parts.receivers[name][0] for name in self.structure.joints}
+        titles = {name: self.variable("joint", name) for name in self.structure.joints}
         given = tuple(each["name"] for each in data.get("parameters", ()))
         words = {
             "least margin of the group of {} over the way of the driver": (
@@ -326,22 +375,27 @@ class LinkageDescription:
         )
 
         class FileMachine(InverseMachine):
-            """A machine whose linkage a file describes."""
-
+            __doc__ = f"{data['title'] or data['name']}."
             name = data["name"]
             noun = data["title"] or data["name"]
             turning = data["driver"]["link"]
             description = data["title"] or f"linkage {data['name']}"
             built_by = f"machine_of({described.text!r})"
             maker = (machine_of, (described.text,))
+            about = About(**data.get("about", {}))
+            notes = described.notes
+            repeated = repeated_outputs(described.structure, described.variable)
+            constant = constant_outputs(described.structure, described.variable)
             driver_port = described.port
             span = described.span
             turns = not described.structure.driver.linear
+            end_stops = described.end_stops()
             angle_counts = described.angle_counts
             Parameters = described.Parameters
             Inputs = described.Inputs
             Outputs = described.outputs
             joints = bearings
+            pins = titles
             usual_speed = (0.05, 200.0)
             described_by = described
 
@@ -403,69 +457,7 @@ class LinkageDescription:
         m = Mechanism(MATH, linkage, self.places()[0], derived_numbers(MATH, linkage))
         return [math.copysign(1.0, margin) for margin in m.margins()]
 
-    @cached_property
-    def outputs(self) -> type:
-        """The declaration of the outputs."""
-        fields: list[tuple[str, Any, Any]] = []
-        for name, joint in self.structure.joints.items():
-            of: type = GuideReaction if joint.kind == PRISMATIC else Force
-            words = f"joint {name}: on {joint.on[0]} from {joint.by[0]}"
-            fields.append((self.variable("joint", name), of, group(of, words)))
-        for name, of in self.link_outputs.items():
-            fields.append((self.variable("link", name), of, group(of, f"link {name}")))
-        running = WayRunning if self.structure.driver.linear else Running
-        return declared_class("Outputs", (self.port.values, running), fields)
-
-    @cached_property
-    def link_outputs(self) -> Mapping[str, Any]:
-        """The declaration of the outputs of each link."""
-        declared = {}
-        for name, link in self.structure.links.items():
-            points = [(point, PointMotion, group(PointMotion, f"point {point}")) for point in link.points]
-            if link.heavy:
-                points.append(("centroid", PointMotion, group(PointMotion, "centroid")))
-            declared[name] = declared_class(f"Link_{name}", (LinkTurning,), points)
-        return declared
-
-    def probes(self, xp: Any, p: Any, u: Any, s: MachineState, a: Any) -> dict[str, Any]:
-        """Reactions, rotation of links and motion of points at acceleration `a` of the driver."""
-        reactions, m, w = s.reactions(a), s.m, s.w
-        assert isinstance(m.linkage, DescribedLinkage)
-        parts = m.linkage.parts
-        given = sum(
-            s.effects[name_of_load(each)].dissipative
-            for each in self.data["loads"]
-            if each["type"] != "spring"
-        )
-        values: dict[str, Any] = {"load_power": -(given * w)}
-        for name, joint in self.structure.joints.items():
-            key, sign = parts.receivers[name]
-            if joint.kind == PRISMATIC:
-                value: Any = guide_reaction(m, joint, key, sign, reactions[key], parts, w, a)
-            else:
-                f = reactions[key]
-                value = force(f if sign > 0.0 else -f)
-            values[self.variable("joint", name)] = value
-        for name, link in self.structure.links.items():
-            moving, frame = m.links[name], parts.frames[name]
-            fields = {
-                "angle": self._angle(xp, name, own_axis(moving.u, frame), m.q),
-                "w": moving.t1 * w,
-                "a": moving.t2 * (w * w) + moving.t1 * a,
-            }
-            for point in link.points:
-                at = frame.of(parts.point(name, point))
-                fields[point] = point_motion(moving.beside(at.x, at.y), w, a)
-            if link.heavy:
-                at = frame.of(parts.vector(link.centroid))
-                fields["centroid"] = point_motion(moving.beside(at.x, at.y), w, a)
-            values[self.variable("link", name)] = self.link_outputs[name](**fields)
-        return values
-
-    def _angle(self, xp: Any, name: str, axis: Vec2, q: Any) -> Any:
-        """The angle of a link without jumps: the middle of its course, which may turn with the driver, and the
-        rest."""
-        rate, middle = self.turning[name]
-        about = middle + rate * q if rate else middle
-        c, s = (xp.cos(about), xp.sin(about)) if rate else (math.cos(about), math.sin(about))
-        return about + xp.atan2(c * axis.y - s * axis.x, c * axis.x + s * axis.y)
+    @property
+    def notes(self) -> str:
+        """See `chainunit.model.Model.notes`."""
+        return notes_on(self.structure.driver, self.span, self.angle_counts)

@@ -1,21 +1,140 @@
-"""Outputs of a linkage from its mechanism at one state: reactions of guides, motion of points, axes of links."""
+"""Outputs of a linkage: which ones it has, and their values at one state (reactions of guides, motion of points, axes
+of links); its frame and signs in words."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, TypeVar
 
 from ...groups.group import GuideForce
+from ...mechanism.assur import GROUND, PRISMATIC
 from ...mechanism.machine import Mechanism
 from ...planar import Motion, Vec2
 from .declarations import GuideReaction, PointMotion
 from .parts import LinkageParts, LinkFrame
-from .structure import JointEntry
+from .structure import DriverEntry, JointEntry, LinkEntry, Structure
+
+_Node = TypeVar("_Node")
 
 
 def own_axis(u: Vec2, frame: LinkFrame) -> Vec2:
     """The x axis of a link's description, from the direction of its frame in the group."""
     e = frame.axis
     return Vec2(u.x * e.x + u.y * e.y, u.y * e.x - u.x * e.y)
+
+
+def repeated_outputs(structure: Structure, variable: Callable[[str, str], str]) -> dict[str, str]:
+    """The outputs that repeat another one, by name, with the name of that one: the motion of a point at which links
+    are pinned together (of the first link that is joined to the ground, else of the first) or in which a centroid
+    lies; the speeds of further points of a link that cannot turn; and the rotation of a link that slides along
+    another one. `variable` gives the name of a link's variables from ``("link", name)``."""
+    grounded = set[str]().union(
+        *(joint.links for joint in structure.joints.values() if GROUND in joint.links)
+    )
+    repeated: dict[str, str] = {}
+
+    def repeat(end: tuple[str, str], of: tuple[str, str], fields: Iterable[str]) -> None:
+        name, one = (f"{variable('link', link)}{f'.{point}' * bool(point)}" for link, point in (end, of))
+        repeated.update(
+            {f"{name}.{field}": f"{one}.{field}" for field in fields if f"{name}.{field}" not in repeated}
+        )
+
+    for name, link in structure.links.items():
+        points = [(name, point) for point in _points(link)]
+        for end in points:
+            met = _pinned(structure, end)
+            own = {each for each, _ in met}
+            ranked = [each for each in structure.links if each in own]
+            first = next((each for each in ranked if each in grounded), ranked[0])
+            one = next((first, point) for point in _points(structure.links[first]) if (first, point) in met)
+            if one != end:
+                repeat(end, one, _PLACE if GROUND in own else _PLACE + _SPEEDS)
+        if name in _orientation(structure, GROUND):
+            for end in points[1:]:
+                repeat(end, points[0], _SPEEDS)
+    for name in structure.links:
+        alike = _orientation(structure, name)
+        first = next(each for each in structure.links if each in alike)
+        if GROUND not in alike and first != name:
+            repeat((name, ""), (first, ""), _TURNING)
+    # an output that is repeated may repeat one itself
+    for name, of in repeated.items():
+        while of in repeated:
+            of = repeated[of]
+        repeated[name] = of
+    constant = constant_outputs(structure, variable)
+    return {name: of for name, of in repeated.items() if name not in constant}
+
+
+def constant_outputs(structure: Structure, variable: Callable[[str, str], str]) -> dict[str, float]:
+    """The outputs that are constant, by name: places that are numbers, and speeds, of points in ground pins; the
+    rotation of links that cannot turn. `variable` is that of `repeated_outputs`."""
+    constant: dict[str, float] = {}
+    for name, link in structure.links.items():
+        own = variable("link", name)
+        if name in _orientation(structure, GROUND):
+            constant |= {f"{own}.{field}": 0.0 for field in _TURNING}
+        for point in _points(link):
+            ground = [at for each, at in _pinned(structure, (name, point)) if each == GROUND]
+            if ground:
+                constant |= {f"{own}.{point}.{field}": 0.0 for field in _SPEEDS}
+                place = zip(_PLACE, structure.ground[ground[0]], strict=True)
+                constant |= {f"{own}.{point}.{field}": x for field, x in place if not isinstance(x, str)}
+    return constant
+
+
+_PLACE, _SPEEDS, _TURNING, _CENTROID = ("x", "y"), ("vx", "vy", "ax", "ay"), ("w", "a"), "centroid"
+
+
+def _points(link: LinkEntry) -> list[str]:
+    """The points of a link that have outputs."""
+    return [*link.points, *[_CENTROID] * link.heavy]
+
+
+def _orientation(structure: Structure, link: str) -> set[str]:
+    """The links that turn as this one does, as sliding joints hold them, and itself; those of the ground cannot
+    turn."""
+    return _connected(link, [j.links for j in structure.joints.values() if j.kind == PRISMATIC])
+
+
+def _pinned(structure: Structure, end: tuple[str, str]) -> set[tuple[str, str]]:
+    """The points, by link and name, that meet this one at all times, and itself: revolute joints hold them together,
+    or a centroid lies in them."""
+    pins = [{j.on, j.by} for j in structure.joints.values() if j.kind != PRISMATIC]
+    for name, link in structure.links.items():
+        pins += [{(name, _CENTROID), (name, each)} for each, at in link.points.items() if at == link.centroid]
+    return _connected(end, pins)
+
+
+def _connected(one: _Node, pairs: Sequence[set[_Node]]) -> set[_Node]:
+    """All that the pairs connect with this one, and itself."""
+    met, grows = {one}, True
+    while grows:
+        more = met.union(*(pair for pair in pairs if pair & met))
+        met, grows = more, more != met
+    return met
+
+
+def notes_on(driver: DriverEntry, span: tuple[float, float], angle_counts: str) -> str:
+    """Paragraphs on frame, signs and limits of a linkage, each behind an empty line. `span` is the range of a driver
+    that slides [m], `angle_counts` says how the angle of one that turns counts."""
+    if driver.linear:
+        effort = "force"
+        counts = (
+            f"phi is the way of {driver.joint}, from {span[0]:g} m to {span[1]:g} m: beyond, the linkage was not "
+            "checked and may not close."
+        )
+    else:
+        effort = "torque"
+        counts = f"The angle of {driver.link} is phi/ratio and counts {angle_counts}."
+    return (
+        "\n\nFrame and signs: x points right, y up; the angle of a link counts counter-clockwise from the x axis. "
+        f"{counts} The {effort} tau is the one that the machine needs. The reaction of a joint is the force on the "
+        "link that its description names first."
+        "\n\nLimits: links are rigid, and joints have no play; a joint pushes and pulls. Friction is smoothed: at "
+        "rest nothing sticks. Lengths are fixed before the initialization, where lengths for which the linkage does "
+        "not close are refused."
+    )
 
 
 def point_motion(k: Motion, w: Any, a: Any) -> PointMotion:

@@ -26,6 +26,11 @@ class JointEntry(NamedTuple):
     toward: str = ""
     angle: Entry = 0.0
 
+    @property
+    def links(self) -> set[str]:
+        """Its two links, of which one may be the ground."""
+        return {self.on[0], self.by[0]}
+
     def at(self, link: str) -> str:
         """Its point on one of its links."""
         return self.on[1] if self.on[0] == link else self.by[1]
@@ -145,6 +150,8 @@ class Structure:
             for end in (joint.on, joint.by)
             if joint.kind == PRISMATIC or end[0] not in each.links
         }
+        if driver.linear:
+            marked |= {named[driver.joint].on, named[driver.joint].by}
         return cls(
             ground,
             {link.name: link for link in links},

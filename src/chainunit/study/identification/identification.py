@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...drives.induction_motor import InductionMotor
+from ...ending import scratch
 from ...errors import Faults, InputError, printable
 from ...progress import Report
 from ...system import Profile
@@ -21,11 +20,11 @@ from ..config import Config
 from ..drive import Drive
 from .fit import MOST_ROUNDS, Fit, fit
 from .information import Combination, Information, information
-from .inspection import OF_SPEED, Expectation, inspect_columns, inspect_motion
+from .inspection import OF_SPEED, Expectation, inspect_columns, inspect_motion, inspect_steadiness
 from .measurands import MEASURANDS
 from .plant import AnyPlant, Plant
 from .posterior import Posterior, posterior
-from .problem import Comparison, Problem, RecordedRun, Sensor
+from .problem import Comparison, Problem, RecordedRun, Sensor, likeness, mark_times
 from .reading import OFFSET_SHARE, WITH_OFFSET, IdentificationPlan, PlannedRun, WatchPlan
 from .recording import Recording, read_part, remedy
 from .residuals import ResidualCheck, Strain, check_residuals, strained_priors, strains
@@ -292,8 +291,8 @@ def drive_of(config: Config, recordings: Mapping[str, Recording]) -> Drive:
             "system.motor with a motor of the catalogue",
             "motor",
         )
-    with tempfile.TemporaryDirectory() as folder:
-        return choose(config, Path(folder), lambda *_: None).drive
+    with scratch() as folder:
+        return choose(config, folder, lambda *_: None).drive
 
 
 def _problem(
@@ -370,13 +369,20 @@ def inspect_runs(problem: Problem, workers: int) -> None:
         expected, off = dict[str, Expectation](), np.inf if run.off is None else run.off
         # of less than a turn the RMS is that of an angle
         known = off - float(run.recording.time[0]) >= 2.0 * np.pi / run.crank_speed
+        has_angle = len(mark_times(run.recording)) > 0
         for name in run.recording.columns if known else ():
             rows = response.describes(name, response.time) & (response.time <= off)
             if MEASURANDS[name].analog and rows.any():
                 size, factor = rms(response.values[name][rows]), NEAR if name in OF_SPEED else WIDE
                 words = f"{1.0 / factor:.2g} to {factor:g} times the simulated one"
-                expected[name] = Expectation(size / factor, size * factor, words)
+                like = likeness(run.recording, name, response) if has_angle else 0.0
+                expected[name] = Expectation(size / factor, size * factor, words, like)
         faults.add(inspect_columns(run.recording, expected, run.off))
+    faults.refuse()
+    for run in problem.runs:
+        reference = run.values.get("motor.w_ref")
+        if not hasattr(reference, "changes"):
+            faults.add(inspect_steadiness(run.recording, ratio, run.off, reference is not None))
     faults.refuse()
 
 

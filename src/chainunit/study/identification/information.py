@@ -39,6 +39,8 @@ OTHER_SPEEDS, SHAKEN = (0.5, 1.5), (0.7, 1.3)
 """Speeds of runs that are proposed, in parts of that of the first run: steady ones, and those of a shaken run."""
 SHAKING, MOST_CHANGES = 4.0, 30
 """Time between the changes of a shaken speed [s], and their largest number."""
+SPARSE, SPARSE_ROWS = 5e-3, 200.0
+"""Time between the rows of a run that is proposed [s], and their least number in a turn of the crank."""
 ADDED = 15.0
 """Mass to add to a part in a run that is proposed [kg]."""
 
@@ -224,10 +226,13 @@ def _proposals(
         at = more.starts
         for name, place in problem.place.items():
             at[more.place[name]] = z[place]
+        sparse, scales = _sparse(problem, run)
         single = Problem(
-            problem.plant, (_simulated(more, run, at, workers),), problem.sought, problem.sensors
+            problem.plant, (_simulated(more, sparse, at, workers),), problem.sought, problem.sensors
         )
-        own = normal(single, np.array([at[more.place[name]] for name in single.place]), workers).fisher
+        own = normal(
+            single, np.array([at[more.place[name]] for name in single.place]), workers, scales
+        ).fisher
         total = np.zeros((len(at), len(at)))
         for part, matrix in ((problem, fisher), (single, own)):
             places = [more.place[name] for name in part.place]
@@ -236,6 +241,19 @@ def _proposals(
         factor = np.exp(np.mean([math.log(a.by_both / b.by_both) for a, b in zip(now, then, strict=True)]))
         ranked.append(Proposal(words, float(factor), sum(each.is_told for each in then)))
     yield from sorted(ranked, key=lambda each: -each.factor)
+
+
+def _sparse(problem: Problem, run: RecordedRun) -> tuple[RecordedRun, dict[tuple[str, str], float]]:
+    """The run with fewer rows, of which each counts for those that it stands for, and the factors on the standard
+    deviations by which it does."""
+    step = min(SPARSE, 2.0 * math.pi / (SPARSE_ROWS * run.crank_speed))
+    (sparse,) = Problem(problem.plant, (run,), problem.sought, problem.sensors).thinned(step).runs
+    every = sparse.recording.step / run.recording.step
+    # the instant of a mark is known up to the time between two rows
+    return sparse, {
+        (run.name, name): 1.0 / every if name == "mark" else 1.0 / math.sqrt(every)
+        for name in run.recording.columns
+    }
 
 
 def _candidates(problem: Problem) -> Iterator[tuple[str, RecordedRun]]:

@@ -13,9 +13,11 @@ from ...errors import InputError
 from ...refusals import unit_behind
 from ...units import scale
 from ..arrays import rms, stretches
-from .measurands import MEASURANDS
+from .measurands import COUNTS, MEASURANDS
 from .plant import MOVING
 from .problem import crank_speed as speed_at
+from .problem import mark_times, speed_column
+from .reading import OFFSET_SHARE
 from .recording import Recording, name_and_unit
 
 MISSING = 0.2
@@ -36,6 +38,17 @@ JUMP = 1e4
 """Fall of the count of an encoder from which it began anew."""
 STANDS = 0.05
 """Mean speed, in parts of the expected one, below which the machine stands."""
+SAME = 1.2
+"""Factor by which the mean of a column may differ from the known speed where it is that of the speed."""
+SIGNAL = 0.3
+"""Mean in parts of the RMS from which on a column is more than the zero of a sensor; and standard deviation in parts
+of the mean up to which a column can be that of a steady speed."""
+WANDERS, DRIFT = 0.01, 3
+"""Standard deviation of the mean speeds of turns, in parts of the mean, above which a run is not steady; and the
+degree of a polynomial over the run that is taken off before, as a motor warms up."""
+OFFSETS, LIKE = 3.0, 0.5
+"""Standard deviations of an offset up to which a mean may be that of an offset; and the correlation of a column with
+its simulated course that tells its sign."""
 _ROWS_STUCK = 20
 OF_SPEED = ("motor.w", "crank.w", "motor.u")
 """Quantities whose sizes follow from the speed."""
@@ -44,15 +57,22 @@ OF_SPEED = ("motor.w", "crank.w", "motor.u")
 @dataclass(frozen=True)
 class Expectation:
     """The sizes that a column can have: its RMS lies between `low` and `high`; `words` say from where the upper limit
-    comes."""
+    comes. `likeness` is the correlation of the column with its simulated course, 0 where the angle is not known."""
 
     low: float
     high: float
     words: str
+    likeness: float = 0.0
 
     def admits(self, size: float) -> bool:
         """Whether the RMS can have this size."""
         return self.low <= size <= self.high
+
+    def is_reversed(self, mean: float, size: float) -> bool:
+        """Whether a column of a driven machine with this mean and RMS has a wrong sign. Of a motion that takes hardly
+        any energy the mean may be that of an offset, and the course tells the sign."""
+        clear = abs(mean) > OFFSETS * OFFSET_SHARE * size
+        return mean < 0.0 and self.likeness < (LIKE if clear else -LIKE)
 
 
 def inspect_motion(
@@ -88,16 +108,71 @@ def inspect_columns(
     faults, sizes = list[InputError](), {name: rms(driven.columns[name]) for name in expected}
     swapped = _swapped(sizes, expected)
     if swapped:
-        first, second = swapped
-        faults.append(
-            _fault(recording, first, f"RMS of {_size(first, sizes[first])} and of {recording.heads[second]} "
-                   f"{_size(second, sizes[second])}: the two columns look swapped; exchange their heads")
-        )  # fmt: skip
+        faults.append(_exchanged(recording, *swapped, sizes))
     for name in recording.columns:
         if MEASURANDS[name].analog and not (swapped and name in swapped):
             inspected = recording if name in MOVING else driven
             faults += _of_column(inspected, name, driven.columns[name], expected.get(name))
     return faults
+
+
+def inspect_steadiness(
+    recording: Recording, ratio: float, off: float | None = None, follows: bool = False
+) -> list[InputError]:
+    """That the speed of a run without stated changes of the speed is that of a steady run, as it is simulated.
+
+    Parameters
+    ----------
+    off : the time at which the motor is switched off [s]
+    follows : whether the motor follows a reference of the speed, whose changes can be stated
+    """
+    driven = recording if off is None else recording.part(end=off)
+    name, times = _turns(driven, ratio)
+    if len(times) < FEWEST_TURNS + 1.0:
+        return []
+    at, lasts = 0.5 * (times[1:] + times[:-1]), np.diff(times)
+    # a gap may hide passes of the mark
+    speeds = 2.0 * math.pi * np.round(lasts / np.median(lasts)) / lasts
+    degree = min(DRIFT, (len(speeds) - 2) // 2)
+    slow = np.polynomial.Polynomial.fit(at, speeds, degree)(at)
+    mean, spread = (
+        float(np.mean(speeds)),
+        math.sqrt(np.sum((speeds - slow) ** 2) / (len(speeds) - degree - 1)),
+    )
+    # a mark stands in the first row behind it
+    instant = recording.step / math.sqrt(6.0) / float(np.median(lasts)) if name == "mark" else 0.0
+    if spread <= (WANDERS + 3.0 * instant) * mean:
+        return []
+    remedy = "name a part in which it is steady (begin, end), or record at a constant speed"
+    stated = "state its changes (speeds), " if follows else ""
+    return [
+        _fault(
+            recording, name,
+            f"the mean speed of the crank in a turn wanders from {np.min(speeds):.4g} to {np.max(speeds):.4g} rad/s, "
+            f"with a standard deviation of {100.0 * spread / mean:.2g} %; must be <= {100.0 * WANDERS:g} %, as the "
+            f"run is simulated at a constant speed: {stated}{remedy}",
+        )
+    ]  # fmt: skip
+
+
+def _turns(recording: Recording, ratio: float) -> tuple[str, Any]:
+    """The column that tells the turns of the crank, and the times at which they end, by passes of the mark, by the
+    count of an encoder, or by the measured speed."""
+    passed, time = mark_times(recording), recording.time
+    if len(passed):
+        return "mark", passed
+    if "motor.count" in recording.columns:
+        turned = recording.columns["motor.count"] / (COUNTS * ratio)
+        turned = np.maximum.accumulate(turned - turned[0])
+        return "motor.count", np.interp(np.arange(0.0, turned[-1]), turned, time)
+    speed = speed_at(recording, ratio)
+    if speed is None:
+        return "", np.zeros(0)
+    turned = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(time))]) / (
+        2.0 * math.pi
+    )
+    turned = np.maximum.accumulate(turned)
+    return speed_column(recording), np.interp(np.arange(0.0, turned[-1]), turned, time)
 
 
 def _of_column(
@@ -118,11 +193,11 @@ def _of_column(
     if expected is not None and not expected.admits(size):
         yield _fault(recording, name, _scale_words(name, size, expected))
         return
-    if expected is not None and mean < 0.0:
+    if expected is not None and expected.is_reversed(mean, size):
         yield _fault(
             recording, name,
-            f"mean of {_size(name, mean)}, although the motor drives: the sign is reversed; change the "
-            "sign of the column, or turn the sensor round",
+            f"mean of {_size(name, mean)} at an RMS of {_size(name, size)}, although the motor drives: the sign is "
+            "reversed; change the sign of the column, or turn the sensor round",
         )  # fmt: skip
     if share > CLIPPED and at >= 3:
         yield _fault(
@@ -235,12 +310,21 @@ def _kept(recording: Recording, name: str, rows: tuple[int, int]) -> str:
 def _stands(recording: Recording, driven: Recording, crank_speed: float, ratio: float) -> list[InputError]:
     """That the machine does not turn, by the first column that tells; `driven` is the part before the motor is
     switched off."""
+    count, passed = driven.columns.get("motor.count"), mark_times(driven)
+    counts = 0.0 if count is None else float(np.ptp(count))
     for name, of in (("motor.w", ratio), ("crank.w", 1.0)):
-        if name in recording.columns:
-            mean = float(np.mean(driven.columns[name]))
-            if abs(mean) < STANDS * crank_speed * of:
-                return [_standing(recording, name, f"mean of {_size(name, mean)}")]
-    if "motor.count" in recording.columns and np.ptp(recording.columns["motor.count"]) < 4.0:
+        if name in driven.columns and abs(float(np.mean(driven.columns[name]))) < STANDS * crank_speed * of:
+            words = f"mean of {_size(name, float(np.mean(driven.columns[name])))}"
+            other = _with_speed(driven, name, crank_speed * of)
+            if other:
+                sizes = {each: rms(driven.columns[each]) for each in (name, other)}
+                return [_exchanged(recording, name, other, sizes)]
+            if len(passed) > FEWEST_TURNS or counts > FEWEST_TURNS * COUNTS * ratio:
+                turns = f"the mark is passed {len(passed)} times" if len(passed) else "the encoder counts"
+                remedy = "the sensor is not connected, or the column is another one; mend it, or leave it out"
+                return [_fault(recording, name, f"{words}, although {turns}: {remedy}")]
+            return [_standing(recording, name, words)]
+    if count is not None and counts < 4.0:
         return [_standing(recording, "motor.count", "does not change")]
     if "mark" in recording.columns and not np.any(recording.columns["mark"]):
         turns = (recording.time[-1] - recording.time[0]) * crank_speed / (2.0 * math.pi)
@@ -249,12 +333,35 @@ def _stands(recording: Recording, driven: Recording, crank_speed: float, ratio: 
     return []
 
 
+def _with_speed(recording: Recording, name: str, speed: float) -> str:
+    """The column of another quantity that has the values of a speed, where the column `name` of the speed has values
+    that are neither a speed nor the zero of a sensor; empty without one."""
+    x = recording.columns[name]
+    if abs(float(np.mean(x))) < SIGNAL * rms(x) or not np.any(x):
+        return ""
+    for other, y in recording.columns.items():
+        like = MEASURANDS[other].analog and other not in OF_SPEED
+        mean = float(np.mean(y))
+        if like and speed / SAME < mean < SAME * speed and float(np.std(y)) < SIGNAL * mean:
+            return other
+    return ""
+
+
 def _standing(recording: Recording, name: str, words: str) -> InputError:
     return _fault(
         recording,
         name,
         f"{words}: the machine stands, or the sensor is not connected; record the running machine",
     )
+
+
+def _exchanged(recording: Recording, first: str, second: str, sizes: Mapping[str, float]) -> InputError:
+    """The fault of two columns that are swapped, with the RMS of each."""
+    return _fault(
+        recording, first,
+        f"RMS of {_size(first, sizes[first])} and of {recording.heads[second]} {_size(second, sizes[second])}: the "
+        "two columns look swapped; exchange their heads",
+    )  # fmt: skip
 
 
 def _scale_words(name: str, size: float, expected: Expectation) -> str:

@@ -217,12 +217,7 @@ class Problem:
     def _likeness(self, run: RecordedRun, value: Mapping[str, float], workers: int) -> float:
         """The sum of the correlations of measured and simulated columns."""
         response = self.plant.respond(self._course(run, value), {}, workers)
-        total = 0.0
-        for name, y in run.recording.columns.items():
-            if MEASURANDS[name].analog and np.ptp(y):
-                x = np.interp(run.recording.time, response.time, response.values[name])
-                total += float(np.corrcoef(y, x)[0, 1]) if np.ptp(x) else 0.0
-        return total
+        return sum(likeness(run.recording, name, response) for name in run.recording.columns)
 
     def thinned(self, step: float) -> Problem:
         """The problem with rows at this distance in time [s], or at its own if that is longer. A mark stands in the
@@ -360,6 +355,17 @@ class Problem:
         columns = [slopes, *(np.reshape(x, (-1, 1)) / size for x in more.values())]
         places = [self.place[name] for name in (*names, *more)]
         return Comparison(run.name, column, residuals, np.hstack(columns), places, angle, size, rows)
+
+
+def likeness(recording: Recording, name: str, response: Response) -> float:
+    """The correlation of a measured analog column with the simulated one, where that is described; 0 where one of
+    them is constant, and for a column that is counted."""
+    if not MEASURANDS[name].analog:
+        return 0.0
+    rows = response.describes(name, recording.time)
+    y, time = recording.columns[name][rows], recording.time[rows]
+    x = np.interp(time, response.time, response.values[name])
+    return float(np.corrcoef(y, x)[0, 1]) if len(y) and np.ptp(y) and np.ptp(x) else 0.0
 
 
 def _nuisance(name: str, unit: str, start: float, spread: float) -> Unknown:

@@ -1,8 +1,10 @@
 """Whether a fit describes the recordings. A wrong model leaves orders of the crank in the residuals, or strains
-clocks and sensors: a wrong gear is described by a clock that runs too fast."""
+clocks and sensors: a wrong gear is described by a clock that runs too fast. A machine whose speed or load was not
+steady leaves residuals that change slowly."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -19,10 +21,15 @@ ORDERS = 20
 """Highest order of the crank that is looked at."""
 ROWS = 10
 """Number of rows for each order that is looked at."""
-FALSE_ALARMS = 0.01
+RESOLVED = 2e-2
+"""Size of a combination of orders over the rows, in parts of the largest one, from which on they resolve it."""
+PART = 0.5 * math.pi
+"""Crank angle of a part of the run, of which the mean is looked at [rad]."""
+LOUD = 1.5
+"""Noise in parts of the stated one from which on a sentence names it, and slow changes are no noise: those of a
+smaller size do not bend a result by much."""
+FALSE_ALARMS = 1e-3
 """Share of right models of which some column is taken for wrong."""
-
-
 STRAINED = 5.0
 """Deviation from what is known of a clock or a sensor, in standard deviations, that is no chance."""
 
@@ -31,10 +38,12 @@ STRAINED = 5.0
 class ResidualCheck:
     """The residuals of a column of a run.
 
-    `statistic` is the sum of the squares of the cosine and sine parts of all orders, in standard deviations of noise
-    of the same size; noise exceeds `limit` in the permitted share of fits. `orders` are the three largest orders with
-    their amplitudes in the unit of the column. `noise` is the standard deviation of the rest, in parts of the
-    stated noise of the sensor.
+    `statistic` is the sum of the squares of the parts of the residuals along cosine and sine of all orders, in
+    standard deviations of noise of the same size; noise exceeds `limit` in the permitted share of fits. `orders` are
+    the three largest orders with their amplitudes in the unit of the column. `noise` is the standard deviation of the
+    rest, in parts of the stated noise of the sensor. `slow` is the sum of the squares of the means of parts of the
+    run, in the same deviations, with its limit, and `changes` the standard deviation of these means in the unit of
+    the column.
     """
 
     run: str
@@ -43,11 +52,22 @@ class ResidualCheck:
     limit: float
     orders: tuple[tuple[int, float], ...]
     noise: float
+    slow: float = 0.0
+    slow_limit: float = math.inf
+    changes: float = 0.0
+
+    @property
+    def reason(self) -> str:
+        """Why the residuals are no noise: "slow", "orders"; empty where they may be noise. The size of noise alone is
+        no reason."""
+        if self.noise > LOUD and self.slow > self.slow_limit:
+            return "slow"
+        return "orders" if not self.statistic <= self.limit else ""
 
     @property
     def is_noise(self) -> bool:
         """Whether the residuals may be noise."""
-        return self.statistic <= self.limit
+        return not self.reason
 
 
 @dataclass(frozen=True)
@@ -86,31 +106,57 @@ def strained_priors(sought: Sequence[Unknown], best: Normal) -> list[Strain]:
 def check_residuals(best: Normal) -> list[ResidualCheck]:
     """The checks of all columns of a fit that have a value in each row. Of few rows fewer orders are looked at."""
     columns = [each for each in best.comparisons if each.column != "mark" and len(each.residuals) >= 2 * ROWS]
-    level = (1.0 - FALSE_ALARMS) ** (1.0 / max(1, len(columns)))
+    # each has two statistics
+    level = (1.0 - FALSE_ALARMS) ** (0.5 / max(1, len(columns)))
     return [check(each, level) for each in columns]
 
 
 def check(of: Comparison, level: float) -> ResidualCheck:
-    """The check of one column; noise is within the limit of its statistic with the probability `level`."""
+    """The check of one column; noise is within the limit of its statistic with the probability `level`.
+
+    Over a part of a turn, such as a machine that swings after its motor was switched off, the orders are nearly one
+    another's sums. Their orthogonal combinations are looked at, up to those that the angles resolve.
+    """
     rows = len(of.residuals)
     orders = min(ORDERS, rows // ROWS)
-    # the noise is measured, too
-    limit = 2 * orders * float(f.ppf(level, 2 * orders, rows - 2 * orders - 1))
-    waves = np.stack(list(_waves(of.angle, orders)), axis=1)
-    parts, *_ = np.linalg.lstsq(waves, of.residuals, rcond=None)
-    rest = of.residuals - waves @ parts
-    noise = float(np.sqrt(np.sum(rest**2) / (len(rest) - waves.shape[1])))
     # the constant part is that of an offset
-    covariance = np.linalg.inv(waves.T @ waves)[1:, 1:]
-    statistic = float(parts[1:] @ np.linalg.solve(covariance, parts[1:])) / noise**2
-    sizes = np.hypot(parts[1::2], parts[2::2]) * of.size
-    largest = np.argsort(-sizes)[:3]
-    found = tuple((int(k) + 1, float(sizes[k])) for k in largest)
-    return ResidualCheck(of.run, of.column, statistic, limit, found, noise)
+    waves = np.stack(list(_waves(of.angle, orders)), axis=1)
+    waves -= np.mean(waves, axis=0)
+    residuals = of.residuals - np.mean(of.residuals)
+    squares, combinations = np.linalg.eigh(waves.T @ waves)
+    resolved = squares > RESOLVED**2 * squares[-1]
+    sizes, combinations = np.sqrt(squares[resolved]), combinations[:, resolved]
+    count = len(sizes)
+    along = combinations.T @ (waves.T @ residuals) / sizes
+    free = rows - count - 1
+    noise = math.sqrt(max(0.0, float(residuals @ residuals - along @ along)) / free)
+    # the noise is measured, too
+    limit = count * float(f.ppf(level, count, free))
+    parts = combinations @ (along / sizes)
+    amplitudes = np.hypot(parts[::2], parts[1::2]) * of.size
+    largest = np.argsort(-amplitudes)[:3]
+    found = tuple((int(k) + 1, float(amplitudes[k])) for k in largest)
+    statistic = float(along @ along) / noise**2
+    slow = _slow(residuals, of.angle, level)
+    return ResidualCheck(of.run, of.column, statistic, limit, found, noise, *slow[:2], slow[2] * of.size)
+
+
+def _slow(residuals: Any, angle: Any, level: float) -> tuple[float, float, float]:
+    """The sum of the squares of the means of parts of the run, in standard deviations of the noise within the parts,
+    its limit, and the standard deviation of the means."""
+    rows, count = len(residuals), min(len(residuals) // ROWS, round(float(np.ptp(angle)) / PART))
+    if count < 2:
+        return 0.0, math.inf, 0.0
+    begins = np.linspace(0.0, rows, count, endpoint=False).astype(int)
+    sizes = np.diff(np.append(begins, rows))
+    means = np.add.reduceat(residuals, begins) / sizes
+    between = float(np.sum(sizes * means**2))
+    within = (float(residuals @ residuals) - between) / (rows - count)
+    limit = (count - 1) * float(f.ppf(level, count - 1, rows - count))
+    return between / within, limit, math.sqrt(between / rows)
 
 
 def _waves(angle: Any, orders: int) -> Iterator[Any]:
-    yield np.ones(len(angle))
     for order in range(1, orders + 1):
         yield np.cos(order * angle)
         yield np.sin(order * angle)

@@ -22,7 +22,7 @@ from .measurands import MEASURANDS
 from .plant import ANGLE
 from .problem import MARK_ANGLE, Problem
 from .reading import IdentificationPlan
-from .residuals import ResidualCheck
+from .residuals import LOUD, ResidualCheck
 from .unknown import Unknown
 
 RESULT = "result.json"
@@ -36,8 +36,6 @@ CLASSES = 90
 """Number of crank angles at which measured and simulated courses are shown."""
 CLASSES_OF_TIME = 600
 """Number of times at which those of a run that is not steady are shown."""
-LOUD = 1.5
-"""Noise in parts of the stated one from which a sentence names it."""
 
 
 def as_dict(found: IdentifiedMachine) -> dict[str, Any]:
@@ -172,9 +170,13 @@ def _check(found: IdentifiedMachine, each: ResidualCheck) -> dict[str, Any]:
         "run": each.run,
         "column": each.column,
         "is_noise": each.is_noise,
+        "reason": each.reason,
         "statistic": entry(each.statistic, "1"),
         "limit": entry(each.limit, "1"),
         "noise": entry(each.noise, "1"),
+        "slow": entry(each.slow, "1"),
+        "slow_limit": entry(each.slow_limit if math.isfinite(each.slow_limit) else None, "1"),
+        "changes": entry(each.changes, unit),
         "orders": [
             {"order": entry(float(order), "1"), "amplitude": entry(size, unit)} for order, size in each.orders
         ],
@@ -254,15 +256,22 @@ def sentences(found: IdentifiedMachine) -> list[str]:
     words += [str(each) for each in found.suspicions if each.is_suspicious]
     for check in found.checks:
         unit = MEASURANDS[check.column].unit
-        if not check.is_noise:
+        place = f"{check.column} of the run {check.run}"
+        if check.reason == "orders":
             order, size = check.orders[0]
             words.append(
-                f"{check.column} of the run {check.run}: the model does not describe it. Order {order} of the crank "
-                f"remains, with {size:.2g} {unit}; check the dimensions, the gear ratio, and the control"
+                f"{place}: the model does not describe it. Order {order} of the crank remains, with {size:.2g} "
+                f"{unit}; check the dimensions, the gear ratio, and the control"
             )
-        if check.noise > LOUD:
+        elif check.reason == "slow":
             words.append(
-                f"{check.column} of the run {check.run}: its noise is {check.noise:.2g} times the stated one; state "
+                f"{place}: the model does not describe it. Slow changes remain, with a standard deviation of "
+                f"{check.changes:.2g} {unit}: the speed, the feed or the supply was not steady; state the changes of "
+                "the speed (speeds), or name a steady part (begin, end)"
+            )
+        elif check.noise > LOUD:
+            words.append(
+                f"{place}: its noise is {check.noise:.2g} times the stated one; state "
                 "its own (identify.sensor.noise), as all deviations grow with it"
             )
     return words

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...drives.terminal_signals import terminal_signals
+from ...ending import scratch
 from ...errors import Faults, InputError
 from ...fmu.backends import export
 from ...machines.load_observer import LoadObserver
@@ -382,8 +382,8 @@ def observe(
     table, time = np.stack(list(signals.values())), recording.time
     results = [np.zeros((len(OUTPUTS), len(time))) for _ in tunings]
     pieces = np.split(np.arange(len(time)), np.flatnonzero(np.diff(time) > gap) + 1)
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / f"{LoadObserver.name}.fmu"
+    with scratch() as folder:
+        file = folder / f"{LoadObserver.name}.fmu"
         export(LoadObserver, file, dict(tunings[0]))
         with contextlib.closing(Fmu(file)) as fmu:
             for result, values in zip(results, tunings, strict=True):

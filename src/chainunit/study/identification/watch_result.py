@@ -44,6 +44,7 @@ def _as_dict(watched: WatchedRecording) -> dict[str, Any]:
             {
                 "column": each.column,
                 "is_noise": each.is_noise,
+                "reason": each.reason,
                 "statistic": entry(each.statistic, "1"),
                 "limit": entry(each.limit, "1"),
             }
@@ -52,6 +53,8 @@ def _as_dict(watched: WatchedRecording) -> dict[str, Any]:
         "doubts": [
             *(
                 f"order {each.orders[0][0]} of the crank remains in {each.column}"
+                if each.reason == "orders"
+                else f"slow changes remain in {each.column}"
                 for each in watched.checks
                 if not each.is_noise
             ),

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-import shutil
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ...ending import scratch
 from ...fmu.backends import Backend
 from ...machines.machine import Machine
 from ...progress import Report
@@ -301,15 +299,12 @@ def _by_fmu(
     search: Search, best: Answer, machine: Machine, found: Mapping[str, float], backend: Backend | None
 ) -> dict[str, FmuValue]:
     """The quantities by the FMU of the best machine."""
-    folder = Path(tempfile.mkdtemp(prefix="chainunit_"))
     angles = [
         angle for q in quantities_of(search.wishes).values() for angle in search.extreme_angles(q, best.x)
     ]
-    try:
+    with scratch() as folder:
         quantities = quantities_of(search.wishes)
         return by_fmu(search.wishes, machine, quantities, found, angles, folder, backend)
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _turns(wishes: Wishes, machine: Machine) -> dict[str, Any]:

@@ -1,0 +1,101 @@
+"""Ratios that gears are made in: preferred numbers, and the largest ratio of one gear unit by its kind.
+
+The limits are typical of standard units, and belong to no maker. A helical stage makes up to about 6.3, so that two
+stages make up to 40 and three up to 250; two-stage units of makers end between 30 and 60, three-stage units between
+200 and 350. A worm gear makes up to about 100, a V-belt up to about 6.3.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from .gearing import KINDS
+
+_TENTHS = "100 112 125 140 160 180 200 224 250 280 315 355 400 450 500 560 630 710 800 900"
+_BETWEEN_R20 = "106 118 132 150 170 190 212 236 265 300 335 375 425 475 530 600 670 750 850 950"
+_BETWEEN_R40 = (
+    "103 109 115 122 128 136 145 155 165 175 185 195 206 218 230 243 258 272 290 307 "
+    "325 345 365 387 412 437 462 487 515 545 580 615 650 690 730 775 825 875 925 975"
+)
+
+
+def _numbers(*texts: str) -> tuple[float, ...]:
+    return tuple(sorted(float(each) / 100.0 for text in texts for each in text.split()))
+
+
+SERIES: Mapping[str, tuple[float, ...]] = MappingProxyType(
+    {
+        "R20": _numbers(_TENTHS),
+        "R40": _numbers(_TENTHS, _BETWEEN_R20),
+        "R80": _numbers(_TENTHS, _BETWEEN_R20, _BETWEEN_R40),
+    }
+)
+"""Preferred numbers of ISO 3 in a decade, by series, the coarsest first."""
+
+
+@dataclass(frozen=True)
+class GearUnit:
+    """A gear in one housing, or one belt, with the largest ratio that it is made with."""
+
+    title: str
+    largest: float
+
+
+UNITS: Mapping[str, tuple[GearUnit, ...]] = MappingProxyType(
+    {
+        "helical": (
+            GearUnit("one-stage helical gear", 6.3),
+            GearUnit("two-stage helical gear", 40.0),
+            GearUnit("three-stage helical gear", 250.0),
+        ),
+        "worm": (GearUnit("worm gear", 100.0),),
+        "belt": (GearUnit("V-belt", 6.3),),
+    }
+)
+"""The units of each kind of gear, by rising ratio; bevel-helical gears count as helical ones."""
+
+EFFICIENCY: Mapping[str, float] = MappingProxyType(
+    {
+        kind: KINDS[transmission].efficiency
+        for kind, transmission in (("helical", "gear"), ("worm", "worm"), ("belt", "belt"))
+    }
+)
+"""Typical efficiency of each kind. That of a worm gear falls from 0.9 at a ratio of 5 to 0.65 at 80; the number is
+that of 50."""
+
+
+def gear_unit(kind: str, ratio: float) -> GearUnit | None:
+    """The smallest unit of the `kind` that has the `ratio`; None where one unit does not suffice."""
+    return next((unit for unit in UNITS[kind] if ratio <= unit.largest), None)
+
+
+def nearest(ratio: float, ratios: Iterable[float]) -> float:
+    """The one of the `ratios` with which the speed differs least from that with the `ratio`."""
+    return min(ratios, key=lambda each: abs(math.log(each / ratio)))
+
+
+def preferred_ratio(ratio: float, tolerance: float) -> tuple[float, str]:
+    """The nearest preferred number to a `ratio`, and its series: the coarsest that has one with which the speed
+    differs by at most the `tolerance`, or the finest."""
+    decade = 10.0 ** math.floor(math.log10(ratio))
+    near = {name: decade * nearest(ratio / decade, (*numbers, 10.0)) for name, numbers in SERIES.items()}
+    fine = [name for name, best in near.items() if abs(ratio / best - 1.0) <= tolerance]
+    name = fine[0] if fine else "R80"
+    return float(f"{near[name]:.4g}"), name
+
+
+def ratio_on_offer(ratio: float, series: str, ratios: Sequence[float], tolerance: float) -> tuple[float, str]:
+    """The ratio that a drive gets which needs a `ratio`, and the name of its source.
+
+    Parameters
+    ----------
+    series : "preferred" or "exact"; of no meaning where there are `ratios`
+    ratios : the ratios of a catalogue of gears
+    tolerance : see `preferred_ratio`
+    """
+    if ratios:
+        return nearest(ratio, ratios), "own list"
+    return preferred_ratio(ratio, tolerance) if series == "preferred" else (ratio, "")

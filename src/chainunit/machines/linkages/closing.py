@@ -1,0 +1,103 @@
+"""Why a linkage does not close: the group, its gap, and the lengths with which it closes. Standard library only: FMUs
+carry this file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from ...engines import MATH
+from ...errors import InputError
+from ...groups.dyad import Dyad
+from ...groups.sliding import RRP
+from ...mechanism.linkage import Linkage
+from ...mechanism.machine import Mechanism
+
+PLACES = 720
+"""Places over the span at which a group is looked at."""
+Wanted = tuple[str, float, float, float]
+"""A link, its length, and the least and largest length with which its group closes all the way [m]."""
+
+
+def open_group(links: Sequence[str], where: str, hint: str = "") -> InputError:
+    """The refusal of a group that does not close."""
+    return InputError(
+        f"the group of {', '.join(links)} cannot close at {where}{hint or ': change its lengths'}",
+        key=f"links.{links[0]}",
+    )
+
+
+def dead_group(links: Sequence[str], where: str) -> InputError:
+    """The refusal of a group that comes to a dead position."""
+    return InputError(
+        f"the group of {', '.join(links)} comes to a dead position at {where}: there its forces have no limit; "
+        "change its lengths",
+        key=f"links.{links[0]}",
+    )
+
+
+def gap_hint(
+    linkage: Linkage, number: int, derived: Sequence[Any], q: float, span: tuple[float, float]
+) -> str:
+    """Words on the gap in a group at the place `q` of the driver, and on the lengths that close it over the `span`;
+    empty for a group whose gap is no matter of two lengths, or where what stands before it does not close.
+
+    Parameters
+    ----------
+    number : index of the group in the linkage
+    """
+    low, high = span
+    places = [low + (high - low) * k / PLACES for k in range(PLACES + 1)]
+    group, before = linkage.groups[number], linkage.before(number)
+    if not isinstance(group, Dyad | RRP):
+        return ""
+    try:
+        apart = [_apart(group, Mechanism(MATH, before, at, derived[: before.derived])) for at in (q, *places)]
+    except (ArithmeticError, ValueError, IndexError):
+        return ""
+    if isinstance(group, RRP):
+        rod = group.first
+        gap = apart[0] - rod.length
+        wanted = [(rod.name, rod.length, max(apart), math.inf)]
+        words = (
+            f": its line is {_mm(apart[0])} from the pin {rod.pin}, {_mm(gap)} more than {rod.name} is long"
+        )
+    else:
+        one, other = group.first, group.second
+        near, far = abs(one.length - other.length), one.length + other.length
+        gap = apart[0] - far if apart[0] > far else near - apart[0]
+        missing = (
+            f"more than both are long ({_mm(far)})"
+            if apart[0] > far
+            else f"less than they differ ({_mm(near)})"
+        )
+        words = f": its pins {one.pin} and {other.pin} are {_mm(apart[0])} apart, {_mm(gap)} {missing}"
+        wanted = [
+            (a.name, a.length, max(max(apart) - b.length, b.length - min(apart)), min(apart) + b.length)
+            for a, b in ((one, other), (other, one))
+        ]
+    if not gap > 0.0:
+        return ""
+    fits = []
+    for name, _, low, high in wanted:
+        if low < high:
+            most = "" if high == math.inf else f" and {_mm(high, -1.0)}"
+            fits.append(f"a length of {name} {'between' if most else 'above'} {_mm(low, 1.0)}{most}")
+    return f"{words}; {' or '.join(fits)} closes it all the way" if fits else f"{words}; change both lengths"
+
+
+def _apart(group: Dyad | RRP, m: Mechanism) -> float:
+    """How far apart the outer joints of the group are [m]."""
+    if isinstance(group, Dyad):
+        return math.sqrt((m.pins[group.first.pin].p - m.pins[group.second.pin].p).squared())
+    line = group.rail.placed(m.links)
+    return abs(line.u.cross(m.pins[group.first.pin].p - line.pin.p))
+
+
+def _mm(length: float, sense: float = 0.0) -> str:
+    """A length in four digits, rounded upward where `sense` is +1, downward where it is -1."""
+    if sense and length > 0.0:
+        unit = 10.0 ** (math.floor(math.log10(length)) - 3)
+        length = (math.ceil if sense > 0.0 else math.floor)(length / unit) * unit
+    return f"{1e3 * length:.4g} mm"

@@ -1,0 +1,268 @@
+"""The loads of a linkage file, the tables that they know, and the extremes of the motion that they name."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from collections.abc import Mapping
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from ... import units
+from ...errors import InputError, meant, near_name, shown
+from ...mechanism.assur import GROUND
+from ...mechanism.expressions import Expression
+from ...reading import file_text
+from .checks import name_fault
+from .entries import EntryReader, Known, is_given
+from .loads import place_of
+
+LOADS = {
+    "force": ("type", "on", "force"),
+    "follower": ("type", "on", "force"),
+    "torque": ("type", "on", "torque"),
+    "spring": ("type", "on", "by", "stiffness", "length", "damping"),
+}
+"""Keys of each type of load."""
+_OF_LINK: Known = {"phi": "rad", "w": "rad/s", "angle": "rad", "angle_rate": "rad/s"}
+_OF_FORCE: Known = {**_OF_LINK, "x": "m", "y": "m", "vx": "m/s", "vy": "m/s"}
+_AXES = {"x": "m", "y": "m", "angle": "rad"}
+_OWN = re.compile(r"\b(min|max|stroke)\(\s*(x|y|angle)\s*\)")
+_HEADING = re.compile(r"\s*([^\[(]*?)\s*(?:[\[(]\s*(.*?)\s*[\])])?\s*")
+
+
+class LoadReader(EntryReader):
+    """The reader of loads and tables."""
+
+    def __init__(self, data: Mapping[str, Any], name: str, folder: Path) -> None:
+        super().__init__(data, name)
+        self.folder = folder
+        self.table_units: dict[str, str | None] = {}
+        self.curve_units: dict[str, tuple[str | None, str | None]] = {}
+
+    # tables
+
+    def curves(self) -> dict[str, Any]:
+        """Tables over the coordinate, and over a quantity that a load gives."""
+        curves = {}
+        given = self.table("tables")
+        self.named("tables", given)
+        for name in given:
+            key = f"tables.{name}"
+            table = self.table(key, given)
+            self.keys(key, table, ("phi", "x", "value", "file"))
+            self.refused.add(name)
+            with self.at(key):
+                over = "phi" if "phi" in table else "x"
+                places, values = self.columns(key, table, over)
+                of_x, of_value = places[0][1], values[0][1]
+                at = [x for x, _ in places]
+                turns = over == "phi" and of_x == "rad"
+                if any(b <= a for a, b in pairwise(at)):
+                    raise InputError(f"{over} must rise" + ", within less than one turn" * turns)
+                if turns and at[-1] - at[0] >= 2.0 * math.pi:
+                    raise InputError("phi must rise, within less than one turn: the table repeats itself")
+                curves[name] = {"over": over, "places": at, "values": [x for x, _ in values]}
+                if over == "phi":
+                    self.table_units[name] = of_value
+                self.curve_units[name] = of_x, of_value
+                if not name_fault(name):
+                    self.refused.discard(name)
+        return curves
+
+    def columns(
+        self, key: str, table: Mapping[str, Any], over: str
+    ) -> tuple[list[tuple[float, str | None]], list[tuple[float, str | None]]]:
+        """The two columns of a table, each value with its unit."""
+        if "file" in table:
+            if {"phi", "x", "value"} & table.keys():
+                raise InputError("has file and lists: the file gives both columns; take one of both out")
+            return self.columns_of_file(table["file"])
+        least = 3 if over == "phi" else 2
+        places, values = table.get(over), table.get("value")
+        if (
+            not isinstance(places, list)
+            or not isinstance(values, list)
+            or not least <= len(places) == len(values)
+        ):
+            raise InputError(
+                f"must have {over} and value, two lists of one length, of {least} or more, or file, a CSV file"
+            )
+        linear = "joint" in self.table("driver")
+        if over == "phi":
+            unit = "m" if linear else "rad"
+            at: list[tuple[float, str | None]] = [(self.number(key, x, unit), unit) for x in places]
+        else:
+            at = self.like(places)
+        return at, self.like(values)
+
+    def like(self, given: list[Any]) -> list[tuple[float, str | None]]:
+        """Values of one unit, that of the first one."""
+        first = self.with_unit(given[0], None)
+        if first[1] is None:
+            return [self.with_unit(x, None) for x in given]
+        return [(self.number("", x, first[1]), first[1]) for x in given]
+
+    def columns_of_file(
+        self, given: Any
+    ) -> tuple[list[tuple[float, str | None]], list[tuple[float, str | None]]]:
+        """The two columns of a CSV file beside the linkage file, with units in a heading ("way [mm], force [kN]")."""
+        if not isinstance(given, str):
+            raise InputError(f"file is {shown(given)}; must be the name of a CSV file with two columns")
+        text = file_text(self.folder / given)
+        lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
+        mark = (
+            ";"
+            if any(";" in line for line in lines)
+            else "\t"
+            if any("\t" in line for line in lines)
+            else ","
+        )
+        rows = list(csv.reader(io.StringIO("\n".join(lines)), delimiter=mark))
+        if wrong := next((row for row in rows if len(row) != 2), None):
+            raise InputError(
+                f"{given}: {shown(mark.join(wrong))}: each row must have two columns, x and value"
+            )
+        found: list[str | None] = [None, None]
+        scales = [1.0, 1.0]
+        if rows and any(_number(cell) is None for cell in rows[0]):
+            for k, head in enumerate(rows.pop(0)):
+                match = _HEADING.fullmatch(head)
+                if match and match[2]:
+                    scales[k], found[k] = self.with_unit(f"1 {match[2]}", None)
+        if len(rows) < 2:
+            raise InputError(f"{given}: must have two or more rows of numbers")
+        columns: list[list[tuple[float, str | None]]] = [[], []]
+        for row in rows:
+            for k, cell in enumerate(row):
+                value = _number(cell)
+                if value is None or not math.isfinite(value):
+                    raise InputError(f"{given}: {shown(cell)} is no number")
+                columns[k].append((value * scales[k], found[k]))
+        return columns[0], columns[1]
+
+    # extremes of the motion
+
+    def further(self, given: Expression, in_load: bool) -> dict[str, str | None]:
+        """See `EntryReader.further`."""
+        if not in_load:
+            return super().further(given, in_load)
+        found: dict[str, str | None] = {each: self.extreme(each, given.text) for each in given.extremes}
+        for name in given.tables:
+            if name not in self.curve_units:
+                if name in self.refused:
+                    continue
+                hint = near_name(name, self.curve_units)
+                raise InputError(f"is {shown(given.text)}; {name} is no table{hint}")
+            found[f"x of {name}"], found[f"table {name}"] = self.curve_units[name]
+            self.used.add(name)
+        return found
+
+    def note(self, name: str, known: Any) -> str:
+        """See `EntryReader.note`."""
+        if name in self.curve_units:
+            return f"; it is a table over x: write table(x, {name})"
+        return super().note(name, known)
+
+    def extreme(self, name: str, text: str) -> str:
+        """The unit of an extreme.
+
+        Raises
+        ------
+        InputError
+            in one line, where the linkage has no such place.
+        """
+        begin = f"is {shown(text)}; in {name} "
+        if "." not in name:
+            raise InputError(
+                f"{begin}{name[4:-1]} is no place of the motion; write a point of a link and its axis, such as "
+                "min(ram.C.y); of two numbers the lesser is min(a, b)"
+            )
+        _, link, point, axis = place_of(name)
+        if link not in self.points or link == GROUND:
+            known = [each for each in self.points if each != GROUND]
+            raise InputError(f"{begin}{link} is no link{meant(link, known)} links: {', '.join(known)}")
+        if point and point not in self.points[link]:
+            raise InputError(
+                f"{begin}{point} is no point of {link}{meant(point, self.points[link])} its points: "
+                f"{', '.join(self.points[link])}"
+            )
+        if axis not in _AXES or (point and axis == "angle"):
+            raise InputError(f"{begin}{axis} must be x or y of a point, or x, y or angle of a link")
+        return _AXES[axis]
+
+    # loads
+
+    def load(self, name: str, given: Any) -> dict[str, Any]:
+        """A load."""
+        key = f"loads.{name}"
+        table = self.table(key, self.table("loads"))
+        kind = table.get("type", "force")
+        if kind not in LOADS:
+            self.fault(f"{key}.type", f"is {shown(kind)}{meant(str(kind), LOADS)} must be {', '.join(LOADS)}")
+            return {}
+        self.keys(key, table, LOADS[kind])
+        load: dict[str, Any] = {"name": name, "type": kind}
+        if kind == "torque":
+            on = table.get("on")
+            if on not in self.points or on == GROUND:
+                self.fault(f"{key}.on", f"{is_given(on)}; must be a link{near_name(str(on), self.points)}")
+            torque = _placed(table.get("torque"), [str(on)])
+            return load | {
+                "on": [on],
+                "torque": self.entry(f"{key}.torque", torque, "N.m", self.known(_OF_LINK), True),
+            }
+        for each in ("on", "by") if kind == "spring" else ("on",):
+            with self.at(f"{key}.{each}"):
+                load[each] = self.end(f"{key}.{each}", table.get(each))
+                if kind != "spring" and load[each][0] == GROUND:
+                    raise InputError("acts on the ground; give a point of a link")
+        if kind == "spring":
+            for each, unit in (("stiffness", "N/m"), ("length", "m"), ("damping", "N.s/m")):
+                load[each] = self.positive(f"{key}.{each}", table.get(each, 0.0), unit)
+            return load
+        force = table.get("force")
+        if isinstance(force, list) and "on" in load:
+            force = [_placed(each, load["on"]) for each in force]
+        load["force"] = self.vector(f"{key}.force", force, "N", self.known(_OF_FORCE), True)
+        return load
+
+    def known(self, motion: Known) -> Known:
+        """The units of the names that a load knows beside parameters and inputs."""
+        way = {"phi": "m", "w": "m/s"} if "joint" in self.table("driver") else {}
+        return {**motion, **way, **self.table_units}
+
+    def end(self, key: str, given: Any) -> list[str]:
+        """A point of a link, as "link.point" or a list of two."""
+        if given is None:
+            raise InputError('is missing; must be a link and its point, such as "rod.A"')
+        parts = given.split(".") if isinstance(given, str) else given
+        if not isinstance(parts, list) or len(parts) != 2 or not all(isinstance(x, str) for x in parts):
+            raise InputError(f'is {shown(given)}; must be a link and its point, such as "rod.A"')
+        link, point = parts
+        if link not in self.points:
+            raise InputError(f"is {shown(given)}; {link} is no link{near_name(link, self.points)}")
+        if point not in self.points[link]:
+            known = ", ".join(self.points[link]) or "none"
+            raise InputError(
+                f"is {shown(given)}; {point} is no point of {link}{meant(point, self.points[link])} its points: "
+                f"{known}"
+            )
+        return [link, point]
+
+
+def _placed(given: Any, at: list[str]) -> Any:
+    """An expression in which extremes of the load's own place have the name of this place."""
+    if not isinstance(given, str):
+        return given
+    return _OWN.sub(lambda m: f"{m[1]}({'.'.join([at[0]] if m[2] == 'angle' else at)}.{m[2]})", given)
+
+
+def _number(cell: str) -> float | None:
+    try:
+        return float(units.with_point(cell.strip()) or cell)
+    except ValueError:
+        return None

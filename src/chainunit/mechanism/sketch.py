@@ -1,0 +1,35 @@
+"""The pins and links of a mechanism that a picture shows, and the sketch of a machine. No FMU carries this file."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..model import Sketch
+from .linkage import Linkage
+from .machine import Mechanism
+
+
+def shown_pins(linkage: Linkage) -> set[str]:
+    """The pins and points that are drawn: not those of the ground that only say where a rail lies, and not further
+    points of a link that meet a pin."""
+    topology = linkage.topology
+    joined = {pin for pin, _ in topology.joints}
+    return {pin for pin in (*joined, *topology.carries) if "." not in pin or pin in joined}
+
+
+def places(mechanism: Mechanism) -> dict[str, tuple[Any, Any]]:
+    """The places x, y of the pins and points of a mechanism that are drawn [m]."""
+    shown = shown_pins(mechanism.linkage)
+    return {name: (pin.p.x, pin.p.y) for name, pin in mechanism.pins.items() if name in shown}
+
+
+def sketch_of(mechanism: Mechanism) -> Sketch:
+    """The sketch of a machine, from its mechanism at one place of the driver."""
+    linkage, at = mechanism.linkage, places(mechanism)
+    links = {name: [pin for pin in carried if pin in at] for name, carried in linkage.topology.links.items()}
+    return Sketch(
+        {name: (float(x), float(y)) for name, (x, y) in at.items()},
+        links,
+        linkage.driver.bar.name,
+        frozenset(linkage.ground) & {*at},
+    )

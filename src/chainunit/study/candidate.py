@@ -1,0 +1,184 @@
+"""A candidate of sizing: a motor behind a gear, with or without a flywheel, and the results of its runs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+from ..drives.catalogue import CatalogueMotor
+from ..drives.disc import Disc, steel_disc
+from ..drives.gear_ratios import GearUnit
+from ..quantities import Value, declaration, quantity
+from ..text import entries, number
+from .drive import Drive
+from .limits import Check
+
+TOLERANCES = ("crank_speed",)
+"""Checks of a tolerance, which a drive may use wholly: the gear's ratio takes it, and no load does."""
+
+
+@declaration
+class Flywheel:
+    """The flywheel of a drive, and the disc of steel that has its inertia; None without a flywheel."""
+
+    J: Value = quantity("kg.m2", "flywheel on the motor shaft")
+    mass: Value = quantity("kg", "steel disc, mass")
+    diameter: Value = quantity("m", "steel disc, diameter")
+    width: Value = quantity("m", "steel disc, width")
+    rim_speed: Value = quantity("m/s", "steel disc, speed of the rim")
+    fluctuation: Value = quantity("1", "fluctuation of the crank speed in the run", kind="percent")
+
+
+@declaration
+class DriveNumbers:
+    """The numbers by which the order of preference compares drives."""
+
+    start_class: Value = quantity(
+        "1", "trip class of the overload relay that holds in the start; 40: none up to class 30"
+    )
+    mass: Value = quantity("kg", "mass of motor and flywheel, the relative cost")
+    price: Value = quantity("1", "price of the motor, as the catalogue has it")
+
+
+class Standing(StrEnum):
+    """The result of a candidate."""
+
+    CHOSEN = "chosen"
+    FITS = "fits"
+    INSUFFICIENT = "insufficient"
+    """the nearest candidate, where none fits; the study goes on with it"""
+    REJECTED = "rejected"
+
+
+class Criterion(StrEnum):
+    """The order of preference among candidates that fit: each criterion decides where those before it leave a
+    choice."""
+
+    MARGIN = "margin"
+    LARGER = "larger"
+    GEAR = "gear"
+    START = "start"
+    FLYWHEEL = "flywheel"
+    POLES = "poles"
+    POWER = "power"
+    COST = "cost"
+    USE = "use"
+
+
+@dataclass
+class Candidate:
+    """A motor behind a gear, with the results of its runs."""
+
+    motor: CatalogueMotor
+    drive: Drive
+    checks: dict[str, Check]
+    margin: float = 0.0
+    """share of each limit that should remain free"""
+    unit: GearUnit | None = None
+    """the gear unit of the ratio; None where one unit does not suffice"""
+    series: str = ""
+    """source of the ratio, such as a series of preferred numbers; empty for an exact or a given one"""
+    start_class: int | None = None
+    """see `chainunit.study.start_class`; None for an inverter, or where there is no start"""
+    breakdown_torque: float = math.nan
+    """breakdown torque of the motor [N m]"""
+    duty_torque: float = math.nan
+    """peak torque at the crank in steady running, and while all feed moves to either side and stays there [N
+    m]"""
+    fluctuation: float = math.nan
+    verdict: Standing | None = None
+    """None until the candidate is judged or ranked"""
+    criterion: Criterion | None = None
+    """the criterion by which a candidate that fits stands behind the chosen one"""
+    reason: str = ""
+
+    @property
+    def sizes(self) -> dict[str, float]:
+        """Utilisation by check; infinite where the candidate does not get so far."""
+        return {n: math.inf if c.utilisation is None else c.utilisation for n, c in self.checks.items()}
+
+    @property
+    def starts(self) -> bool:
+        """Whether its motor brings the machine up to speed."""
+        return bool(self.checks) and all(check.value is not None for check in self.checks.values())
+
+    @property
+    def violation(self) -> float:
+        """Largest utilisation of all checks; infinite where the run of the candidate failed."""
+        return max(self.sizes.values(), default=math.inf)
+
+    @property
+    def use(self) -> float:
+        """Largest utilisation of the checks without the tolerances."""
+        return max((x for name, x in self.sizes.items() if name not in TOLERANCES), default=math.inf)
+
+    @property
+    def fits(self) -> bool:
+        """Whether every check is within its limit."""
+        return self.violation <= 1.0
+
+    def exceeds(self, name: str) -> bool:
+        """Whether a check takes more of its limit than the margin leaves; False for a check that there is not."""
+        permitted = 1.0 if name in TOLERANCES else 1.0 - self.margin
+        return self.sizes.get(name, 0.0) > permitted
+
+    @property
+    def keeps_margin(self) -> bool:
+        """Whether the candidate fits with the margin."""
+        return self.fits and not any(map(self.exceeds, self.checks))
+
+    @property
+    def power(self) -> float:
+        """Rated power [W]."""
+        return float(self.motor.nameplate.power)
+
+    @property
+    def disc(self) -> Disc | None:
+        """The flywheel as a disc of steel; None without one."""
+        return steel_disc(self.drive.flywheel) if self.drive.flywheel else None
+
+    @property
+    def mass(self) -> float | None:
+        """Mass of motor and flywheel [kg]; None where that of the motor is unknown."""
+        if not self.motor.nameplate.mass:
+            return None
+        return float(self.motor.nameplate.mass + (self.disc.mass if self.disc else 0.0))
+
+    @property
+    def flywheel_words(self) -> str:
+        """The flywheel, and its disc, in words."""
+        assert self.disc is not None
+        mass, diameter = number(self.disc.mass, "kg"), number(self.disc.diameter, "m")
+        return f"{number(self.drive.flywheel, 'kg.m2')} (steel disc of {mass}, {diameter} in diameter)"
+
+    def flywheel_numbers(self) -> Flywheel:
+        """The flywheel of the candidate."""
+        disc = self.disc
+        return Flywheel(
+            J=self.drive.flywheel,
+            mass=disc and disc.mass,
+            diameter=disc and disc.diameter,
+            width=disc and disc.width,
+            rim_speed=disc and disc.rim_speed(self.motor.nameplate.speed),
+            fluctuation=self.fluctuation,
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Ready for JSON, each number with its unit."""
+        numbers = DriveNumbers(
+            start_class=self.start_class, mass=self.mass, price=self.motor.nameplate.price or None
+        )
+        return {
+            "motor": self.motor.designation,
+            "ratio": {"value": self.drive.ratio, "unit": "1"},
+            "gear": self.unit.title if self.unit else "two gear units",
+            "series": self.series,
+            "flywheel": entries(self.flywheel_numbers(), with_titles=True),
+            "numbers": entries(numbers, with_titles=True),
+            "verdict": self.verdict,
+            "criterion": self.criterion,
+            "reason": self.reason,
+            "checks": {name: check.as_dict() for name, check in self.checks.items()},
+        }

@@ -1,0 +1,319 @@
+"""The ways to a safety coupling for a drive whose start puts more on it than running does: each is tried in a
+simulation of its own."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ..drives.induction_motor import SoftStart
+from ..drives.slip_clutch import SlipClutch
+from ..errors import InterruptedRunError, RunError
+from ..progress import Report
+from ..system import ModelComponent, monolithic
+from ..system.graph import in_line
+from .arrays import peak
+from .catalogue_drive import with_starter
+from .cycle import cycle
+from .event import Role
+from .event_torques import peaks_in_events
+from .limits import starting
+from .measures import STARTED
+from .protection import MARGIN, Alternative, Setting, Way, WayNumbers
+from .record import StudyRecord
+from .rig import Rig, join
+from .start_runs import StartNumbers, from_angle, hardest, longest_start, start_from, starts_from_all
+from .starts import StartAnalysis
+from .torques import on_coupling
+
+SOFT_STARTERS = ((0.5, 1.0), (0.5, 3.0), (0.4, 2.0), (0.4, 5.0), (0.3, 5.0), (0.3, 10.0))
+"""Share of the voltage and ramp [s] of the soft starters that are tried, in this order."""
+RAMPS = (1.0, 2.0, 5.0, 10.0, 20.0)
+"""Ramps of the inverter that are tried [s], in this order."""
+_ROWS = 2e-4
+"""Time between the rows of the run with a slip clutch [s]."""
+_SWING = 0.05
+"""Time in which the first swings of a start die down [s]."""
+_SMOOTH, _FASTEST, _STUCK = 2e-3, 2e4, 5.0
+"""Smoothing slip of the clutch as a share of the motor's speed; largest rate at which the load may follow the motor
+[1/s], for which the smoothing slip of a light load is larger; and slip, over the smoothing slip, below which the
+clutch counts as stuck: there it passes 98 % of its setting."""
+
+
+def alternatives(study: StudyRecord, rig: Rig, report: Report) -> tuple[Alternative, ...]:
+    """The ways for a sized drive that starts direct on line, if the start decides its setting and an overload would
+    open a coupling that running alone allows. A way whose run fails is left out."""
+    setting, config = study.setting, study.config
+    if setting is None or config.start != "direct" or not setting.start_decides:
+        return ()
+    if not setting.opened_by(setting.least_in_running) or StartAnalysis.name not in study.findings:
+        return ()
+    makers: tuple[Callable[[StudyRecord, Rig, Setting], Alternative | None], ...] = (
+        _soft_starter,
+        _inverter,
+        _slip_clutch,
+        _higher,
+        _before_flywheel,
+    )
+    ways = []
+    for make in makers:
+        report("ways to a safety coupling", 1.0, 1.0)
+        try:
+            ways.append(make(study, rig, setting))
+        except InterruptedRunError:
+            raise
+        except RunError:
+            continue
+    return tuple(way for way in ways if way is not None)
+
+
+def _worst(study: StudyRecord) -> StartNumbers:
+    """The start from the angle at which the direct start puts most on the coupling."""
+    worst: StartNumbers = max(
+        study.findings[StartAnalysis.name].starts, key=lambda start: start.coupling_torque
+    )
+    return worst
+
+
+_Trial = tuple[Rig, float, dict[str, float]]
+"""A rig with a starter, the time after which its start-up counts as failed [s], and the numbers of the starter."""
+
+
+def _gentlest(
+    trials: Iterator[_Trial], study: StudyRecord, goal: float, limit: float
+) -> tuple[Rig, list[StartNumbers], dict[str, float]] | None:
+    """The first of the `trials` whose starts put at most `goal` [N m] on the coupling and take at most the time
+    `limit` [s]; where none does, the one whose hardest start is the gentlest. None where none starts in time."""
+    events = [e for e in study.config.events.values() if e.from_rest and e.name in study.answers]
+    angle, full = _worst(study).angle, []
+    probes: list[tuple[float, int, _Trial]] = []
+    for trial in trials:
+        probe = start_from(trial[0], angle, trial[1])
+        if probe.start_time is None or probe.start_time > limit:
+            continue
+        if probe.coupling_torque > goal:
+            probes.append((probe.coupling_torque, len(probes), trial))
+            continue
+        starts = starts_from_all(trial[0], trial[1], events)
+        if all(start.start_time is not None and start.start_time <= limit for start in starts):
+            full.append((trial[0], starts, trial[2]))
+            if hardest(starts) <= goal:
+                return full[-1]
+            # the next one is probed at the angle at which this one is hardest
+            angle = max(starts, key=lambda start: start.coupling_torque).angle
+    if probes:
+        _, _, (rig, longest, numbers) = min(probes, key=lambda probe: probe[:2])
+        starts = starts_from_all(rig, longest, events)
+        if all(start.start_time is not None and start.start_time <= limit for start in starts):
+            full.append((rig, starts, numbers))
+    return min(full, key=lambda trial: hardest(trial[1]), default=None)
+
+
+def _as_numbers(setting: Setting, running: float, starts: list[StartNumbers], **more: float) -> WayNumbers:
+    """The numbers of a starter; no setting where the gear does not carry it."""
+    start = hardest(starts)
+    least = MARGIN * max(running, start)
+    return WayNumbers.of(
+        setting=least if least < setting.gear else None,
+        running=running,
+        start=start,
+        start_time=max(each.start_time for each in starts),
+        **more,
+    )
+
+
+def _soft_starter(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative:
+    """The same motor with a soft starter; at its full voltage the drive is that of the study."""
+    config = study.config
+    assert study.sizing is not None and study.start is not None
+    plate = study.sizing.best.motor.nameplate
+    usual = longest_start(config, study.start.start_time)
+
+    def rigs() -> Iterator[_Trial]:
+        for voltage, time in SOFT_STARTERS:
+            starter = dataclasses.replace(config.starter, soft_start=SoftStart(voltage=voltage, time=time))
+            p = with_starter(rig.drive.parameters, plate, "soft", starter)
+            soft = dataclasses.replace(
+                rig,
+                config=dataclasses.replace(config, start="soft", starter=starter),
+                drive=dataclasses.replace(rig.drive, parameters=p),
+            )
+            yield soft, usual + time, {"voltage": voltage, "ramp": time}
+
+    best = _gentlest(rigs(), study, setting.running, starting(None, plate).limit)
+    if best is None:
+        return Alternative(Way.SOFT_STARTER, WayNumbers.of(), {})
+    _, starts, numbers = best
+    found = _as_numbers(setting, setting.running, starts, **numbers)
+    return Alternative(Way.SOFT_STARTER, found, _opened(setting.overloads, found))
+
+
+def _opened(overloads: dict[str, float] | Any, numbers: WayNumbers) -> dict[str, float]:
+    if numbers.setting is None:
+        return {}
+    return {name: torque for name, torque in overloads.items() if torque > numbers.setting}
+
+
+def _inverter(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative:
+    """The same motor and gear with an inverter, which keeps the speed better: its running and its overloads are those
+    of runs of its own."""
+    config = study.config
+    assert study.sizing is not None
+    plate = study.sizing.best.motor.nameplate
+    p = with_starter(rig.drive.parameters, plate, "inverter", config.starter)
+    drive = dataclasses.replace(rig.drive, parameters=p, follows=True, observer=None, observed={})
+
+    def rigs() -> Iterator[_Trial]:
+        for ramp in RAMPS:
+            run = dataclasses.replace(config.run, ramp=ramp)
+            own = dataclasses.replace(config, start="inverter", run=run)
+            yield dataclasses.replace(rig, config=own, drive=drive), 1.5 * ramp + 1.0, {"ramp": ramp}
+
+    best = _gentlest(rigs(), study, setting.running, math.inf)
+    if best is None:
+        return Alternative(Way.INVERTER, WayNumbers.of(), {})
+    fed, starts, numbers = best
+    fed = dataclasses.replace(fed, fed_from=None)
+    running, overloads = _runs(study, fed)
+    found = _as_numbers(setting, running, starts, **numbers)
+    return Alternative(Way.INVERTER, found, _opened(overloads, found))
+
+
+def _runs(study: StudyRecord, rig: Rig) -> tuple[float, dict[str, float]]:
+    """The largest torque of normal duty on the coupling of another drive, at the crank [N m], and its peaks in the
+    overloads, by name."""
+    config = rig.config
+    peaks: dict[Role, dict[str, float]] = {role: {} for role in Role}
+    with rig.from_rest() as simulation:
+        start_up = rig.start_up(simulation, config.stop, lambda time: None, {})
+        rig = start_up.rig
+        steady = start_up.run.sel(time=slice(start_up.steady_from, None))
+        begin = simulation.save()
+        angle, speed = rig.drive.crank_motion(steady)
+        events = {
+            name: event
+            for name, event in config.events.items()
+            if name in study.answers and not event.from_rest
+        }
+        leads = rig.leads(simulation, [*events.values()], float(angle[-1]), float(np.mean(speed)))
+        for (name, event), lead in zip(events.items(), leads, strict=True):
+            at = begin + lead
+            run = rig.follow(simulation, event, at, at + event.follow(config.turn)).run
+            peaks[event.role][name] = on_coupling(rig.drive, run.sel(time=slice(at, None)))
+        assert study.sizing is not None
+        for side in study.sizing.duty.one_sided:
+            event = config.one_sided(side)
+            run = rig.follow(simulation, event, begin, begin + event.p.shift + 2.0 * config.turn).run
+            peaks[Role.DUTY][f"all on the {side}"] = on_coupling(rig.drive, run)
+    return max(on_coupling(rig.drive, steady), *peaks[Role.DUTY].values(), 0.0), peaks[Role.SHOCK]
+
+
+def slip_run(rig: Rig, start: StartNumbers, setting: float) -> xr.Dataset | None:
+    """A start direct on line from the crank angle of `start`, the same start without a clutch, with a slip clutch of
+    the `setting` [N m at the crank] behind rotor and flywheel, until the clutch sticks and the machine has its speed;
+    None where it slips on for three times as long as the start takes. The variables of the clutch are ``clutch.*``.
+
+    The clutch may slip again near the breakdown torque of the motor: the attribute `slip_time` [s] is the sum of all
+    times in which it slips."""
+    rig = from_angle(rig, start.angle)
+    drive = rig.drive
+    capacity, speed = setting / drive.ratio, rig.config.run.crank_speed * drive.ratio
+    inertia = float(np.min(cycle(drive.machine, rig.config.run.crank_speed, rig.config.feed).outputs.J))
+    smooth = max(_SMOOTH * speed, capacity / (_FASTEST * inertia))
+    p = SlipClutch.Parameters(phi_start=drive.parameters.phi_start, setting=capacity, w_smooth=smooth)
+    parts = drive.graph.components
+    behind = {name: parts[name] for name in ("machine", "gear", "driveline") if name in parts}
+    system = in_line({**behind, "clutch": ModelComponent(SlipClutch, p), "motor": parts["motor"]})
+    signals = rig.signals(ramp=True)
+    assert start.start_time is not None
+    piece, pieces, state = 0.25 * start.start_time + _SWING, list[xr.Dataset](), None
+    full, slip_time = STARTED * rig.config.run.crank_speed * drive.driven_machine.ratio, 0.0
+    for k in range(12):
+        times = np.linspace(k * piece, (k + 1) * piece, int(piece / _ROWS) + 2)
+        run = monolithic(system, signals, times, rtol=1e-6, start=state)
+        state = {str(name): float(x[-1]) for name, x in run.data_vars.items()}
+        slips = np.abs(run["clutch.slip"].values) > _STUCK * smooth
+        slip_time += float(np.mean(slips)) * piece
+        pieces.append(run)
+        if not slips[-1] and float(run["machine.w0"].values[-1]) >= full:
+            break
+    if slips[-1]:
+        return None
+    return join(pieces).assign_attrs(slip_time=slip_time)
+
+
+def _slip_clutch(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative | None:
+    """A slip clutch with the setting that running alone allows, in a start from the angle from which the direct start
+    takes longest: there the load is largest. It slips in the overloads as well."""
+    capacity = setting.least_in_running
+    if rig.drive.outsiders or capacity >= setting.gear:
+        return None
+    slowest = max(study.findings[StartAnalysis.name].starts, key=lambda start: start.start_time or 0.0)
+    run = slip_run(rig, slowest, capacity)
+    if run is None:
+        return Alternative(Way.SLIP_CLUTCH, WayNumbers.of(running=setting.running), {})
+    numbers = WayNumbers.of(
+        setting=capacity,
+        running=setting.running,
+        start=peak(run["clutch.tau"].values) * rig.drive.ratio,
+        slip_time=run.attrs["slip_time"],
+        slip_energy=float(np.trapezoid(run["clutch.dissipated_power"].values, run["time"].values)),
+        slip_power=capacity * study.config.run.crank_speed,
+    )
+    return Alternative(Way.SLIP_CLUTCH, numbers, setting.opened_by(capacity))
+
+
+def _higher(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative:
+    """The setting that no start reaches, and what it still protects."""
+    numbers = WayNumbers.of(
+        setting=setting.least if setting.least < setting.gear else None,
+        running=setting.running,
+        start=setting.start,
+        rocker=_rocker_until(study, setting.least),
+    )
+    return Alternative(Way.HIGHER, numbers, _opened(setting.overloads, numbers))
+
+
+def _rocker_until(study: StudyRecord, setting: float) -> float | None:
+    """The largest torque of the rocker in the overloads [N m], each up to the instant at which the coupling carries
+    its setting; None for a machine without a rocker."""
+    peaks = []
+    for name in peaks_in_events(study, Role.SHOCK):
+        run = study.runs[name].sel(time=slice(study.event[name], None))
+        if "machine.rocker.tau" not in run:
+            return None
+        passed = np.flatnonzero(np.abs(run["motor.tau"].values) * study.drive.ratio > setting)
+        end = int(passed[0]) + 1 if passed.size else None
+        peaks.append(peak(run["machine.rocker.tau"].values[:end]))
+    return max(peaks, default=None)
+
+
+def on_motor_side(rig: Rig, run: xr.Dataset) -> float:
+    """Peak torque in a run on a coupling between rotor and flywheel, at the crank [N m]: that behind the flywheel,
+    and the torque that accelerates flywheel and gear."""
+    drive = rig.drive
+    inertia = drive.flywheel + drive.gear_inertia
+    torque = run["motor.tau"].values + inertia * run["motor.a"].values
+    return peak(torque + drive.gear_friction * run["motor.w"].values) * drive.ratio
+
+
+def _before_flywheel(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative | None:
+    """The coupling between motor and flywheel, where the drive has a flywheel; else None."""
+    if not rig.drive.flywheel:
+        return None
+    steady = on_motor_side(rig, study.steady)
+    run = study.runs["start_up"].sel(time=slice(None, study.steady_begin))
+    events = study.config.events
+    peaks: dict[Role, dict[str, float]] = {role: {} for role in Role}
+    for name, begin in study.event.items():
+        if name in study.runs and not events[name].from_rest:
+            peaks[events[name].role][name] = on_motor_side(rig, study.runs[name].sel(time=slice(begin, None)))
+    running, start = max(steady, *peaks[Role.DUTY].values(), 0.0), on_motor_side(rig, run)
+    least = MARGIN * max(running, start)
+    numbers = WayNumbers.of(setting=least if least < setting.gear else None, running=running, start=start)
+    return Alternative(Way.BEFORE_FLYWHEEL, numbers, _opened(peaks[Role.SHOCK], numbers))

@@ -1,0 +1,106 @@
+"""The loss of the gear of a catalogue motor in steady running, beside the power that the machine takes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..progress import Report
+from ..quantities import Value, declaration, quantity
+from ..text import entries, number
+from .analysis import Analysis, Findings
+from .config import Config
+from .drive import Drive
+from .record import StudyRecord
+from .rig import Rig
+from .verdict import STEADY
+from .window import Phase
+
+SWINGS = 1.5
+"""Mean of |power| over the net power of the machine, above which the remark tells of the energy that swings."""
+
+
+@declaration
+class GearLoss:
+    """The mean loss of the gear in steady running. The loss by load is that of its efficiency, taken of the power
+    that passes in either direction; the loss without load is that of its drag `gear.d`."""
+
+    by_load: Value = quantity("W", "loss by load")
+    without_load: Value = quantity("W", "loss without load")
+    net_power: Value = quantity("W", "mean power that the machine takes")
+    passed_power: Value = quantity("W", "mean of |power| that passes to and fro")
+    share: Value = quantity("1", "whole loss over the mean power that the machine takes", kind="percent")
+
+
+@dataclass(frozen=True)
+class GearFindings(Findings):
+    """The loss of the gear, and its efficiency while the motor drives."""
+
+    loss: GearLoss
+    efficiency: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Ready for JSON."""
+        return entries(self.loss)
+
+    def remark(self, study: StudyRecord) -> None:
+        """The loss beside the power of the machine, and its parts."""
+        loss = self.loss
+        text = "The gear takes {total} in steady running"
+        if loss.share is not None:
+            text += ", {share} of the {net_power} that the machine takes in the mean"
+        text += (
+            ": {by_load} by load, at an efficiency of {efficiency}, and {without_load} without load (gear.d)."
+        )
+        if loss.passed_power > SWINGS * loss.net_power:
+            text += (
+                " The machine swings energy to and fro, {passed_power} in the mean of both ways, and the teeth lose "
+                "their share of each way."
+            )
+        study.note(
+            "gear loss",
+            text,
+            STEADY,
+            total=(loss.by_load + loss.without_load, "W"),
+            share=(loss.share, "1", "percent"),
+            net_power=(loss.net_power, "W"),
+            by_load=(loss.by_load, "W"),
+            without_load=(loss.without_load, "W"),
+            passed_power=(loss.passed_power, "W"),
+            efficiency=number(self.efficiency, "1", "percent"),
+        )
+
+
+class GearAnalysis(Analysis):
+    """The loss of the gear, where the study knows one: with a motor of the catalogue."""
+
+    name = "gear_loss"
+    needs_runs = True
+
+    @staticmethod
+    def applies(config: Config, drive: Drive) -> bool:
+        """Whether the drive has a gear with a loss."""
+        return drive.gear_friction > 0.0
+
+    @staticmethod
+    def find(study: StudyRecord, rig: Rig, report: Report) -> GearFindings | None:
+        """The loss in the steady turns; None without them."""
+        if STEADY not in study.answers:
+            return None
+        drive, gear = study.drive, study.config.gear
+        window = study.window(Phase.STEADY, study.steady)
+        squared = window.mean(lambda run: run[drive.motor_speed].values ** 2)
+        total, net = drive.gear_friction * squared, float(study.answers[STEADY].power_mean)
+        without_load = min(total, gear.d * squared)
+        return GearFindings(
+            GearLoss(
+                by_load=total - without_load,
+                without_load=without_load,
+                net_power=net,
+                passed_power=window.mean(lambda run: np.abs(drive.shaft_power(run))),
+                share=total / net if net > 0.0 else None,
+            ),
+            float(gear.efficiency),
+        )

@@ -1,0 +1,198 @@
+"""The order of preference of drives: which one a drive engineer takes of those that fit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+
+from ..text import number
+from .candidate import TOLERANCES, Candidate, Criterion, Standing
+
+ALIKE = 0.05
+"""Difference of utilisations, or relative difference of costs, up to which they count as equal, as the search for
+a flywheel ends near a limit."""
+STEP = 1.5
+"""Ratio of the powers of neighbouring standard motors, at most."""
+
+ORDER: Mapping[Criterion, str] = {
+    Criterion.MARGIN: "each limit is kept with the margin",
+    Criterion.LARGER: "the power is at most sizing.larger times that of the smallest motor that fits so",
+    Criterion.GEAR: "one gear unit has the ratio",
+    Criterion.START: "the start takes a relay of a lower trip class",
+    Criterion.FLYWHEEL: "there is no flywheel",
+    Criterion.POLES: "4 poles, then 6, then 2, then more than 6; a motor one step larger may have the better number",
+    Criterion.POWER: "the power is smaller",
+    Criterion.COST: "the price is lower, or without prices the mass of motor and flywheel",
+    Criterion.USE: "the most used limit is used less",
+}
+"""The criteria in their order, in words."""
+
+
+def poles_rank(poles: float) -> float:
+    """The place of a number of poles in the order of preference; a smaller one is better."""
+    return {4.0: 0.0, 6.0: 1.0, 2.0: 2.0}.get(poles, poles)
+
+
+def rank(candidates: list[Candidate], larger: float) -> None:
+    """Order the candidates by rank and set their reasons. First come those that fit, by the order of preference,
+    then those that do not fit, by their largest utilisation; among those that do not start at all a larger
+    motor comes first. For `larger` see `chainunit.study.sizing_table`."""
+    for c in candidates:
+        _judge(c)
+    others = [c for c in candidates if not c.fits]
+    others.sort(key=lambda c: (not c.starts, c.violation, -c.power, c.motor.designation))
+    fitting = [c for c in candidates if c.fits]
+    ranking = []
+    behind: dict[int, Criterion] = {}
+    while fitting:
+        best, dropped = choice(fitting, larger)
+        behind = behind or dropped
+        ranking.append(best)
+        fitting.remove(best)
+    candidates[:] = ranking + others
+    best = candidates[0]
+    if not best.fits:
+        best.verdict = Standing.INSUFFICIENT
+        best.reason = f"the nearest of those that do not fit; {best.reason}"
+        return
+    for c in ranking[1:]:
+        c.criterion = behind[id(c)]
+        c.reason = f"{_behind(c, best)}; {c.reason}"
+    best.verdict, best.reason = Standing.CHOSEN, f"{_chosen(best, ranking)}; {best.reason}"
+
+
+def choice(fitting: Sequence[Candidate], larger: float) -> tuple[Candidate, dict[int, Criterion]]:
+    """The preferred one of candidates that fit, and by the `id` of each other one the criterion by which it was
+    left out."""
+    left = sorted(fitting, key=lambda c: c.motor.designation)
+    dropped: dict[int, Criterion] = {}
+    for criterion, keep in _steps(larger):
+        kept = keep(left)
+        dropped |= {id(c): criterion for c in left if not any(c is each for each in kept)}
+        left = kept
+    return left[0], dropped | {id(c): Criterion.USE for c in left[1:]}
+
+
+def _steps(larger: float) -> Sequence[tuple[Criterion, Callable[[list[Candidate]], list[Candidate]]]]:
+    """The criteria in the order of preference, each with the function that keeps the preferred ones of candidates."""
+    return (
+        (Criterion.MARGIN, _with_margin),
+        (Criterion.LARGER, partial(_powerful, most=larger)),
+        (Criterion.GEAR, partial(_least, value=lambda c: float(c.unit is None))),
+        (Criterion.START, partial(_least, value=lambda c: c.start_class or 0)),
+        (Criterion.FLYWHEEL, partial(_least, value=lambda c: float(c.drive.flywheel > 0.0))),
+        # the better number of poles may cost one step of power
+        (Criterion.POWER, partial(_powerful, most=STEP)),
+        (Criterion.POLES, partial(_least, value=lambda c: poles_rank(c.motor.nameplate.poles))),
+        (Criterion.POWER, partial(_least, value=lambda c: c.power)),
+        (Criterion.COST, _cheaper),
+        (Criterion.USE, _less_used),
+    )
+
+
+def _least(left: list[Candidate], value: Callable[[Candidate], float]) -> list[Candidate]:
+    least = min(map(value, left))
+    return [c for c in left if value(c) == least]
+
+
+def _with_margin(left: list[Candidate]) -> list[Candidate]:
+    """Those that keep the margin; where none does, those that use least of their limits."""
+    return [c for c in left if c.keeps_margin] or _less_used(left)
+
+
+def _powerful(left: list[Candidate], most: float) -> list[Candidate]:
+    least = min(c.power for c in left)
+    return [c for c in left if c.power <= most * least * (1.0 + 1e-9)]
+
+
+def _cheaper(left: list[Candidate]) -> list[Candidate]:
+    """Those with the lowest cost, to a twentieth: the prices, where each motor has one and no drive a flywheel, else
+    the masses, where each is known."""
+    costs: list[float | None] = [c.motor.nameplate.price or None for c in left]
+    if None in costs or any(c.drive.flywheel for c in left):
+        costs = [c.mass for c in left]
+    known = [cost for cost in costs if cost is not None]
+    if len(known) < len(left):
+        return left
+    return [c for c, cost in zip(left, known, strict=True) if cost <= (1.0 + ALIKE) * min(known)]
+
+
+def _less_used(left: list[Candidate]) -> list[Candidate]:
+    least = min(c.use for c in left)
+    return [c for c in left if c.use <= least + ALIKE]
+
+
+# -- reasons
+
+
+def _judge(c: Candidate) -> None:
+    """Set verdict and reason of a candidate by its own checks."""
+    c.criterion = None
+    if c.fits:
+        loads = [check for name, check in c.checks.items() if name not in TOLERANCES]
+        most = max(loads, key=lambda check: check.utilisation or 0.0)
+        c.verdict = Standing.FITS
+        c.reason = f"most used: {most.title}, {number(c.use, '1', 'used')}"
+    elif not c.checks:
+        # the run failed, and the reason is already set
+        c.verdict = Standing.REJECTED
+    elif not c.starts:
+        c.verdict, c.reason = Standing.REJECTED, "it does not bring the machine up to speed"
+    else:
+        over = [check for name, check in c.checks.items() if c.sizes[name] > 1.0]
+        c.verdict, c.reason = Standing.REJECTED, "; ".join(check.excess for check in over)
+    if c.disc:
+        c.reason += f", with a flywheel of {c.flywheel_words}"
+
+
+def _chosen(best: Candidate, ranking: Sequence[Candidate]) -> str:
+    """The reason for the chosen candidate."""
+    if not best.keeps_margin:
+        return f"no motor keeps the margin of {_margin(best)}; the nearest to it"
+    smaller = [c for c in ranking[1:] if c.keeps_margin and c.power < best.power]
+    if not smaller:
+        barely = any(c.power < best.power for c in ranking[1:])
+        return (
+            f"the smallest that keeps the margin of {_margin(best)}" if barely else "the smallest that fits"
+        )
+    least = min(c.power for c in smaller)
+    # the one of the smallest that comes farthest in the order of preference
+    rival = max((c for c in smaller if c.power == least), key=lambda c: [*Criterion].index(c.criterion))
+    name = f"{rival.motor.designation}, the smallest that fits,"
+    if rival.criterion is Criterion.GEAR:
+        return f"takes one gear unit, where {name} takes two"
+    if rival.criterion is Criterion.START:
+        return f"starts in {_class(best)}, where {name} starts in {_class(rival)}"
+    if rival.criterion is Criterion.FLYWHEEL:
+        return f"needs no flywheel, where {name} needs one of {rival.flywheel_words}"
+    return f"has {best.motor.nameplate.poles:g} poles, where {name} has {rival.motor.nameplate.poles:g}"
+
+
+def _behind(c: Candidate, best: Candidate) -> str:
+    """The reason why a candidate that fits comes after the best one."""
+    if c.criterion is Criterion.COST:
+        is_priced = c.motor.nameplate.price and not c.drive.flywheel
+        return "dearer than the chosen one" if is_priced else f"heavier than the chosen one: {_mass(c)}"
+    if c.criterion is Criterion.USE:
+        is_more = c.use > best.use + ALIKE
+        return "more used than the chosen one" if is_more else "as good as the chosen one"
+    poles = (each.motor.nameplate.poles for each in (c, best))
+    return {
+        Criterion.MARGIN: f"leaves less than the margin of {_margin(c)}",
+        Criterion.GEAR: "its ratio takes two gear units",
+        Criterion.START: f"its start is of {_class(c)}, that of the chosen one of {_class(best)}",
+        Criterion.FLYWHEEL: "needs a flywheel, the chosen one none",
+        Criterion.POLES: "{:g} poles, where {:g} are to be had".format(*poles),
+    }.get(c.criterion or Criterion.POWER, "larger than needed")
+
+
+def _margin(c: Candidate) -> str:
+    return number(c.margin, "1", "percent", full=False)
+
+
+def _mass(c: Candidate) -> str:
+    return f"{number(c.mass, 'kg')} with its flywheel" if c.disc else number(c.mass, "kg")
+
+
+def _class(c: Candidate) -> str:
+    return f"class {c.start_class}" if c.start_class else "no class"

@@ -1,0 +1,109 @@
+"""The force at a ram for which the setting of a safety coupling stands.
+
+At constant speed the power of the crank is that of the ram: T w = F v. So a torque T at the crank stands for the
+force F = T/|ds/dphi| along the guide, with the way s of the ram and the crank angle phi. Towards a dead centre
+ds/dphi goes to zero, and the force has no limit. Weights, inertia and friction are left out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from operator import attrgetter
+from typing import Any
+
+import numpy as np
+
+from ..mechanism.assur import GROUND, PRISMATIC, REVOLUTE
+from .record import StudyRecord
+from .turn import TurnAnalysis
+
+TIMES = 2.0
+"""Multiple of the working force from which on the ram counts as overloaded."""
+
+
+@dataclass(frozen=True)
+class RamForce:
+    """A ram over a turn of the crank: `angle` [rad], `lever` = |ds/dphi| [m] and `way` [m], each of shape (n,); the
+    largest `working` force of normal running along the guide [N]; and the index `dead` of the dead centre before
+    which it works."""
+
+    ram: str
+    angle: Any
+    lever: Any
+    way: Any
+    working: float
+    dead: int
+
+    def least(self, torque: float) -> float:
+        """The force where the ram is fastest [N], for a torque of the crank [N m]."""
+        return float(torque / np.max(self.lever))
+
+    def before(self, torque: float, angle: float) -> float:
+        """The force at so much crank angle [rad] before the dead centre [N]."""
+        turn = 2.0 * math.pi
+        lever = np.interp(self.angle[self.dead] - angle, self.angle, self.lever, period=turn)
+        return float(torque / lever)
+
+    def overloaded(self, torque: float) -> tuple[float, float] | None:
+        """Crank angle [rad] and way [m] before the dead centre within which `torque` [N m] stands for more than
+        `TIMES` the working force; None where it does at every angle."""
+        n, limit = len(self.angle), torque / (TIMES * self.working)
+        places = (self.dead - np.arange(n)) % n  # backwards from the dead centre
+        lever, way = self.lever[places], self.way[places]
+        k = int(np.argmax(lever >= limit))
+        if lever[k] < limit:
+            return None
+        share = (limit - lever[k - 1]) / (lever[k] - lever[k - 1]) if k else 0.0
+        at = way[k - 1] + share * (way[k] - way[k - 1]) if k else way[0]
+        return (max(k - 1, 0) + share) * 2.0 * math.pi / n, float(abs(way[0] - at))
+
+
+def rams(study: StudyRecord) -> Iterator[RamForce]:
+    """The rams of a linkage: links that slide on the ground and that a pin drives."""
+    description = getattr(study.drive.machine.model, "described_by", None)
+    if description is None or TurnAnalysis.name not in study.findings:
+        return
+    turn = study.findings[TurnAnalysis.name].loaded
+    joints = description.structure.joints
+    for name, joint in joints.items():
+        if joint.kind != PRISMATIC or GROUND not in (joint.on[0], joint.by[0]):
+            continue
+        ram = joint.on[0] if joint.by[0] == GROUND else joint.by[0]
+        pin = next((k for k, j in joints.items() if j.kind == REVOLUTE and ram in (j.on[0], j.by[0])), None)
+        if pin is None or name == description.structure.driver.joint:
+            continue
+        guide, force = (attrgetter(description.variable("joint", each))(turn.outputs) for each in (name, pin))
+        shape = turn.angle.shape
+        lever = np.abs(np.broadcast_to(guide.v, shape)) / study.config.run.crank_speed
+        way = np.broadcast_to(guide.s, shape)
+        size = np.broadcast_to(_along(guide, force), shape)
+        dead = max(_dead_centres(guide.v, lever), key=lambda k: _before(size, k), default=None)
+        if dead is not None and np.max(size) > 0.0:
+            yield RamForce(ram, turn.angle, lever, way, float(np.max(size)), dead)
+
+
+def _along(guide: Any, force: Any) -> Any:
+    """Size of the part of a pin's force along a fixed guide [N]. The reaction of the guide is across it, which gives
+    its direction; without such a reaction the whole force is along it."""
+    normal = np.atleast_1d(guide.normal)
+    k = int(np.argmax(np.abs(normal)))
+    across = [float(np.atleast_1d(x)[k if np.size(x) > 1 else 0]) for x in (guide.fx, guide.fy)]
+    size = math.hypot(*across)
+    if size == 0.0:
+        return np.hypot(force.fx, force.fy)
+    return np.abs(force.fx * across[1] - force.fy * across[0]) / size
+
+
+def _dead_centres(v: Any, lever: Any) -> list[int]:
+    """The places at which the speed of the ram changes its sign, the one nearer to rest of each pair."""
+    changes = [int(k) for k in np.flatnonzero(v * np.roll(v, -1) < 0.0)]
+    pairs = [(k, (k + 1) % len(v)) for k in changes]
+    return [min(pair, key=lambda k: float(lever[k])) for pair in pairs]
+
+
+def _before(size: Any, place: int) -> float:
+    """Mean of a force over the thirty degrees before a place."""
+    count = max(1, len(size) // 12)
+    return float(np.mean([size[(place - k) % len(size)] for k in range(1, count + 1)]))

@@ -1,0 +1,98 @@
+"""The table [sizing] of a study file: declarations only."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+from pydantic import Field
+
+from ..drives.gear_ratios import UNITS
+from ..drives.gearing import Transmission
+from ..quantities import Value, declaration, quantity
+from .entry_values import numbers
+
+
+@declaration
+class Sizing:
+    """The demands on a motor from the catalogue."""
+
+    one_sided_share: Value = quantity(
+        "1",
+        "share of the running time with all feed on one side",
+        default=0.1,
+        min=0.0,
+        max=1.0,
+        kind="percent",
+    )
+    starts_per_hour: Value = quantity("1", "starts per hour", default=2.0, min=0.0, max=1000.0)
+    fluctuation: Value = quantity(
+        "1",
+        "permitted fluctuation of the crank speed, (largest - least)/mean",
+        default=0.05,
+        above=0.0,
+        max=1.0,
+        kind="percent",
+    )
+    margin: Value = quantity(
+        "1",
+        "share of each limit that the chosen drive leaves free; not of the tolerance of the crank speed",
+        default=0.1,
+        min=0.0,
+        max=0.9,
+        kind="percent",
+    )
+    breakdown_margin: Value = quantity(
+        "1", "factor between the peak torque and the breakdown torque", default=1.25, min=1.0, max=10.0
+    )
+    inertia_ratio: Value = quantity(
+        "1",
+        "permitted ratio of all other inertia at the motor shaft, flywheel included, to that of the rotor; of motors "
+        "on the line only where it is given",
+        default=10.0,
+        above=0.0,
+        max=1000.0,
+    )
+    ambient: Value = quantity("K", "temperature of the surroundings", default=313.15, min=230.0, max=340.0)
+    temperature: Value = quantity(
+        "K", "permitted temperature of the winding", default=393.15, min=330.0, max=500.0
+    )
+    poles_least: Value = quantity("1", "least number of poles", default=2.0, min=2.0, max=48.0)
+    poles_most: Value = quantity("1", "largest number of poles", default=6.0, min=2.0, max=48.0)
+    larger: Value = quantity(
+        "1",
+        "power of a motor, relative to the smallest that fits, up to which it may be preferred: without a "
+        "flywheel, with a lighter start, with a better number of poles",
+        default=2.0,
+        min=1.0,
+        max=100.0,
+    )
+    candidates: Value = quantity(
+        "1",
+        "least number of motors that are tried; more follow until one fits and none behind it can be preferred",
+        default=9.0,
+        min=1.0,
+        max=200.0,
+    )
+
+
+RATIO_SERIES = ("preferred", "exact")
+"""The ratios that sizing may take: preferred numbers, or any."""
+
+SIZING_KEYS: Mapping[str, Any] = {
+    "gear_kind": (
+        Literal[tuple(UNITS)],
+        Field("helical", description="kind of the gear, by which one unit has a largest ratio"),
+    ),
+    "ratio_series": (
+        Literal[RATIO_SERIES],
+        Field(
+            "preferred",
+            description="gear ratio: a preferred number of ISO 3, or exactly the one that gives the speed",
+        ),
+    ),
+    "ratios": (
+        numbers(Transmission, "ratio", "sizing.ratios", 500),
+        Field([], description="gear ratios on offer, of a catalogue of gears, in place of the series"),
+    ),
+}

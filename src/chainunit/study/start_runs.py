@@ -1,0 +1,89 @@
+"""Runs of starts from several crank angles: the load of a machine depends on its angle, and so do the torque and the
+time of a start."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..quantities import Value, declaration, quantity
+from .config import Config
+from .event import Event
+from .measures import STARTED, time_to_start
+from .rig import Rig, join
+from .torques import at_gear, on_coupling
+
+START_ANGLES = 8
+"""Number of crank angles, evenly over the turn, from which the machine is started."""
+_STEP = 1e-3
+"""Longest step of a start [s]: the first swings have the frequency of the supply, and a coarser one misses peaks."""
+_AFTER = 0.25
+"""Time for which a start is followed once the crank has its speed [s]: the motor overshoots and settles."""
+
+
+@declaration
+class StartNumbers:
+    """A start from rest."""
+
+    angle: Value = quantity("rad", "crank angle from which it starts")
+    gear_torque: Value = quantity("N.m", "largest torque at the output of the gear")
+    coupling_torque: Value = quantity(
+        "N.m", "largest torque on a coupling on the motor's shaft, at the crank"
+    )
+    start_time: Value = quantity("s", "start-up time")
+
+
+def from_angle(rig: Rig, angle: float) -> Rig:
+    """The rig whose crank stands at that angle [rad] at the start, without an observer."""
+    drive, turned = rig.drive, angle * rig.drive.ratio
+    parameters = replace(drive.parameters, phi_start=drive.parameters.phi_start + turned)
+    line = None if drive.line is None else replace(drive.line, phi_start=drive.line.phi_start + turned)
+    drive = replace(drive, parameters=parameters, line=line, observer=None, observed={})
+    return replace(rig, drive=drive, fed_from=None)
+
+
+def start_from(rig: Rig, angle: float, longest: float, event: Event | None = None) -> StartNumbers:
+    """A start from the crank angle [rad], with the `event` of a start, if one is given.
+
+    It is followed until the crank has its speed and a little longer, at most to the time `longest` [s]; `start_time`
+    is None where the crank comes to no lasting speed by then, by the rule of `time_to_start`."""
+    rig = from_angle(rig, angle)
+    name, ratio = rig.drive.crank_speed
+    goal = STARTED * rig.config.run.crank_speed * ratio
+    step = min(rig.step, _STEP)
+    with rig.from_rest(event) as simulation:
+        run = simulation.run(longest, step, guards={name: goal})
+        reached = float(simulation.time) if float(run[name][-1]) >= (1.0 - 1e-9) * goal else None
+        if reached is not None:
+            run = join([run, simulation.run(reached + _AFTER, step)])
+        else:
+            # it may have settled at another speed: then it has started, as in the start-up of a study
+            time, speed = run["time"].values, run[name].values / ratio
+            final = float(np.mean(speed[time >= time[-1] - rig.config.turn]))
+            reached = time_to_start(time, speed, final, rig.config.run.crank_speed)
+    return StartNumbers(
+        angle=angle,
+        gear_torque=at_gear(rig.drive, run),
+        coupling_torque=on_coupling(rig.drive, run),
+        start_time=reached,
+    )
+
+
+def longest_start(config: Config, start_time: float) -> float:
+    """Time after which a start counts as failed [s], where that from the first angle takes `start_time` [s]."""
+    return max(config.ramp_end, 3.0 * start_time) + 1.0
+
+
+def starts_from_all(rig: Rig, longest: float, events: Sequence[Event] = ()) -> list[StartNumbers]:
+    """Starts from `START_ANGLES` angles over the turn; each of the `events`, which are starts, from the angle 0."""
+    angles = [2.0 * math.pi * k / START_ANGLES for k in range(START_ANGLES)]
+    starts = [start_from(rig, angle, longest) for angle in angles]
+    return starts + [start_from(rig, 0.0, longest, event) for event in events]
+
+
+def hardest(starts: Sequence[StartNumbers]) -> float:
+    """The largest torque on the coupling, at the crank [N m]."""
+    return max(start.coupling_torque for start in starts)

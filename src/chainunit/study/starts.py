@@ -1,0 +1,133 @@
+"""Starts from several crank angles: whether the gear carries their torque, and whether the motor starts from each."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from ..progress import Report
+from ..text import entries, entry, number
+from .analysis import Analysis, Findings
+from .config import Config
+from .drive import Drive
+from .event_torques import running_torque
+from .record import StudyRecord
+from .rig import Rig
+from .start_runs import StartNumbers, longest_start, starts_from_all
+from .torques import at_gear
+
+LARGE = 2.0
+"""Ratio of the torque of a start to that of running from which on it is told where no limit of the gear is given:
+gears of catalogues commonly permit about twice their rated torque for the moment of a start."""
+
+
+@dataclass(frozen=True)
+class StartFindings(Findings):
+    """The starts, the largest torque of `running` at the output of the gear [N m], and the permitted torque of the
+    gear in a start [N m], infinite where none is given."""
+
+    starts: tuple[StartNumbers, ...]
+    running: float
+    limit: float
+
+    @property
+    def worst(self) -> StartNumbers:
+        """The start with the largest torque at the output of the gear."""
+        return max(self.starts, key=lambda start: start.gear_torque)
+
+    @property
+    def stuck(self) -> list[StartNumbers]:
+        """The starts in which the crank does not come to its speed."""
+        return [start for start in self.starts if start.start_time is None]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Ready for JSON."""
+        return {
+            "from": [entries(start) for start in self.starts],
+            "worst": entries(self.worst),
+            "running": entry(self.running, "N.m"),
+            "over_running": entry(self.worst.gear_torque / self.running, "1"),
+            "limit": entry(self.limit, "N.m"),
+        }
+
+    def remark(self, study: StudyRecord) -> None:
+        """Warn of a start that the gear does not carry, or that puts much more on it than running does, and of angles
+        from which the motor does not start."""
+        worst, start = self.worst, _STARTERS[study.config.start]
+        numbers: dict[str, Any] = {
+            "torque": (worst.gear_torque, "N.m"),
+            "running": (self.running, "N.m"),
+            "over": (worst.gear_torque / self.running, "1"),
+            "angle": (worst.angle, "rad"),
+        }
+        if worst.gear_torque > self.limit:
+            study.warn(
+                "start at gear",
+                "{start} from a crank angle of {angle} puts {torque} on the output of the gear; the gear permits "
+                "{limit} in a start (gear.torque_limit x gear.start_factor): {remedy}.",
+                "start_up",
+                start=start,
+                limit=(self.limit, "N.m"),
+                remedy=_remedy(study.config.start),
+                **numbers,
+            )
+        elif math.isinf(self.limit) and worst.gear_torque > LARGE * self.running:
+            study.warn(
+                "start at gear",
+                "{start} from a crank angle of {angle} puts {torque} on the output of the gear, {over} times the "
+                "{running} of running. Gears of catalogues commonly permit about {large} times their rated torque in "
+                "a start: choose the gear by this torque (gear.torque_limit, gear.start_factor), or {remedy}.",
+                "start_up",
+                start=start,
+                large=f"{LARGE:g}",
+                remedy=_remedy(study.config.start),
+                **numbers,
+            )
+        if self.stuck:
+            study.warn(
+                "no start",
+                "The motor does not bring the crank to its speed from {where}: take a larger motor{ramp}.",
+                "start_up",
+                where=" and ".join(number(each.angle, "rad") for each in self.stuck),
+                ramp=", or a higher voltage of the soft starter" if study.config.start == "soft" else "",
+            )
+
+
+_STARTERS = {
+    "direct": "A start direct on line",
+    "soft": "A start with the soft starter",
+    "inverter": "A start by the inverter",
+}
+
+
+def _remedy(start: str) -> str:
+    """Words on the remedies for a start that is too hard."""
+    return {
+        "direct": 'start softer (start = "soft" or "inverter")',
+        "soft": "lower the voltage or lengthen the ramp of the soft starter",
+        "inverter": "lengthen run.ramp",
+    }[start]
+
+
+class StartAnalysis(Analysis):
+    """Starts from several angles of a drive with a motor of the catalogue, which has a gear."""
+
+    name = "starts"
+    needs_runs = True
+
+    @staticmethod
+    def applies(config: Config, drive: Drive) -> bool:
+        """Where the motor is of the catalogue; chains take too long."""
+        return config.of_catalogue and drive.chain is None
+
+    @staticmethod
+    def find(study: StudyRecord, rig: Rig, report: Report) -> StartFindings | None:
+        """The starts; None where the motor does not start at all."""
+        config = study.config
+        if study.start is None or study.start.start_time is None:
+            return None
+        report("starts from other crank angles", 1.0, 1.0)
+        starts = starts_from_all(rig, longest_start(config, study.start.start_time))
+        limit = config.gear.start_limit if "gear.torque_limit" in config.given else math.inf
+        return StartFindings(tuple(starts), running_torque(study, at_gear), limit)

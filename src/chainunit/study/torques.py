@@ -1,0 +1,27 @@
+"""The torque on the parts between motor and machine in a run, at the crank: on a safety coupling on the
+motor's shaft, and at the output of the gear."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import xarray as xr
+
+from .arrays import peak
+from .drive import Drive
+
+PeakOf = Callable[[Drive, xr.Dataset], float]
+"""The peak of a torque in a run, at the crank [N m]."""
+
+
+def on_coupling(drive: Drive, run: xr.Dataset) -> float:
+    """Peak torque in a run on a coupling that sits on the motor shaft behind rotor and flywheel, at the crank [N m]:
+    the torque of the motor less the one that accelerates the inertia on its side."""
+    return peak(run["motor.tau"].values) * drive.ratio
+
+
+def at_gear(drive: Drive, run: xr.Dataset) -> float:
+    """Peak torque in a run at the output of the gear [N m]: in the shaft behind the gear where the driveline is
+    there, else at the crank."""
+    behind_gear = drive.line is not None and drive.driven_machine.ratio == 1.0
+    return on_coupling(drive, run) if behind_gear else peak(drive.crank_torque(run))

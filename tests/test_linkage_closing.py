@@ -1,0 +1,94 @@
+"""What a refused linkage is told: the gap and the lengths that close it, and names of points that look alike."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import pytest
+
+from chainunit.errors import InputError
+from chainunit.machines.linkages.file import description_of
+from chainunit.machines.linkages.model import machine_of
+from chainunit.machines.machine import Machine
+from chainunit.reading import toml
+
+FOUR_BAR = """
+[parameters]
+r = "50 mm"
+l = "600 mm"
+h = "400 mm"
+[ground]
+O1 = [0, 0]
+O2 = ["600 mm", "400 mm"]
+[driver]
+link = "crank"
+[links.crank]
+points = { O1 = [0, 0], A = ["r", 0] }
+mass = 2
+[links.coupler]
+points = { A = [0, 0], B = ["l", 0] }
+[links.rocker]
+points = { O2 = [0, 0], B = ["h", 0] }
+[start]
+points = { B = ["600 mm", 0] }
+"""
+SLIDER = FOUR_BAR.replace('h = "400 mm"', 'h = "20 mm"').replace(
+    '[links.rocker]\npoints = { O2 = [0, 0], B = ["h", 0] }', "[links.ram]\npoints = { B = [0, 0] }"
+).replace('O2 = ["600 mm", "400 mm"]', 'G = [0, "h"]\nG2 = [1, "h"]').replace(
+    "[start]", '[joints.guide]\non = "ram.B"\nby = "ground.G"\ntoward = "G2"\n[start]'
+)  # fmt: skip
+
+
+def machine(text, **values):
+    return Machine(machine_of(description_of(toml(text), "mine")), values)
+
+
+@pytest.mark.parametrize("values", [{"l": 0.3}, {"l": 1.2}, {"h": 0.1}, {"h": 1.3}])
+def test_a_dyad_that_does_not_close_is_told_with_gap_and_lengths(values):
+    """The pins A and O2 are sqrt(0.52) m -+ r apart: the limits in the refusal close it, and none beyond."""
+    (name, value), known = next(iter(values.items())), {"l": 0.6, "h": 0.4} | values
+    with pytest.raises(
+        InputError, match=r"cannot close at \S+ deg of crank: its pins A and O2 are"
+    ) as caught:
+        machine(FOUR_BAR, **values)
+    other = known["h" if name == "l" else "l"]
+    far, near = math.sqrt(0.52) + 0.05, math.sqrt(0.52) - 0.05
+    link = {"l": "coupler", "h": "rocker"}[name]
+    limits = re.search(rf"length of {link} between (\S+) mm and (\S+) mm", str(caught.value))
+    low, high = (1e-3 * float(x) for x in limits.groups())
+    assert low == pytest.approx(max(far - other, other - near), abs=1.1e-3)
+    assert high == pytest.approx(near + other, abs=1.1e-3)
+    for closing in (low, high):
+        machine(FOUR_BAR, **{name: closing})
+    for beyond in (low - 2e-3, high + 2e-3):
+        with pytest.raises(InputError):
+            machine(FOUR_BAR, **{name: beyond})
+    told = re.search(r"are (\S+) mm apart, (\S+) mm", str(caught.value))
+    apart, gap = (1e-3 * float(x) for x in told.groups())
+    assert gap == pytest.approx(max(apart - value - other, abs(value - other) - apart), abs=5e-4)
+
+
+def test_a_rod_that_does_not_reach_its_line_is_told_with_its_least_length():
+    with pytest.raises(InputError, match=r"more than coupler is long") as caught:
+        machine(SLIDER, l=0.06)
+    least = 1e-3 * float(re.search(r"a length of coupler above (\S+) mm", str(caught.value))[1])
+    assert least == pytest.approx(0.07, abs=1e-4)
+    machine(SLIDER, l=least + 1e-4)
+
+
+@pytest.mark.parametrize("name", ["Bb", "b", "B_"])
+def test_names_of_points_that_look_alike_are_told(name):
+    text = FOUR_BAR.replace("points = { O2 = [0, 0], B", f"points = {{ O2 = [0, 0], {name}")
+    with pytest.raises(InputError, match="too many degrees of freedom") as caught:
+        machine(text)
+    assert f"the points coupler.B and rocker.{name} look alike: a pin joins points of one name" in str(
+        caught.value
+    )
+
+
+def test_names_with_another_number_do_not_look_alike():
+    text = FOUR_BAR.replace("points = { O2 = [0, 0], B", "points = { O2 = [0, 0], B2")
+    with pytest.raises(InputError, match="too many degrees of freedom") as caught:
+        machine(text)
+    assert "alike" not in str(caught.value)

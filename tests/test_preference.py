@@ -1,0 +1,333 @@
+"""The order of preference of drives: what a drive engineer orders, of those that fit."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from event_tables import HEAVY_MACHINE
+
+from chainunit.drives.catalogue import catalogue
+from chainunit.drives.disc import DENSITY, steel_disc
+from chainunit.drives.gear_ratios import EFFICIENCY, SERIES, gear_unit, preferred_ratio, ratio_on_offer
+from chainunit.study import sizing
+from chainunit.study.candidate import Candidate, Criterion, Standing
+from chainunit.study.config import parse
+from chainunit.study.limits import Check
+from chainunit.study.preference import ORDER, poles_rank, rank
+from chainunit.study.start_class import HEAVIER, start_class
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+DOCS = Path(__file__).parents[1] / "docs"
+
+
+# -- ratios
+
+
+def test_preferred_numbers_are_those_of_iso_3():
+    """Each is the rounded power of ten of its series; a coarser series is part of a finer one."""
+    for name, count in (("R20", 20), ("R40", 40), ("R80", 80)):
+        exact = 10.0 ** (np.arange(count) / count)
+        assert SERIES[name] == pytest.approx(exact, rel=0.014)
+    assert set(SERIES["R20"]) < set(SERIES["R40"]) < set(SERIES["R80"])
+
+
+@pytest.mark.parametrize(
+    ("ratio", "wanted"),
+    [
+        (99.6, (100.0, "R20")),
+        (101.9, (100.0, "R20")),
+        (66.3, (67.0, "R40")),  # of R20 63 and 71 are 5 and 7 % off
+        (184.96, (185.0, "R80")),  # of R40 180 and 190 are 2.7 % off
+        (9.95, (10.0, "R20")),
+        (1.0, (1.0, "R20")),
+        (0.52, (0.53, "R40")),
+    ],
+)
+def test_the_coarsest_series_near_enough_is_taken(ratio, wanted):
+    assert preferred_ratio(ratio, 0.025) == wanted
+
+
+def test_every_ratio_has_a_preferred_one_within_the_tolerance():
+    for ratio in np.geomspace(0.3, 3000.0, 3001):
+        best, _ = preferred_ratio(float(ratio), 0.025)
+        assert abs(ratio / best - 1.0) <= 0.025
+
+
+def test_ratios_of_an_own_list_and_exact_ones():
+    assert ratio_on_offer(99.6, "preferred", [86.5, 97.3, 110.2], 0.025) == (97.3, "own list")
+    assert ratio_on_offer(99.6, "exact", [], 0.025) == (99.6, "")
+    assert ratio_on_offer(99.6, "preferred", [], 0.025) == (100.0, "R20")
+
+
+@pytest.mark.parametrize(
+    ("kind", "ratio", "title"),
+    [
+        ("helical", 5.0, "one-stage helical gear"),
+        ("helical", 6.3**2, "two-stage helical gear"),
+        ("helical", 185.0, "three-stage helical gear"),
+        ("helical", 369.5, None),
+        ("worm", 60.0, "worm gear"),
+        ("worm", 125.0, None),
+        ("belt", 4.0, "V-belt"),
+        ("belt", 8.0, None),
+    ],
+)
+def test_each_kind_of_gear_has_a_largest_ratio(kind, ratio, title):
+    unit = gear_unit(kind, ratio)
+    assert (unit and unit.title) == title
+
+
+# -- numbers of a drive
+
+
+@pytest.mark.parametrize("J", [0.01, 0.462, 30.0])
+def test_the_disc_has_the_inertia(J):
+    """By mass and radius, J = m r^2/2, and the mass by the volume."""
+    disc = steel_disc(J)
+    assert 0.5 * disc.mass * (0.5 * disc.diameter) ** 2 == pytest.approx(J)
+    assert disc.mass == pytest.approx(DENSITY * math.pi * (0.5 * disc.diameter) ** 2 * disc.width)
+    assert disc.rim_speed(157.0) == pytest.approx(157.0 * 0.5 * disc.diameter)
+
+
+def test_the_class_of_a_start_by_hand():
+    """At five times the rated current a relay of class 10 may trip after 4 s (7.2/5)^2 = 8.3 s."""
+    for current, seconds, wanted in (
+        (5.0, 8.2, 10),
+        (5.0, 8.4, 20),
+        (7.2, 4.1, 20),
+        (7.2, 6.1, 30),
+        (7.2, 9.1, HEAVIER),
+    ):
+        time = np.linspace(0.0, seconds, 101)
+        assert start_class(time, np.full(101, 3.0 * current), 3.0) == wanted
+
+
+# -- the order
+
+
+def made(name, power=2200.0, poles=4.0, flywheel=0.0, used=0.5, **more):
+    """A candidate with a check that uses a share of its limit."""
+    motor = catalogue()[0]
+    plate = {
+        "power": power,
+        "poles": poles,
+        "mass": more.pop("mass", power / 80.0),
+        "price": more.pop("price", 0.0),
+    }
+    motor = dataclasses.replace(
+        motor, designation=name, nameplate=dataclasses.replace(motor.nameplate, **plate)
+    )
+    drive = SimpleNamespace(flywheel=flywheel, ratio=50.0)
+    checks = {"temperature": Check("heat", used, 1.0, "1"), "crank_speed": Check("speed", 0.95, 1.0, "1")}
+    more = {"unit": gear_unit("helical", 50.0), "start_class": 10, "margin": 0.1} | more
+    return Candidate(motor, drive, checks, **more)
+
+
+def ranked(*candidates, larger=2.0):
+    candidates = [*candidates]
+    rank(candidates, larger)
+    return candidates
+
+
+PLAIN = {"name": "b, plain"}
+WORSE = [
+    (Criterion.MARGIN, {"used": 0.95}, "leaves less than the margin of 10 %"),
+    (Criterion.LARGER, {"power": 5500.0}, "larger than needed"),
+    (Criterion.GEAR, {"unit": None}, "its ratio takes two gear units"),
+    (Criterion.START, {"start_class": 20}, "its start is of class 20, that of the chosen one of class 10"),
+    (Criterion.FLYWHEEL, {"flywheel": 0.5}, "needs a flywheel, the chosen one none"),
+    (Criterion.POLES, {"poles": 6.0}, "6 poles, where 4 are to be had"),
+    (Criterion.POWER, {"power": 3000.0}, "larger than needed"),
+    (Criterion.COST, {"mass": 31.0}, "heavier than the chosen one: 31.0 kg"),
+    (Criterion.USE, {"used": 0.6}, "more used than the chosen one"),
+]
+"""By criterion, in which a candidate is worse than a plain one, and the reason that it gets."""
+
+
+@pytest.mark.parametrize(("criterion", "worse", "reason"), WORSE, ids=[w[0] for w in WORSE])
+def test_each_criterion_decides(criterion, worse, reason):
+    """The worse one stands first by its name."""
+    for order in ((0, 1), (1, 0)):
+        pair = [made("b, plain"), made("a, worse", **worse)]
+        first, second = ranked(*(pair[i] for i in order))
+        assert (first.motor.designation, first.verdict) == ("b, plain", Standing.CHOSEN)
+        assert second.criterion is criterion and second.reason.startswith(reason)
+
+
+def test_a_smaller_motor_that_barely_fits_is_not_passed_over_in_silence():
+    first, second = ranked(made("a, small", power=1500.0, used=0.97), made("b, large"))
+    assert first.motor.designation == "b, large" and second.fits
+    assert first.reason.startswith("the smallest that keeps the margin of 10 %")
+    assert ranked(made("a"))[0].reason.startswith("the smallest that fits")
+
+
+@pytest.mark.parametrize("i", range(len(WORSE) - 1))
+def test_an_earlier_criterion_outweighs_a_later_one(i):
+    """Of two candidates each of which is worse in one, that wins which is worse in the later one."""
+    (earlier, much, _), (_, little, _) = WORSE[i], WORSE[i + 1]
+    first, second = ranked(made("a, much", **much), made("b, little", **little))
+    if earlier is Criterion.LARGER:
+        # the larger one is not needed, as the other fits
+        assert second.criterion is Criterion.LARGER
+    assert first.motor.designation == "b, little" and second.criterion is earlier
+
+
+def test_the_order_of_poles():
+    assert sorted([2.0, 4.0, 6.0, 8.0, 12.0], key=poles_rank) == [4.0, 6.0, 2.0, 8.0, 12.0]
+
+
+def test_a_motor_one_step_larger_may_have_the_better_poles():
+    first, second = ranked(made("a, 2-pole", 2200.0, 2.0), made("b, 4-pole", 3000.0, 4.0))
+    assert first.motor.designation == "b, 4-pole" and second.criterion is Criterion.POLES
+    assert first.reason.startswith("has 4 poles, where a, 2-pole, the smallest that fits, has 2; most used")
+    first, second = ranked(made("a, 2-pole", 2200.0, 2.0), made("b, 4-pole", 4000.0, 4.0))
+    assert first.motor.designation == "a, 2-pole" and second.criterion is Criterion.POWER
+
+
+def test_a_larger_motor_spares_a_flywheel_up_to_a_ratio_of_powers():
+    """`larger` says up to which; a much larger motor is not ordered to spare a flywheel."""
+    pair = made("a, small", 2200.0, flywheel=0.5), made("b, large", 4000.0)
+    first, second = ranked(*pair)
+    assert first.motor.designation == "b, large" and second.criterion is Criterion.FLYWHEEL
+    assert first.reason.startswith(
+        "needs no flywheel, where a, small, the smallest that fits, needs one of 0.500 kg m"
+    )
+    assert "steel disc of 30.0 kg, 0.365 m in diameter" in first.reason
+    for more in ({"larger": 1.0}, {"larger": 1.5}):
+        first, second = ranked(*pair, **more)
+        assert first.motor.designation == "a, small" and second.criterion is Criterion.LARGER
+
+
+def test_prices_count_before_masses():
+    """Where each motor has one; with a flywheel, whose price is not known, the masses do."""
+    light, cheap = made("a, light", mass=25.0, price=400.0), made("b, cheap", mass=31.0, price=300.0)
+    first, second = ranked(light, cheap)
+    assert first is cheap and second.reason.startswith("dearer than the chosen one")
+    first, _ = ranked(made("a, light", mass=25.0), made("b, cheap", mass=31.0, price=300.0))
+    assert first.motor.designation == "a, light"
+    first, second = ranked(
+        made("a, much flywheel", flywheel=2.0, price=1.0), made("b, little flywheel", flywheel=0.5, price=2.0)
+    )
+    assert first.motor.designation == "b, little flywheel"
+    assert second.reason.startswith("heavier than the chosen one: 96.4 kg with its flywheel")
+
+
+def test_without_a_candidate_that_keeps_the_margin_the_nearest_is_taken():
+    """Its drive still fits, and the reason says that it keeps no margin."""
+    first, second = ranked(made("a", used=0.998), made("b", 5500.0, used=0.92))
+    assert first.motor.designation == "b" and first.verdict is Standing.CHOSEN and second.fits
+    assert first.reason.startswith("no motor keeps the margin of 10 %; the nearest to it")
+    assert second.criterion is Criterion.MARGIN
+
+
+def test_the_page_states_the_order():
+    text = (DOCS / "drives.md").read_text("utf-8")
+    assert list(ORDER) == [*Criterion]
+    places = [text.index(f"{i}. {words}") for i, words in enumerate(ORDER.values(), 1)]
+    assert places == sorted(places)
+
+
+# -- the keys
+
+
+def proposed(more, motor="IE3 4-pole 1.1 kW, 90S"):
+    config = parse(f"{HEAVY_MACHINE}{more}")
+    plate = next(m for m in catalogue() if m.designation == motor)
+    turn = SimpleNamespace(crank_torque=np.full(10, 60.0))
+    return config, sizing.proposal(config, plate, SimpleNamespace(normal=turn))
+
+
+def test_a_file_chooses_the_ratios():
+    _, exact = proposed('[sizing]\nratio_series = "exact"\n')
+    _, usual = proposed("[sizing]\n")
+    assert (exact.series, usual.series) == ("", "R40")
+    assert exact.drive.ratio == pytest.approx(52.0, abs=0.4) and usual.drive.ratio == 53.0
+    _, own = proposed("[sizing]\nratios = [44.1, 48.7, 57.3]\n")
+    assert (own.drive.ratio, own.series) == (48.7, "own list")
+    _, given = proposed("[sizing]\n[gear]\nratio = 47.11\n")
+    assert (given.drive.ratio, given.series) == (47.11, "")
+
+
+def test_the_kind_of_gear_has_its_efficiency_and_its_unit():
+    config, c = proposed('[sizing]\ngear_kind = "worm"\n')
+    assert config.gear.efficiency == EFFICIENCY["worm"] == 0.7 and c.unit.title == "worm gear"
+    config, _ = proposed('[sizing]\ngear_kind = "worm"\n[gear]\nefficiency = "80 %"\n')
+    assert config.gear.efficiency == 0.8
+    config, c = proposed("[sizing]\n")
+    assert config.gear.efficiency == 0.96 and c.unit.title == "three-stage helical gear"
+
+
+def test_a_heavy_start_and_a_second_gear_are_named():
+    config = parse(f"{HEAVY_MACHINE}[sizing]\n")
+    assert [*sizing._needs(made("a"), config)] == []
+    (relay,) = sizing._needs(made("a", start_class=20), config)
+    assert relay == "The start takes an overload relay of class 20; one of class 10 may trip in it."
+    (relay,) = sizing._needs(made("a", start_class=HEAVIER), config)
+    assert "heavier than class 30" in relay
+    (gear,) = sizing._needs(made("a", unit=None), config)
+    assert gear.endswith("takes two gear units: a three-stage helical gear ends at about 250.")
+    given = parse(f"{HEAVY_MACHINE}[sizing]\n[gear]\nratio = 400\n")
+    assert [*sizing._needs(made("a", unit=None), given)] == []
+
+
+# -- the mill and the pump
+
+
+def sized(name, tmp_path, monkeypatch, *designations, **demands):
+    """The result of sizing for an example, with these motors alone."""
+    motors = [m for m in catalogue() if m.designation in designations]
+    monkeypatch.setattr(sizing, "catalogue", lambda extra: motors)
+    config = parse((EXAMPLES / f"{name}.toml").read_text("utf-8"), str(EXAMPLES / f"{name}.toml"))
+    config = dataclasses.replace(config, sizing=dataclasses.replace(config.sizing, **demands))
+    return sizing.size(config, tmp_path, lambda *said: None)
+
+
+def test_the_heavy_mill_gets_the_motor_without_a_flywheel(tmp_path, monkeypatch):
+    """It got 0.55 kW with 2 poles, a ratio of 199, a flywheel of 200 rotors, and a start of 7.3 s."""
+    result = sized(
+        "heavy_mill",
+        tmp_path,
+        monkeypatch,
+        "IE3 2-pole 0.55 kW, 71M",
+        "IE3 4-pole 0.75 kW, 80M",
+        candidates=2.0,
+    )
+    best, small = result.candidates
+    assert result.chosen_candidate is best and best.motor.designation == "IE3 4-pole 0.75 kW, 80M"
+    assert best.drive.flywheel == 0.0 and best.checks["start"].value < 0.2
+    assert (best.drive.ratio, best.series) == (100.0, "R20")
+    assert best.use <= 0.9
+    # the smaller one fits, too, and the result has the trade
+    assert small.fits and small.drive.flywheel > 50.0 * small.motor.nameplate.J
+    assert small.checks["start"].value > 5.0 and small.criterion in (Criterion.START, Criterion.FLYWHEEL)
+    assert result.trade == (small, best) and result.as_dict()["trade"] == [1, 0]
+    numbers = result.as_dict()["candidates"][1]["flywheel"]
+    mass, diameter = numbers["mass"]["value"], numbers["diameter"]["value"]
+    assert mass * diameter**2 / 8.0 == pytest.approx(numbers["J"]["value"])
+
+
+def test_the_beam_pump_gets_four_poles_and_one_gear(tmp_path, monkeypatch):
+    """It got 2 poles and a ratio of 369."""
+    motors = "IE3 2-pole 11 kW, 160M", "IE3 4-pole 11 kW, 160M", "IE3 6-pole 11 kW, 160L"
+    result = sized("beam_pump", tmp_path, monkeypatch, *motors, candidates=3.0)
+    assert [c.motor.nameplate.poles for c in result.candidates] == [4.0, 6.0, 2.0]
+    best, six, two = result.candidates
+    assert (best.drive.ratio, best.unit.title) == (185.0, "three-stage helical gear")
+    assert two.unit is None and two.drive.ratio > 250.0
+    assert (six.criterion, two.criterion) == (Criterion.POLES, Criterion.GEAR)
+    assert all(c.fits for c in result.candidates) and result.trade is None
+
+
+def test_the_next_motor_without_a_flywheel_is_sought_beyond_the_candidates(tmp_path, monkeypatch):
+    """With `larger` = 1 the smallest motor is chosen, with its flywheel; beside it stands the one that needs none."""
+    four = [m.designation for m in catalogue() if m.nameplate.poles == 4.0][:6]
+    result = sized("heavy_mill", tmp_path, monkeypatch, *four, candidates=1.0, larger=1.0)
+    small, large = result.trade
+    assert small is result.chosen_candidate and small.motor.nameplate.power == 550.0
+    assert large.motor.nameplate.power == 750.0 and large.criterion is Criterion.LARGER
+    assert len(result.candidates) == 2

@@ -1,0 +1,164 @@
+"""Starts from several crank angles, what the gear carries in them, and what a setting means at a ram."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from chainunit import cli
+from chainunit.machines.api import machine_of
+from chainunit.machines.linkages.file import read_linkage
+from chainunit.study import config, sizing
+from chainunit.study.candidate import Candidate
+from chainunit.study.cycle import cycle
+from chainunit.study.limits import Check
+from chainunit.study.preference import rank
+from chainunit.study.ram_force import rams
+from chainunit.study.rig import Rig
+from chainunit.study.run import run_study
+from chainunit.study.start_runs import START_ANGLES
+from chainunit.study.turn import TurnAnalysis
+from chainunit.study.verdict import shown_speed
+
+LINKAGES = Path(__file__).parents[1] / "examples" / "linkages"
+PUMP = f"""event = []
+[system]
+machine = "{LINKAGES / "pump_jack.toml"}"
+motor = "IE3 4-pole 11 kW, 160M"
+[run]
+crank_speed = "8 rev/min"
+turns = 1
+settle_turns = 0
+[gear]
+ratio = 185
+"""
+
+
+@pytest.fixture(scope="module")
+def pump(tmp_path_factory):
+    """A beam pump that starts direct on line."""
+    return run_study(config.parse(PUMP), tmp_path_factory.mktemp("pump"))
+
+
+def test_the_worst_start_is_named_with_its_angle(pump):
+    """The start puts more on the gear than running does, and the worst is that of all angles."""
+    assert pump.failure is None
+    found = pump.findings["starts"]
+    peaks = [start.gear_torque for start in found.starts]
+    assert len(peaks) == START_ANGLES and found.worst.gear_torque == max(peaks) > 1.02 * min(peaks)
+    assert found.starts[0].gear_torque == pytest.approx(pump.start.crank_torque_peak, rel=1e-6)
+    steady = pump.answers["steady"].crank_torque_peak
+    assert found.running == pytest.approx(steady) and found.worst.gear_torque > 2.0 * steady
+    (warning,) = [each for each in pump.warnings if each.kind == "start at gear"]
+    assert warning.quantities["torque"] == (found.worst.gear_torque, "N.m")
+    assert warning.quantities["angle"] == (found.worst.angle, "rad")
+    assert f"{found.worst.gear_torque / steady:.2f} times" in warning.text
+
+
+def test_a_start_from_an_angle_by_the_compiled_system(pump):
+    """The same start by another route: one system with the motor's shaft at that angle, without FMUs."""
+    worst, drive = pump.findings["starts"].worst, pump.drive
+    p = dataclasses.replace(drive.parameters, phi_start=worst.angle * drive.ratio)
+    turned = dataclasses.replace(drive, parameters=p)
+    with Rig(pump.config, turned, None).from_rest() as simulation:
+        run = simulation.run(worst.start_time + 0.25, 1e-3)
+    assert float(drive.crank_motion(run)[0][0]) == pytest.approx(worst.angle)
+    inertia, rotor = run["machine.J"].values, drive.fmu_parameters.rotor
+    # J a + tau_bias of the machine, and what the motor gives less its own inertia and friction
+    by_machine = inertia * run["motor.a"].values + run["machine.tau_bias"].values
+    by_motor = (
+        run["motor.air_gap_tau"].values - rotor.J * run["motor.a"].values - rotor.d * run["motor.w"].values
+    )
+    for torque in (by_machine, by_motor):
+        assert float(np.max(np.abs(torque))) * drive.ratio == pytest.approx(worst.gear_torque, rel=0.02)
+
+
+@pytest.mark.parametrize(("factor", "passed"), [(1.0, True), (9.0, False)])
+def test_the_gear_has_a_limit_of_its_own_in_a_start(pump, factor, passed):
+    """gear.start_factor times gear.torque_limit; the study warns where a start passes it."""
+    limit = 1.2 * pump.answers["steady"].crank_torque_peak
+    text = f"torque_limit = {limit}\nstart_factor = {factor}\n"
+    given = config.parse(PUMP + text)
+    assert given.gear.start_limit == pytest.approx(factor * limit)
+    found = dataclasses.replace(pump.findings["starts"], limit=given.gear.start_limit)
+    said = SimpleNamespace(config=given, warn=lambda kind, text, *runs, **parts: kinds.append((kind, parts)))
+    kinds: list[tuple[str, dict]] = []
+    found.remark(said)
+    assert [kind for kind, _ in kinds] == (["start at gear"] if passed else [])
+    assert not passed or kinds[0][1]["limit"] == (given.gear.start_limit, "N.m")
+
+
+def test_no_start_is_permitted_where_running_alone_is_too_hot():
+    """The reason has words and no multiple of nothing, and such a motor does start."""
+    words = "no start is permitted, as running alone is too hot"
+    none = Check("starts per hour", 2.0, 0.0, "1", forbidden=words)
+    assert none.over and none.excess == words and none.as_dict()["forbidden"] == words
+    assert Check("starts per hour", 0.0, 0.0, "1", forbidden=words).utilisation == 0.0
+    (motor,) = [m for m in sizing.catalogue(None) if m.designation == "IE3 4-pole 0.55 kW, 80M"]
+    drive = SimpleNamespace(flywheel=0.0, ratio=50.0)
+    hot = Check("rise of temperature", 100.0, 80.0, "K", "difference")
+    lost = Check("time to start", None, 10.0, "s")
+    first = Candidate(motor, drive, {"start": lost, "starts": none})
+    second = Candidate(motor, drive, {"temperature": hot, "starts": none})
+    candidates = [first, second]
+    rank(candidates, larger=2.0)
+    assert candidates[0] is second and second.reason.endswith(words) and "1000" not in second.reason
+    assert first.reason == "it does not bring the machine up to speed"
+
+
+def test_a_study_whose_crank_does_not_turn_ends_with_status_1(tmp_path):
+    """Masses of a million kilograms: the crank stands, and that is said as a person writes it."""
+    masses = "".join(f"{link} = {{ m = 1e6, I = 1e7 }}\n" for link in ("crank", "coupler", "rocker"))
+    file = tmp_path / "heavy.toml"
+    file.write_text(
+        f"event = []\n[machine]\n{masses}[run]\nstep = 0.01\nsettle_turns = 0\nturns = 1\nramp = 0.1\n"
+    )
+    result = CliRunner().invoke(cli.app, ["study", str(file), "-o", str(tmp_path / "out")])
+    assert result.exit_code == 1, result.output
+    words = " ".join(result.output.split())
+    assert "The motor does NOT reach the speed" in words and "10⁻" not in words.partition("Demands")[0]
+    assert "The motor does not keep the speed asked for." in words
+
+
+def test_a_crank_that_stands_has_no_speed_of_many_digits():
+    assert shown_speed(5.39e-5, 3.0) == 0.0 and shown_speed(-5.39e-5, 3.0) == 0.0
+    assert shown_speed(0.0711, 3.0) == 0.0711
+
+
+def test_a_setting_at_the_ram_by_hand():
+    """F = T/|ds/dphi|, with the way of a slider-crank in closed form; without limit at the dead centre."""
+    machine = machine_of(read_linkage(LINKAGES / "slider_crank_press.toml"))
+    speed = 2.0 * math.pi
+    study = SimpleNamespace(
+        drive=SimpleNamespace(machine=machine),
+        config=SimpleNamespace(run=SimpleNamespace(crank_speed=speed)),
+        findings={
+            TurnAnalysis.name: SimpleNamespace(loaded=cycle(machine, speed, machine.model.Feed(), 3600))
+        },
+    )
+    (ram,) = rams(study)
+    r, rod, offset = 0.08, 0.36, 0.025
+    # crank pin (r cos, r sin), ram at x = offset below it: y = r sin - sqrt(l^2 - (r cos - offset)^2)
+    across = r * np.cos(ram.angle) - offset
+    lever = r * np.cos(ram.angle) - across * r * np.sin(ram.angle) / np.sqrt(rod**2 - across**2)
+    assert ram.lever == pytest.approx(np.abs(lever), abs=1e-9)
+    torque = 200.0
+    assert ram.least(torque) == pytest.approx(torque / np.max(np.abs(lever)))
+    # where the ram is lowest or highest the lever is nothing
+    assert ram.lever[ram.dead] < 2e-3 * r and ram.before(torque, 0.0) > 100.0 * ram.least(torque)
+    assert ram.before(torque, math.radians(10.0)) > 2.0 * ram.before(torque, math.radians(30.0))
+    angle, way = ram.overloaded(torque)
+    assert ram.before(torque, angle) == pytest.approx(2.0 * ram.working, rel=1e-6)
+
+    def height(phi):
+        return r * np.sin(phi) - np.sqrt(rod**2 - (r * np.cos(phi) - offset) ** 2)
+
+    dead = ram.angle[ram.dead]
+    assert way == pytest.approx(abs(height(dead) - height(dead - angle)), rel=1e-3)
+    assert ram.ram == "ram"
