@@ -91,7 +91,7 @@ def height(figure: Figure) -> int:
 def page_figure(spec: Figure, units: Units) -> dict[str, Any]:
     """The figure for the script of the page: traces and layout of plotly and, where panels stand beside each other,
     the changes of the layout for a `narrow` box and back to a `wide` one, and the width `below` which a box is
-    narrow [px]. On paper a `tall` figure keeps its height, as its rows have names, and one of many `rows` has more."""
+    narrow [px]. On paper a `tall` figure keeps its height, as its rows have names."""
     drawing = _drawn(spec, units)
     embedded: dict[str, Any] = drawing.figure.to_plotly_json()
     embedded["rows"] = len(spec.panels)
