@@ -236,11 +236,16 @@ def _transient(s: b.Source, study: StudyRecord, name: str) -> fig.Figure:
     coasting = study.runs.get(name + run_names.COASTING)
     if coasting is not None:
         after = coasting["time"].values - (event or 0.0)
-        speed.append(fig.Curve("crank behind the open coupling", after, drive.crank_motion(coasting)[1], 1))
-        high = float(after[-1])
+        of_crank = drive.crank_motion(coasting)[1]
+        speed.append(fig.Curve("crank behind the open coupling", after, of_crank, 1))
+        # until the crank stands: the rest of the run shows nothing
+        turning = np.flatnonzero(np.abs(of_crank) > 0.02 * study.config.run.crank_speed)
+        stands = float(after[turning[-1]]) if turning.size else high
+        high = min(float(after[-1]), 1.3 * max(high, stands))
     if event is not None:
         # a quarter turn before the event shows enough of steady running
-        low = max(low, -0.5 * math.pi / study.config.run.crank_speed)
+        before = 0.5 * math.pi / study.config.run.crank_speed
+        low = max(low, -before if coasting is None else -min(before, 0.5 * high))
     marks, words = _marks(study, name, event), run_names.title(study, name)
     return fig.Figure(
         f"time-{name.replace('_', '-')}",
