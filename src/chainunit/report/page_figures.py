@@ -197,8 +197,11 @@ class _Drawing:
             for name, text in titles.items()
             if len(text) > _LINE
         }
+        legend = _legend_rows(spec, _PHONE)
         if len(spec.panels[0]) == 1:
-            return changes and {"height": height(spec), **changes}
+            more = max(0, legend - _legend_rows(spec))
+            bottom = {"margin.b": 52 + _legend_rows(spec) + more} if more else {}
+            return (changes or bottom) and {"height": height(spec) + more, **bottom, **changes}
         places = sorted(self.places, key=lambda place: (place[1], place[0]))
         heights = spec.heights or (1.0,) * len(spec.panels)
         row = _HALF_ROW if spec.half else _ROW
@@ -209,7 +212,6 @@ class _Drawing:
             for a, b in pairwise(places)
         ]  # fmt: skip
         room, begin = sum(sizes) + sum(gaps), 0.0
-        legend = _legend_rows(spec, _PHONE)
         changes["height"] = round(room + _ENDS + _above(spec) + legend)
         changes["margin.b"] = 52 + legend
         for place, size, gap in zip(places, sizes, (*gaps, 0.0), strict=True):
