@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..files import clear, refuse_foreign, whole
+from ..files import clear, whole
 from ..fmu.backends import Backend
 from ..progress import Report as Progress
 from ..reading import in_file
@@ -72,7 +72,6 @@ def compute(
         with a line for each fault of the table [optimize].
     """
     wishes = _wishes(config)
-    refuse_foreign(folder, *FILES)
     clear(folder, *FILES)
     return _search(wishes, config, progress, backend)
 
