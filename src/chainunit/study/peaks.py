@@ -14,7 +14,7 @@ _POINTS = 9
 _ROUNDS = 10
 """Points of a range around a sample, and rounds in which the range shrinks to two of its steps."""
 _HALVINGS = 48
-_ROUNDING = 1e-14
+ROUNDING = 1e-14
 """Part of the largest size of a quantity below which it counts as zero."""
 _PARTS, _NODES = 48, 8
 """Parts of the way at first, and points in each, of a mean."""
@@ -61,7 +61,7 @@ def roots(values_at: Callable[[Any], Any], q: Any, *, around: bool) -> list[Any]
     found: list[Any] = []
     rows = np.asarray(values_at(q))
     for row, samples in enumerate(rows[:, :-1] if around else rows):
-        nothing = _ROUNDING * float(np.max(np.abs(samples)))
+        nothing = ROUNDING * float(np.max(np.abs(samples)))
 
         def signs_of(values: Any, nothing: float = nothing) -> Any:
             return np.where(np.abs(values) <= nothing, 0.0, np.sign(values))
