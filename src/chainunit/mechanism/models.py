@@ -188,13 +188,13 @@ class InverseMachine(LinkageModel, MachineModel):
         )
 
     @classmethod
-    def sketch(cls) -> Sketch:
+    def sketch(cls, start: Mapping[str, float] | None = None) -> Sketch:
         """See `chainunit.model.Model.sketch`; the driver is at a sixth of its `span`."""
         from .sketch import sketch_of  # here, as FMUs do without it
 
         low, high = cls.span
-        layout = cls.parameter_layout
-        p = cls.check(layout.instance([v.quantity.start for v in layout.variables]))
+        layout, given = cls.parameter_layout, start or {}
+        p = cls.check(layout.instance([given.get(v.name, v.quantity.start) for v in layout.variables]))
         return sketch_of(cls.state(MATH, p, cls.Inputs(), low + (high - low) / (2.0 * math.pi), 0.0).m)
 
     @classmethod
@@ -310,9 +310,9 @@ class DirectMachine(LinkageModel):
         super().__init_subclass__()
 
     @classmethod
-    def sketch(cls) -> Sketch:
+    def sketch(cls, start: Mapping[str, float] | None = None) -> Sketch:
         """That of the inverse model."""
-        return cls.inverse.sketch()
+        return cls.inverse.sketch(start)
 
     @classmethod
     def linkage(cls, xp: Any, p: Any, u: Any) -> Linkage:
