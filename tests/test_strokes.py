@@ -10,8 +10,8 @@ import pytest
 
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
+from chainunit.mechanism.courses import largest, means, roots
 from chainunit.study.linkage_turn import linkage_findings
-from chainunit.study.peaks import largest, means, roots
 
 LINKAGES = Path(__file__).parents[1] / "examples" / "linkages"
 
@@ -48,6 +48,8 @@ def test_a_scotch_yoke_has_its_dead_centres_at_the_ends_of_its_diameter():
     stroke = yoke.strokes["guide"]
     assert stroke.range == pytest.approx(0.12, rel=1e-12) and stroke.time_ratio == pytest.approx(1.0)
     assert yoke.dead_centres["guide"] == pytest.approx([0.0, math.pi], abs=1e-9)
+    # an angle of rounding is none
+    assert stroke.largest_at == 0.0
 
 
 def test_a_driver_that_slides_has_ends_and_no_time_ratio():

@@ -16,8 +16,8 @@ from ..machines.linkages.model import LinkageDescription
 from ..machines.linkages.structure import CYLINDER
 from ..machines.machine import Machine
 from ..mechanism.assur import PRISMATIC
+from ..mechanism.courses import largest, means, roots
 from ..quantities import Value, declaration, quantity
-from .peaks import largest, means, roots
 
 PLACES = 361
 _LOSSLESS = 1e-9
@@ -278,4 +278,4 @@ def _motions(
 def _folded(q: float, turns: bool) -> float:
     """A place of the driver; the angle of one that turns from 0 to a whole turn."""
     folded = q % (2.0 * math.pi) if turns else q
-    return 0.0 if turns and 2.0 * math.pi - folded < STANDS else folded
+    return 0.0 if turns and min(folded, 2.0 * math.pi - folded) < STANDS else folded
