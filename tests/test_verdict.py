@@ -190,7 +190,7 @@ def test_words_and_data():
     assert verdict.details(CALLED | {"feed_left": "feed to left"}) == [
         "Bars that are pushed, where a chain would go slack and snatch: feed to left (web mean pull -44.3 N, "
         "wall mean pull -26.2 N); a lump jams (wall mean pull -995 N).",
-        "The rocker torque of two bars is good to 10 % up to a crank speed of 2.00 rad/s.",
+        "The rocker torque of two bars is good to 10 % only up to a crank speed of 2.00 rad/s.",
     ]
     data = verdict.as_dict()
     assert data["holds"] == "in part" and data["speed"] == {"value": 3.0, "unit": "rad/s", "kind": "speed"}

@@ -99,8 +99,9 @@ _TOPICS = {
 """By kind of fault: its words in the verdict, the begin of the line with its numbers, and its remedy."""
 _UP_TO = {
     "slack speed": "A web goes slack from a crank speed of {} on",
-    "crank torque": "The crank torque of two bars is good to 10 % up to a crank speed of {}, the rocker torque less",
-    "rocker torque": "The rocker torque of two bars is good to 10 % up to a crank speed of {}",
+    "crank torque": "The crank torque of two bars is good to 10 % only up to a crank speed of {}, the rocker torque "
+    "less far",
+    "rocker torque": "The rocker torque of two bars is good to 10 % only up to a crank speed of {}",
 }
 """By kind of fault at a crank speed: the line that names its limit."""
 
