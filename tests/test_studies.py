@@ -76,6 +76,10 @@ def test_a_foreign_fmu_is_seen_before_earlier_results_are_removed(tmp_path):
     with pytest.raises(InputError, match=r"fmu/DcMotor\.fmu: would be lost, as chainunit did not write it"):
         Study(**TABLES).run(tmp_path)
     assert (tmp_path / "torque.png").exists() and (tmp_path / "fmu" / "DcMotor.fmu").read_text() == "mine"
+    # results of other kinds see theirs before they compute, as their commands do
+    (tmp_path / "identified.toml").write_text("mine")
+    with pytest.raises(InputError, match=r"identified\.toml: would be lost"):
+        Study(**TABLES).identify(tmp_path)
 
 
 def test_answers_are_a_table_with_units(result):

@@ -425,6 +425,7 @@ class BestResult(WrittenResult):
     """The result of a search for the best machine. Its `repr` shows the answer, the parameters and what binds."""
 
     _command = "optimize"
+    _names = optimum.FILES
 
     def __init__(self, config: Config, best: Best) -> None:
         self.config = config

@@ -67,7 +67,7 @@ def requirement_of_width(key: str, width: Width, sign: float, parameters: Collec
     """The requirement that a width keeps its sign."""
     subject = f"{'width' if sign > 0.0 else 'fall'} of {width.call} in {key}"
     given = tuple(name for name in width.of.names if name in parameters)
-    return Requirement(subject, "1", "a smooth function changes over a width", given)
+    return Requirement(subject, "1", "the function cannot change over it", given)
 
 
 def _texts(loads: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, str]]:
