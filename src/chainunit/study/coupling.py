@@ -257,7 +257,7 @@ def remark_on_rams(study: StudyRecord) -> None:
             _RAM + (_RAM_WITHIN if quantities else _RAM_ALWAYS) + _RAM_END,
             trip=(torque, "N.m"),
             ram=ram.ram,
-            dead=(float(ram.angle[ram.dead]), "rad"),
+            dead=(ram.dead, "rad"),
             fastest=(ram.least(torque), "N"),
             thirty=(ram.before(torque, math.radians(30.0)), "N"),
             ten=(ram.before(torque, math.radians(10.0)), "N"),

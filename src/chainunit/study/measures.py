@@ -297,8 +297,8 @@ class Answers:
         during=_AT_SPEED,
     )
     recovery_time: Value = measure("s", "recovery", _recovery, during=_EVENTS)
-    web_pull_least: Value = measure("N", "least pull in a web", lambda w: w.least_pull("web"), during=_ALL)
-    wall_pull_least: Value = measure("N", "least pull in a wall", lambda w: w.least_pull("wall"), during=_ALL)
+    web_pull_least: Value = measure("N", "web end pull, least", lambda w: w.least_pull("web"), during=_ALL)
+    wall_pull_least: Value = measure("N", "wall end pull, least", lambda w: w.least_pull("wall"), during=_ALL)
     slack_time: Value = measure(
         "1", "share of the time with a slack rod", _slack_time, kind="percent", during=_ALL
     )

@@ -147,6 +147,12 @@ class EntryReader:
             if each.names == (given.strip(),) and self.units.get(given.strip(), "") is None:
                 self.units[given.strip()] = unit
             checked_dimension(each.text, known, unit)
+            for width in each.widths:
+                if moving := {*width.of.names} & ({*self.inputs} | {*(motion or {})}) or {*width.of.tables}:
+                    raise InputError(
+                        f"is {shown(given)}; the width of {width.call} changes with {', '.join(sorted(moving))}; "
+                        "must be a number or an expression of parameters"
+                    )
             return given
         return 0.0
 
