@@ -19,6 +19,7 @@ from chainunit.study.candidate import Candidate, Criterion, Standing
 from chainunit.study.config import parse
 from chainunit.study.limits import Check
 from chainunit.study.preference import ORDER, poles_rank, rank
+from chainunit.study.rig import Rig
 from chainunit.study.start_class import HEAVIER, start_class
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -331,3 +332,93 @@ def test_the_next_motor_without_a_flywheel_is_sought_beyond_the_candidates(tmp_p
     assert small is result.chosen_candidate and small.motor.nameplate.power == 550.0
     assert large.motor.nameplate.power == 750.0 and large.criterion is Criterion.LARGER
     assert len(result.candidates) == 2
+
+
+PRESS = """
+event = []
+[system]
+machine = "slider_crank_press.toml"
+[run]
+crank_speed = "60 rev/min"
+[gear]
+ratio = 25
+[sizing]
+fluctuation = "15 %"
+candidates = 1
+"""
+
+
+def pressed(tmp_path, monkeypatch, more="", *designations):
+    """The result of sizing for the press of the gallery, with these motors alone."""
+    motors = [m for m in catalogue() if m.designation in designations]
+    monkeypatch.setattr(sizing, "catalogue", lambda extra: motors)
+    folder = EXAMPLES / "linkages"
+    return sizing.size(parse(PRESS + more, str(folder / "press.toml")), tmp_path, lambda *said: None)
+
+
+def test_a_motor_that_stalls_in_the_peak_runs_with_a_flywheel(tmp_path, monkeypatch):
+    """The press takes 200 W in the mean and 837 W by the RMS torque: 1.1 kW was chosen as the smallest. Without a
+    flywheel the motor of 0.55 kW stalls where the ram meets the workpiece."""
+    motors = "IE3 4-pole 0.55 kW, 80M", "IE3 4-pole 1.1 kW, 90S", "IE3 4-pole 4 kW, 112M"
+    result = pressed(tmp_path, monkeypatch, "", *motors)
+    best = result.chosen_candidate
+    assert best is not None and best.motor.designation == motors[0] and best.keeps_margin and result.weak == 0
+    assert best.drive.flywheel > 20.0 * best.motor.nameplate.J and best.reason.startswith(
+        "the smallest that fits"
+    )
+    # the drive runs as its checks say, with its gear and its flywheel, in a run of its own
+    config = parse(PRESS, str(EXAMPLES / "linkages" / "press.toml"))
+    rig = Rig(config, best.drive, None)
+    with rig.from_rest() as simulation:
+        simulation.run(8.0, rig.step)
+        run = simulation.run(10.0, rig.step)
+    assert float(run["motor.w"].mean()) / best.drive.ratio == pytest.approx(2.0 * math.pi, rel=0.03)
+    current = math.sqrt(float(np.mean(run["motor.i"].values ** 2)))
+    assert current < 0.9 * best.motor.nameplate.rated_current
+    # the larger motor beside it needs none
+    assert [c.motor.designation for c in result.trade] == [motors[0], motors[2]]
+
+
+def test_a_motor_that_stalls_without_a_flywheel_is_told_so(tmp_path, monkeypatch):
+    """Its flywheels stay below the permitted ratio of inertias: none carries it through. It never ran hot."""
+    result = pressed(tmp_path, monkeypatch, "inertia_ratio = 2\n", "IE3 4-pole 0.55 kW, 80M")
+    (c,) = result.candidates
+    assert result.chosen_candidate is None
+    bare = dataclasses.replace(c, drive=dataclasses.replace(c.drive, flywheel=0.0))
+    sizing.judge(parse(PRESS, str(EXAMPLES / "linkages" / "press.toml")), bare, result.duty, None)
+    rank(alone := [bare], 2.0)
+    assert "without a flywheel it stalls at 2" in alone[0].reason and "deg" in alone[0].reason
+    assert "hot" not in alone[0].reason and bare.checks["starts"].value is None
+    # the ram meets the workpiece 10 mm above its lower dead centre, on the way down
+    turn = result.duty.normal
+    hard = turn.angle[np.abs(turn.crank_torque) > 0.5 * result.duty.numbers.torque_peak]
+    assert hard[0] - 0.2 < bare.stall_angle < hard[-1]
+
+
+def test_a_candidate_that_leaves_no_margin_is_told_apart():
+    best, barely, fits = ranked(made("b"), made("c", used=0.95), made("a, larger", power=3000.0))
+    by_name = {c.motor.designation: c.verdict for c in (best, barely, fits)}
+    assert by_name == {"b": Standing.CHOSEN, "c": Standing.BARELY, "a, larger": Standing.FITS}
+
+
+def test_the_next_motor_without_a_flywheel_is_found_below_a_gear_that_the_largest_break(
+    tmp_path, monkeypatch
+):
+    """The torque of the gear in a start grows with the motor: the largest do not fit, and one between does."""
+    config = parse(f"{HEAVY_MACHINE}[sizing]\nlarger = 1\n")
+    motors = [m for m in catalogue() if m.nameplate.poles == 4.0][:9]
+    tried = []
+
+    def bare(config, motor, duty):
+        return made(motor.designation, motor.nameplate.power)
+
+    def judge(config, c, duty, files):
+        tried.append(c.power)
+        load, hard = (Check("", used, 1.0, "1") for used in (1800.0 / c.power, c.power / 4000.0))
+        c.checks = {"rms_torque": load, "gear_start": hard}
+
+    monkeypatch.setattr(sizing, "proposal", bare)
+    monkeypatch.setattr(sizing, "judge", judge)
+    small = made("small", 550.0, flywheel=0.5)
+    found = sizing._without_flywheel(config, motors, [small], SimpleNamespace(), None)
+    assert found.power == 2200.0 and len(tried) <= 4

@@ -11,8 +11,12 @@ from . import blocks as b
 from .lines import Aside, Line, Number, Strong, capital, line, spoken
 
 _REASONS = 5  # of the candidates that do not fit; the table has all
-_SIGN = {Standing.CHOSEN: "✓", Standing.FITS: "○", Standing.INSUFFICIENT: "✗", Standing.REJECTED: "✗"}
-_SEVERITY: dict[str, b.Severity] = {Standing.CHOSEN: "good", Standing.FITS: "partly"}
+_SIGN = {Standing.CHOSEN: "✓", Standing.FITS: "○", Standing.BARELY: "△"}
+_SEVERITY: dict[str, b.Severity] = {
+    Standing.CHOSEN: "good",
+    Standing.FITS: "partly",
+    Standing.BARELY: "partly",
+}
 
 
 def answer(s: b.Source) -> Iterator[b.Block]:
@@ -201,7 +205,7 @@ def _candidates(s: b.Source, row_count: int) -> b.Table:
         rows.append(
             b.TableRow(
                 (motor, s.words(f"{path}.verdict"), *parts, *cells),
-                line(f"{_SIGN.get(verdict, '')} ", s.words(f"{path}.reason")),
+                line(f"{_SIGN.get(verdict, '✗')} ", s.words(f"{path}.reason")),
                 _SEVERITY.get(verdict, "bad"),
                 "both" if i < row_count else "long",
             )

@@ -47,6 +47,7 @@ class Standing(StrEnum):
 
     CHOSEN = "chosen"
     FITS = "fits"
+    BARELY = "fits without margin"
     INSUFFICIENT = "insufficient"
     """the nearest candidate, where none fits; the study goes on with it"""
     REJECTED = "rejected"
@@ -82,12 +83,14 @@ class Candidate:
     """source of the ratio, such as a series of preferred numbers; empty for an exact or a given one"""
     start_class: int | None = None
     """see `chainunit.study.start_class`; None for an inverter, or where there is no start"""
-    breakdown_torque: float = math.nan
-    """breakdown torque of the motor [N m]"""
     duty_torque: float = math.nan
     """peak torque at the crank in steady running, and while all feed moves to either side and stays there [N
     m]"""
     fluctuation: float = math.nan
+    stall_angle: float | None = None
+    """crank angle at which the load stalls the motor [rad]; None for a motor that starts"""
+    heaviest: float = 0.0
+    """the heaviest flywheel that was tried with the motor [kg m2]"""
     verdict: Standing | None = None
     """None until the candidate is judged or ranked"""
     criterion: Criterion | None = None

@@ -38,6 +38,8 @@ _EVENED = ("speed", "rms_torque", "peak_torque", "temperature")
 """Checks that a flywheel improves: it evens the speed, and with it the torque of a varying load."""
 _WORSE_WITH_INERTIA = ("start", "inertia")
 """Checks that a flywheel makes worse."""
+_WORSE_WITH_POWER = ("gear_start",)
+"""Checks that a larger motor makes worse."""
 _SMALL = 0.1
 """Inertia of a flywheel, relative to all other inertia, below which it hardly evens the speed."""
 _TOLERANCE = SPEED_DEVIATION - 0.005
@@ -57,8 +59,8 @@ class SizingResult:
     """number of motors of the catalogue with a permitted number of poles; `candidates` are those that were
     tried"""
     weak: int = 0
-    """number of motors that were left out, as their rated power is less than 0.7 times the power that the
-    cycle needs"""
+    """number of motors that were left out, as their rated power does not give the mean power of the cycle with the
+    margin"""
 
     @property
     def chosen_candidate(self) -> Candidate | None:
@@ -155,20 +157,19 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
     motors = [
         m for m in catalogue(config.catalogue) if limits.poles_least <= m.nameplate.poles <= limits.poles_most
     ]
-    # the search begins below the power that the cycle needs, so that the first motor that fits is the
-    # smallest
-    power = max(numbers.power_mean, numbers.torque_rms * config.run.crank_speed)
+    # a flywheel evens the torque of a cycle, but gives no mean power
+    power = numbers.power_mean / (1.0 - limits.margin)
     motors.sort(key=lambda m: (m.nameplate.power, poles_rank(m.nameplate.poles)))
     if not motors:
         raise InputError(
             f"sizing.poles_least = {limits.poles_least:g}, sizing.poles_most = {limits.poles_most:g}: the catalogue "
             "has no motor with so many poles"
         )
-    strong = [m for m in motors if m.nameplate.power >= 0.7 * power]
+    strong = [m for m in motors if m.nameplate.power >= power]
     if not strong:
         notes.append(
-            "No motor of the catalogue has 0.7 times the power of the cycle, "
-            f"{number(0.7 * power, 'W')}: the largest were tried."
+            "No motor of the catalogue gives the mean power of the cycle with the margin, "
+            f"{number(power, 'W')}: the largest were tried."
         )
         strong = [m for m in motors if m.nameplate.power == motors[-1].nameplate.power]
     candidates: list[Candidate] = []
@@ -246,13 +247,15 @@ def _without_flywheel(
         judge(config, candidate, duty, files)
         return candidate
 
-    # a larger motor runs more evenly, so that the motors that fit are the last ones of the list
-    if not rest or not (least := bare(rest.pop())).keeps_margin:
-        return None
+    # a larger motor runs more evenly, but puts more on the gear in its start: the largest may not fit
+    least = None
     while rest:
         middle = len(rest) // 2
         candidate = bare(rest[middle])
-        least, rest = (candidate, rest[:middle]) if candidate.keeps_margin else (least, rest[middle + 1 :])
+        if candidate.keeps_margin:
+            least = candidate
+        too_weak = any(candidate.exceeds(name) for name in candidate.checks if name not in _WORSE_WITH_POWER)
+        rest = rest[middle + 1 :] if too_weak else rest[:middle]
     return least
 
 
@@ -264,7 +267,7 @@ def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[st
     """The candidate with the least flywheel, to about a tenth, that keeps the permitted fluctuation and the
     limits of torque and temperature. It has no flywheel where none is needed, or where it exceeds a limit
     that no flywheel improves. If such a flywheel exceeds another limit, it is the flywheel that comes nearest
-    to all limits.
+    to all limits. A motor that stalls in the peak of the cycle may run with a flywheel, which carries it through.
 
     The largest flywheel that is tried is that of the hand formulas for speed and torque. It is on the safe
     side for the speed, as the formula leaves out that a motor's torque falls with speed, which evens the
@@ -279,6 +282,9 @@ def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[st
         return candidate
 
     def heavy_enough(candidate: Candidate) -> bool:
+        if candidate.checks and not candidate.starts:
+            # it stalls for want of inertia, unless it starts with less
+            return any(c.starts for c in trials if c.drive.flywheel < candidate.drive.flywheel)
         return too_heavy(candidate) or is_even(candidate)
 
     first = trial_with(0.0)
@@ -295,7 +301,7 @@ def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[st
             break
         below = share
     else:
-        return min(trials, key=lambda c: c.violation)
+        return _nearest(trials)
     for _ in range(3):
         middle = 0.5 * (below + share)
         if heavy_enough(trial_with(middle * whole)):
@@ -303,11 +309,14 @@ def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[st
         else:
             below = middle
     solutions = [c for c in trials if is_even(c) and not too_heavy(c)]
-    return (
-        min(solutions, key=lambda c: c.drive.flywheel)
-        if solutions
-        else min(trials, key=lambda c: c.violation)
-    )
+    return min(solutions, key=lambda c: c.drive.flywheel) if solutions else _nearest(trials)
+
+
+def _nearest(trials: list[Candidate]) -> Candidate:
+    """The trial that comes nearest to all limits; where none starts, the one without a flywheel."""
+    best = min(trials, key=lambda c: c.violation)
+    best.heaviest = max(c.drive.flywheel for c in trials)
+    return best
 
 
 def torque_evening_inertia(c: Candidate, numbers: CycleNumbers, crank_speed: float) -> float:
@@ -338,7 +347,7 @@ def torque_evening_inertia(c: Candidate, numbers: CycleNumbers, crank_speed: flo
 
 def is_even(c: Candidate) -> bool:
     """Whether the candidate keeps every limit that a flywheel improves, with the margin."""
-    return not any(c.exceeds(name) and c.sizes[name] < math.inf for name in _EVENED)
+    return not any(map(c.exceeds, _EVENED))
 
 
 def too_heavy(c: Candidate) -> bool:
@@ -375,5 +384,4 @@ def judge(config: Config, c: Candidate, duty: Duty, files: Mapping[str, Path] | 
         c.reason = f"its run failed: {error}"
         return
     c.checks, c.fluctuation = trial.checks(), trial.fluctuation
-    c.breakdown_torque, c.duty_torque = trial.breakdown_torque, trial.duty_torque
-    c.start_class = trial.start_class
+    c.duty_torque, c.stall_angle, c.start_class = trial.duty_torque, trial.stall_angle, trial.start_class

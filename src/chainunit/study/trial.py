@@ -31,6 +31,8 @@ from .start_runs import StartNumbers, starts_from_all
 from .window import BURNT, is_settled
 
 _GAP = "motor.air_gap_tau"
+_STANDS = 0.25
+"""Turns that a crank which stands, and swings against its load, makes in a run at most."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,14 @@ class Trial:
         speed, time = (np.concatenate([run[name].values for run in runs]) for name in ("motor.w", "time"))
         requested = self.config.run.crank_speed * self.drive.ratio
         return time_to_start(time, speed, self.speed, requested) if self.speed > CREEPS * requested else None
+
+    @cached_property
+    def stall_angle(self) -> float | None:
+        """Crank angle at which the load stalls the motor [rad]; None for a motor that starts, or that only turns too
+        slowly."""
+        if self.start_time is not None or self.drive.turns(self.steady) > _STANDS:
+            return None
+        return float(np.max(self.drive.crank_motion(self.steady)[0])) % (2.0 * math.pi)
 
     @cached_property
     def start_class(self) -> int | None:
@@ -89,9 +99,11 @@ class Trial:
 
     @cached_property
     def frequency(self) -> float:
-        """Frequency of the supply in steady running [Hz]."""
+        """Frequency of the supply in steady running [Hz]; the rated one for a motor that does not start."""
         plate = self.motor.nameplate
-        return max(self.speed * plate.poles / (4.0 * math.pi), 1.0) if self.drive.follows else plate.frequency
+        if not self.drive.follows or self.start_time is None:
+            return plate.frequency
+        return max(self.speed * plate.poles / (4.0 * math.pi), 1.0)
 
     @cached_property
     def breakdown_torque(self) -> float:
@@ -176,7 +188,10 @@ class Trial:
         if self.drive.follows:
             start = dataclasses.replace(start, limit=1.0 + 1.2 * self.config.run.ramp)
         weaker = min(1.0, plate.frequency / self.frequency)
-        cooling = min(1.0, self._cooling / self.drive.motor.cooling(MATH, p, plate.speed))
+        # the limits of a motor that does not start are those that it has at its speed
+        cooling = (
+            1.0 if self.start_time is None else self._cooling / self.drive.motor.cooling(MATH, p, plate.speed)
+        )
         breakdown = self.breakdown_torque / demands.breakdown_margin
         requested_speed = self.drive.ratio * self.config.run.crank_speed
         checks = {
@@ -184,7 +199,7 @@ class Trial:
             "rms_torque": check(
                 "RMS torque",
                 rms(*((share, run[_GAP].values) for share, run in self._cases)),
-                plate.torque * weaker * math.sqrt(cooling),
+                plate.torque * weaker * math.sqrt(min(1.0, cooling)),
                 "N.m",
             ),
             "peak_torque": check(
@@ -194,12 +209,14 @@ class Trial:
                 "N.m",
             ),
             "temperature": at_speed(heating(self.temperature, p.ambient.T, demands.temperature)),
-            "starts": Check(
-                "starts per hour",
-                demands.starts_per_hour,
-                self.permitted_starts,
-                "1",
-                forbidden="no start is permitted, as running alone is too hot",
+            "starts": at_speed(
+                Check(
+                    "starts per hour",
+                    demands.starts_per_hour,
+                    self.permitted_starts,
+                    "1",
+                    forbidden="no start is permitted, as running alone is too hot",
+                )
             ),
             "crank_speed": at_speed(keeping_speed(self.speed, requested_speed)),
             "speed": check("speed fluctuation", self.fluctuation, demands.fluctuation, "1", "percent"),
