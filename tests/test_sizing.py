@@ -275,7 +275,7 @@ def test_peaks_are_of_both_sides(sized, tmp_path):
         loaded = simulation.run(6.0 + 2.0 * math.pi / config.run.crank_speed, config.run.step)
     peak = float(np.max(np.abs(loaded["motor.air_gap_tau"])))
     assert best.checks["peak_torque"].value == pytest.approx(peak, rel=0.01)
-    assert best.duty_torque > 1.1 * peaks["left"]
+    assert best.duty.torque > 1.1 * peaks["left"]
 
 
 @pytest.mark.parametrize(("series", "tolerance"), [("exact", 0.01), ("preferred", 0.03)])

@@ -170,7 +170,7 @@ def _machine(s: b.Source, best: Best) -> Iterator[b.Block]:
         yield b.Text(s.words("without_effect_words"))
     limited: list[tuple[Line, str]] = [(Name(name), f"quantities.{name}") for name in s.result["quantities"]]
     if s.result["least_pull"] is not None:
-        limited.append(("least pull in a web", "least_pull"))
+        limited.append(("least mean pull along a web", "least_pull"))
     # where no machine meets all limits, a column marks those that the nearest one misses
     marks = () if best.met else ("limit",)
     rows = [
@@ -185,7 +185,9 @@ def _machine(s: b.Source, best: Best) -> Iterator[b.Block]:
         title=s.line("Objectives and limits, of a turn at {=speed:4}"),
     )
     if s.result["least_pull"] is not None:
-        yield b.Text(s.line("The least pull in a web is that at crank speeds up to {=slack_free_speed:4}."))
+        yield b.Text(
+            s.line("The least mean pull along a web is that at crank speeds up to {=slack_free_speed:4}.")
+        )
 
 
 def _binding(s: b.Source) -> Iterator[b.Block]:

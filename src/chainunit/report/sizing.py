@@ -8,7 +8,7 @@ from typing import Any
 from ..study.candidate import Standing
 from ..study.record import StudyRecord
 from . import blocks as b
-from .lines import Aside, Line, Number, Strong, capital, line, spoken
+from .lines import Aside, Line, Number, Strong, capital, join, line, spoken
 
 _REASONS = 5  # of the candidates that do not fit; the table has all
 _SIGN = {Standing.CHOSEN: "✓", Standing.FITS: "○", Standing.BARELY: "△"}
@@ -26,12 +26,14 @@ def answer(s: b.Source) -> Iterator[b.Block]:
     if path is None:
         return
     motor, ratio = s.words(f"{path}.motor"), s.number(f"{path}.ratio", digits=4, as_given=True)
+    also = {"flywheel": _disc, "protection": _protection}
+    gear = (*_gear(s, path), *_gear_torque(s))
     cards = [
-        b.Card("Motor", ((motor, str(b.at(s.result, f"{path}.verdict"))),)),
-        b.Card("Gear ratio", ((ratio, "motor turns per crank turn"),), tuple(_gear(s, path))),
+        b.Card("Motor", ((motor, str(b.at(s.result, f"{path}.verdict"))),), tuple(_data(s))),
+        b.Card("Gear ratio", ((ratio, "motor turns per crank turn"),), gear),
         *(
-            b.Card(capital(name), ((size or "none", title),), tuple(more(s)))
-            for (name, title, size), more in zip(_sizes(s), (_disc, _relay), strict=False)
+            b.Card(capital(name), ((size or "none", title),), tuple(also[name](s)))
+            for name, title, size in _sizes(s)
         ),
     ]
     yield b.Cards(tuple(cards))
@@ -78,6 +80,29 @@ def _disc(s: b.Source, flywheel: str = "sizing.flywheel") -> Iterator[Line]:
     mass = b.at(s.result, f"{flywheel}.mass")
     if mass and mass["value"] is not None:
         yield s.line(f"steel disc {{{flywheel}.mass}}, {{{flywheel}.diameter}} in diameter")
+
+
+def _data(s: b.Source) -> Iterator[Line]:
+    """The data of the motor of all runs."""
+    if "rated_power" in s.result.get("motor", {}):
+        names = ("rated_power", "rated_speed", "rated_torque", "rated_current")
+        yield join((s.number(f"motor.{name}") for name in names), ", ")
+
+
+def _gear_torque(s: b.Source) -> Iterator[Line]:
+    """The rated torque of the gear to be ordered."""
+    if s.result["sizing"].get("gear"):
+        yield s.line("gear with a rated output torque of at least {sizing.gear.rated_torque}")
+
+
+def _protection(s: b.Source) -> Iterator[Line]:
+    """The reason where there is no coupling, or its setting at the motor's shaft; and the relay."""
+    protection = s.result["sizing"]["protection"]
+    if protection.get("why_none"):
+        yield line("no safety coupling: ", s.words("sizing.protection.why_none"))
+    elif "trip_torque_at_motor" in protection:
+        yield s.line("{sizing.protection.trip_torque_at_motor} at the motor's shaft")
+    yield from _relay(s)
 
 
 def _relay(s: b.Source) -> Iterator[Line]:
@@ -130,7 +155,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     tables = []
     # a machine without sides has no one-sided feed
     side_keys = () if study.config.machine.model.sides else ("one_sided_share", "torque_peak_one_sided")
-    for name in ("asked", "cycle", "flywheel", "protection"):
+    for name in ("asked", "cycle", "flywheel", "gear", "protection"):
         # the sentence on the coupling is too long for a cell of a narrow table, and stands above
         leaves = [
             leaf
@@ -147,18 +172,25 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
 def _best(s: b.Source, path: str, word: str) -> Iterator[b.Block]:
     """The sentences on the motor of all runs and on the reason for it."""
     ratio = s.number(f"{path}.ratio", digits=4, as_given=True)
-    sentence = line(f"{word}: ", s.words(f"{path}.motor"), ", ratio ", ratio, _aside(_gear(s, path)))
+    motor = line(s.words(f"{path}.motor"), _aside(_data(s)))
+    sentence = line(f"{word}: ", motor, ", ratio ", ratio, _aside(_gear(s, path)))
+    sentence = line(sentence, *(line("; ", each) for each in _gear_torque(s)))
+    why = s.result["sizing"]["protection"].get("why_none")
     for name, title, size in _sizes(s):
-        if size is None:
-            sentence += line("; no flywheel" if name == "flywheel" else "; no safety coupling")
+        if size is None and name == "flywheel":
+            sentence += line("; no flywheel")
+        elif size is None:
+            sentence += line(
+                "; no safety coupling", Aside(s.words("sizing.protection.why_none")) if why else ()
+            )
         else:
             sentence += line(f"; {title} ", size, _aside(_disc(s)) if name == "flywheel" else ())
     sentence = line(sentence, *(line("; ", relay) for relay in _relay(s)))
     model = s.result["verdict"]["model"]
     doubt = s.line(" ({verdict.model.caveat})") if model is not None and model["caveat"] else ()
-    why = "Chosen: " if word == "Motor" else "Insufficient: "
+    begin = "Chosen: " if word == "Motor" else "Insufficient: "
     yield b.Text(line(sentence, doubt, "."), form="short")
-    yield b.Text(line(why, s.words(f"{path}.reason"), doubt, "."))
+    yield b.Text(line(begin, s.words(f"{path}.reason"), doubt, "."))
 
 
 def _leading(section: Mapping[str, Any] | None) -> str | None:

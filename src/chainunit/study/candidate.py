@@ -14,6 +14,7 @@ from ..quantities import Value, declaration, quantity
 from ..text import entries, number
 from .drive import Drive
 from .limits import Check
+from .torques import DutyPeak
 
 TOLERANCES = ("crank_speed",)
 """Checks of a tolerance, which a drive may use wholly: the gear's ratio takes it, and no load does."""
@@ -83,9 +84,9 @@ class Candidate:
     """source of the ratio, such as a series of preferred numbers; empty for an exact or a given one"""
     start_class: int | None = None
     """see `chainunit.study.start_class`; None for an inverter, or where there is no start"""
-    duty_torque: float = math.nan
-    """peak torque at the crank in steady running, and while all feed moves to either side and stays there [N
-    m]"""
+    duty: DutyPeak | None = None
+    """the largest torque at the crank in steady running, and while all feed moves to either side and stays there;
+    None where the run failed"""
     fluctuation: float = math.nan
     stall_angle: float | None = None
     """crank angle at which the load stalls the motor [rad]; None for a motor that starts"""

@@ -16,10 +16,9 @@ from .arrays import peak
 from .drive import AbsentError
 from .limits import reaches
 from .stored import energy_gap, energy_held, stored_shares
+from .verdict import CREEPS
 from .window import Phase, Window, drift, end_gap
 
-CREEPS = 0.5
-"""Share of the requested speed below which a machine counts as standing."""
 STARTED = 0.95
 """Share of the speed at which a start ends, see `time_to_start`."""
 

@@ -4,7 +4,7 @@ it."""
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
@@ -74,6 +74,28 @@ class Obstacle(StrEnum):
     """the gear may not carry the torque of the setting"""
     OVERLOADS = "the overloads"
     """no overload reaches the torque of the setting"""
+    RELEASE = "the release"
+    """until no torque passes the opening coupling, the gear carries as much as without it, or more than it may"""
+    ENERGY = "the energy balance"
+    """the energy balance is not kept in the runs from which the setting follows"""
+
+
+_SPARED = 0.05
+"""Share of the torque at the output of the gear that a coupling has to spare it in an overload."""
+
+
+@dataclass(frozen=True)
+class Effect:
+    """The effect of a safety coupling in an overload: the largest torque at the output of the gear [N m] without it,
+    and with it until no torque passes it any more."""
+
+    without: float
+    with_coupling: float
+
+
+def spares(effects: Mapping[str, Effect]) -> bool:
+    """Whether a coupling spares the gear a part of its torque in one of the overloads."""
+    return any(effect.with_coupling < (1.0 - _SPARED) * effect.without for effect in effects.values())
 
 
 @dataclass(frozen=True)
@@ -94,6 +116,10 @@ class Setting:
     gear: float
     overloads: Mapping[str, float]
     disturbances: Mapping[str, float] = field(default_factory=dict)
+    effects: Mapping[str, Effect] = field(default_factory=dict)
+    """the effect of the least setting in each overload that opens it; empty until it was tried"""
+    wrong: Sequence[str] = ()
+    """runs that were left out, as their energy balance is not kept; without steady running there are no overloads"""
 
     @property
     def normal(self) -> float:
@@ -125,14 +151,26 @@ class Setting:
     @property
     def obstacle(self) -> Obstacle | None:
         """The reason why there is no setting; None where there is one."""
+        if self.wrong and not self.overloads:
+            return Obstacle.ENERGY
         if self._protects(self.least):
-            return None
+            return None if self.spares else Obstacle.RELEASE
         if self.start_decides and self._protects(self.least_in_running):
             return Obstacle.START
         if self.least >= self.gear:
             return Obstacle.GEAR
         weak = self.overloads and self.least_in_running >= self.motor
         return Obstacle.MOTOR if weak else Obstacle.OVERLOADS
+
+    @property
+    def passed(self) -> dict[str, Effect]:
+        """The overloads in which the gear carries more than it may, though the coupling opens."""
+        return {name: effect for name, effect in self.effects.items() if effect.with_coupling > self.gear}
+
+    @property
+    def spares(self) -> bool:
+        """Whether a coupling of the least setting spares the gear something, and enough; True until it was tried."""
+        return not self.effects or (spares(self.effects) and not self.passed)
 
     @property
     def torque(self) -> float | None:
@@ -189,16 +227,13 @@ class WayNumbers:
 
 @dataclass(frozen=True)
 class Alternative:
-    """A way with its numbers, and the peaks of the overloads in which its coupling opens or slips, by name."""
+    """A way with its numbers, the peaks of the overloads in which its coupling opens or slips, by name, and its
+    effects in those that open it."""
 
     way: Way
     numbers: WayNumbers
     opens: Mapping[str, float]
-
-    @property
-    def holds(self) -> bool:
-        """Whether the coupling has a setting that the start does not reach, and opens in an overload."""
-        return self.numbers.setting is not None and bool(self.opens)
+    effects: Mapping[str, Effect] = field(default_factory=dict)
 
 
 def stall(time: Any, speed: Any, requested: float, share: float = 0.1) -> float | None:

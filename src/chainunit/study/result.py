@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from .. import __version__
 from ..drives.catalogue import CatalogueMotor
 from ..quantities import variables
 from ..text import entries, entry, shown_in, turning
-from .coupling import coupling_sentence, way_words
+from .coupling import coupling_sentence, way_words, why_none
+from .event_torques import running_peak, running_words
 from .given import given_sections
 from .judgement import motor_verdict
 from .measures import measures_of
+from .protection import Effect
 from .record import StudyRecord
+from .starts import LARGE, StartAnalysis
+from .torques import at_gear
+from .verdict import STEADY
 from .window import Phase
 
 
@@ -165,7 +171,7 @@ def _parts(study: StudyRecord) -> dict[str, Any]:
     config = study.config
     parts = {name: findings.as_dict() for name, findings in study.findings.items()}
     if study.sizing:
-        parts["sizing"] = study.sizing.as_dict() | {"protection": _protection(study)}
+        parts["sizing"] = study.sizing.as_dict() | {"gear": _gear(study), "protection": _protection(study)}
     if study.monte_carlo:
         parts["monte_carlo"] = study.monte_carlo.as_dict()
     if study.statics.torsion is not None:
@@ -173,6 +179,25 @@ def _parts(study: StudyRecord) -> dict[str, Any]:
     if config.chain:
         parts["chain"] = study.chain.as_dict() if study.chain else {}
     return parts
+
+
+def _gear(study: StudyRecord) -> dict[str, Any]:
+    """The torques by which the gear of the drive that sizing chose is ordered; empty without steady running, and for
+    an insufficient motor."""
+    if study.insufficient or STEADY not in study.answers:
+        return {}
+    running, starts = running_peak(study, at_gear), study.findings.get(StartAnalysis.name)
+    given = "gear.start_factor" in study.config.given
+    factor = study.config.gear.start_factor if given else LARGE
+    start = starts.worst.gear_torque if starts else 0.0
+    titles = {
+        "rated_torque": f"gear, rated output torque at least, with {factor:g} times that in a start",
+        "running": f"largest torque of {running_words(study, running.run)} on the output of the gear",
+        "start": "largest torque of a start on the output of the gear",
+    }
+    torques = {"rated_torque": max(running.torque, start / factor), "running": running.torque}
+    torques |= {"start": start} if starts else {}
+    return {name: entry(torque, "N.m") | {"title": titles[name]} for name, torque in torques.items()}
 
 
 def _protection(study: StudyRecord) -> dict[str, Any]:
@@ -191,15 +216,21 @@ def _protection(study: StudyRecord) -> dict[str, Any]:
 
     return {
         "trip_torque": torque(setting.torque, "safety coupling, trip torque at the crank"),
+        "trip_torque_at_motor": torque(
+            setting.torque and setting.torque / study.drive.ratio,
+            "safety coupling, trip torque at the motor's shaft",
+        ),
         "relay_current": relay,
         "coupling": coupling_sentence(study),
         "obstacle": setting.obstacle,
+        "why_none": why_none(study),
         "normal_torque": torque(
             setting.normal, "largest torque of normal duty on the coupling, at the crank"
         ),
         "running_torque": torque(setting.running, "largest torque of running on the coupling"),
         "start_torque": torque(setting.start, "largest torque of a start on the coupling"),
         "breakdown_torque": torque(setting.motor, "most that the motor gives at the crank"),
+        "effects": _effects(study, setting.effects),
         "overloads": {
             name: torque(
                 peak, f"{study.title_of(name)}: {'opens it' if name in setting.opens else 'leaves it shut'}"
@@ -219,9 +250,23 @@ def _protection(study: StudyRecord) -> dict[str, Any]:
                 "words": way_words(study, each),
                 **entries(each.numbers, with_titles=True),
                 "opens": {name: entry(peak, "N.m") for name, peak in each.opens.items()},
+                "effects": _effects(study, each.effects),
             }
             for each in study.alternatives
         ],
+    }
+
+
+def _effects(study: StudyRecord, effects: Mapping[str, Effect]) -> dict[str, Any]:
+    """The effects of a safety coupling as it was tried, by overload."""
+    titles = {"without": "without a coupling", "with_coupling": "with it"}
+    return {
+        name: {
+            key: entry(getattr(effect, key), "N.m")
+            | {"title": f"{study.title_of(name)}: peak at the output of the gear, {words}"}
+            for key, words in titles.items()
+        }
+        for name, effect in effects.items()
     }
 
 

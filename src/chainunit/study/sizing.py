@@ -384,4 +384,4 @@ def judge(config: Config, c: Candidate, duty: Duty, files: Mapping[str, Path] | 
         c.reason = f"its run failed: {error}"
         return
     c.checks, c.fluctuation = trial.checks(), trial.fluctuation
-    c.duty_torque, c.stall_angle, c.start_class = trial.duty_torque, trial.stall_angle, trial.start_class
+    c.duty, c.stall_angle, c.start_class = trial.duty, trial.stall_angle, trial.start_class

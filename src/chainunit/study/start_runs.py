@@ -14,7 +14,7 @@ from .config import Config
 from .event import Event
 from .measures import STARTED, time_to_start
 from .rig import Rig, join
-from .torques import at_gear, on_coupling
+from .torques import PeakOf, at_gear, on_coupling
 
 START_ANGLES = 8
 """Number of crank angles, evenly over the turn, from which the machine is started."""
@@ -45,7 +45,9 @@ def from_angle(rig: Rig, angle: float) -> Rig:
     return replace(rig, drive=drive, fed_from=None)
 
 
-def start_from(rig: Rig, angle: float, longest: float, event: Event | None = None) -> StartNumbers:
+def start_from(
+    rig: Rig, angle: float, longest: float, event: Event | None = None, of: PeakOf = on_coupling
+) -> StartNumbers:
     """A start from the crank angle [rad], with the `event` of a start, if one is given.
 
     It is followed until the crank has its speed and a little longer, at most to the time `longest` [s]; `start_time`
@@ -67,7 +69,7 @@ def start_from(rig: Rig, angle: float, longest: float, event: Event | None = Non
     return StartNumbers(
         angle=angle,
         gear_torque=at_gear(rig.drive, run),
-        coupling_torque=on_coupling(rig.drive, run),
+        coupling_torque=of(rig.drive, run),
         start_time=reached,
     )
 
@@ -77,11 +79,14 @@ def longest_start(config: Config, start_time: float) -> float:
     return max(config.ramp_end, 3.0 * start_time) + 1.0
 
 
-def starts_from_all(rig: Rig, longest: float, events: Sequence[Event] = ()) -> list[StartNumbers]:
-    """Starts from `START_ANGLES` angles over the turn; each of the `events`, which are starts, from the angle 0."""
+def starts_from_all(
+    rig: Rig, longest: float, events: Sequence[Event] = (), of: PeakOf = on_coupling
+) -> list[StartNumbers]:
+    """Starts from `START_ANGLES` angles over the turn; each of the `events`, which are starts, from the angle 0. `of`
+    gives the torque on the coupling."""
     angles = [2.0 * math.pi * k / START_ANGLES for k in range(START_ANGLES)]
-    starts = [start_from(rig, angle, longest) for angle in angles]
-    return starts + [start_from(rig, 0.0, longest, event) for event in events]
+    starts = [start_from(rig, angle, longest, of=of) for angle in angles]
+    return starts + [start_from(rig, 0.0, longest, event, of) for event in events]
 
 
 def hardest(starts: Sequence[StartNumbers]) -> float:

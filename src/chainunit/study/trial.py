@@ -24,10 +24,12 @@ from .config import Config
 from .drive import Drive
 from .duty import Duty, rms
 from .limits import Check, heating, keeping_speed, starting
-from .measures import CREEPS, time_to_start
+from .measures import time_to_start
 from .rig import PATIENCE, Rig
 from .start_class import start_class
 from .start_runs import StartNumbers, starts_from_all
+from .torques import DutyPeak, all_feed_on, at_gear, duty_peak
+from .verdict import CREEPS, SETTLING, STEADY
 from .window import BURNT, is_settled
 
 _GAP = "motor.air_gap_tau"
@@ -38,8 +40,8 @@ _STANDS = 0.25
 @dataclass(frozen=True)
 class Trial:
     """Runs of a motor from the catalogue in a `drive`: a start, steady running, and steady running with all
-    feed on each side. The runs `shifts` are between these: in them the feed comes or moves and the motor
-    settles."""
+    feed on each side. The runs `shifts` are between these, each with its name: in them the feed comes or moves and
+    the motor settles."""
 
     config: Config
     motor: CatalogueMotor
@@ -47,7 +49,7 @@ class Trial:
     heavier: SideName | None
     start: xr.Dataset
     steady: xr.Dataset
-    shifts: tuple[xr.Dataset, ...]
+    shifts: tuple[tuple[str, xr.Dataset], ...]
     one_sided: Mapping[SideName, xr.Dataset]
     starts: Sequence[StartNumbers] = ()
     """starts from other crank angles, where the torque of the gear is limited"""
@@ -91,11 +93,11 @@ class Trial:
         return float(np.ptp(w[len(w) // 2 :])) / self.speed if self.speed > 0.0 else math.inf
 
     @cached_property
-    def duty_torque(self) -> float:
-        """Peak torque at the crank in steady running, and while the feed comes, moves to either side and
-        stays there [N m]."""
-        runs = (self.steady, *self.shifts, *self.one_sided.values())
-        return max(peak(self.drive.crank_torque(run)) for run in runs)
+    def duty(self) -> DutyPeak:
+        """The largest torque at the crank in steady running, and while the feed comes, moves to either side and stays
+        there."""
+        sides = [(all_feed_on(side), run) for side, run in self.one_sided.items()]
+        return duty_peak(self.drive, [(STEADY, self.steady), *self.shifts, *sides], at_gear)
 
     @cached_property
     def frequency(self) -> float:
@@ -227,8 +229,8 @@ class Trial:
             checks["inertia"] = Check("inertia ratio", ratio, demands.inertia_ratio, "1")
         if "gear.torque_limit" in self.config.given:
             gear = self.config.gear
-            checks["gear"] = Check("torque of the gear", self.duty_torque, gear.torque_limit, "N.m")
-            hardest = max([peak(self.drive.crank_torque(self.start)), *(s.gear_torque for s in self.starts)])
+            checks["gear"] = Check("torque of the gear", self.duty.torque, gear.torque_limit, "N.m")
+            hardest = max([at_gear(self.drive, self.start), *(s.gear_torque for s in self.starts)])
             title = "torque of the gear in a start"
             checks["gear_start"] = Check(title, hardest, gear.start_limit, "N.m")
         return checks
@@ -262,13 +264,14 @@ def try_motor(
             rig = dataclasses.replace(rig, fed_from=simulation.time)
             simulation.signals = rig.signals(ramp=True)
             window += max(1.0, config.run.settle_turns) * turn
-            shifts.append(simulation.run(window, rig.step))
+            shifts.append((SETTLING, simulation.run(window, rig.step)))
         *settling, steady = _until_settled(rig, simulation, window + 2.0 * turn)
-        shifts += settling
+        shifts += [(SETTLING, run) for run in settling]
         event = simulation.save()
         for side in duty.one_sided:
             feed = config.one_sided(side)
-            shifts.append(rig.follow(simulation, feed, event, event + feed.p.shift + turn).run)
+            shift = rig.follow(simulation, feed, event, event + feed.p.shift + turn).run
+            shifts.append((all_feed_on(side), shift))
             one_sided[side] = simulation.run(simulation.time + turn, rig.step)
     starts: list[StartNumbers] = []
     if "gear.torque_limit" in config.given and drive.chain is None:
