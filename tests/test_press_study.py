@@ -22,7 +22,7 @@ from chainunit.report.linkage_loads import loads_on_slides
 from chainunit.report.study_motion import machine_state
 from chainunit.study import config
 from chainunit.study.event_torques import effects
-from chainunit.study.protection import Effect, spares
+from chainunit.study.protection import CouplingEffect, spares
 from chainunit.study.run import run_study
 from chainunit.text import DEFAULT_UNITS
 
@@ -143,7 +143,7 @@ def test_a_coupling_opens_too_late_for_a_press(study):
     assert effect.without == pytest.approx(np.max(torque)) and np.max(until) == pytest.approx(np.max(torque))
     assert effect.with_coupling == pytest.approx(effect.without) and not spares({"surge": effect})
     # one with the whole release before the peak would spare it
-    assert spares({"surge": Effect(effect.without, setting)})
+    assert spares({"surge": CouplingEffect(effect.without, setting)})
 
 
 def test_power_over_the_turn_and_histogram(study, figures):

@@ -26,7 +26,7 @@ from chainunit.study.coupling import coupling_sentence, recommended_setting, way
 from chainunit.study.coupling_alternatives import _before_flywheel, on_motor_side, slip_run
 from chainunit.study.drive import Drive
 from chainunit.study.judgement import motor_verdict
-from chainunit.study.protection import Effect, Obstacle, Setting, Way, relay_trip, stall
+from chainunit.study.protection import CouplingEffect, Obstacle, Setting, Way, relay_trip, stall
 from chainunit.study.result import as_dict
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
@@ -121,7 +121,7 @@ def test_a_coupling_that_saves_nothing_is_not_recommended():
         (900.0, 880.0, Obstacle.RELEASE),
         (4200.0, 1100.0, Obstacle.RELEASE),
     ):
-        tried = {"jam_left": Effect(400.0, 400.0), "blocked": Effect(without, with_coupling)}
+        tried = {"jam_left": CouplingEffect(400.0, 400.0), "blocked": CouplingEffect(without, with_coupling)}
         setting = dataclasses.replace(result, effects=tried)
         assert setting.obstacle is obstacle and (setting.torque is None) == (obstacle is not None)
     assert list(setting.passed) == ["blocked"]
@@ -252,7 +252,8 @@ def test_the_sentence_on_a_coupling_names_both_shafts_and_its_effect(on_line):
     shocks, ratio = on_line.setting.overloads, on_line.drive.ratio
     own = Setting(280.0, 0.0, 3000.0, 900.0, shocks)
     spared, late = (
-        dataclasses.replace(own, effects={"blocked": Effect(1324.0, peak)}) for peak in (700.0, 1100.0)
+        dataclasses.replace(own, effects={"blocked": CouplingEffect(1324.0, peak)})
+        for peak in (700.0, 1100.0)
     )
     words = coupling_sentence(dataclasses.replace(on_line, setting=spared))
     assert f"350 N m at the crank, {350.0 / ratio:.2f} N m at the motor's shaft" in words

@@ -172,9 +172,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
 def _best(s: b.Source, path: str, word: str) -> Iterator[b.Block]:
     """The sentences on the motor of all runs and on the reason for it."""
     ratio = s.number(f"{path}.ratio", digits=4, as_given=True)
-    motor = line(s.words(f"{path}.motor"), _aside(_data(s)))
-    sentence = line(f"{word}: ", motor, ", ratio ", ratio, _aside(_gear(s, path)))
-    sentence = line(sentence, *(line("; ", each) for each in _gear_torque(s)))
+    sentence = line(f"{word}: ", s.words(f"{path}.motor"), ", ratio ", ratio, _aside(_gear(s, path)))
     why = s.result["sizing"]["protection"].get("why_none")
     for name, title, size in _sizes(s):
         if size is None and name == "flywheel":
@@ -190,6 +188,8 @@ def _best(s: b.Source, path: str, word: str) -> Iterator[b.Block]:
     doubt = s.line(" ({verdict.model.caveat})") if model is not None and model["caveat"] else ()
     begin = "Chosen: " if word == "Motor" else "Insufficient: "
     yield b.Text(line(sentence, doubt, "."), form="short")
+    if order := [line("motor of ", each) for each in _data(s)] + [*_gear_torque(s)]:
+        yield b.Text(line("Order: ", join(order, "; "), "."), form="short")
     yield b.Text(line(begin, s.words(f"{path}.reason"), doubt, "."))
 
 

@@ -13,7 +13,7 @@ from ..text import number
 from .event import Role
 from .event_torques import effects, peaks_in_events, running_peak, running_words
 from .judgement import wrong_runs
-from .protection import MARGIN, Alternative, Effect, Obstacle, Setting, Way, WayNumbers, spares
+from .protection import MARGIN, Alternative, CouplingEffect, Obstacle, Setting, Way, WayNumbers, spares
 from .ram_force import TIMES, rams
 from .record import StudyRecord
 from .sections import Coupling
@@ -185,7 +185,7 @@ def coupling_sentence(study: StudyRecord) -> str:
     return text
 
 
-def _effects(study: StudyRecord, effects: Mapping[str, Effect]) -> str:
+def _effects(study: StudyRecord, effects: Mapping[str, CouplingEffect]) -> str:
     """A list of overloads with the effects of a coupling in them, in words."""
     return ", ".join(
         f"{study.title_of(name)} ({_torque(effect.with_coupling)} at the output of the gear in place of "

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from .event import Role
-from .protection import Effect
+from .protection import CouplingEffect
 from .record import StudyRecord
 from .sections import Coupling
 from .torques import DutyPeak, PeakOf, at_gear, duty_peak, on_coupling
@@ -48,7 +48,7 @@ def running_words(study: StudyRecord, run: str) -> str:
 
 def effects(
     study: StudyRecord, setting: float, runs: Mapping[str, xr.Dataset] | None = None
-) -> dict[str, Effect]:
+) -> dict[str, CouplingEffect]:
     """The effect of a coupling with this setting [N m at the crank] in each shock that opens it, by name; it passes
     torque for the declared release time. `runs` are other runs of the shocks without a coupling, from their begin on;
     by default those of the study."""
@@ -69,5 +69,5 @@ def effects(
         until = run.sel(time=slice(None, end))
         rows = until.sizes["time"]
         last = run.isel(time=slice(rows - 1, rows + 1)).interp(time=[min(end, float(time[-1]))])
-        found[name] = Effect(at_gear(drive, run), max(at_gear(drive, until), at_gear(drive, last)))
+        found[name] = CouplingEffect(at_gear(drive, run), max(at_gear(drive, until), at_gear(drive, last)))
     return found

@@ -85,7 +85,7 @@ _SPARED = 0.05
 
 
 @dataclass(frozen=True)
-class Effect:
+class CouplingEffect:
     """The effect of a safety coupling in an overload: the largest torque at the output of the gear [N m] without it,
     and with it until no torque passes it any more."""
 
@@ -93,7 +93,7 @@ class Effect:
     with_coupling: float
 
 
-def spares(effects: Mapping[str, Effect]) -> bool:
+def spares(effects: Mapping[str, CouplingEffect]) -> bool:
     """Whether a coupling spares the gear a part of its torque in one of the overloads."""
     return any(effect.with_coupling < (1.0 - _SPARED) * effect.without for effect in effects.values())
 
@@ -116,7 +116,7 @@ class Setting:
     gear: float
     overloads: Mapping[str, float]
     disturbances: Mapping[str, float] = field(default_factory=dict)
-    effects: Mapping[str, Effect] = field(default_factory=dict)
+    effects: Mapping[str, CouplingEffect] = field(default_factory=dict)
     """the effect of the least setting in each overload that opens it; empty until it was tried"""
     wrong: Sequence[str] = ()
     """runs that were left out, as their energy balance is not kept; without steady running there are no overloads"""
@@ -163,7 +163,7 @@ class Setting:
         return Obstacle.MOTOR if weak else Obstacle.OVERLOADS
 
     @property
-    def passed(self) -> dict[str, Effect]:
+    def passed(self) -> dict[str, CouplingEffect]:
         """The overloads in which the gear carries more than it may, though the coupling opens."""
         return {name: effect for name, effect in self.effects.items() if effect.with_coupling > self.gear}
 
@@ -233,7 +233,7 @@ class Alternative:
     way: Way
     numbers: WayNumbers
     opens: Mapping[str, float]
-    effects: Mapping[str, Effect] = field(default_factory=dict)
+    effects: Mapping[str, CouplingEffect] = field(default_factory=dict)
 
 
 def stall(time: Any, speed: Any, requested: float, share: float = 0.1) -> float | None:

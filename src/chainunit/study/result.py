@@ -14,7 +14,7 @@ from .event_torques import running_peak, running_words
 from .given import given_sections
 from .judgement import motor_verdict
 from .measures import measures_of
-from .protection import Effect
+from .protection import CouplingEffect
 from .record import StudyRecord
 from .starts import LARGE, StartAnalysis
 from .torques import at_gear
@@ -257,7 +257,7 @@ def _protection(study: StudyRecord) -> dict[str, Any]:
     }
 
 
-def _effects(study: StudyRecord, effects: Mapping[str, Effect]) -> dict[str, Any]:
+def _effects(study: StudyRecord, effects: Mapping[str, CouplingEffect]) -> dict[str, Any]:
     """The effects of a safety coupling as it was tried, by overload."""
     titles = {"without": "without a coupling", "with_coupling": "with it"}
     return {
