@@ -13,6 +13,7 @@ from .given import given_sections
 from .judgement import motor_verdict
 from .measures import measures_of
 from .record import StudyRecord
+from .relay import class_words
 from .window import Phase
 
 
@@ -181,17 +182,17 @@ def _protection(study: StudyRecord) -> dict[str, Any]:
     if study.insufficient:
         return {}
     current = study.sizing.best.motor.nameplate.rated_current
-    relay = entry(current, "A") | {"title": "thermal relay, setting"}
+    relay = _relay(study, current)
     setting = study.setting
     if setting is None:
-        return {"relay_current": relay}
+        return relay
 
     def torque(value: float | None, title: str) -> dict[str, Any]:
         return entry(value, "N.m") | {"title": title}
 
     return {
         "trip_torque": torque(setting.torque, "safety coupling, trip torque at the crank"),
-        "relay_current": relay,
+        **relay,
         "coupling": coupling_sentence(study),
         "obstacle": setting.obstacle,
         "normal_torque": torque(
@@ -222,6 +223,20 @@ def _protection(study: StudyRecord) -> dict[str, Any]:
             }
             for each in study.alternatives
         ],
+    }
+
+
+def _relay(study: StudyRecord, rated: float) -> dict[str, Any]:
+    """The device that protects the motor from heat, its setting, and its trip class, which that of an inverter does
+    not need."""
+    if study.drive.follows:
+        device = "electronic motor protection of the inverter"
+        return {"relay_current": entry(rated, "A") | {"title": f"{device}, setting"}, "device": device}
+    words = class_words(study.relay_class)
+    return {
+        "relay_current": entry(rated, "A") | {"title": "thermal relay, setting"},
+        "relay_class": {"value": words, "unit": "1", "title": "thermal relay, trip class of IEC 60947-4-1"},
+        "device": "relay",
     }
 
 
