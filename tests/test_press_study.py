@@ -99,6 +99,15 @@ def test_the_page_of_a_press_does_not_speak_of_a_chain_unit(page):
     assert "chain unit" not in visible and "rocker" not in visible
 
 
+def test_a_title_in_a_sentence_stands_in_quotes(page):
+    """The question has no capital letter in its middle: a linkage has a title in place of a noun."""
+    assert "this Slider" not in page
+    assert (
+        "motor of the machine &quot;Slider-crank press" in page
+        or 'motor of the machine "Slider-crank press' in page
+    )
+
+
 def test_the_answer_comes_first(page):
     main = page[page.index("<main>") :]
     headings = re.findall(r'<h2 id="(\w+)-title">', main)

@@ -26,12 +26,14 @@ from chainunit.study.coupling import coupling_sentence, recommended_setting, way
 from chainunit.study.coupling_alternatives import _before_flywheel, on_motor_side, slip_run
 from chainunit.study.drive import Drive
 from chainunit.study.judgement import motor_verdict
-from chainunit.study.protection import CouplingEffect, Obstacle, Setting, Way, relay_trip, stall
+from chainunit.study.protection import CouplingEffect, Obstacle, Setting, Way, stall
+from chainunit.study.relay import CLASSES, MULTIPLE, relay_trip, start_class
 from chainunit.study.result import as_dict
 from chainunit.study.rig import Rig
-from chainunit.study.run import run_study
+from chainunit.study.run import _with_class_of_all_starts, run_study
 from chainunit.study.sections import Coupling
 from chainunit.study.start_runs import from_angle
+from chainunit.study.window import Phase
 from chainunit.system import ModelComponent, System, monolithic
 from chainunit.text import entry
 
@@ -46,6 +48,41 @@ def test_a_relay_of_class_10_trips_when_its_class_says():
     # what has run before leaves it warm: sooner
     warm = relay_trip(time, np.full(1201, 36.0), 5.0, 5.0, 36.0)
     assert warm is not None and warm < 5.0
+
+
+@pytest.mark.parametrize("trip_class", CLASSES, ids=lambda each: each.name)
+def test_a_relay_trips_within_the_times_of_its_class(trip_class):
+    """IEC 60947-4-1: from cold, at 7.2 times its setting; by the closed form of a first-order image."""
+    seconds = int(trip_class.name.removesuffix("A"))
+    assert (trip_class.shortest < seconds == trip_class.longest) and MULTIPLE == 7.2
+    time = np.linspace(0.0, 60.0, 6001)
+    trips = relay_trip(time, np.full(6001, 36.0), 5.0, 0.0, 36.0, seconds)
+    assert trip_class.shortest < trips == pytest.approx(trip_class.longest, abs=0.011)
+    # the class of a start whose heat is just that of the shortest time holds
+    hold = np.linspace(0.0, trip_class.shortest, 101)
+    assert start_class(hold, np.full(101, 36.0), 5.0) == max(seconds, 10)
+
+
+def test_the_relay_that_is_ordered_is_simulated(on_line):
+    """A start from another angle takes a heavier class: then its trips in the events are those of that class."""
+    study = dataclasses.replace(on_line, answers=dict(on_line.answers), findings=dict(on_line.findings))
+    light = {name: study.answers[name].thermal_trip_time for name in study.overloads}
+    tripped = [name for name, time in light.items() if time is not None]
+    assert tripped and study.relay_class == 10
+    heavy = [dataclasses.replace(s, start_class=30) for s in study.findings["starts"].starts]
+    study.findings["starts"] = dataclasses.replace(study.findings["starts"], starts=tuple(heavy))
+    _with_class_of_all_starts(study)
+    assert study.relay_class == 30
+    for name in tripped:
+        after = study.runs[name].sel(time=slice(study.event[name], None))
+        since, current = after["time"].values - study.event[name], after["motor.i"].values
+        lasts = float(np.sqrt(np.mean(current[-max(1, len(current) // 5) :] ** 2)))
+        before = study.window(Phase.STEADY, study.steady).rms("motor.i")
+        by_hand = relay_trip(since, current, study.drive.rated_current, before, lasts, 30)
+        later = study.answers[name].thermal_trip_time
+        assert later == by_hand and (later is None or later > light[name])
+    protection = as_dict(study)["sizing"]["protection"]
+    assert protection["relay_class"]["value"] == "class 30"
 
 
 def test_a_stall_is_the_time_from_which_it_stands():
@@ -314,7 +351,11 @@ def test_a_higher_setting_and_a_dip_that_opens_it(on_line, tmp_path, monkeypatch
     (nuisance,) = [warning for warning in trials.warnings if warning.kind == "nuisance trip"]
     assert "nuisance trip that protects nothing: the voltage dips." in nuisance.text
     assert nuisance.runs == ("dip",)
-    assert trials.setting is None and set(as_dict(trials)["sizing"]["protection"]) == {"relay_current"}
+    assert trials.setting is None and set(as_dict(trials)["sizing"]["protection"]) == {
+        "relay_current",
+        "relay_class",
+        "device",
+    }
     for name, peak in on_line.spreads["blocked"].peaks.items():
         # another start leaves another steady turn
         assert trials.spreads["blocked"].peaks[name] == pytest.approx(peak, rel=0.02), name

@@ -407,8 +407,11 @@ def test_a_long_soft_start_is_waited_for(tmp_path):
     config = dataclasses.replace(
         config, start="soft", starter=dataclasses.replace(config.starter, soft_start=soft)
     )
-    (c,) = sizing.size(config, tmp_path, lambda *said: None).candidates
+    c, *weak = sizing.size(config, tmp_path, lambda *said: None).candidates
+    assert c.verdict is Standing.CHOSEN and c.worst_start
     assert c.checks["start"].value is not None and c.checks["crank_speed"].utilisation < 1.0
+    # from the worst angle the smaller ones take longer, or do not start at all
+    assert all(each.power < c.power and each.worst_start for each in weak)
 
 
 def test_ctrl_c_ends_sizing(tmp_path, monkeypatch):
@@ -448,6 +451,8 @@ def test_above_the_corner_an_inverter_has_less_torque(tmp_path, monkeypatch):
     """Twice the rated frequency: the breakdown torque of the check is a quarter, roughly, of that at 50 Hz."""
     monkeypatch.setattr(sizing, "catalogue", lambda extra: small(1))
     config = dataclasses.replace(one_candidate("[gear]\nratio = 104\n", fluctuation=0.9), start="inverter")
+    # with a shorter ramp the start from the worst angle takes too long
+    config = dataclasses.replace(config, run=dataclasses.replace(config.run, ramp=3.0))
     (c,) = sizing.size(config, tmp_path, lambda *said: None).candidates
     at_50_hz = float(breakdown(c.drive.parameters, T=config.sizing.temperature).air_gap_tau)
     breakdown_torque = c.checks["peak_torque"].limit * config.sizing.breakdown_margin
@@ -455,7 +460,7 @@ def test_above_the_corner_an_inverter_has_less_torque(tmp_path, monkeypatch):
     rated = c.motor.nameplate.torque
     assert c.checks["rms_torque"].limit == pytest.approx(0.5 * rated, rel=0.1)
     # all feed on the right asks more than it has left, all on the left does not: a flywheel evens that
-    assert c.verdict is Standing.CHOSEN and c.drive.flywheel > 0.0 and 0.9 < c.sizes["peak_torque"] <= 1.0
+    assert c.verdict is Standing.CHOSEN and c.drive.flywheel > 0.0 and 0.89 < c.sizes["peak_torque"] <= 1.0
     monkeypatch.setattr(sizing, "torque_evening_inertia", lambda *of: 0.0)
     (light,) = sizing.size(config, tmp_path, lambda *said: None).candidates
     assert light.verdict is Standing.INSUFFICIENT and "peak torque" in light.reason

@@ -106,10 +106,14 @@ def _protection(s: b.Source) -> Iterator[Line]:
 
 
 def _relay(s: b.Source) -> Iterator[Line]:
-    """The setting of the relay, where it is not the leading number of the protection."""
+    """The setting and the class of the relay, where it is not the leading number of the protection."""
     protection = s.result["sizing"].get("protection", {})
     if "relay_current" in protection and _leading(protection) != "relay_current":
-        yield s.line("relay at {sizing.protection.relay_current}")
+        trip_class = protection.get("relay_class")
+        more = (", ", s.words("sizing.protection.relay_class.value")) if trip_class else ()
+        yield line(
+            s.line(f"{protection.get('device', 'relay')} at {{sizing.protection.relay_current}}"), *more
+        )
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:

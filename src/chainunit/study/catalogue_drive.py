@@ -40,16 +40,16 @@ def catalogue_drive(
     InputError
         where no circuit meets the motor's nameplate.
     """
-    gear, plate, w = config.gear, motor.nameplate, config.run.crank_speed
+    plate, w = motor.nameplate, config.run.crank_speed
     model, p = motor.model()
     synchronous, rated_speed, rated_torque = plate.synchronous, plate.speed, plate.torque
     follows = config.start == "inverter"
     if gear_ratio is None and "gear.ratio" in config.given:
-        gear_ratio = gear.ratio
+        gear_ratio = config.gear.ratio
     ratio = rated_speed / w if gear_ratio is None else gear_ratio
-    speed, drag = rated_speed, gear.d
+    speed, drag = rated_speed, config.gear.d
     for _ in range(3):
-        shaft = motor_side(numpy_(), dataclasses.replace(gear, ratio=ratio), crank_torque, speed)
+        shaft = motor_side(numpy_(), config.gear_with(ratio), crank_torque, speed)
         mean = float(np.mean(shaft))
         # the slip is proportional to the torque; an inverter compensates it
         speed = rated_speed if follows else synchronous - (synchronous - rated_speed) * mean / rated_torque
@@ -67,7 +67,7 @@ def catalogue_drive(
         follows,
         rated_current=plate.rated_current,
         chain=config.chain,
-        gear_inertia=gear.J,
+        gear_inertia=config.gear.J,
         gear_friction=drag,
     )
 

@@ -60,6 +60,21 @@ def _drive_of_file(config: Config) -> Drive:
     return replace(drive, feed_forward=config.feed_forward, flywheel=flywheel)
 
 
+def as_chosen(config: Config, drive: Drive) -> Config:
+    """The study with the values that follow from the drive with a motor of the catalogue: the efficiency of the gear
+    by its stages, and the boost of the inverter."""
+    if not config.of_catalogue:
+        return config
+    boost = drive.parameters.inverter.boost
+    inverter = replace(config.starter.inverter, boost=boost) if drive.follows else config.starter.inverter
+    efficiency = config.gear_with(drive.ratio).efficiency
+    return replace(
+        config,
+        gear=replace(config.gear, efficiency=efficiency),
+        starter=replace(config.starter, inverter=inverter),
+    )
+
+
 def check_files(config: Config) -> None:
     """Refuse a file that the study names but cannot use.
 

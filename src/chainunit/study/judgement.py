@@ -14,6 +14,8 @@ from .organs import OrganAnalysis
 from .quantiles import runs_needed
 from .record import StudyRecord
 from .rig import worst_residual
+from .start_runs import longest_of
+from .starts import StartAnalysis
 from .verdict import RESIDUAL, STEADY, Holds, Verdict, shown_speed
 
 
@@ -77,9 +79,12 @@ def motor_limits(study: StudyRecord) -> dict[str, Check]:
     steady, start = study.answers.get(STEADY), study.start
     if steady is None or start is None:
         return {}
-    return given_motor(
-        study.config, study.drive, steady.winding_temperature, steady.current_rms, start.start_time
-    )
+    time, found = start.start_time, study.findings.get(StartAnalysis.name)
+    if found is not None:
+        # the worst crank angle counts
+        others = longest_of(found.starts)
+        time = None if others is None or time is None else max(time, others)
+    return given_motor(study.config, study.drive, steady.winding_temperature, steady.current_rms, time)
 
 
 _EXCESSES = {

@@ -1,9 +1,7 @@
-"""The protection of a drive by thermal relay and safety coupling, and the stall from which they protect
-it."""
+"""The protection of a drive by a safety coupling, and the stall from which it protects."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -12,48 +10,6 @@ from typing import Any
 import numpy as np
 
 from ..quantities import Value, declaration, quantity, variables
-
-TRIP_CLASS = 10.0
-"""Time in which a relay of this class trips at 7.2 times its setting, from cold [s] (IEC 60947-4-1)."""
-_PICK_UP = 1.1  # middle of the range 1.05 .. 1.2 in which such a relay has to trip
-
-
-def relay_time_constant(trip_class: float = TRIP_CLASS) -> float:
-    """Time constant [s] of a thermal image that trips after `trip_class` seconds at 7.2 times the setting."""
-    heating = 7.2**2
-    return trip_class / math.log(heating / (heating - _PICK_UP**2))
-
-
-def relay_image(time: Any, current: Any, setting: float, before: float) -> Any:
-    """Thermal image of a relay, set to `setting` [A], over `time` [s] with `current` [A], shape (n,); it
-    trips at 1.
-
-    The image is of first order in the square of the current; `before` is the RMS current before the run [A].
-    """
-    tau = relay_time_constant()
-    heating = (np.asarray(current) / (setting * _PICK_UP)) ** 2
-    image = np.empty(len(heating))
-    image[0] = (before / (setting * _PICK_UP)) ** 2
-    step = np.diff(np.asarray(time))
-    decay = np.exp(-step / tau)
-    middle = 0.5 * (heating[1:] + heating[:-1])
-    for k in range(len(step)):
-        image[k + 1] = middle[k] + (image[k] - middle[k]) * decay[k]
-    return image
-
-
-def relay_trip(time: Any, current: Any, setting: float, before: float, holds: float) -> float | None:
-    """Time at which the relay trips [s], also after the run, with the lasting current `holds` [A]; None where
-    it never trips."""
-    image = relay_image(time, current, setting, before)
-    over = np.flatnonzero(image >= 1.0)
-    if over.size:
-        return float(time[over[0]])
-    final = (holds / (setting * _PICK_UP)) ** 2
-    if final <= 1.0:
-        return None
-    return float(time[-1]) + relay_time_constant() * math.log((final - image[-1]) / (final - 1.0))
-
 
 MARGIN = 1.25
 """Ratio of the setting of a safety coupling to the largest torque of normal duty."""

@@ -16,6 +16,7 @@ from .judgement import motor_verdict
 from .measures import measures_of
 from .protection import CouplingEffect
 from .record import StudyRecord
+from .relay import class_words
 from .starts import LARGE, StartAnalysis
 from .torques import at_gear
 from .verdict import STEADY
@@ -206,10 +207,10 @@ def _protection(study: StudyRecord) -> dict[str, Any]:
     if study.insufficient:
         return {}
     current = study.sizing.best.motor.nameplate.rated_current
-    relay = entry(current, "A") | {"title": "thermal relay, setting"}
+    relay = _relay(study, current)
     setting = study.setting
     if setting is None:
-        return {"relay_current": relay}
+        return relay
 
     def torque(value: float | None, title: str) -> dict[str, Any]:
         return entry(value, "N.m") | {"title": title}
@@ -220,7 +221,7 @@ def _protection(study: StudyRecord) -> dict[str, Any]:
             setting.torque and setting.torque / study.drive.ratio,
             "safety coupling, trip torque at the motor's shaft",
         ),
-        "relay_current": relay,
+        **relay,
         "coupling": coupling_sentence(study),
         "obstacle": setting.obstacle,
         "why_none": why_none(study),
@@ -267,6 +268,20 @@ def _effects(study: StudyRecord, effects: Mapping[str, CouplingEffect]) -> dict[
             for key, words in titles.items()
         }
         for name, effect in effects.items()
+    }
+
+
+def _relay(study: StudyRecord, rated: float) -> dict[str, Any]:
+    """The device that protects the motor from heat, its setting, and its trip class, which that of an inverter does
+    not need."""
+    if study.drive.follows:
+        device = "electronic motor protection of the inverter"
+        return {"relay_current": entry(rated, "A") | {"title": f"{device}, setting"}, "device": device}
+    words = class_words(study.relay_class)
+    return {
+        "relay_current": entry(rated, "A") | {"title": "thermal relay, setting"},
+        "relay_class": {"value": words, "unit": "1", "title": "thermal relay, trip class of IEC 60947-4-1"},
+        "device": "relay",
     }
 
 

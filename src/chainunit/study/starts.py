@@ -38,6 +38,11 @@ class StartFindings(Findings):
         return max(self.starts, key=lambda start: start.gear_torque)
 
     @property
+    def start_class(self) -> int:
+        """Trip class of the relay that holds in every start that reaches its speed; 0 for an inverter."""
+        return int(max((start.start_class or 0 for start in self.starts), default=0))
+
+    @property
     def stuck(self) -> list[StartNumbers]:
         """The starts in which the crank does not come to its speed."""
         return [start for start in self.starts if start.start_time is None]

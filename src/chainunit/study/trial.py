@@ -25,9 +25,9 @@ from .drive import Drive
 from .duty import Duty, rms
 from .limits import Check, heating, keeping_speed, starting
 from .measures import time_to_start
+from .relay import start_class
 from .rig import PATIENCE, Rig
-from .start_class import start_class
-from .start_runs import StartNumbers, starts_from_all
+from .start_runs import StartNumbers, longest_of, longest_start, starts_from_all
 from .torques import DutyPeak, all_feed_on, at_gear, duty_peak
 from .verdict import CREEPS, SETTLING, STEADY
 from .window import BURNT, is_settled
@@ -52,11 +52,19 @@ class Trial:
     shifts: tuple[tuple[str, xr.Dataset], ...]
     one_sided: Mapping[SideName, xr.Dataset]
     starts: Sequence[StartNumbers] = ()
-    """starts from other crank angles, where the torque of the gear is limited"""
+    """starts from all crank angles; none where the start from the angle 0 stands for them"""
 
     @cached_property
     def start_time(self) -> float | None:
-        """Time to start [s]; None where the motor does not bring the machine up to speed."""
+        """Longest time to start [s]; None where the motor does not bring the machine up to speed."""
+        if self._first is None or not self.starts:
+            return self._first
+        others = longest_of(self.starts)
+        return None if others is None else max(self._first, others)
+
+    @cached_property
+    def _first(self) -> float | None:
+        """Time of the start from the angle 0 [s]; None where it fails."""
         runs = (self.start, self.steady)
         speed, time = (np.concatenate([run[name].values for run in runs]) for name in ("motor.w", "time"))
         requested = self.config.run.crank_speed * self.drive.ratio
@@ -72,14 +80,25 @@ class Trial:
 
     @cached_property
     def start_class(self) -> int | None:
-        """Trip class of the relay that holds in the start; None for an inverter, or without a start."""
-        if self.start_time is None or self.drive.follows:
+        """Trip class of the relay that holds in each start; None for an inverter, or without a start."""
+        if self._first is None or self.start_time is None or self.drive.follows:
             return None
         runs = (self.start, self.steady)
         names = ("time", f"motor.{self.drive.motor.current}")
         time, current = (np.concatenate([run[name].values for run in runs]) for name in names)
-        starting = time <= self.start_time
-        return start_class(time[starting], current[starting], self.motor.nameplate.rated_current)
+        starting = time <= self._first
+        first = start_class(time[starting], current[starting], self.motor.nameplate.rated_current)
+        return max(first, *(start.start_class for start in self.starts), 0)
+
+    def _peak_current(self, *runs: xr.Dataset) -> float:
+        return max(peak(run[f"motor.{self.drive.motor.current}"].values) for run in runs)
+
+    @cached_property
+    def start_current(self) -> float | None:
+        """Largest current in a start [A]; None without a start."""
+        if self.start_time is None:
+            return None
+        return max([self._peak_current(self.start), *(start.current for start in self.starts)])
 
     @cached_property
     def speed(self) -> float:
@@ -103,7 +122,7 @@ class Trial:
     def frequency(self) -> float:
         """Frequency of the supply in steady running [Hz]; the rated one for a motor that does not start."""
         plate = self.motor.nameplate
-        if not self.drive.follows or self.start_time is None:
+        if not self.drive.follows or self._first is None:
             return plate.frequency
         return max(self.speed * plate.poles / (4.0 * math.pi), 1.0)
 
@@ -157,13 +176,15 @@ class Trial:
 
     @cached_property
     def _heat(self) -> tuple[float, float]:
-        """Heat of the duty [W], and the additional heat of a start [J] beyond that of the running which
+        """Heat of the duty [W], and the additional heat of the worst start [J] beyond that of the running which
         follows it: of the duty or, for a machine that starts empty, of a turn without feed."""
         steady = after = sum(share * float(np.mean(run["motor.heat"])) for share, run in self._cases)
         time, heat = self.start["time"].values, self.start["motor.heat"].values
         if self.config.empty_start:
             after = float(np.mean(heat[time >= time[-1] - self.config.turn]))
-        return steady, max(0.0, float(np.trapezoid(heat - after, time)))
+        extra = [float(np.trapezoid(heat - after, time))]
+        extra += [start.heat - after * start.followed for start in self.starts]
+        return steady, max(0.0, *extra)
 
     @property
     def _cases(self) -> list[tuple[float, xr.Dataset]]:
@@ -227,6 +248,12 @@ class Trial:
             inertia = float(np.max(self.drive.load_inertia(self.steady)))
             ratio = (inertia + p.rotor.J - plate.J) / plate.J
             checks["inertia"] = Check("inertia ratio", ratio, demands.inertia_ratio, "1")
+        if self.drive.follows:
+            most = self.config.starter.overload * plate.rated_current
+            current = self._peak_current(
+                self.steady, *(run for _, run in self.shifts), *self.one_sided.values()
+            )
+            checks["inverter_current"] = check("peak current of the inverter", current, most, "A")
         if "gear.torque_limit" in self.config.given:
             gear = self.config.gear
             checks["gear"] = Check("torque of the gear", self.duty.torque, gear.torque_limit, "N.m")
@@ -237,9 +264,16 @@ class Trial:
 
 
 def try_motor(
-    config: Config, motor: CatalogueMotor, drive: Drive, duty: Duty, files: Mapping[str, Path] | None
+    config: Config,
+    motor: CatalogueMotor,
+    drive: Drive,
+    duty: Duty,
+    files: Mapping[str, Path] | None,
+    *,
+    worst_start: bool = False,
 ) -> Trial:
-    """Simulate a motor in its drive, by the FMU `files`, or without them on the compiled system.
+    """Simulate a motor in its drive, by the FMU `files`, or without them on the compiled system. With `worst_start`
+    it starts from all crank angles, too, if its organs are no chains.
 
     Raises
     ------
@@ -273,10 +307,10 @@ def try_motor(
             shift = rig.follow(simulation, feed, event, event + feed.p.shift + turn).run
             shifts.append((all_feed_on(side), shift))
             one_sided[side] = simulation.run(simulation.time + turn, rig.step)
-    starts: list[StartNumbers] = []
-    if "gear.torque_limit" in config.given and drive.chain is None:
-        starts = starts_from_all(rig, window)
-    return Trial(config, motor, drive, duty.heavier, start, steady, tuple(shifts), one_sided, starts)
+    trial = Trial(config, motor, drive, duty.heavier, start, steady, tuple(shifts), one_sided)
+    if not worst_start or drive.chain is not None or trial.start_time is None:
+        return trial
+    return dataclasses.replace(trial, starts=starts_from_all(rig, longest_start(config, trial.start_time)))
 
 
 def _until_settled(rig: Rig, simulation: Simulation, stop: float) -> list[xr.Dataset]:
