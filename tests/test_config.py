@@ -225,7 +225,8 @@ def test_a_refused_crank_is_refused_at_its_own_line():
 
 
 def test_a_sought_number_outside_its_bounds_is_refused_with_them():
-    text = "[[identify.parameter]]\nname = 'machine.left.web_mass'\nfrom = '40 kg'\nto = '50 kg'\ndeviation = '3 kg'\n"
+    name = "[[identify.parameter]]\nname = 'machine.left.web_mass'\n"
+    text = f"{name}from = '40 kg'\nto = '50 kg'\ndeviation = '3 kg'\n"
     with pytest.raises(InputError, match=r"21\.6 kg, must lie between from and to, here from 40 to 50 kg"):
         parse(text)
 

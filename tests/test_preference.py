@@ -23,6 +23,7 @@ from chainunit.drives.gear_ratios import (
 )
 from chainunit.study import sizing
 from chainunit.study.candidate import Candidate, Criterion, Standing
+from chainunit.study.catalogue_drive import gear_with
 from chainunit.study.choice import as_chosen
 from chainunit.study.config import parse
 from chainunit.study.duty import duty_of
@@ -295,11 +296,11 @@ def test_a_file_chooses_the_ratios():
 
 def test_the_kind_of_gear_has_its_efficiency_and_its_unit():
     config, c = proposed('[sizing]\ngear_kind = "worm"\n')
-    assert config.gear_with(c.drive.ratio).efficiency == 0.7 and c.unit.title == "worm gear"
+    assert gear_with(config, c.drive.ratio).efficiency == 0.7 and c.unit.title == "worm gear"
     config, _ = proposed('[sizing]\ngear_kind = "worm"\n[gear]\nefficiency = "80 %"\n')
-    assert config.gear_with(50.0).efficiency == 0.8
+    assert gear_with(config, 50.0).efficiency == 0.8
     config, c = proposed("[sizing]\n")
-    assert config.gear_with(c.drive.ratio).efficiency == pytest.approx(0.98**3)
+    assert gear_with(config, c.drive.ratio).efficiency == pytest.approx(0.98**3)
     assert c.unit.title == "three-stage helical gear"
 
 

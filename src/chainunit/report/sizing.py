@@ -109,11 +109,14 @@ def _relay(s: b.Source) -> Iterator[Line]:
     """The setting and the class of the relay, where it is not the leading number of the protection."""
     protection = s.result["sizing"].get("protection", {})
     if "relay_current" in protection and _leading(protection) != "relay_current":
-        trip_class = protection.get("relay_class")
-        more = (", ", s.words("sizing.protection.relay_class.value")) if trip_class else ()
-        yield line(
-            s.line(f"{protection.get('device', 'relay')} at {{sizing.protection.relay_current}}"), *more
-        )
+        setting = s.line(f"{protection.get('device', 'relay')} at {{sizing.protection.relay_current}}")
+        yield line(setting, _class(s))
+
+
+def _class(s: b.Source) -> Line:
+    """The trip class of the relay, to follow its setting; empty for the motor protection of an inverter."""
+    protection = s.result["sizing"].get("protection", {})
+    return line(", ", s.words("sizing.protection.relay_class.value")) if "relay_class" in protection else ()
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
@@ -186,7 +189,9 @@ def _best(s: b.Source, path: str, word: str) -> Iterator[b.Block]:
                 "; no safety coupling", Aside(s.words("sizing.protection.why_none")) if why else ()
             )
         else:
-            sentence += line(f"; {title} ", size, _aside(_disc(s)) if name == "flywheel" else ())
+            is_relay = name == "protection" and _leading(s.result["sizing"][name]) == "relay_current"
+            more = _aside(_disc(s)) if name == "flywheel" else _class(s) if is_relay else ()
+            sentence += line(f"; {title} ", size, more)
     sentence = line(sentence, *(line("; ", relay) for relay in _relay(s)))
     model = s.result["verdict"]["model"]
     doubt = s.line(" ({verdict.model.caveat})") if model is not None and model["caveat"] else ()

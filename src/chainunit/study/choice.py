@@ -19,7 +19,7 @@ from ..fmu.backends import Backend
 from ..progress import Report
 from ..quantities import Layout
 from ..system import foreign_component
-from .catalogue_drive import catalogue_drive
+from .catalogue_drive import catalogue_drive, gear_with
 from .config import Config
 from .cycle import cycle
 from .drive import Drive
@@ -67,7 +67,7 @@ def as_chosen(config: Config, drive: Drive) -> Config:
         return config
     boost = drive.parameters.inverter.boost
     inverter = replace(config.starter.inverter, boost=boost) if drive.follows else config.starter.inverter
-    efficiency = config.gear_with(drive.ratio).efficiency
+    efficiency = gear_with(config, drive.ratio).efficiency
     return replace(
         config,
         gear=replace(config.gear, efficiency=efficiency),

@@ -10,7 +10,6 @@ from typing import Any
 
 from ..drives.cardan import check
 from ..drives.catalogue import CatalogueMotor
-from ..drives.gear_ratios import typical_efficiency
 from ..drives.gearing import Transmission
 from ..drives.motor import Motor
 from ..errors import Faults, GeometryError, InputError, each_refusal, refusal_prefix
@@ -166,13 +165,6 @@ class Config:
     def of_catalogue(self) -> bool:
         """Whether the motor is one of the catalogue."""
         return self.plate is not None or self.sizing is not None
-
-    def gear_with(self, ratio: float) -> Transmission:
-        """The gear with that ratio; its efficiency is the typical one of its kind and stages, unless the file gives
-        one."""
-        typical = typical_efficiency(self.choices["sizing.gear_kind"], ratio)
-        efficiency = self.gear.efficiency if "gear.efficiency" in self.given else typical
-        return dataclasses.replace(self.gear, ratio=ratio, efficiency=efficiency)
 
     def gives(self, section: str) -> bool:
         """Whether the file sets anything in that table."""

@@ -67,7 +67,7 @@ def inverter_needs(best: Candidate, config: Config) -> Iterator[str]:
             yield (
                 f"{text}, and the start takes {number(best.start_current, 'A')}, {best.start_current / rated:.2g} "
                 f"times the rated current of the motor: order one of at least {number(best.inverter_current, 'A')}, "
-                "or lengthen run.ramp. The model of the inverter limits no current."
+                "or lengthen run.ramp."
             )
     yield (
         "The electronic motor protection of the inverter stands in place of a thermal relay: set it to the rated "
