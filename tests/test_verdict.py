@@ -15,6 +15,7 @@ from chainunit.study.verdict import (
     ROCKER_GOOD_EMPTY,
     chains,
     outsider,
+    rigid_links,
     two_bars,
 )
 
@@ -147,6 +148,13 @@ def test_an_energy_balance_that_is_not_kept():
         for share in (RESIDUAL, math.nan):
             verdict = bars(residuals=KEPT | {run: share})
             assert verdict.holds == holds and [r.topic for r in verdict.reasons] == ["energy"]
+
+
+def test_a_shorter_step_is_no_advice_for_a_crank_that_stalls():
+    """It moves hardly any energy, so that the residual over the energy moved says nothing of the step."""
+    turning, stalled = (rigid_links(3.0, {"steady": 0.1}, actual=speed) for speed in (2.9, 0.05))
+    assert "shorten run.step" in turning.text and "shorten run.step" not in stalled.text
+    assert stalled.holds == "false" and "the energy balance is not kept" in stalled.text
 
 
 def test_of_a_machine_that_is_not_known_only_the_energy_balance_is_judged():

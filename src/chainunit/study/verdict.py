@@ -177,6 +177,11 @@ class Verdict:
         return self._turns != self._judged_speed
 
     @property
+    def _stalls(self) -> bool:
+        """Whether the crank hardly turns."""
+        return self.actual is not None and abs(self.actual) < CREEPS * self.speed
+
+    @property
     def caveat(self) -> str:
         """Words to add to results of a model that does not hold; empty where it holds, or holds in part."""
         if self.holds != "false":
@@ -203,7 +208,8 @@ class Verdict:
             runs = {reason.run for reason in self.reasons if reason.topic == topic}
             if runs:
                 why.append(short + _where(runs))
-                remedies.append(remedy)
+                # a crank that hardly turns moves no energy that a residual could be compared with
+                remedies.append("" if topic == "energy" and self._stalls else remedy)
         # a remedy for several faults is named once
         return "; ".join((line, *why, *dict.fromkeys(filter(None, remedies)))) + "."
 
@@ -255,8 +261,10 @@ class Verdict:
         }
 
 
+CREEPS = 0.5
+"""Share of the requested speed below which a machine counts as standing."""
 _STANDS = 1e-3
-"""Share of the requested speed below which a crank stands."""
+"""Share of the requested speed below which a speed is shown as 0."""
 
 
 def shown_speed(speed: float, requested: float) -> float:
