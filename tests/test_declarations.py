@@ -17,11 +17,13 @@ NAMES = Path(__file__).parent / "data" / "variables.json"
 
 
 def variables_of(model):
-    """The variables of the model's FMU by causality, in their order, each with its unit."""
+    """The variables of the model's FMU by causality, in their order, each with its unit, or its type if it is no
+    Real."""
     root = model_description(Interface(model, {}), "", {"ModelExchange": {}}, "0")
     results: dict[str, list[str]] = {}
     for variable in root.iter("ScalarVariable"):
-        unit = variable.find("Real").get("unit")
+        (own,) = variable
+        unit = own.get("unit") if own.tag == "Real" else own.tag
         words = variable.get("name") if unit is None else f"{variable.get('name')} [{unit}]"
         results.setdefault(variable.get("causality"), []).append(words)
     return results

@@ -19,7 +19,7 @@ from ..drives.motors import MOTORS
 from ..drives.shafts import SECTIONS as PROFILES
 from ..drives.shafts import Shaft
 from ..models import MACHINES
-from ..quantities import Layout, Variable, variables
+from ..quantities import Layout, Variable, variables, written
 from ..text import CHOICES as UNITS
 from ..units import shortest_text
 from .config import Config, parse
@@ -191,6 +191,8 @@ def _numbers(
     for v in variables(declared):
         value = known.get(v.name, v.quantity.start)
         left_out = "" if value is None else shortest_text(value, v.unit, v.kind)
+        if value is not None and v.type != "Real":
+            left_out = written(value, v.type)
         follows = _FOLLOWS.get(f"{table}.{v.name}", "")
         yield Key(
             prefix + v.name,

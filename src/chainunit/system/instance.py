@@ -18,6 +18,12 @@ from ..errors import InputError, RunError, printable, shown
 
 log = logging.getLogger("chainunit.fmu")
 _WARNING, _DISCARD, _FATAL = 1, 2, 4  # of fmi2Status
+NUMBERS: Mapping[str, Any] = {"Real": ctypes.c_double, "Integer": ctypes.c_int, "Boolean": ctypes.c_int}
+"""By type of the variables that this package takes for numbers, how FMI 2.0 passes them: false is 0, true is 1."""
+_WHOLE = {
+    "Integer": (-(2.0**31), 2.0**31 - 1.0, "a whole number of 32 bits"),
+    "Boolean": (0.0, 1.0, "0 or 1"),
+}
 Kind = Literal["Co-Simulation", "Model Exchange"]
 """Interface of an FMU."""
 _working_directory = threading.Lock()
@@ -95,7 +101,7 @@ class Fmu:
 
     def outputs(self) -> list[str]:
         """Names of the outputs that are numbers, in declared order."""
-        return [name for name, v in self.variables.items() if v.causality == "output" and v.type == "Real"]
+        return [name for name, v in self.variables.items() if v.causality == "output" and v.type in NUMBERS]
 
     def feedthrough(self) -> dict[str, set[str] | None]:
         """By output, the inputs on which it depends directly; None where the FMU does not declare them."""
@@ -122,6 +128,39 @@ def _unloadable(fmu: Fmu, error: Exception) -> str:
     there = sorted(p.name for p in Path(fmu.folder, "binaries").glob("*"))
     has = f"it has those for {printable(', '.join(there))}" if there else "it has none"
     return f"has no library for this machine, {library}; {has}"
+
+
+class Handle:
+    """Variables by their value references, with room for their `values`. Those of each type have a call of their own:
+    in `calls` their type, their places among the values, their references, and room for their values in that type."""
+
+    def __init__(self, variables: Sequence[Any]) -> None:
+        self.n, self.names = len(variables), [v.name for v in variables]
+        self.references = (ctypes.c_uint * self.n)(*(v.valueReference for v in variables))
+        self.values: Any = (ctypes.c_double * self.n)()
+        self.calls: list[tuple[str, list[int], Any, Any]] = []
+        if all(v.type == "Real" for v in variables):
+            return
+        for kind in NUMBERS:
+            if places := [i for i, v in enumerate(variables) if v.type == kind]:
+                own = (ctypes.c_uint * len(places))(*(self.references[i] for i in places))
+                self.calls.append((kind, places, own, (NUMBERS[kind] * len(places))()))
+
+    def of_type(self, kind: str, i: int) -> Any:
+        """The value at this place, in its type.
+
+        Raises
+        ------
+        InputError
+            for a count that is no whole number, and a switch that is neither 0 nor 1.
+        """
+        value = self.values[i]
+        if kind == "Real":
+            return value
+        least, most, words = _WHOLE[kind]
+        if not (least <= value <= most and value % 1.0 == 0.0):
+            raise InputError(f"{self.names[i]} = {value:g}: must be {words}")
+        return int(value)
 
 
 class Instance:
@@ -175,6 +214,8 @@ class Instance:
         # a run calls these functions at every step: without fmpy's layer, which takes twice their time
         self._library, self._component = self._fmi.dll, self._fmi.component
         self._get, self._set = self._library.fmi2GetReal, self._library.fmi2SetReal
+        self._getters = {kind: getattr(self._library, f"fmi2Get{kind}") for kind in NUMBERS}
+        self._setters = {kind: getattr(self._library, f"fmi2Set{kind}") for kind in NUMBERS}
 
     def _call(self, what: str, function: Any, *args: Any) -> Any:
         from fmpy.fmi1 import FMICallException
@@ -205,23 +246,32 @@ class Instance:
         """Leave the initialization mode."""
         self._call("initialization", self._fmi.exitInitializationMode)
 
-    def handle(self, names: Sequence[str]) -> tuple[Any, Any, int]:
-        """Value references and room for their values, for `read` and `write`."""
-        n = len(names)
-        references = (ctypes.c_uint * n)(*(self.fmu.variables[name].valueReference for name in names))
-        return references, (ctypes.c_double * n)(), n
+    def handle(self, names: Sequence[str]) -> Handle:
+        """The variables of these names, for `read` and `write`."""
+        return Handle([self.fmu.variables[name] for name in names])
 
-    def read(self, handle: tuple[Any, Any, int]) -> Sequence[float]:
-        """Values behind a handle."""
-        references, values, n = handle
-        self._check(self._get(self._component, references, n, values), "reading values")
+    def read(self, handle: Handle) -> Sequence[float]:
+        """Values behind a handle; a switch is 0 or 1."""
+        values = handle.values
+        if not handle.calls:
+            self._check(self._get(self._component, handle.references, handle.n, values), "reading values")
+        for kind, places, references, own in handle.calls:
+            status = self._getters[kind](self._component, references, len(places), own)
+            self._check(status, "reading values")
+            for i, value in zip(places, own, strict=True):
+                values[i] = value
         return values
 
-    def write(self, handle: tuple[Any, Any, int], new: Sequence[float]) -> None:
-        """Set the values behind a handle."""
-        references, values, n = handle
+    def write(self, handle: Handle, new: Sequence[float]) -> None:
+        """Set the values behind a handle; see `Handle.of_type`."""
+        values = handle.values
         values[:] = new
-        self._check(self._set(self._component, references, n, values), "setting values")
+        if not handle.calls:
+            self._check(self._set(self._component, handle.references, handle.n, values), "setting values")
+        for kind, places, references, own in handle.calls:
+            own[:] = [handle.of_type(kind, i) for i in places]
+            status = self._setters[kind](self._component, references, len(places), own)
+            self._check(status, "setting values")
 
     def get(self, names: Sequence[str]) -> list[float]:
         """Values by name."""
