@@ -79,7 +79,8 @@ def _converted(variable: Variable, text: str) -> float:
             return units.convert(number, written, variable.unit, variable.kind) if written else number
     except ValueError:
         pass
-    meant = units.probable_text(text, variable.unit, variable.kind)
+    counted = variable.type != "Real"
+    meant = "" if counted else units.probable_text(text, variable.unit, variable.kind)
     hint = f'; was "{meant}" meant?' if meant else ""
     raise ValueError(f"{variable.name} = {shown(text)}: must be {_kind(variable)}{hint}")
 
