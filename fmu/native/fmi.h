@@ -1,6 +1,6 @@
 /* The common functions of FMI 2.0 and 3.0, on top of runtime.c. The including file defines FMI(), the name of a
- * function by its name in FMI 3.0, and the types Result, Handle, Boolean, Memory, Byte and Text of its version. This file names
- * no model. */
+ * function by its name in FMI 3.0, `report`, `type_names` in the order of Type, and the types Result, Handle, Boolean,
+ * Memory, Byte and Text of its version. This file names no model. */
 
 #define INSTANCE ((Instance *)c)
 #define NEED(modes) \
@@ -20,7 +20,7 @@
  * FMU, and `word` the name of this identifier in messages. */
 static Instance *instantiate(const char *name, const char *word, const char *identifier, const char *own,
                              int model_exchange, void *environment, void (*log)(void)) {
-    Instance *c = instance_new(name && *name ? name : model.name, report);
+    Instance *c = instance_new(name && *name ? name : model.name, type_names, report);
     if (!c) return NULL;
     c->log = log;
     c->environment = environment;

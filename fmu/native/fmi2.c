@@ -1,6 +1,5 @@
 /* FMI 2.0, Co-Simulation and Model Exchange, on top of runtime.c. This file names no model. */
 #include "fmi2Functions.h"
-#define TYPE_NAMES {"Real", "Integer", "Boolean"}
 #include "runtime.c"
 
 /* some headers omit the prefix */
@@ -8,6 +7,8 @@
 #undef fmi2FullName
 #define fmi2FullName(name) CHAINUNIT_JOIN(FMI2_FUNCTION_PREFIX, name)
 #endif
+
+static const char *const type_names[] = {"Real", "Integer", "Boolean"};
 
 static void report(const Instance *c, Status status, const char *message) {
     const fmi2CallbackLogger log = (fmi2CallbackLogger)c->log;

@@ -1,7 +1,8 @@
 /* FMI 3.0, Co-Simulation and Model Exchange, on top of runtime.c. This file names no model. */
 #include "fmi3Functions.h"
-#define TYPE_NAMES {"Float64", "Int32", "Boolean"}
 #include "runtime.c"
+
+static const char *const type_names[] = {"Float64", "Int32", "Boolean"};
 
 static void report(const Instance *c, Status status, const char *message) {
     const fmi3LogMessageCallback log = (fmi3LogMessageCallback)c->log;

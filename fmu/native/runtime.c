@@ -37,6 +37,7 @@ struct Instance {
     unsigned n_references;
     unsigned *slot, *needs; /* by value reference: place in the block, and the groups to evaluate for it */
     unsigned *type;         /* by value reference: one of Type */
+    const char *const *type_names;
     unsigned fresh;         /* a bit per group of outputs; the highest bit for the derivatives */
     int changed;    /* parameters or inputs were set after the start of the states */
     int doubtful;   /* an input was set to a value out of its bounds */
@@ -97,7 +98,7 @@ static void fill_tables(Instance *c) {
     c->slot[r] = (unsigned)(c->w - 1 - c->block); /* the time */
 }
 
-static Instance *instance_new(const char *name, Report report) {
+static Instance *instance_new(const char *name, const char *const *type_names, Report report) {
     const int n_in = model.n_u + model.n_x;
     int work = 4 * model.n_x + 3 * n_in + 2 * model.n_y + model.n_x + 3 * (model.n_required + model.n_start_required) + 2 * model.n_z;
     if (kernels.closed && work < 3 * model.n_u + 10 * model.n_x) work = 3 * model.n_u + 10 * model.n_x;
@@ -132,6 +133,7 @@ static Instance *instance_new(const char *name, Report report) {
     c->needs = c->slot + c->n_references + 1;
     c->type = c->needs + c->n_references + 1;
     fill_tables(c);
+    c->type_names = type_names;
     c->report = report;
     instance_reset(c);
     return c;
@@ -335,8 +337,7 @@ static Status unknown_reference(Instance *c, unsigned reference) {
 }
 
 static Status other_type(Instance *c, unsigned reference, Type type) {
-    static const char *const names[] = TYPE_NAMES;
-    return complain(c, ERROR, OTHER_TYPE, reference, names[type]);
+    return complain(c, ERROR, OTHER_TYPE, reference, c->type_names[type]);
 }
 
 /* OK where all references that exist are those of numbers with derivatives. */
