@@ -747,3 +747,13 @@ def test_the_alarm_of_model_exchange_changes_in_event_mode_only(unit, native_fmu
     assert seen(equal) == (1, True)
     one.api.terminate()
     assert one.get("alarm") == [1]
+
+
+@both
+def test_a_refused_experiment_leaves_nothing_behind(unit, fmi):
+    """From an endless time to an endless time: the FMU takes its own saved state, and starts."""
+    one = unit("InductionMotor", fmi)
+    assert one.refused(one.start, float("inf"), float("inf")) == "start time = inf s: must be a finite number"
+    one.restore(one.serialized())
+    one.start(0.0, float("inf")).step(0.0, 0.01)
+    one.restore(one.serialized())

@@ -217,10 +217,13 @@ static Status step_taken(Instance *c) {
 }
 
 static Status set_experiment(Instance *c, double time, int has_stop, double stop) {
-    if (has_stop && !(stop >= time))
-        return complain(c, ERROR, STOP, stop, time);
-    c->stop = has_stop ? stop + SAME_TIME * (stop - time) + ADDED_UP * fabs(larger(stop, time)) : INFINITY;
-    return set_time(c, "start time", time);
+    if (isfinite(time) && has_stop && !(stop >= time)) return complain(c, ERROR, STOP, stop, time);
+    const Status status = set_time(c, "start time", time);
+    if (status) return status;
+    /* the allowance for an endless experiment would be no number */
+    const int ends = has_stop && isfinite(stop);
+    c->stop = ends ? stop + SAME_TIME * (stop - time) + ADDED_UP * fabs(larger(stop, time)) : INFINITY;
+    return OK;
 }
 
 static int all_finite(const double *v, int n) {

@@ -131,36 +131,34 @@ def _unloadable(fmu: Fmu, error: Exception) -> str:
 
 
 class Handle:
-    """Variables by their value references, with room for their `values`. Those of each type have a call of their own:
-    in `calls` their type, their places among the values, their references, and room for their values in that type."""
+    """Variables by their value references, with room for their `values`. Variables of one type have this type as
+    `kind`; those of several types have `parts`, each with the places of its variables and their own handle."""
 
     def __init__(self, variables: Sequence[Any]) -> None:
         self.n, self.names = len(variables), [v.name for v in variables]
+        kinds = {v.type for v in variables} or {"Real"}
+        self.kind = kinds.pop() if len(kinds) == 1 else "Real"
         self.references = (ctypes.c_uint * self.n)(*(v.valueReference for v in variables))
-        self.values: Any = (ctypes.c_double * self.n)()
-        self.calls: list[tuple[str, list[int], Any, Any]] = []
-        if all(v.type == "Real" for v in variables):
-            return
-        for kind in NUMBERS:
-            if places := [i for i, v in enumerate(variables) if v.type == kind]:
-                own = (ctypes.c_uint * len(places))(*(self.references[i] for i in places))
-                self.calls.append((kind, places, own, (NUMBERS[kind] * len(places))()))
+        self.values: Any = (NUMBERS[self.kind] * self.n)()
+        places = [[i for i, v in enumerate(variables) if v.type == kind] for kind in kinds]
+        self.parts = [(own, Handle([variables[i] for i in own])) for own in places]
 
-    def of_type(self, kind: str, i: int) -> Any:
-        """The value at this place, in its type.
+    def put(self, new: Sequence[float]) -> None:
+        """Take values of variables of one type.
 
         Raises
         ------
         InputError
             for a count that is no whole number, and a switch that is neither 0 nor 1.
         """
-        value = self.values[i]
-        if kind == "Real":
-            return value
-        least, most, words = _WHOLE[kind]
-        if not (least <= value <= most and value % 1.0 == 0.0):
-            raise InputError(f"{self.names[i]} = {value:g}: must be {words}")
-        return int(value)
+        if self.kind == "Real":
+            self.values[:] = new
+            return
+        least, most, words = _WHOLE[self.kind]
+        for i, value in enumerate(new):
+            if not (least <= value <= most and value % 1.0 == 0.0):
+                raise InputError(f"{self.names[i]} = {value:g}: must be {words}")
+            self.values[i] = int(value)
 
 
 class Instance:
@@ -213,7 +211,6 @@ class Instance:
         self._alive = True
         # a run calls these functions at every step: without fmpy's layer, which takes twice their time
         self._library, self._component = self._fmi.dll, self._fmi.component
-        self._get, self._set = self._library.fmi2GetReal, self._library.fmi2SetReal
         self._getters = {kind: getattr(self._library, f"fmi2Get{kind}") for kind in NUMBERS}
         self._setters = {kind: getattr(self._library, f"fmi2Set{kind}") for kind in NUMBERS}
 
@@ -253,25 +250,22 @@ class Instance:
     def read(self, handle: Handle) -> Sequence[float]:
         """Values behind a handle; a switch is 0 or 1."""
         values = handle.values
-        if not handle.calls:
-            self._check(self._get(self._component, handle.references, handle.n, values), "reading values")
-        for kind, places, references, own in handle.calls:
-            status = self._getters[kind](self._component, references, len(places), own)
-            self._check(status, "reading values")
-            for i, value in zip(places, own, strict=True):
+        for places, part in handle.parts:
+            for i, value in zip(places, self.read(part), strict=True):
                 values[i] = value
+        if not handle.parts:
+            get = self._getters[handle.kind]
+            self._check(get(self._component, handle.references, handle.n, values), "reading values")
         return values
 
     def write(self, handle: Handle, new: Sequence[float]) -> None:
-        """Set the values behind a handle; see `Handle.of_type`."""
-        values = handle.values
-        values[:] = new
-        if not handle.calls:
-            self._check(self._set(self._component, handle.references, handle.n, values), "setting values")
-        for kind, places, references, own in handle.calls:
-            own[:] = [handle.of_type(kind, i) for i in places]
-            status = self._setters[kind](self._component, references, len(places), own)
-            self._check(status, "setting values")
+        """Set the values behind a handle; see `Handle.put`."""
+        for places, part in handle.parts:
+            self.write(part, [new[i] for i in places])
+        if not handle.parts:
+            handle.put(new)
+            put = self._setters[handle.kind]
+            self._check(put(self._component, handle.references, handle.n, handle.values), "setting values")
 
     def get(self, names: Sequence[str]) -> list[float]:
         """Values by name."""
