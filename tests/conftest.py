@@ -50,6 +50,9 @@ def pytest_configure(config):
     if not hasattr(config, "workerinput"):
         store = tempfile.mkdtemp(prefix="chainunit_tests_")
         os.environ[VARIABLE] = store
+        # the matrices are small: beside the workers, threads of a BLAS only wait for each other
+        for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+            os.environ.setdefault(threads, "1")
         config.add_cleanup(lambda: shutil.rmtree(store, ignore_errors=True))
 
 

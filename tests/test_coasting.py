@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_simpson
 
+from chainunit.report.study import report
 from chainunit.study import config
 from chainunit.study.rig import Rig
 from chainunit.study.run import Runner, run_study
@@ -76,3 +77,17 @@ def test_it_goes_on_as_the_same_machine(organ, more, trip, tmp_path, monkeypatch
     alone = System({"machine": ModelComponent(model, p)})
     exact = monolithic(alone, {**loads, **jam, "machine.tau": 0.0}, times)
     np.testing.assert_allclose(coasting["machine.w"], exact["machine.w"], atol=5e-4 * w)
+
+
+def test_the_axis_of_time_ends_where_the_crank_stands(tmp_path, monkeypatch):
+    """The run behind the open coupling lasts on: it took nine tenths of the figure of a jam, at rest."""
+    monkeypatch.setattr("chainunit.study.run._chains", lambda *_: None)
+    study = run_study(config.parse(STUDY.format(organ="two-bar", more="", trip=250)), tmp_path)
+    assert study.failure is None
+    figure = next(each for each in report(study).figures if each.name == "time-jam-left")
+    event, coasting = study.event["jam_left"], study.runs["jam_left_coasting"]
+    time, speed = coasting["time"].values - event, abs(study.drive.crank_motion(coasting)[1])
+    stands = time[np.flatnonzero(speed > 0.02 * 4.0)[-1]]
+    axis = figure.panels[0][0].x
+    assert stands < axis.high < 2.0 * stands < 0.5 * time[-1]
+    assert -axis.high < axis.low < 0.0

@@ -284,7 +284,7 @@ SIZED = (
 def compare_with_pump(best):
     """Torque at the crank and inertia at the motor, of the candidate, with those of the pump."""
     torque, inertia = pump(np.linspace(0.0, 2.0 * math.pi, 720), SPEED, PRESSURE)
-    assert best.duty_torque == pytest.approx(np.max(np.abs(torque)), rel=0.05)
+    assert best.duty.torque == pytest.approx(np.max(np.abs(torque)), rel=0.05)
     rotor, plate = best.drive.fmu_parameters.rotor.J, best.motor.nameplate.J
     reflected = np.max(inertia) / best.drive.ratio**2
     assert best.checks["inertia"].value == pytest.approx((reflected + rotor - plate) / plate, rel=1e-3)

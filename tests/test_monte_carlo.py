@@ -360,7 +360,8 @@ def test_a_scheduler_is_asked_before_any_run(tmp_path):
             assert not (tmp_path / "out" / "fmu").exists()
 
 
-@pytest.mark.parametrize("end", [None, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("end", [None, signal.SIGTERM])
 def test_processes_leave_nothing_behind(end, tmp_path):
     """No folder stays behind when the processes end, nor after SIGTERM to all of them."""
     scratch = tmp_path / "scratch"

@@ -798,3 +798,12 @@ def test_a_map_is_hatched_by_its_reasons():
     reasons = result.dataset.reason.attrs["reasons"]
     assert {each.name for each in hatches} <= set(reasons) and len(hatches) >= 2
     assert field.levels[0] <= np.nanmin(field.z) and field.levels[-1] >= np.nanmax(field.z)
+
+
+def test_a_few_large_values_leave_the_others_their_classes():
+    """Most of a map stood in one class where the force rises steeply at its rim; each half has classes of its own."""
+    rim = np.append(np.linspace(545.0, 1800.0, 95), [3000.0, 5000.0, 7000.0, 9000.0, 10170.0])
+    levels = sweep_figures._levels(rim)
+    counts, _ = np.histogram(rim, levels)
+    assert counts.sum() == rim.size and counts.max() < 0.75 * rim.size
+    assert sweep_figures._levels(np.linspace(545.0, 10170.0, 100)) == tuple(range(0, 12001, 2000))

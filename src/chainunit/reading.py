@@ -82,7 +82,9 @@ def _converted(variable: Variable, text: str) -> float:
     counted = variable.type != "Real"
     meant = "" if counted else units.probable_text(text, variable.unit, variable.kind)
     hint = f'; was "{meant}" meant?' if meant else ""
-    raise ValueError(f"{variable.name} = {shown(text)}: must be {_kind(variable)}{hint}")
+    other = units.of_other_kind(parts[1], variable.unit) if parts is not None and parts[1] else ""
+    other = f"; {printable(other)}" if other else ""
+    raise ValueError(f"{variable.name} = {shown(text)}: must be {_kind(variable)}{other}{hint}")
 
 
 def option_value(name: str, text: str, unit: str, description: str) -> float:
@@ -99,10 +101,14 @@ def option_value(name: str, text: str, unit: str, description: str) -> float:
         others = {"rad/s": ("rev/min", "rad/s"), "m/s": ("m/s", "mm/s")}.get(unit, (unit.replace(".", " "),))
         examples = " or ".join(f'"{parts[0]:g} {other}"' for other in others)
         raise InputError(f"{name} {printable(text)}: has no unit; give it as {examples}")
-    try:
-        return to_number(
-            Variable(name, description, Quantity(unit, description, low=0.0, open_low=True)), text
+    quantity = Quantity(unit, description, low=0.0, open_low=True)
+    if parts is not None and parts[1] and not units.converts(parts[1], unit):
+        kind = units.of_other_kind(parts[1], unit) or f"{printable(parts[1])} is no known unit"
+        raise InputError(
+            f'{name} "{printable(text)}": {kind}; must be {units.with_units(unit)} ({description})'
         )
+    try:
+        return to_number(Variable(name, description, quantity), text)
     except ValueError as error:
         raise InputError(str(error)) from None
 

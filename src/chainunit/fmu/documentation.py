@@ -6,7 +6,7 @@ import inspect
 from dataclasses import fields
 from html import escape
 
-from ..model import About
+from ..model import About, Sketch
 from ..quantities import written
 from .description import Interface, Signal
 from .pictures import drawing
@@ -19,18 +19,21 @@ td.number { text-align: right; font-variant-numeric: tabular-nums; white-space: 
 code { font-family: ui-monospace, monospace; }
 """
 
-_FIGURE = "The machine with its start values: links, pins and supports by name; the driven link is coloured."
+_FIGURE = (
+    "The machine with its start values, its driver at about a sixth of its way: links, pins and supports by name; "
+    "the driven link is coloured."
+)
 _NOT_CONNECTED = "An input that is not connected keeps its start value."
 _MOTION = (
     " Inputs phi, w and a belong together: give all of them. As declared, the {what} stands at phi = {at:g}."
 )
 
 
-def page(interface: Interface, version: str) -> str:
-    """A self-contained page: a description of the model, and tables of its parameters, inputs and outputs."""
+def page(interface: Interface, version: str, sketch: Sketch | None) -> str:
+    """A self-contained page: a description of the model with its `sketch`, and tables of its parameters, inputs and
+    outputs."""
     model = interface.model
     text = escape(inspect.cleandoc(model.__doc__ or "") + model.notes).replace("\n\n", "</p><p>")
-    sketch = model.sketch()
     picture = f"<figure>{drawing(sketch)}<figcaption>{_FIGURE}</figcaption></figure>\n" if sketch else ""
     tables = "".join(
         f"<h2>{title}</h2>\n{_table(interface.of(causality), causality)}"

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..engines import numpy_
+from ..study.bearings import hardest_run
 from ..study.cycle import Cycle
 from ..study.drive import Drive
 from ..study.record import StudyRecord
@@ -236,11 +237,16 @@ def _transient(s: b.Source, study: StudyRecord, name: str) -> fig.Figure:
     coasting = study.runs.get(name + run_names.COASTING)
     if coasting is not None:
         after = coasting["time"].values - (event or 0.0)
-        speed.append(fig.Curve("crank behind the open coupling", after, drive.crank_motion(coasting)[1], 1))
-        high = float(after[-1])
+        of_crank = drive.crank_motion(coasting)[1]
+        speed.append(fig.Curve("crank behind the open coupling", after, of_crank, 1))
+        # until the crank stands: the rest of the run shows nothing
+        turning = np.flatnonzero(np.abs(of_crank) > 0.02 * study.config.run.crank_speed)
+        stands = float(after[turning[-1]]) if turning.size else high
+        high = min(float(after[-1]), 1.3 * max(high, stands))
     if event is not None:
         # a quarter turn before the event shows enough of steady running
-        low = max(low, -0.5 * math.pi / study.config.run.crank_speed)
+        before = 0.5 * math.pi / study.config.run.crank_speed
+        low = max(low, -before if coasting is None else -min(before, 0.5 * high))
     marks, words = _marks(study, name, event), run_names.title(study, name)
     return fig.Figure(
         f"time-{name.replace('_', '-')}",
@@ -334,7 +340,7 @@ def _after(s: b.Source, study: StudyRecord, run: str) -> str:
 def _reactions(s: b.Source, study: StudyRecord) -> fig.Figure:
     reference = "steady" if "steady" in study.pins else next(iter(study.pins))
     steady, pins = study.pins[reference], list(study.pins[reference])
-    largest = {pin: max(study.pins, key=lambda run: study.pins[run][pin]["peak"] or 0.0) for pin in pins}
+    largest = {pin: hardest_run(study.pins, pin) for pin in pins}
     of_run = run_names.title(study, reference)
     places = np.arange(len(pins), dtype=float)
     bars: list[tuple[str, float, list[float | None], float, int, bool, tuple[str, ...]]] = [

@@ -47,21 +47,23 @@
       for (const box of boxes) box.textContent = "This browser cannot unpack the plots; open the page in one of 2023 or later.";
     });
   // paper is narrower than a screen: a plot is laid out anew for it, so that its letters keep their size
-  const PAPER = { width: 690, most: 900, two: 415, letters: 10, titles: 9.5, as: 900 };
+  const PAPER = { width: 690, most: 900, two: 415, rows: 500, letters: 10, titles: 9.5, as: 900 };
   const resize = (box, figure, width, height, letters, titles, across) => {
     const layout = { ...layoutFor(figure, across), width, height, autosize: width === null, "font.size": letters };
     for (const axis of Object.keys(box.layout).filter((name) => /^[xy]axis/.test(name))) {
       layout[axis + ".title.font.size"] = titles;
+      // rows are lower on paper than their titles are long: the unit has a line of its own there
+      const text = box.layout[axis].title?.text;
+      if (axis[0] === "y" && text) layout[axis + ".title.text"] = figure.rows > 2 && width ? text.replace(" [", "<br>[") : text.replace("<br>[", " [");
     }
     box.style.height = height + "px";
     Plotly.relayout(box, layout);
   };
   window.addEventListener("beforeprint", () => {
     for (const [box, figure] of plots) {
-      // two on a page; a plot that is tall for its many rows stays so
-      const height = Math.round(0.85 * figure.height);
-      resize(box, figure, PAPER.width, Math.min(PAPER.most, height < 1.6 * PAPER.two ? Math.min(height, PAPER.two) : height),
-        PAPER.letters, PAPER.titles, PAPER.as);
+      // two on a page; a plot that is tall for its named rows stays so
+      const height = Math.min(Math.round(0.85 * figure.height), figure.tall ? PAPER.most : figure.rows > 2 ? PAPER.rows : PAPER.two);
+      resize(box, figure, PAPER.width, height, PAPER.letters, PAPER.titles, PAPER.as);
     }
   });
   window.addEventListener("afterprint", () => {

@@ -91,9 +91,11 @@ def height(figure: Figure) -> int:
 def page_figure(spec: Figure, units: Units) -> dict[str, Any]:
     """The figure for the script of the page: traces and layout of plotly and, where panels stand beside each other,
     the changes of the layout for a `narrow` box and back to a `wide` one, and the width `below` which a box is
-    narrow [px]."""
+    narrow [px]. On paper a `tall` figure keeps its height, as its rows have names."""
     drawing = _drawn(spec, units)
     embedded: dict[str, Any] = drawing.figure.to_plotly_json()
+    embedded["rows"] = len(spec.panels)
+    embedded["tall"] = any(panel.y.names for _, _, panel in spec.all_panels())
     narrow = drawing.narrow()
     if narrow:
         wide = {key: _at(embedded["layout"], key) for key in narrow}
@@ -195,8 +197,11 @@ class _Drawing:
             for name, text in titles.items()
             if len(text) > _LINE
         }
+        legend = _legend_rows(spec, _PHONE)
         if len(spec.panels[0]) == 1:
-            return changes and {"height": height(spec), **changes}
+            more = max(0, legend - _legend_rows(spec))
+            bottom = {"margin.b": 52 + _legend_rows(spec) + more} if more else {}
+            return (changes or bottom) and {"height": height(spec) + more, **bottom, **changes}
         places = sorted(self.places, key=lambda place: (place[1], place[0]))
         heights = spec.heights or (1.0,) * len(spec.panels)
         row = _HALF_ROW if spec.half else _ROW
@@ -207,7 +212,6 @@ class _Drawing:
             for a, b in pairwise(places)
         ]  # fmt: skip
         room, begin = sum(sizes) + sum(gaps), 0.0
-        legend = _legend_rows(spec, _PHONE)
         changes["height"] = round(room + _ENDS + _above(spec) + legend)
         changes["margin.b"] = 52 + legend
         for place, size, gap in zip(places, sizes, (*gaps, 0.0), strict=True):

@@ -18,6 +18,7 @@ from . import figure as fig
 from .style import WIDE
 
 _CLASSES = 7
+_MOST_VALUES = 0.9  # share of the values that one class of a map may hide
 _MOST_ROWS, _MOST_PANELS = 6, 8
 _MOST_OF_AXIS = 400
 """Largest numbers of panels of a figure, of rows and of both columns, and of values on an axis of a map."""
@@ -47,14 +48,15 @@ def over_parameters(summary: SweepSummary) -> Iterator[fig.Figure]:
 
 
 def _levels(z: Any) -> tuple[float, ...]:
-    """Even levels around the finite values, in rounded steps, at most `_CLASSES` + 1."""
-    low, high = float(np.nanmin(z)), float(np.nanmax(z))
+    """Even levels around the finite values, in rounded steps, at most `_CLASSES` + 1; levels that grow where values
+    reach over decades, or where most of them would stand in one even class."""
+    low, most, high = (float(each) for each in np.nanquantile(z, (0.0, _MOST_VALUES, 1.0)))
     if not high - low > 1e-9 * max(abs(low), abs(high)):
         wide = max(abs(low), 1e-9)
         return (low - wide, low, low + wide)
-    if low > 0.0 and high > WIDE * low:
-        return _wide_levels(low, high)
     raw = (high - low) / _CLASSES
+    if low > 0.0 and (high > WIDE * low or (most < low + raw and high > 4.0 * low)):
+        return _wide_levels(low, high)
     size = 10.0 ** np.floor(np.log10(raw))
     for factor in (1.0, 2.0, 2.5, 5.0, 10.0, 20.0, 25.0, 50.0):
         step = factor * size

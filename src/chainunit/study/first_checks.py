@@ -34,7 +34,7 @@ def check_values(data: Mapping[str, Any], source: str) -> tuple[Parts | None, li
         read_table(known.form, own)
     with faults.collected():
         if isinstance(data.get("event", []), list):
-            read_events(data.get("event", []))
+            read_events(data.get("event", []), known.machine if parts else None)
     with faults.collected():
         random = named_table(data, "monte_carlo").get("event")
         if isinstance(random, Mapping):

@@ -134,6 +134,13 @@ class Starter:
 
     soft_start: SoftStart = group(SoftStart, "soft starter", default=SoftStart(voltage=0.5, time=1.0))
     inverter: InverterControl = group(InverterControl, "inverter", default=InverterControl())
+    overload: Value = quantity(
+        "1",
+        "largest current of an inverter, for up to 60 s, over the rated current of the motor",
+        default=1.5,
+        min=1.0,
+        max=5.0,
+    )
 
 
 @declaration

@@ -34,7 +34,7 @@ class Optimize(CycleBasis):
     )
     slack_free_speed: Value = quantity(
         "rad/s",
-        "crank speed up to which the webs keep their pull; with 0 there is no such limit",
+        "crank speed up to which no web goes slack: its mean pull stays above 0; with 0 there is no such limit",
         default=0.0,
         min=0.0,
         max=1000.0,
