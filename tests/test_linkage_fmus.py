@@ -200,7 +200,7 @@ def test_a_linkage_has_the_parameters_that_it_needs(tmp_path):
 
 def test_the_derivative_of_an_energy_is_a_power():
     units = {
-        v.get("name"): v.find("Real").get("unit")
+        v.get("name"): v[0].get("unit")
         for v in described(chainunit.models.MODELS["DcMotor"]).iter("ScalarVariable")
     }
     assert units["der(load_energy)"] == "W" and units["der(w)"] == "rad/s2"

@@ -523,7 +523,7 @@ def test_a_genetic_search_finds_nothing_better():
         ({"[optimize.limits]": '[optimize.limits]\n"min(margn)" = { min = 1 }'}, 'was "margin" meant?'),
         ({'{ max = "4 kN" }': "3000"}, "must be a table with min, max, or both"),
         ({"16 deg": "21 deg"}, "must be >= min"),
-        ({"starts = 4": "starts = 0.5"}, "mine.toml:6: optimize.starts = 0.5: must be >= 1"),
+        ({"starts = 4": "starts = 0.5"}, "mine.toml:6: optimize.starts = 0.5: must be a whole number >= 1"),
     ],
 )
 def test_refusals(changes, line, tmp_path):
@@ -560,7 +560,7 @@ def test_all_faults_at_once(command, tmp_path):
     assert done.returncode == 2
     lines = [
         '2: optimize.objectives: "peak(crank_torqe)": the ChamberForces has no output',
-        "3: optimize.starts = 0.5: must be >= 1",
+        "3: optimize.starts = 0.5: must be a whole number >= 1",
         "5: optimize.free.machine.r: no such parameter of the machine; write optimize.free.r",
         "6: optimize.free.crank.m = 3: must be a table with min and max",
         "7: optimize.free.crank.s.step: unknown key; known here: min, max",

@@ -7,6 +7,7 @@ from dataclasses import fields
 from html import escape
 
 from ..model import About, Sketch
+from ..quantities import written
 from .description import Interface, Signal
 from .pictures import drawing
 
@@ -64,18 +65,20 @@ def _origin(about: About | None) -> str:
 def _table(signals: list[Signal], causality: str) -> str:
     settable = causality != "output"
     head = (
-        "<tr><th>name</th><th>unit</th>"
+        "<tr><th>name</th><th>unit or type</th>"
         + ("<th>start</th><th>allowed</th>" if settable else "")
         + "<th>meaning</th></tr>"
     )
     rows = []
     for signal in signals:
         v, q = signal.variable, signal.variable.quantity
-        cells = [f"<td><code>{escape(v.name)}</code></td>", f"<td>{escape(v.unit)}</td>"]
+        unit = v.unit if v.type == "Real" else v.type
+        cells = [f"<td><code>{escape(v.name)}</code></td>", f"<td>{escape(unit)}</td>"]
         if settable:
             bounds = escape(q.allowed_range) + (
                 "" if causality == "input" else ", tunable" if q.tunable else ", fixed"
             )
-            cells += [f'<td class="number">{signal.start:.6g}</td>', f"<td>{bounds}</td>"]
+            start = f"{signal.start:.6g}" if v.type == "Real" else written(signal.start or 0.0, v.type)
+            cells += [f'<td class="number">{start}</td>', f"<td>{bounds}</td>"]
         rows.append("<tr>" + "".join(cells) + f"<td>{escape(v.description)}</td></tr>")
     return f"<table>{head}\n" + "\n".join(rows) + "</table>\n"

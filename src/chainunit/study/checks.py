@@ -10,7 +10,6 @@ from ..quantities import Layout
 from ..refusals import unit_behind
 from .foreign_machine import ForeignModel
 from .parts import Parts, named_table
-from .sections import FileSection
 
 _NEEDS_MODEL = "needs a model of the machine, which is an FMU; leave it out"
 _TWO_BARS = 'quantities of a turn are of organs with two bars; leave out organ = "chain"'
@@ -161,8 +160,8 @@ _ORDER = (
 LOWER_LIMITS = {high: low for low, _, high in _ORDER}
 
 
-def check_order(values: Mapping[str, Any], sections: Mapping[str, FileSection]) -> Iterator[InputError]:
-    """Refusals of limits with no value between them, and of counts that are not whole numbers."""
+def check_order(values: Mapping[str, Any]) -> Iterator[InputError]:
+    """Refusals of limits with no value between them."""
 
     def value(name: str) -> tuple[float, str]:
         section, _, key = name.partition(".")
@@ -174,9 +173,3 @@ def check_order(values: Mapping[str, Any], sections: Mapping[str, FileSection]) 
         (least, limit), (most, text) = value(low), value(high)
         if most < least or (most == least and relation == ">"):
             yield InputError(f"{high} = {text}: must be {relation} {low}, {limit}", key=high)
-    for section, table in sections.items():
-        for key in table.whole:
-            number, text = value(f"{section}.{key}")
-            if number != int(number):
-                name = f"{section}.{key}"
-                yield InputError(f"{name} = {text}: must be a whole number", key=name)

@@ -295,7 +295,7 @@ def _config(
     """The study of a file each of whose values is allowed."""
     sections, faults = parts.sections, Faults()
     tables, values = _read_sections(sections, checked, faults)
-    faults.add(check_order(values, sections))
+    faults.add(check_order(values))
     of_study = {name: values[name] for name in ("feed", "run", "monte_carlo", "gear", "starter", "torsion")}
     of_study |= {
         name: values[name] if name in data else None for name, each in sections.items() if each.optional

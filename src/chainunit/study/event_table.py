@@ -239,12 +239,4 @@ def _parameters(of: type[Event], table: Mapping[str, Any], prefix: str, place: s
     with `prefix`."""
     own = {name: x for name, x in table.items() if name not in _TEXTS}
     with each_refusal(lambda fault: InputError(f"{prefix}{fault}", (place or prefix) + fault.key)):
-        values = given_values(read_table(_form(of.Parameters), own))
-        p = instance(of.Parameters, values)
-        broken = [name for name in of.counts if getattr(p, name) != int(getattr(p, name))]
-        lines = [
-            InputError(f"{name} = {getattr(p, name):g}: must be a whole number", name) for name in broken
-        ]
-        if lines:
-            raise InputError.of(lines)
-    return p
+        return instance(of.Parameters, given_values(read_table(_form(of.Parameters), own)))
