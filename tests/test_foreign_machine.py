@@ -359,8 +359,9 @@ def test_a_package_holds_their_files_as_they_are(tool, folder, tmp_path):
             assert archive.read(f"resources/{name}.fmu") == (folder / f"{name}.fmu").read_bytes()
     system = read_ssd(str(tmp_path / "both.ssp")).system
     inputs = {e.name: e.parameterBindings[0].parameterValues[0].parameters for e in system.elements}
-    values = {f"{name}.{p.name}": float(p.value) for name, each in inputs.items() for p in each}
-    assert values == {
+    given = {f"{name}.{p.name}": p.value for name, each in inputs.items() for p in each}
+    assert given.pop("machine.vented") == "false" and int(given.pop("machine.cylinders")) == 1
+    assert {name: float(value) for name, value in given.items()} == {
         "machine.piston.mass": MASS,
         "machine.throw": 0.15,
         "machine.back_pressure": PRESSURE,
