@@ -357,6 +357,7 @@ def test_a_file_has_what_memory_has(fmus, tmp_path, monkeypatch):
     assert [p.name for p in tmp_path.iterdir()] == ["run.nc"]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
 def test_memory_does_not_grow_with_a_run_that_is_written_to_a_file(tmp_path):
     """Measured by the allocations of Python: 48,000 steps of a motor against 24,000."""

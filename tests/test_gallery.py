@@ -389,7 +389,11 @@ fluctuation = "10 %"
 
 
 @pytest.mark.parametrize(
-    ("name", "speed"), [("blake_jaw_crusher", "250 rpm"), ("scotch_yoke_pump", "150 rpm")]
+    ("name", "speed"),
+    [
+        ("blake_jaw_crusher", "250 rpm"),
+        pytest.param("scotch_yoke_pump", "150 rpm", marks=pytest.mark.slow),
+    ],
 )
 def test_a_study_finds_a_motor(name, speed, tmp_path):
     study = run_study(parse(SIZED.format(name=name, speed=speed), str(FOLDER / "study.toml")), tmp_path)
