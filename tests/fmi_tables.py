@@ -27,6 +27,9 @@ GetReal output                               -            x          x       x  
 GetReal derivative                           -            x          x       x          x        x
 GetReal input                                +            +          x       x          x        x
 GetReal parameter                            +            +          x       x          x        x
+GetInteger output                            -            x          x       x          x        x
+GetInteger parameter                         +            +          x       x          x        x
+GetBoolean parameter                         +            +          x       x          x        x
 GetInteger none                              +            x          x       x          x        x
 GetBoolean none                              +            x          x       x          x        x
 GetString none                               +            x          x       x          x        x
@@ -35,6 +38,9 @@ SetReal tunable parameter                    x            x          x       +  
 SetReal input                                +            x          x       x          -        +
 SetReal state                                -            -          -       x          -        +
 SetReal output                               -            -          -       -          -        -
+SetInteger fixed parameter                   x            x          -       -          -        -
+SetInteger output                            -            -          -       -          -        -
+SetBoolean fixed parameter                   x            x          -       -          -        -
 SetInteger none                              x            x          x       +          +        +
 SetBoolean none                              x            x          x       +          +        +
 SetString none                               x            x          x       +          +        +
@@ -80,6 +86,9 @@ GetReal output                               -            x         x     x     
 GetReal derivative                           -            x         x     x        x        x
 GetReal input                                +            +         x     x        x        x
 GetReal parameter                            +            +         x     x        x        x
+GetInteger output                            -            x         x     x        x        x
+GetInteger parameter                         +            +         x     x        x        x
+GetBoolean parameter                         +            +         x     x        x        x
 GetInteger none                              +            x         x     x        x        x
 GetBoolean none                              +            x         x     x        x        x
 GetString none                               +            x         x     x        x        x
@@ -88,6 +97,9 @@ SetReal tunable parameter                    x            x         x     +     
 SetReal input                                +            x         x     +        -        +
 SetReal state                                -            -         -     -        -        -
 SetReal output                               -            -         -     -        -        -
+SetInteger fixed parameter                   x            x         -     -        -        -
+SetInteger output                            -            -         -     -        -        -
+SetBoolean fixed parameter                   x            x         -     -        -        -
 SetInteger none                              x            x         x     +        +        +
 SetBoolean none                              x            x         x     +        +        +
 SetString none                               x            x         x     +        +        +
@@ -133,11 +145,17 @@ GetFloat64 derivative                        -            x          x       x  
 GetFloat64 input                             x            x          x       x          x        x
 GetFloat64 parameter                         x            x          x       x          x        x
 GetFloat64 time                              +            x          x       x          x        x
+GetInt32 output                              -            x          x       x          x        x
+GetInt32 parameter                           x            x          x       x          x        x
+GetBoolean parameter                         x            x          x       x          x        x
 SetFloat64 fixed parameter                   x            x          -       -          -        -
 SetFloat64 tunable parameter                 x            x          x       +          -        +
 SetFloat64 input                             x            x          x       x          -        +
 SetFloat64 state                             -            -          -       x          -        +
 SetFloat64 output                            -            -          -       -          -        -
+SetInt32 fixed parameter                     x            x          -       -          -        -
+SetInt32 output                              -            -          -       -          -        -
+SetBoolean fixed parameter                   x            x          -       -          -        -
 Get* none                                    x            x          x       x          x        x
 Set* none                                    x            x          x       +          +        +
 GetClock none                                +            +          x       +          +        +
@@ -190,11 +208,17 @@ GetFloat64 derivative                        -            x         x     x     
 GetFloat64 input                             x            x         x     x        x        x
 GetFloat64 parameter                         x            x         x     x        x        x
 GetFloat64 time                              +            x         x     x        x        x
+GetInt32 output                              -            x         x     x        x        x
+GetInt32 parameter                           x            x         x     x        x        x
+GetBoolean parameter                         x            x         x     x        x        x
 SetFloat64 fixed parameter                   x            x         -     -        -        -
 SetFloat64 tunable parameter                 x            x         x     x        -        +
 SetFloat64 input                             x            x         x     x        -        +
 SetFloat64 state                             -            -         -     -        -        -
 SetFloat64 output                            -            -         -     -        -        -
+SetInt32 fixed parameter                     x            x         -     -        -        -
+SetInt32 output                              -            -         -     -        -        -
+SetBoolean fixed parameter                   x            x         -     -        -        -
 Get* none                                    x            x         x     x        x        x
 Set* none                                    x            x         x     x        +        +
 GetClock none                                +            +         +     +        +        +
@@ -258,7 +282,8 @@ _STEP = {"GetRealOutputDerivatives", "GetOutputDerivatives"}
 NO_VALUE_YET = {
     "initialization": _STEP,
     "instantiated": _STEP
-    | {f"Get{type_} {kind}" for type_ in ("Real", "Float64") for kind in ("output", "derivative")}
+    | {f"Get{type_} output" for type_ in ("Real", "Float64", "Integer", "Int32")}
+    | {f"Get{type_} derivative" for type_ in ("Real", "Float64")}
     | {"GetDirectionalDerivative", "GetEventIndicators", "GetContinuousStates", "GetDerivatives"}
     | {"GetContinuousStateDerivatives"},
 }

@@ -6,7 +6,7 @@ Its shaft is the crank: x = throw cos(phi) is the place of the piston, which the
 
 import math
 
-from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
+from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real
 
 NAMES = {}  # what it calls otherwise
 LEFT_OUT = ()  # outputs that it does not have
@@ -18,7 +18,7 @@ class ForeignMachine(Fmi2Slave):
         super().__init__(**kwargs)
         self.description = "An eccentric pump: one piston"
         self.u = {"phi": 0.0, "w": 0.0, "a": 0.0, "back_pressure": 0.0}
-        self.p = {"piston.mass": 40.0, "throw": 0.15}
+        self.p = {"piston.mass": 40.0, "throw": 0.15, "cylinders": 1, "vented": False}
         for table, causality in ((self.u, Fmi2Causality.input), (self.p, Fmi2Causality.parameter)):
             for name in table:
                 self.declare(name, causality, table)
@@ -32,7 +32,8 @@ class ForeignMachine(Fmi2Slave):
         setter = None if table is None else (lambda value: table.update({name: value}))
         start = {} if table is None else {"start": table[name]}
         kind = Fmi2Variability.tunable if causality == Fmi2Causality.parameter else Fmi2Variability.continuous
-        variable = Real(
+        of = Real if table is None else {int: Integer, bool: Boolean}.get(type(table[name]), Real)
+        variable = of(
             NAMES.get(name, name),
             causality=causality,
             variability=kind,
@@ -44,9 +45,9 @@ class ForeignMachine(Fmi2Slave):
 
     def load(self):
         phi, w, a, pressure = (self.u[name] for name in ("phi", "w", "a", "back_pressure"))
-        mass, throw = self.p["piston.mass"], self.p["throw"]
-        s, c, force = math.sin(phi), math.cos(phi), pressure * AREA
-        moving = mass * throw * throw
+        mass, throw, cylinders = self.p["piston.mass"], self.p["throw"], self.p["cylinders"]
+        s, c, force = math.sin(phi), math.cos(phi), 0.0 if self.p["vented"] else pressure * AREA * cylinders
+        moving = mass * cylinders * throw * throw
         v = throw * w * s
         root = math.sqrt(v * v + SMOOTH * SMOOTH)
         share, slope = v / root, SMOOTH * SMOOTH / root**3

@@ -1,8 +1,11 @@
 /* What the two drivers with random calls share. */
+#include <limits.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "model.h"
 
 static unsigned long long seed = 88172645463325252ull;
 static unsigned random_below(unsigned n) {
@@ -13,6 +16,22 @@ static unsigned random_below(unsigned n) {
 static double random_value(void) {
     static const double odd[] = {0.0, -1.0, 1e308, -1e308, 1e-308, NAN, INFINITY, -INFINITY, 0.9};
     return random_below(4) ? (double)random_below(2000) / 100.0 - 5.0 : odd[random_below(9)];
+}
+
+static int random_integer(void) {
+    static const int odd[] = {0, 1, -1, INT_MAX, INT_MIN};
+    return random_below(2) ? (int)random_below(40) - 10 : odd[random_below(5)];
+}
+
+/* A value reference of this type, most often; `otherwise` where there is none. */
+static unsigned random_of(Type type, unsigned otherwise) {
+    const unsigned first = (unsigned)(model.n_p + model.n_u), all = first + (unsigned)model.n_y, from = random_below(all);
+    for (unsigned k = 0; random_below(10) && k < all; ++k) {
+        const unsigned i = (from + k) % all;
+        if (i < first && model.declared[i].type == type) return i;
+        if (i >= first && type == INTEGER && model.group_of[i - first] == model.discrete) return i + (unsigned)model.n_x;
+    }
+    return otherwise;
 }
 
 static long messages, count[4]; /* of status OK, discard, error, other */

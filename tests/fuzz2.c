@@ -4,7 +4,6 @@
 #include "fuzz.h"
 
 #include "fmi2Functions.h"
-#include "model.h"
 
 static void logger(fmi2ComponentEnvironment e, fmi2String n, fmi2Status s, fmi2String c, fmi2String m, ...) {
     (void)e, (void)s, (void)c;
@@ -123,8 +122,17 @@ int main(int argc, char **argv) {
         case 37: TRY(fmi2GetBooleanStatus(c, asked, MAYBE(&a))); break;
         case 38: TRY(fmi2GetStringStatus(c, asked, &said)); break;
         case 39: TRY(fmi2SetDebugLogging(c, random_below(2), random_below(2), category)); break;
-        case 40: TRY(random_below(2) ? fmi2GetInteger(c, vr, n, number) : fmi2SetInteger(c, vr, n, number)); break;
-        case 41: TRY(random_below(2) ? fmi2GetBoolean(c, vr, n, number) : fmi2SetBoolean(c, vr, n, number)); break;
+        case 40: case 41:
+            for (size_t j = 0; j < n; ++j) vr[j] = random_of(random_below(2) ? INTEGER : BOOLEAN, vr[j]), number[j] = random_integer();
+            TRY(random_below(2) ? fmi2GetInteger(c, MAYBE(vr), n, MAYBE(number)) : fmi2SetInteger(c, MAYBE(vr), n, MAYBE(number)));
+            TRY(random_below(2) ? fmi2GetBoolean(c, MAYBE(vr), n, MAYBE(number)) : fmi2SetBoolean(c, MAYBE(vr), n, MAYBE(number)));
+            if (n) {
+                vr[0] = random_of(INTEGER, vr[0]);
+                TRY(random_below(2) ? fmi2GetInteger(c, vr, 1, number) : fmi2SetInteger(c, vr, 1, number));
+                vr[0] = random_of(BOOLEAN, vr[0]);
+                TRY(random_below(2) ? fmi2GetBoolean(c, vr, 1, number) : fmi2SetBoolean(c, vr, 1, number));
+            }
+            break;
         case 42: TRY(random_below(2) ? fmi2GetString(c, vr, n, text) : fmi2SetString(c, vr, n, text)); break;
         default:
             TRY(random_below(2) ? fmi2GetReal(c, NULL, n, NULL) : fmi2SetReal(c, NULL, n, NULL));

@@ -3,7 +3,6 @@
 #include "fuzz.h"
 
 #include "fmi3Functions.h"
-#include "model.h"
 
 static void logger(fmi3InstanceEnvironment e, fmi3Status s, fmi3String c, fmi3String m) {
     (void)e, (void)s, (void)c;
@@ -134,12 +133,27 @@ int main(int argc, char **argv) {
         TYPE(37, UInt8);
         TYPE(38, Int16);
         TYPE(39, UInt16);
-        TYPE(40, Int32);
+        case 40: {
+            fmi3Boolean truth[MOST] = {0};
+            fmi3Int32 number[MOST];
+            for (size_t j = 0; j < n; ++j) {
+                vr[j] = random_of(random_below(2) ? INTEGER : BOOLEAN, vr[j]);
+                number[j] = random_integer(), truth[j] = random_below(2);
+            }
+            TRY(random_below(2) ? fmi3GetInt32(c, MAYBE(vr), n, MAYBE(number), m) : fmi3SetInt32(c, MAYBE(vr), n, MAYBE(number), m));
+            TRY(random_below(2) ? fmi3GetBoolean(c, MAYBE(vr), n, MAYBE(truth), m) : fmi3SetBoolean(c, MAYBE(vr), n, MAYBE(truth), m));
+            if (n) {
+                vr[0] = random_of(INTEGER, vr[0]);
+                TRY(random_below(2) ? fmi3GetInt32(c, vr, 1, number, 1) : fmi3SetInt32(c, vr, 1, number, 1));
+                vr[0] = random_of(BOOLEAN, vr[0]);
+                TRY(random_below(2) ? fmi3GetBoolean(c, vr, 1, truth, 1) : fmi3SetBoolean(c, vr, 1, truth, 1));
+            }
+            break;
+        }
         TYPE(41, UInt32);
         case 42:
             TRY(random_below(2) ? fmi3GetInt64(c, vr, n, (void *)room, n) : fmi3SetInt64(c, vr, n, (void *)room, n));
             fmi3GetUInt64(c, vr, n, counter, n), fmi3SetUInt64(c, vr, n, counter, n);
-            fmi3GetBoolean(c, vr, n, (void *)room, n), fmi3SetBoolean(c, vr, n, (void *)room, n);
             fmi3GetString(c, vr, n, text, n), fmi3SetString(c, vr, n, text, n);
             fmi3GetBinary(c, vr, n, sizes, binary, n), fmi3SetBinary(c, vr, n, sizes, binary, n);
             break;

@@ -209,18 +209,40 @@ posix = pytest.mark.skipif(not hasattr(os, "geteuid"), reason="owners and rights
 
 
 @posix
-@pytest.mark.parametrize("mode", [0o770, 0o707, None])
-def test_a_folder_in_which_others_can_put_code_is_refused(mode, store, tmp_path, monkeypatch):
+@pytest.mark.parametrize("mode", [0o775, 0o770, 0o707])
+def test_an_own_folder_is_closed_to_others(mode, store):
+    """A umask of 002 makes it open to the group. The code that was there meanwhile is not run."""
+    entry(b"key", lambda: b"code")
+    (file,) = store.iterdir()
+    file.write_bytes(cache._mark(file.name, b"planted") + b"planted")
+    (store / "notes.txt").write_text("of the user")
+    store.chmod(mode)
+    assert entry(b"key", lambda: b"made") == b"made" and store.stat().st_mode & 0o777 == 0o700
+    assert entry(b"key", lambda: b"other") == b"made" and (store / "notes.txt").exists()
+
+
+@posix
+@pytest.mark.parametrize("kind", ["of another user", "stays open", "behind a link"])
+def test_a_folder_in_which_others_can_put_code_is_refused(kind, store, tmp_path, monkeypatch):
     """Where the user named it; else it is not used, and nothing is written there."""
     entry(b"key", lambda: b"code")
     (file,) = store.iterdir()
     file.write_bytes(cache._mark(file.name, b"planted") + b"planted")
-    if mode is None:
+    if kind == "of another user":
         own = os.geteuid()
         monkeypatch.setattr("os.geteuid", lambda: own + 1)
     else:
-        store.chmod(mode)
-    words = "belongs to another user" if mode is None else "can be written by other users"
+        store.chmod(0o770)
+    if kind == "stays open":
+
+        def refused(*_):
+            raise PermissionError(1, "Operation not permitted")
+
+        monkeypatch.setattr("os.fchmod", refused)
+    if kind == "behind a link":
+        store.rename(tmp_path / "elsewhere")
+        store.symlink_to(tmp_path / "elsewhere")
+    words = "belongs to another user" if kind == "of another user" else "can be written by other users"
     with pytest.raises(
         InputError, match=f"CHAINUNIT_CACHE: its folder {store} {words}, so that .*; name a folder"
     ):

@@ -187,6 +187,17 @@ def test_a_result_beside_itself_differs_in_nothing(folder, tmp_path):
     assert f"All {data['given_equal']['value']:.0f} given values are the same." in done.stdout
 
 
+def test_values_of_one_alone_leave_no_empty_table(folder, tmp_path):
+    """On the terminal, where the given values of an event of one alone are left out."""
+    (tmp_path / "b").mkdir()
+    other = json.dumps(numbers(folder, "a")).replace("jam_right", "jam_other")
+    (tmp_path / "b" / "result.json").write_text(other)
+    done = chainunit("compare", folder / "a", "b", "-o", "out", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    printed = " ".join(done.stdout.split())
+    assert "given values that both have are the same." in printed and "key" not in printed
+
+
 def test_a_measure_of_one_alone_and_other_units(folder, tmp_path):
     """As of another version of the program: a measure more, a unit that is another, a name that nobody declares."""
     shutil.copytree(folder / "a", tmp_path / "old")

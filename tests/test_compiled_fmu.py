@@ -201,7 +201,7 @@ def test_initialisation_refuses_by_full_name(whole):
             ({"machine.crank.m": -1.0}, r"machine\.crank\.m = -1 kg: must be >= 0 kg"),
             ({"machine.r": 3.0}, r"machine\.c = 1\.49\d* m: the crank circle must stay left"),
             ({"motor.rotor.J": 0.0}, r"motor\.rotor\.J = 0 kg m2: must be > 0"),
-            ({"solver.max_steps": 0.0}, r"solver\.max_steps = 0: must be >= 1"),
+            ({"solver.max_steps": 0.0}, r"solver\.max_steps = 0: must be a whole number >= 1"),
         ):
             journal = []
             with contextlib.closing(Instance(fmu, "unit", journal)) as unit:

@@ -216,6 +216,29 @@ def test_a_refused_geometry_names_the_cause_and_the_range_in_which_all_holds(nam
         parse(f"[machine]\n{name} = {beyond + 0.002 * (value - beyond) / abs(value - beyond) * beyond}")
 
 
+def test_a_refused_crank_is_refused_at_its_own_line():
+    """Not at the line of c, whose range it sets."""
+    with pytest.raises(InputError) as refusal:
+        parse('[machine]\nc = "1.49 m"\nr = "2 m"')
+    (fault,) = refusal.value.faults
+    assert fault.key == "machine.r" and "must stay left of the pivot C" in str(fault)
+
+
+def test_a_sought_number_outside_its_bounds_is_refused_with_them():
+    name = "[[identify.parameter]]\nname = 'machine.left.web_mass'\n"
+    text = f"{name}from = '40 kg'\nto = '50 kg'\ndeviation = '3 kg'\n"
+    with pytest.raises(InputError, match=r"21\.6 kg, must lie between from and to, here from 40 to 50 kg"):
+        parse(text)
+
+
+def test_a_wrong_unit_is_named_by_its_kind():
+    with pytest.raises(InputError) as refusal:
+        parse('[machine]\nr = "60 kg"\n[run]\ncrank_speed = "60 mm"\nstep = "2 parsnips"')
+    mass, length, unknown = refusal.value.faults
+    assert str(mass).endswith("; kg is a mass") and str(length).endswith("; mm is a length")
+    assert "parsnips is" not in str(unknown)
+
+
 def test_a_refused_geometry_names_the_lengths_that_are_the_examples():
     """Twice some of the lengths: c and hy, which the file does not give, are why they do not fit."""
     twice = {"r": 0.3, "l": 3.0, "h": 2.0, "l1": 2.7, "l2": 1.08, "e": 1.62, "z": 1.70763}

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
+import math
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from chainunit.engines import MATH, numpy_
 from chainunit.errors import InputError
-from chainunit.fmu.description import Interface, model_description
+from chainunit.fmu.description import Interface, model_description, model_description_3
 from chainunit.models import MODELS
 from chainunit.quantities import Layout, Quantity, base_units, variables, within_bounds
 from chainunit.reading import to_number
@@ -17,11 +21,13 @@ NAMES = Path(__file__).parent / "data" / "variables.json"
 
 
 def variables_of(model):
-    """The variables of the model's FMU by causality, in their order, each with its unit."""
+    """The variables of the model's FMU by causality, in their order, each with its unit, or its type if it is no
+    Real."""
     root = model_description(Interface(model, {}), "", {"ModelExchange": {}}, "0")
     results: dict[str, list[str]] = {}
     for variable in root.iter("ScalarVariable"):
-        unit = variable.find("Real").get("unit")
+        (own,) = variable
+        unit = own.get("unit") if own.tag == "Real" else own.tag
         words = variable.get("name") if unit is None else f"{variable.get('name')} [{unit}]"
         results.setdefault(variable.get("causality"), []).append(words)
     return results
@@ -91,6 +97,75 @@ def test_no_unit_of_an_fmu_can_be_read_in_two_ways(model):
 def test_a_text_takes_brackets_below_a_stroke():
     (slip,) = (v for v in MODELS["InductionMotor"].parameter_layout.variables if v.unit == "Hz/(N.m)")
     assert to_number(slip, "0.02 Hz/(N.m)") == to_number(slip, "0.02 Hz/N.m") == pytest.approx(0.02)
+
+
+def test_a_count_is_a_whole_number_and_a_switch_is_on_or_off():
+    of = {v.name: v for v in MODELS["InductionMotor"].parameter_layout.variables}
+    pairs, on = of["pole_pairs"], of["inverter.on"]
+    assert [to_number(pairs, x) for x in (1, 3.0, "24")] == [1.0, 3.0, 24.0]
+    assert [to_number(on, x) for x in (True, False, 1, 0.0)] == [1.0, 0.0, 1.0, 0.0]
+    for variable, wrong in ((pairs, (2.5, 0, 25, True, "2.5", "50 %")), (on, (0.5, 2, "true", "1"))):
+        for x in wrong:
+            with pytest.raises(ValueError, match=re.escape(f"must be {variable.quantity.allowed_range} (")):
+                to_number(variable, x)
+    assert pairs.quantity.allowed_range == "a whole number >= 1 and <= 24"
+    assert on.quantity.allowed_range == "true or false"
+    assert list(pairs.quantity.admits(np.array([2.0, 2.5, 25.0, math.nan]))) == [True, False, False, False]
+
+
+def test_python_takes_ints_and_bools():
+    """The equations give the same numbers, alone and over arrays."""
+    motor = MODELS["InductionMotor"]
+    u = motor.input_layout.from_names({"w_ref": 100.0, "load.J": 0.01})
+    moving = dict.fromkeys(motor.state_layout.names, 0.3) | {
+        "w": 30.0,
+        "supply.frequency": 20.0,
+        "stator.T": 300.0,
+    }
+    found = []
+    for given in ({"pole_pairs": 3, "inverter.on": True}, {"pole_pairs": 3.0, "inverter.on": 1.0}):
+        p = motor.check(motor.parameter_layout.from_names(given))
+        x = motor.state_layout.from_names(moving)
+        many = motor.state_layout.from_names({name: np.full(2, value) for name, value in moving.items()})
+        slips = [motor.evaluate(xp, p, u, at)[0].slip for xp, at in ((MATH, x), (numpy_(), many))]
+        assert slips[0] == slips[1][0] == pytest.approx(1.0 - 30.0 * 3.0 / (2.0 * math.pi * 20.0))
+        found.append(motor.derivatives(MATH, p, u, x))
+    assert found[0] == found[1]
+    with pytest.raises(InputError, match=r"pole_pairs = 2\.5: must be a whole number"):
+        motor.check(motor.parameter_layout.from_names({"pole_pairs": 2.5}))
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_types_of_an_fmu_are_those_of_the_declaration(version):
+    """Counts and switches have no unit; an output of theirs is discrete."""
+    names = {2: ("Integer", "Boolean"), 3: ("Int32", "Boolean")}[version]
+    found = {}
+    for name in ("InductionMotor", "LoadObserver"):
+        interface = Interface(MODELS[name], {"pole_pairs": 3, "inverter.on": True} if name[0] == "I" else {})
+        if version == 2:
+            root = model_description(interface, "", {"ModelExchange": {}}, "0")
+        else:
+            root = model_description_3(interface, "", {"ModelExchange": {}}, "0")
+        for node in root.find("ModelVariables"):
+            own = node[0] if version == 2 else node
+            if own.tag in names:
+                found[node.get("name")] = (own.tag, {**node.attrib, **own.attrib})
+    assert {name: tag for name, (tag, _) in found.items()} == {
+        "solver.max_steps": names[0], "pole_pairs": names[0], "inverter.on": names[1], "alarm": names[0],
+    }  # fmt: skip
+    assert [found[name][1]["start"] for name in ("solver.max_steps", "pole_pairs", "inverter.on")] == [
+        "500000", "3", "true",
+    ]  # fmt: skip
+    variability = {name: attributes["variability"] for name, (_, attributes) in found.items()}
+    assert variability.pop("alarm") == "discrete" and set(variability.values()) == {"fixed"}
+    alarm = found["alarm"][1]
+    assert (alarm["causality"], alarm["initial"], alarm["min"], alarm["max"]) == (
+        "output",
+        "calculated",
+        "-1",
+        "1",
+    )
+    assert not any("unit" in attributes for _, attributes in found.values())
 
 
 def test_what_is_off_its_bound_by_rounding_counts_as_the_bound():

@@ -17,7 +17,7 @@ from command import chainunit
 
 from chainunit import ending, ledger
 from chainunit.errors import InputError, WriteError
-from chainunit.files import LOCK, claim, clear, folder, refuse_foreign, whole
+from chainunit.files import LOCK, claim, clear, folder, whole
 
 SHORT = """
 event = []
@@ -306,13 +306,42 @@ def test_the_list_of_files_is_that_of_sha256sum_and_goes_with_them(tmp_path):
     # a process that was killed leaves the part of a line
     with (tmp_path / "out" / ledger.NAME).open("a") as out:
         out.write("0123")
-    with claim(tmp_path / "out", "compare") as place:
-        refuse_foreign(place, "a.png", "b.csv")
+    with claim(tmp_path / "out", "compare", "a.png", "b.csv") as place:
         clear(place, "a.png", "b.csv")
     assert names(tmp_path / "out") == []
     (tmp_path / "out" / ledger.NAME).write_text("a list of my own\n")
     with pytest.raises(InputError, match="is no list of files of chainunit"):
         write(tmp_path / "out", "text", "b.csv")
+
+
+@posix
+@pytest.mark.parametrize("moment", ["before", "after"])
+def test_a_run_that_is_killed_while_it_replaces_a_file_leaves_its_own(moment, tmp_path):
+    """The list has the old and the new content until the file has its name; the next run takes neither for a
+    foreign file."""
+    out = tmp_path / "out"
+    write(out, "first", "a.txt", "b.txt")
+    kill = "os.kill(os.getpid(), signal.SIGKILL)"
+    renames = "real(part, file);" if moment == "after" else ""
+    code = (
+        "import os, signal; from pathlib import Path; from chainunit.files import claim, whole\n"
+        "real = Path.replace\n"
+        "def replace(part, file):\n"
+        f"    {renames} {kill}\n"
+        f"with claim(Path({str(out)!r}), 'compare', 'a.txt') as place, whole(place / 'a.txt') as part:\n"
+        "    part.write_text('second'); Path.replace = replace\n"
+    )
+    killed = python(code, tmp_path)
+    killed.communicate()
+    assert killed.returncode == -signal.SIGKILL
+    assert (out / "a.txt").read_text() == ("second" if moment == "after" else "first")
+    write(out, "third", "a.txt", "b.txt")
+    assert (out / "a.txt").read_text() == "third"
+    lines = (out / ledger.NAME).read_text().splitlines()
+    assert [line.split()[1] for line in lines] == ["a.txt", "b.txt"]
+    (out / "a.txt").write_text("first")  # what the program wrote long ago is changed, too
+    with pytest.raises(InputError, match=r"a\.txt: would be lost"):
+        write(out, "fourth", "a.txt")
 
 
 def test_a_command_leaves_a_foreign_page_alone(tmp_path):

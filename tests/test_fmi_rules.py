@@ -43,6 +43,7 @@ class Unit:
         description = fmpy.read_model_description(folder)
         self.fmi, self.capsys = fmi, capsys
         self.reference = {v.name: v.valueReference for v in description.modelVariables}
+        self.type = {v.name: v.type for v in description.modelVariables}
         made = {2: (FMU2Slave, FMU2Model), 3: (FMU3Slave, FMU3Model)}[fmi][exchange]
         self.api = made(
             guid=description.guid or description.instantiationToken,
@@ -62,13 +63,17 @@ class Unit:
         return self
 
     def set(self, given):
-        names = [name.replace("__", ".") for name in given]
-        call = self.api.setReal if self.fmi == 2 else self.api.setFloat64
-        call([self.reference[n] for n in names], list(given.values()))
+        """Set values by the functions of their types."""
+        by_type = {}
+        for name, value in given.items():
+            name = name.replace("__", ".")
+            by_type.setdefault(self.type[name], {})[self.reference[name]] = value
+        for kind, values in by_type.items():
+            getattr(self.api, f"set{kind}")(list(values), list(values.values()))
 
     def get(self, *names):
-        call = self.api.getReal if self.fmi == 2 else self.api.getFloat64
-        return call([self.reference[n] for n in names])
+        (kind,) = {self.type[n] for n in names}
+        return getattr(self.api, f"get{kind}")([self.reference[n] for n in names])
 
     def step(self, time, size):
         self.api.doStep(time, size)
@@ -328,7 +333,7 @@ def test_a_completed_step_does_not_compute_with_a_refused_input(unit, fmi):
 @both
 @pytest.mark.parametrize("name", [name for name, model in MODELS.items() if model.state_layout])
 def test_a_step_beyond_the_budget_is_discarded_and_leaves_all_as_it_was(unit, name, fmi):
-    one = unit(name, fmi).start(solver__max_steps=20.0)
+    one = unit(name, fmi).start(solver__max_steps=20)
     states = MODELS[name].state_layout.names
     one.step(0.0, 1e-3)
     before = one.get(*states)
@@ -346,7 +351,9 @@ def test_a_step_beyond_the_budget_is_discarded_and_leaves_all_as_it_was(unit, na
         assert one.get("time") == [1e-3]
     one.step(1e-3, 1e-3)
     fresh = unit(name, fmi)
-    assert "solver.max_steps = 0: must be >= 1" in fresh.refused(fresh.start, solver__max_steps=0.0)
+    assert "solver.max_steps = 0: must be a whole number >= 1" in fresh.refused(
+        fresh.start, solver__max_steps=0
+    )
 
 
 @both
@@ -448,10 +455,11 @@ def test_every_declared_initial_dependency_has_a_derivative(unit, native_fmus, n
         one.api.enterInitializationMode()
     else:
         one.api.enterInitializationMode(startTime=0.0)
-    by = {}
+    by, number = {}, {2: "Real", 3: "Float64"}[fmi]
     for declarations in description.initialUnknowns:
         for known in declarations.dependencies:
-            by.setdefault(known.valueReference, []).append(declarations.variable.valueReference)
+            if known.type == number == declarations.variable.type:
+                by.setdefault(known.valueReference, []).append(declarations.variable.valueReference)
     parameters = {v.valueReference for v in description.modelVariables if v.causality == "parameter"}
     assert parameters & by.keys()
     set_values, read = (
@@ -637,3 +645,115 @@ def test_sources_are_of_one_version(native_fmus, tmp_path):
     process = subprocess.run([shutil.which("cc"), *flags], capture_output=True, text=True)
     assert process.returncode and "define the one of this FMU's version of FMI" in process.stderr
     assert not subprocess.run([shutil.which("cc"), flags[0], *flags[2:]]).returncode
+
+
+@both
+def test_a_variable_is_read_and_set_by_the_functions_of_its_type_alone(unit, fmi):
+    """A count, a switch and a number of the motor; no variable is a text."""
+    one = unit("InductionMotor", fmi)
+    names = {2: ("Real", "Integer", "Boolean", "String"), 3: ("Float64", "Int32", "Boolean", "String")}[fmi]
+    own = dict(zip(("cage.R", "pole_pairs", "inverter.on"), names, strict=False))
+    good = {"cage.R": 2.5, "pole_pairs": 3, "inverter.on": True}
+    for name, value in good.items():
+        vr = one.reference[name]
+        assert one.type[name] == own[name]
+        for kind in names:
+            get, put = (getattr(one.api, f"{verb}{kind}") for verb in ("get", "set"))
+            if kind == own[name]:
+                put([vr], [value])
+                assert get([vr]) == [value]
+                continue
+            line = f"value reference {vr} is no variable of the type {kind}"
+            assert one.refused(get, [vr]) == line and one.status == 3
+            assert one.refused(put, [vr], ["" if kind == "String" else 1]) == line and one.status == 3
+    line = "value reference 9999 does not exist"
+    assert one.refused(getattr(one.api, f"get{names[1]}"), [9999]) == line
+    one.start()
+    assert {name: one.get(name)[0] for name in good} == good
+    fixed = "pole_pairs is fixed: set it before initialization or after reset"
+    assert one.refused(one.set, {"pole_pairs": 2}) == fixed
+    # no derivative by a whole number
+    again = unit("InductionMotor", fmi)
+    if fmi == 2:
+        again.api.setupExperiment()
+    again.api.enterInitializationMode()
+    slopes, w, vr = again.api.getDirectionalDerivative, again.reference["w"], again.reference["pole_pairs"]
+    assert f"value reference {vr} is no variable" in again.refused(slopes, [w], [vr], [1.0])
+
+
+@both
+def test_a_count_out_of_its_bounds_is_refused_at_the_initialization(unit, fmi):
+    limits = allowed("InductionMotor", "pole_pairs")
+    assert limits == "must be a whole number >= 1 and <= 24"
+    for pairs in (0, 25, -(2**31), 2**31 - 1):
+        one = unit("InductionMotor", fmi)
+        line = one.refused(one.start, pole_pairs=pairs)
+        assert line.startswith("pole_pairs = ") and line.endswith(limits)
+        one.set({"pole_pairs": 4})
+        one.start()
+
+
+@both
+def test_a_saved_state_has_counts_and_switches(unit, fmi):
+    one = unit("InductionMotor", fmi).start(pole_pairs=3, inverter__on=True, w_ref=100.0)
+    raw = one.serialized()
+    other = unit("InductionMotor", fmi).start()
+    other.restore(raw)
+    assert other.get("pole_pairs") == [3] and other.get("inverter.on") == [True]
+    for each in (one, other):
+        each.step(0.0, 0.01)
+    assert other.get("w", "slip") == one.get("w", "slip")
+
+
+@both
+def test_the_alarm_of_model_exchange_changes_in_event_mode_only(unit, native_fmus, fmi):
+    """A discrete output: the FMU asks for the event, and holds the value until then."""
+    description = fmpy.read_model_description(native_fmus["LoadObserver", fmi][1])
+    order = [v.derivative.name for v in description.modelVariables if v.derivative]
+    (alarm,) = (v for v in description.modelVariables if v.name == "alarm")
+    assert (alarm.variability, alarm.causality) == ("discrete", "output")
+    one = unit("LoadObserver", fmi, exchange=True).start(phi=1.0, w=150.0)
+    n, update = len(order), one.api.newDiscreteStates if fmi == 2 else one.api.updateDiscreteStates
+    update()
+    one.api.enterContinuousTimeMode()
+    x = (ctypes.c_double * n)()
+    one.api.getContinuousStates(x, n)
+    equal, loaded = list(x), list(x)
+    # as after a long time: sure of the loads, and one side has too much
+    loaded[order.index("left.material_mass")] = 300.0
+
+    def seen(states):
+        """The alarm, and whether the FMU asks for an event, at these states."""
+        x[:] = states
+        one.api.setContinuousStates(x, n)
+        return one.get("alarm")[0], one.api.completedIntegratorStep()[0]
+
+    assert seen(equal) == (0, False)
+    assert seen(loaded) == (0, True)
+    raw = one.serialized()
+    for _ in range(2):
+        assert one.get("alarm") == [0]  # still, though the states are beyond the threshold
+        one.api.enterEventMode()
+        assert one.get("alarm") == [1]
+        update()
+        one.api.enterContinuousTimeMode()
+        assert seen(loaded) == (1, False)
+        assert seen(equal) == (1, True)
+        one.restore(raw)  # which holds the alarm, too
+    one.api.enterEventMode()
+    x[:] = loaded
+    one.api.setContinuousStates(x, n)
+    one.api.enterContinuousTimeMode()
+    assert seen(equal) == (1, True)
+    one.api.terminate()
+    assert one.get("alarm") == [1]
+
+
+@both
+def test_a_refused_experiment_leaves_nothing_behind(unit, fmi):
+    """From an endless time to an endless time: the FMU takes its own saved state, and starts."""
+    one = unit("InductionMotor", fmi)
+    assert one.refused(one.start, float("inf"), float("inf")) == "start time = inf s: must be a finite number"
+    one.restore(one.serialized())
+    one.start(0.0, float("inf")).step(0.0, 0.01)
+    one.restore(one.serialized())

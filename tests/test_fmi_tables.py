@@ -77,7 +77,7 @@ class Unit:
         self._sort(description)
 
     def _sort(self, description):
-        """One variable of each kind, by the words of the tables; a model may lack some."""
+        """One variable of each type and kind, by the words of the tables; a model may lack some."""
         self.variables = {}
         states = {v.derivative.valueReference for v in description.modelVariables if v.derivative}
         self.n_x = len(states)
@@ -91,10 +91,11 @@ class Unit:
             else:
                 kinds = ["time" if v.causality == "independent" else "derivative"]
             for kind in kinds:
-                self.variables.setdefault(kind, v)
+                self.variables.setdefault((v.type, kind), v)
         self.bounded = next(
             (v for v in description.modelVariables if v.causality == "input" and v.min is not None), None
         )
+        self.number = "Real" if self.fmi == 2 else "Float64"
         self.budget = next((v for v in description.modelVariables if v.name == "solver.max_steps"), None)
 
     def status(self, name, *given):
@@ -116,10 +117,10 @@ class Unit:
         if state == "failed":
             # so that a long step fails, and a short one does not
             if self.budget:
-                assert not self._set(self.budget.valueReference, 1.0)
+                assert not self._set(self.budget, 1)
             elif self.bounded:
                 low, high = float(self.bounded.min), float(self.bounded.max or "inf")
-                assert not self._set(self.bounded.valueReference, min(low + 10.0, 0.5 * (low + high)))
+                assert not self._set(self.bounded, min(low + 10.0, 0.5 * (low + high)))
         assert not self._initialize()
         if state == "initialization":
             return True
@@ -139,7 +140,7 @@ class Unit:
 
     def err(self):
         """An error that is possible in any state: a value that is no number."""
-        assert self._set(self.variables["input"].valueReference, float("nan")) == ERROR
+        assert self._set(self.variables[self.number, "input"], float("nan")) == ERROR
 
     def _initialize(self):
         if self.fmi == 3:
@@ -162,17 +163,14 @@ class Unit:
 
     # -- the calls
 
-    def _set(self, reference, value):
-        if self.fmi == 2:
-            return self.status("SetReal", byref(c_uint(reference)), c_size_t(1), byref(c_double(value)))
-        return self.status(
-            "SetFloat64", byref(c_uint(reference)), c_size_t(1), byref(c_double(value)), c_size_t(1)
-        )
+    def _value(self, verb, v, value=0):
+        """Get or set a variable by the function of its type."""
+        counted = () if self.fmi == 2 else (c_size_t(1),)
+        room = (c_double if v.type == self.number else c_int)(value)
+        return self.status(verb + v.type, byref(c_uint(v.valueReference)), c_size_t(1), byref(room), *counted)
 
-    def _get(self, reference):
-        more = () if self.fmi == 2 else (c_size_t(1),)
-        name = "GetReal" if self.fmi == 2 else "GetFloat64"
-        return self.status(name, byref(c_uint(reference)), c_size_t(1), byref(c_double()), *more)
+    def _set(self, v, value):
+        return self._value("Set", v, value)
 
     def _step(self, size):
         if self.fmi == 2:
@@ -183,11 +181,9 @@ class Unit:
     def call(self, row):
         """The status of the call of a row, with arguments that are right."""
         name, _, what = row.partition(" ")
-        if name in ("GetReal", "GetFloat64"):
-            return self._get(self.variables[what].valueReference)
-        if name in ("SetReal", "SetFloat64"):
-            v = self.variables[what]
-            return self._set(v.valueReference, float(v.start) if v.start is not None else 0.0)
+        if (v := self.variables.get((name[3:], what))) is not None:
+            start = {"true": 1, "false": 0}.get(v.start, v.start) or 0
+            return self._value(name[:3], v, float(start) if v.type == self.number else int(start))
         return getattr(self, "_" + name.replace("*", ""), lambda: self._plain(name, what))()
 
     def _plain(self, name, what):
@@ -209,8 +205,9 @@ class Unit:
             if name == "SetContinuousStates":
                 states = (c_double * max(self.n_x, 1))(*self._states())
             return states, n
-        one = byref(c_uint(self.variables["input"].valueReference))
-        output = byref(c_uint(self.variables["output"].valueReference))
+        one, output = (
+            byref(c_uint(self.variables[self.number, kind].valueReference)) for kind in ("input", "output")
+        )
         order, value = byref(c_int(1)), byref(c_double(0.0))
         counted = () if self.fmi == 2 else (c_size_t(1),)
         return {
@@ -352,7 +349,8 @@ def wrong_cells(folder, fmi, kind):
         unit = Unit(library, description, fmi, kind)
         what = row.partition(" ")[2]
         try:
-            if (what not in ("", "none") and what not in unit.variables) or not unit.enter(before or state):
+            lacks = what not in ("", "none") and (row[3:].partition(" ")[0], what) not in unit.variables
+            if lacks or not unit.enter(before or state):
                 return
             if before:
                 unit.err()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import binascii
+import contextlib
 import json
 import math
 import re
@@ -252,6 +253,9 @@ def test_needs_only_the_standard_library(fmus, tmp_path):
             archive.extractall(tmp_path / name)
         resources = tmp_path / name / "resources"
         module = (resources / "slavemodule.txt").read_text()
+        types = {}
+        for v in fmpy.read_model_description(str(file)).modelVariables:
+            types.setdefault(v.type.lower(), []).append(v.valueReference)
         script = f"""
 import sys, json
 sys.path.insert(0, {str(resources)!r})
@@ -259,8 +263,7 @@ module = __import__({module!r})
 unit = getattr(module, {name!r})(instance_name="unit", resources={str(resources)!r})
 unit.enter_initialization_mode(); unit.exit_initialization_mode()
 ok = unit.do_step(0.0, 0.01)
-count = {len(fmpy.read_model_description(str(file)).modelVariables)}
-values = unit.get_real(list(range(count)))
+values = [v for name, own in {types}.items() for v in getattr(unit, "get_" + name)(own)]
 foreign = [m for m in sys.modules if m.split(".")[0] in ("numpy", "casadi", "fmpy", "pydantic")]
 print(json.dumps([ok, all(v == v for v in values), foreign]))
 """
@@ -595,6 +598,51 @@ def test_calls_of_other_types_and_unknown_references_are_not_fatal(motor):
             assert unit.messages[-1].startswith("saved state: it ")
         unit.restore(state)
         assert unit.get(["w"]) == before
+
+
+def test_counts_and_switches_are_integers_and_booleans(unpacked):
+    """In pythonfmu's FMU: read and set by their own functions alone, and refused by others without a number."""
+    fmu = unpacked("InductionMotor")
+    names = ("cage.R", "pole_pairs", "inverter.on")
+    real, count, switch = (fmu.variables[name].valueReference for name in names)
+    start = {"pole_pairs": 3, "inverter.on": True, "w_ref": 100.0, "load.J": 0.01}
+    with Running(fmu, start) as unit:
+        api = unit._fmi
+        assert unit.get(["pole_pairs", "cage.R", "inverter.on"]) == [3.0, 2.1, 1.0]
+        assert api.getInteger([count]) == [3] and api.getBoolean([switch]) == [True]
+        for get, vr, nothing, kind in (
+            (api.getReal, count, math.nan, "Real"),
+            (api.getReal, switch, math.nan, "Real"),
+            (api.getInteger, switch, 0, "Integer"),
+            (api.getBoolean, real, 0, "Boolean"),
+        ):
+            assert get([vr]) == pytest.approx([nothing], nan_ok=True)
+            assert unit.messages[-1] == f"value reference {vr} is no variable of the type {kind}"
+        api.setReal([count], [4.0])
+        assert api.getInteger([count]) == [3]
+        unit.step(0.0, 0.01)
+    runs = [
+        fmpy.simulate_fmu(
+            str(fmu.file), start_values=given, output=["w", *names[1:]], stop_time=0.1, output_interval=0.01
+        )
+        for given in (start, start | {"inverter.on": False}, start | {"pole_pairs": 1})
+    ]
+    assert [(int(run["pole_pairs"][-1]), bool(run["inverter.on"][-1])) for run in runs] == [
+        (3, True),
+        (3, False),
+        (1, True),
+    ]
+    assert len({float(run["w"][-1]) for run in runs}) == 3
+    with (
+        Running(fmu, {"pole_pairs": 25}) as unit,
+        pytest.raises(RunError, match="pole_pairs = 25: must be a whole number >= 1 and <= 24"),
+    ):
+        unit.step(0.0, 0.01)
+    with (
+        contextlib.closing(Instance(fmu, "unit")) as unit,
+        pytest.raises(InputError, match=r"pole_pairs = 2\.5: must be a whole number"),
+    ):
+        unit.initialize({"pole_pairs": 2.5}, 0.0)
 
 
 def test_fixed_and_tunable_parameters(chamber):

@@ -133,13 +133,14 @@ def together(t_end, w_ref, pressure):
 
 def test_what_a_file_sets_is_declared_by_the_fmu(folder):
     study = parse(folder, STUDY + MACHINE)
-    assert study.machine.by_name == {"ratio": RATIO, "piston.mass": MASS, "throw": 0.15}
-    assert study.machine.component.start == {"piston.mass": MASS, "throw": 0.15}
+    own = {"piston.mass": MASS, "throw": 0.15, "cylinders": 1.0, "vented": 0.0}
+    assert study.machine.by_name == {"ratio": RATIO} | own
+    assert study.machine.component.start == own
     assert study.feed.back_pressure == PRESSURE
     for change, messages in (
         (
             ("piston =", "pistn ="),
-            r'machine\.pistn: unknown key; was "piston" meant\? known here: ratio, piston, throw',
+            r'machine\.pistn: unknown key; was "piston" meant\? known here: ratio, piston, throw, cylinders, vented',
         ),
         (
             ("back_pressure", "pressure"),
@@ -147,6 +148,8 @@ def test_what_a_file_sets_is_declared_by_the_fmu(folder):
         ),
         (("ForeignMachine", "none"), r"system\.machine: .*none\.fmu: no such FMU"),
         (("ForeignMachine", "ForeignMotor"), r"system\.machine: .*ForeignMotor\.fmu: has no variable phi; a"),
+        (("[feed]", "cylinders = 1.5\n[feed]"), r"machine\.cylinders = 1\.5: must be a whole number"),
+        (("[feed]", "vented = 2\n[feed]"), r"machine\.vented = 2: must be true or false"),
         (("[run]", "feed_forward = true\n[run]"), r"feed_forward: needs a model of the machine"),
         (("[run]", "[monte_carlo]\nruns = 5\n[run]"), r"monte_carlo\.runs: needs a model of the machine"),
         (("[run]", 'organ = "chain"\n[run]'), r"organ: is of the chain unit"),
@@ -165,6 +168,18 @@ def test_a_turn_at_constant_speed_is_by_the_fmu_alone(ratio, folder):
     torque, inertia = pump(turn.angle, SPEED, PRESSURE)
     np.testing.assert_allclose(turn.crank_torque, torque, rtol=1e-9, atol=1e-9 * np.max(torque))
     np.testing.assert_allclose(turn.outputs.J * ratio**2, inertia, rtol=1e-12)
+
+
+def test_counts_and_switches_of_a_machine_reach_its_fmu(folder):
+    """An Integer and a Boolean of the FMU, in the machine's table: two pistons, nothing that they press against."""
+    text = (STUDY + MACHINE).replace("[feed]", "cylinders = 2\nvented = true\n[feed]")
+    study = parse(folder, text)
+    turn = cycle(study.machine, SPEED, study.feed, points=30)
+    moving, s, c = 2.0 * MASS * 0.15**2, np.sin(turn.angle), np.cos(turn.angle)
+    np.testing.assert_allclose(
+        turn.crank_torque, moving * s * c * SPEED**2 + 0.5 * SPEED, rtol=1e-9, atol=1e-9
+    )
+    np.testing.assert_allclose(turn.outputs.J * RATIO**2, 2.0 + moving * s * s, rtol=1e-12)
 
 
 def test_motor_and_machine_of_somebody_else(folder, burst):
@@ -269,7 +284,7 @@ SIZED = (
 def compare_with_pump(best):
     """Torque at the crank and inertia at the motor, of the candidate, with those of the pump."""
     torque, inertia = pump(np.linspace(0.0, 2.0 * math.pi, 720), SPEED, PRESSURE)
-    assert best.duty_torque == pytest.approx(np.max(np.abs(torque)), rel=0.05)
+    assert best.duty.torque == pytest.approx(np.max(np.abs(torque)), rel=0.05)
     rotor, plate = best.drive.fmu_parameters.rotor.J, best.motor.nameplate.J
     reflected = np.max(inertia) / best.drive.ratio**2
     assert best.checks["inertia"].value == pytest.approx((reflected + rotor - plate) / plate, rel=1e-3)

@@ -179,7 +179,7 @@ def test_the_residuals_tell_a_wrong_machine(loaded, empty):
     )
     wrong = problem_of(*recordings, empty=(1,), r=0.153)
     worst = max(check_residuals(fit(wrong)), key=lambda each: each.statistic)
-    assert worst.column == "motor.i" and worst.statistic > 2.0 * worst.limit and not worst.is_noise
+    assert worst.column == "motor.i" and worst.statistic > 2.0 * worst.limit and worst.reason == "orders"
 
 
 def test_a_wrong_gear_strains_the_clock(loaded):
@@ -283,6 +283,17 @@ def test_slow_changes_are_no_noise():
     own = checked(4.0, 1.0)
     assert own.reason == "slow" and not own.is_noise and own.statistic < own.limit
     assert own.changes == pytest.approx(0.2 * 4.0 / np.sqrt(2.0), rel=0.1)
+
+
+def test_low_orders_of_the_crank_are_no_slow_changes():
+    """A wrong dimension leaves them beside higher ones that are not looked at; residuals of zero are no fault."""
+    angle = np.linspace(0.0, 60.0, 1500)
+    rng = np.random.default_rng(9)
+    wave = 4.0 * sum(np.cos(k * angle + k) for k in (1, 2, 3, 31)) + rng.standard_normal(1500)
+    own = residuals.check(Comparison("run", "motor.i", wave, None, (), angle, 0.2), 0.99)
+    assert own.reason == "orders" and own.slow < own.slow_limit and own.noise > residuals.LOUD
+    exact = residuals.check(Comparison("run", "motor.i", 0.0 * wave, None, (), angle, 0.2), 0.99)
+    assert exact.is_noise and exact.noise == exact.statistic == exact.slow == 0.0
 
 
 def test_the_residuals_of_a_swinging_machine_are_checked():

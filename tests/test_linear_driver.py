@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import fmpy
@@ -11,14 +12,14 @@ import pytest
 from command import chainunit
 from fmpy.validation import validate_fmu
 
-from chainunit.engines import MATH
+from chainunit.engines import MATH, numpy_
 from chainunit.errors import InputError
 from chainunit.fmu.native.export import export
 from chainunit.integrate import controlled
 from chainunit.machines.linkages.file import description_of, read_linkage
 from chainunit.machines.linkages.model import machine_of
 from chainunit.machines.machine import Machine
-from chainunit.mechanism.end_stops import EndStops, stop_force
+from chainunit.mechanism.end_stops import EndStops, stop_action
 from chainunit.native.compilers import compiler
 from chainunit.study import config
 
@@ -278,13 +279,15 @@ def test_what_is_no_cylinder_is_refused():
         machine_of(description_of({**JIB, "links": links}, "loose"))
 
 
-def test_a_driver_that_moves_by_itself_stays_in_its_range():
+@pytest.mark.parametrize("ratio", [1.0, 1.25])
+def test_a_driver_that_moves_by_itself_stays_in_its_range(ratio):
     """Without a force it falls from the middle of its range onto its lower end stop, and rests there; with a large
     one it goes to the upper one. No energy is lost but in the pins and the stops."""
     model = read_linkage(LIFT.with_name("tipper.toml")).direct()
-    low, high = model.inverse.span
-    p, layout = model.check(model.Parameters()), model.state_layout
-    for tau, end, sign in ((0.0, low, -1.0), (1.5e5, high, 1.0)):
+    low, high = (ratio * end for end in model.inverse.span)
+    layout = model.state_layout
+    p = model.check(replace(model.Parameters(), ratio=ratio))
+    for tau, end, sign in ((0.0, low, -1.0), (1.5e5 / ratio, high, 1.0)):
         u, pace = model.Inputs(tau=tau), 0.0
         start = model.start(MATH, p, u)
         # the third state is the energy that the effort gives less the energy lost
@@ -305,17 +308,30 @@ def test_a_driver_that_moves_by_itself_stays_in_its_range():
         gained = sum(s * (o.kinetic_energy + o.potential_energy) for s, o in ((1.0, after), (-1.0, before)))
         assert gained == pytest.approx(states[2], rel=1e-4)
         # at rest the stop carries the difference
-        assert after.end_stop_force == pytest.approx(tau - after.tau_bias, rel=1e-2)
+        assert after.end_stop_force == pytest.approx(ratio * (tau - after.tau_bias), rel=1e-2)
         assert sign * after.end_stop_force > 0.0
 
 
 def test_end_stops_push_and_never_pull():
     law, span = EndStops(stiffness=1e6, damping=1e4), (0.2, 1.2)
     for w in (-50.0, -1.0, 0.0, 1.0, 50.0):
-        assert all(stop_force(MATH, law, span, q, w) == 0.0 for q in (0.2, 0.7, 1.2))
-        assert stop_force(MATH, law, span, 1.21, w) >= 0.0 >= stop_force(MATH, law, span, 0.19, w)
-    assert stop_force(MATH, law, span, 1.21, 0.0) == pytest.approx(1e4, rel=0.02)
-    assert stop_force(MATH, law, span, 0.19, 0.0) == pytest.approx(-1e4, rel=0.02)
+        assert all(stop_action(MATH, law, span, q, w) == (0.0, 0.0, 0.0) for q in (0.2, 0.7, 1.2))
+        for q, sign in ((1.21, 1.0), (1.20012, 1.0), (0.19, -1.0)):
+            action = stop_action(MATH, law, span, q, w)
+            assert sign * action.force >= 0.0 and action.lost * w >= 0.0
+    upper, lower = (stop_action(MATH, law, span, q, 0.0) for q in (1.21, 0.19))
+    assert upper.force == pytest.approx(1e4, rel=0.02) and lower.force == pytest.approx(-1e4, rel=0.02)
+    assert stop_action(MATH, law, span, 1.21, 0.2).lost == pytest.approx(2e3, rel=0.02)
+
+
+@pytest.mark.parametrize("end", [0.19, 1.21])
+def test_the_energy_of_an_end_stop_is_the_work_of_its_spring(end):
+    """A second route: the integral of the force at rest over the way, and the slope of the energy."""
+    law, span = EndStops(stiffness=1e6, damping=1e4), (0.2, 1.2)
+    q = np.linspace(0.7, end, 200001)
+    actions = stop_action(numpy_(), law, span, q, 0.0 * q)
+    np.testing.assert_allclose(np.trapezoid(actions.force, q), actions.energy[-1], rtol=1e-6)
+    assert np.all(actions.lost == 0.0) and actions.energy[-1] == pytest.approx(50.0, rel=0.02)
 
 
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")

@@ -106,7 +106,14 @@ def test_export(tmp_path, direct):
         (("export", "ChamberForce"), 'was "ChamberForces" meant?'),
         (("export", "ChamberForces", "--direct"), "--direct: is of linkage files"),
         (("linkage", "nope.toml"), "nope.toml: cannot be read"),
-        (("linkage", str(PRESS), "--speed", "60 kg"), "--speed"),
+        (
+            ("linkage", str(PRESS), "--speed", "60 mm"),
+            '--speed "60 mm": mm is a length; must be a speed in rev/min, rad/s, deg/s or Hz',
+        ),
+        (
+            ("linkage", str(PRESS), "--speed", "60 furlong"),
+            "furlong is no known unit; must be a speed in rev/min",
+        ),
         (("linkage", str(PRESS), "--speed", "0"), "must be > 0"),
         (
             ("linkage", str(PRESS), "--speed", "60"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import pickle
 import re
 import zipfile
@@ -17,6 +18,7 @@ from chainunit.engines import MATH
 from chainunit.fmu.accompany import companion_files
 from chainunit.fmu.backends import export
 from chainunit.fmu.description import Interface, model_description, model_description_3
+from chainunit.fmu.pictures import drawing
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
 
@@ -92,6 +94,20 @@ def test_the_machine_of_a_user_is_not_of_this_package(tmp_path):
         assert {*model.sketch().pins, *model.sketch().links} <= {*re.findall(r">([^<>]+)</text>", drawn)}
         assert "x points right, y up" in page and "Limits:" in page and "MIT licence" in page
     assert "A. Bauer" in companion_files(Interface(named, {}), "9.9", 2)["documentation/index.html"].decode()
+
+
+def test_the_pictures_of_an_fmu_show_its_start_values():
+    """A crank of twice the length is twice as long in the drawing, as the scale of the rest tells."""
+    model = read_linkage(FOLDER / "slider_crank_press.toml")
+    for each in (model, model.direct()):
+        usual, longer = (companion_files(Interface(each, start), "9.9", 3) for start in ({}, {"r": 0.16}))
+        names = ("documentation/index.html", "terminalsAndIcons/icon.png", "terminalsAndIcons/icon.svg")
+        assert all(usual[name] != longer[name] for name in names)
+        own = each.sketch({"r": 0.16}).pins
+        (x0, y0), (x1, y1) = own["O1"], own["A"]
+        assert math.hypot(x1 - x0, y1 - y0) == pytest.approx(0.16)
+        drawn = re.search(r"<svg.*</svg>", longer["documentation/index.html"].decode(), re.S)[0]
+        assert drawn + "\n" == drawing(each.sketch({"r": 0.16}))
 
 
 def test_a_text_that_is_no_text_is_told(tmp_path):
@@ -184,7 +200,7 @@ def test_a_linkage_has_the_parameters_that_it_needs(tmp_path):
 
 def test_the_derivative_of_an_energy_is_a_power():
     units = {
-        v.get("name"): v.find("Real").get("unit")
+        v.get("name"): v[0].get("unit")
         for v in described(chainunit.models.MODELS["DcMotor"]).iter("ScalarVariable")
     }
     assert units["der(load_energy)"] == "W" and units["der(w)"] == "rad/s2"

@@ -76,6 +76,45 @@ def test_the_functions_are_exact_outside_of_their_width():
     assert area == pytest.approx(value("positive(x, 0.4)", 0.3), rel=1e-7)
 
 
+@pytest.mark.parametrize(
+    ("force", "words"),
+    [
+        ("step(vy, 0)", "the width of step(vy, 0) is 0; must be > 0"),
+        ("positive(y, -0.1) / way", "the width of positive(y, -0.1) is -0.1; must be > 0"),
+        ("where(vy > 0, 1, 2, 0.1 - 0.3)", "the width of where(vy > 0, 1, 2, 0.1 - 0.3) is -0.2; must be > 0"),
+        ("ramp(vy, 0.2, 2 * 0.1)", "the begin and the end of ramp(vy, 0.2, 2 * 0.1) must differ"),
+        ("step(vy, 1 / (2 - 2))", "the width of step(vy, 1 / (2 - 2)) is nan; must be > 0"),
+        ("step(y, way - 0.02)", "the width of step(y, way - 0.02) is -0.01; must be > 0 (way = 0.01)"),
+        ("step(y, -stroke(y))", "the width of step(y, -stroke(ram.T.y)) is -0.16"),
+        ("step(vy, 0.1 * vx)", "the width of step(vy, 0.1 * vx) changes with vx; must be a number or an expression"),
+        ("step(vy, valve)", "the width of step(vy, valve) changes with valve; must be a number or an expression"),
+    ],
+)  # fmt: skip
+def test_a_width_that_is_not_above_zero_is_refused_with_its_key(force, words, tmp_path):
+    """Also one that follows from parameters, at their start values."""
+    file = tmp_path / "press.toml"
+    more = '[inputs.valve]\nvalue = "1 m/s"\n'
+    used = "0 * press_force * valve / valve * way / way"
+    load = f'[loads.tool]\non = "ram.T"\nforce = [0, "press_force * {force} + {used}"]\n'
+    file.write_text(f"{BODY}\n{load}\n{more}\n{START}")
+    with pytest.raises(InputError) as refusal:
+        read_linkage(file)
+    line = str(refusal.value)
+    assert re.match(rf"{re.escape(str(file))}:\d+: loads\.tool\.force: ", line) and words in line
+
+
+def test_a_width_of_parameters_stays_above_zero_when_they_change():
+    """A falling ramp stays one that falls. The FMU has the same requirement."""
+    m = machine('on = "ram.T"\nforce = [0, "press_force * step(y, way - 0.005) * ramp(y, 0.1, 0.1 - way)"]')
+    assert [each.subject for each in m.model.required[-2:]] == [
+        "width of step(y, way - 0.005) in loads.tool.force",
+        "fall of ramp(y, 0.1, 0.1 - way) in loads.tool.force",
+    ]
+    assert m.replace({"way": 0.006}).p.way == 0.006
+    with pytest.raises(InputError, match=r"width of step\(y, way - 0.005\) in loads.tool.force = -0.004"):
+        m.replace({"way": 0.001})
+
+
 def test_a_quantity_may_have_the_name_of_a_new_function():
     """Files of before have such names; a call is told from a name."""
     m = machine(

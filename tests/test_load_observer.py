@@ -7,6 +7,7 @@ import math
 from pathlib import Path
 
 import control
+import fmpy
 import numpy as np
 import observing
 import pytest
@@ -475,3 +476,41 @@ def test_thresholds_of_the_linear_filter(observer, monkeypatch):
         memory = 0.5  # in turns, of estimates that follow within a turn
         assert np.all(levels > load_filter.level(MATH, 2.0 * memory, 0.5e-6 * rate))
         assert np.all(levels < 1.5 * load_filter.level(MATH, 0.5 * memory, 0.5e-6 * rate))
+
+
+@native
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_the_alarm_rises_in_model_exchange_as_in_co_simulation(native_fmus, fmi):
+    """In the importer that solves it: an integer, at one row of both kinds, as half of the feed shifts."""
+    rows = observing.course(observing.shifted(2.0, 0.5), 4.0)
+    times = np.arange(rows.shape[1]) * observing.STEP
+    names = [
+        ("time", float),
+        ("phi", float),
+        ("w", float),
+        ("current", float),
+        ("torque", float),
+        ("power", float),
+    ]
+    table = np.array([(t, *row, 0.0, 0.0) for t, row in zip(times, rows.T, strict=True)], dtype=names)
+    runs = {}
+    for kind, more in (("CoSimulation", {"step_size": observing.STEP}), ("ModelExchange", {})):
+        runs[kind] = fmpy.simulate_fmu(
+            native_fmus["LoadObserver", fmi][0],
+            fmi_type=kind,
+            start_values=observing.noise_of(rows),
+            input=table,
+            output=["alarm", "grounds.feed"],
+            stop_time=times[-1],
+            output_interval=1e-2,
+            relative_tolerance=1e-5,
+            **more,
+        )
+    for run in runs.values():
+        (k,) = np.flatnonzero(np.diff(run["alarm"]))
+        assert run["alarm"].dtype == np.int32 and list(run["alarm"][[0, k, k + 1, -1]]) == [0, 0, 1, 1]
+        assert run["time"][k + 1] == pytest.approx(3.13, abs=0.3)
+        # the ground passes 1 there
+        assert run["grounds.feed"][k - 1] < 1.0 < run["grounds.feed"][k + 2]
+    ends = [run["time"][np.flatnonzero(run["alarm"])[0]] for run in runs.values()]
+    assert ends[0] == pytest.approx(ends[1], abs=0.02)

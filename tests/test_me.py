@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import fmpy
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from systems import component, pair
+from test_ssp import OBSERVED
 
 from chainunit import InputError, RunError
 from chainunit.machines.flexible import flexible
@@ -277,3 +279,19 @@ def test_a_failing_run_keeps_what_it_computed(tmp_path):
             simulation.run(0.05, 0.001)
     partial = caught.value.partial
     assert 0 < partial.sizes["time"] <= 12 and np.all(np.isfinite(partial["motor.w"].values))
+
+
+def test_a_discrete_output_changes_at_an_event_that_its_fmu_asks_for(native_fmus):
+    """The alarm beside machine and motor: a whole number, up in one event; as late as a step of the solver."""
+    files = {
+        name: replace(each, file=native_fmus[each.model.name, 2][0])
+        for name, each in OBSERVED.components.items()
+    }
+    with ModelExchange(replace(OBSERVED, components=files), rtol=1e-6) as simulation:
+        run = simulation.run(2.2, 0.01, names=["observer.alarm", "observer.grounds.feed"])
+        assert simulation.events == 1
+    alarm, ground = (run[f"observer.{name}"].values for name in ("alarm", "grounds.feed"))
+    (k,) = np.flatnonzero(np.diff(alarm))
+    assert set(alarm[: k + 1]) == {0.0} and set(alarm[k + 1 :]) == {1.0}
+    (first,) = np.flatnonzero((ground[:-1] < 1.0) & (ground[1:] >= 1.0))
+    assert first <= k <= first + 2

@@ -13,13 +13,27 @@ from event_tables import HEAVY_MACHINE
 
 from chainunit.drives.catalogue import catalogue
 from chainunit.drives.disc import DENSITY, steel_disc
-from chainunit.drives.gear_ratios import EFFICIENCY, SERIES, gear_unit, preferred_ratio, ratio_on_offer
+from chainunit.drives.gear_ratios import (
+    SERIES,
+    gear_unit,
+    next_ratio,
+    preferred_ratio,
+    ratio_on_offer,
+    typical_efficiency,
+)
 from chainunit.study import sizing
 from chainunit.study.candidate import Candidate, Criterion, Standing
+from chainunit.study.catalogue_drive import gear_with
+from chainunit.study.choice import as_chosen
 from chainunit.study.config import parse
+from chainunit.study.duty import duty_of
+from chainunit.study.inverter import inverter_needs, least_boost, misses_by_a_hair
 from chainunit.study.limits import Check
 from chainunit.study.preference import ORDER, poles_rank, rank
-from chainunit.study.start_class import HEAVIER, start_class
+from chainunit.study.relay import HEAVIER, start_class
+from chainunit.study.rig import Rig
+from chainunit.study.start_runs import starts_from_all
+from chainunit.text import number
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 DOCS = Path(__file__).parents[1] / "docs"
@@ -62,6 +76,33 @@ def test_ratios_of_an_own_list_and_exact_ones():
     assert ratio_on_offer(99.6, "preferred", [86.5, 97.3, 110.2], 0.025) == (97.3, "own list")
     assert ratio_on_offer(99.6, "exact", [], 0.025) == (99.6, "")
     assert ratio_on_offer(99.6, "preferred", [], 0.025) == (100.0, "R20")
+
+
+@pytest.mark.parametrize(
+    ("kind", "ratio", "efficiency"),
+    [
+        ("helical", 5.0, 0.98),
+        ("helical", 30.0, 0.98**2),
+        ("helical", 185.0, 0.98**3),
+        ("helical", 400.0, 0.98**4),
+        ("worm", 40.0, 0.7),
+        ("belt", 4.0, 0.95),
+        ("belt", 30.0, 0.95**2),
+    ],
+)
+def test_the_efficiency_is_that_of_the_stages(kind, ratio, efficiency):
+    assert typical_efficiency(kind, ratio) == pytest.approx(efficiency)
+
+
+def test_the_next_ratio_is_of_the_finest_series_or_of_the_list():
+    assert [next_ratio(ratio, []) for ratio in (180.0, 185.0, 98.0, 9.75, 0.95)] == [
+        185.0,
+        190.0,
+        100.0,
+        10.0,
+        0.975,
+    ]
+    assert next_ratio(97.3, [86.5, 97.3, 110.2]) == 110.2 and next_ratio(110.2, [97.3, 110.2]) is None
 
 
 @pytest.mark.parametrize(
@@ -122,7 +163,7 @@ def made(name, power=2200.0, poles=4.0, flywheel=0.0, used=0.5, **more):
     motor = dataclasses.replace(
         motor, designation=name, nameplate=dataclasses.replace(motor.nameplate, **plate)
     )
-    drive = SimpleNamespace(flywheel=flywheel, ratio=50.0)
+    drive = SimpleNamespace(flywheel=flywheel, ratio=50.0, follows=False)
     checks = {"temperature": Check("heat", used, 1.0, "1"), "crank_speed": Check("speed", 0.95, 1.0, "1")}
     more = {"unit": gear_unit("helical", 50.0), "start_class": 10, "margin": 0.1} | more
     return Candidate(motor, drive, checks, **more)
@@ -235,8 +276,8 @@ def test_the_page_states_the_order():
 # -- the keys
 
 
-def proposed(more, motor="IE3 4-pole 1.1 kW, 90S"):
-    config = parse(f"{HEAVY_MACHINE}{more}")
+def proposed(more, motor="IE3 4-pole 1.1 kW, 90S", start="direct"):
+    config = parse(f'start = "{start}"\n{HEAVY_MACHINE}{more}')
     plate = next(m for m in catalogue() if m.designation == motor)
     turn = SimpleNamespace(crank_torque=np.full(10, 60.0))
     return config, sizing.proposal(config, plate, SimpleNamespace(normal=turn))
@@ -255,11 +296,12 @@ def test_a_file_chooses_the_ratios():
 
 def test_the_kind_of_gear_has_its_efficiency_and_its_unit():
     config, c = proposed('[sizing]\ngear_kind = "worm"\n')
-    assert config.gear.efficiency == EFFICIENCY["worm"] == 0.7 and c.unit.title == "worm gear"
+    assert gear_with(config, c.drive.ratio).efficiency == 0.7 and c.unit.title == "worm gear"
     config, _ = proposed('[sizing]\ngear_kind = "worm"\n[gear]\nefficiency = "80 %"\n')
-    assert config.gear.efficiency == 0.8
+    assert gear_with(config, 50.0).efficiency == 0.8
     config, c = proposed("[sizing]\n")
-    assert config.gear.efficiency == 0.96 and c.unit.title == "three-stage helical gear"
+    assert gear_with(config, c.drive.ratio).efficiency == pytest.approx(0.98**3)
+    assert c.unit.title == "three-stage helical gear"
 
 
 def test_a_heavy_start_and_a_second_gear_are_named():
@@ -271,8 +313,12 @@ def test_a_heavy_start_and_a_second_gear_are_named():
     assert "heavier than class 30" in relay
     (gear,) = sizing._needs(made("a", unit=None), config)
     assert gear.endswith("takes two gear units: a three-stage helical gear ends at about 250.")
+    # a ratio that the file gives takes two only beyond all that makers have in one unit, and the reason is told
     given = parse(f"{HEAVY_MACHINE}[sizing]\n[gear]\nratio = 400\n")
-    assert [*sizing._needs(made("a", unit=None), given)] == []
+    (gear,) = sizing._needs(made("a", unit=gear_unit("helical", 400.0, is_given=True)), given)
+    assert gear.endswith("a three-stage helical gear even of makers with large ratios ends at about 350.")
+    assert [*sizing._needs(made("a", unit=gear_unit("helical", 300.0, is_given=True)), given)] == []
+    assert gear_unit("helical", 300.0) is None
 
 
 # -- the mill and the pump
@@ -302,6 +348,10 @@ def test_the_heavy_mill_gets_the_motor_without_a_flywheel(tmp_path, monkeypatch)
     assert best.drive.flywheel == 0.0 and best.checks["start"].value < 0.2
     assert (best.drive.ratio, best.series) == (100.0, "R20")
     assert best.use <= 0.9
+    # its start is that from the worst angle, which takes longer than that from 0 deg
+    starts = starts_from_all(Rig(result.config, best.drive, None), 2.0)
+    slowest = max(start.start_time for start in starts)
+    assert best.worst_start and best.checks["start"].value == pytest.approx(slowest, rel=0.02)
     # the smaller one fits, too, and the result has the trade
     assert small.fits and small.drive.flywheel > 50.0 * small.motor.nameplate.J
     assert small.checks["start"].value > 5.0 and small.criterion in (Criterion.START, Criterion.FLYWHEEL)
@@ -321,6 +371,85 @@ def test_the_beam_pump_gets_four_poles_and_one_gear(tmp_path, monkeypatch):
     assert two.unit is None and two.drive.ratio > 250.0
     assert (six.criterion, two.criterion) == (Criterion.POLES, Criterion.GEAR)
     assert all(c.fits for c in result.candidates) and result.trade is None
+    # the start of the chosen one is that from the worst of the crank angles
+    starts = starts_from_all(Rig(result.config, best.drive, None), 3.0)
+    slowest = max(start.start_time for start in starts)
+    assert best.worst_start and not six.worst_start
+    assert best.checks["start"].value == pytest.approx(slowest, rel=0.02)
+    assert best.start_class == max(start.start_class for start in starts)
+
+
+def test_an_inverter_takes_the_next_ratio_before_a_larger_motor(tmp_path, monkeypatch):
+    """At a ratio of 180, 11 kW missed the limit of the torque by 2 % of it, and 15 kW was chosen."""
+    monkeypatch.setattr(
+        sizing, "catalogue", lambda extra: [m for m in catalogue() if m.designation in PUMP_MOTORS]
+    )
+    file = EXAMPLES / "beam_pump.toml"
+    config = parse(f'start = "inverter"\n{file.read_text("utf-8")}', str(file))
+    config = dataclasses.replace(config, sizing=dataclasses.replace(config.sizing, candidates=2.0))
+    result = sizing.size(config, tmp_path, lambda *said: None)
+    best = result.best
+    assert result.chosen_candidate is best and best.motor.designation == "IE3 4-pole 11 kW, 160M"
+    assert (best.drive.ratio, best.series) == (185.0, "R80") and best.use <= 0.9
+    bare = sizing.proposal(config, best.motor, duty_of(config, tmp_path, None))
+    sizing.judge(config, bare, result.duty, None)
+    assert bare.drive.ratio == 180.0 and misses_by_a_hair(bare) and 0.9 < bare.sizes["rms_torque"] < 0.95
+    # the inverter: boost, current, and no class of a relay
+    rated = best.motor.nameplate.rated_current
+    assert best.start_class is None and best.drive.parameters.inverter.boost == 0.05
+    assert best.checks["inverter_current"].limit == pytest.approx(1.5 * rated)
+    assert best.inverter_current == pytest.approx(max(rated, best.start_current / 1.5))
+    notes = " ".join(result.notes)
+    assert "needs a voltage boost of 5 %" in notes and "electronic motor protection" in notes
+    assert number(best.inverter_current, "A") in notes and "relay of" not in notes
+    chosen = as_chosen(config, best.drive)
+    assert chosen.gear.efficiency == pytest.approx(0.98**3) and chosen.starter.inverter.boost == 0.05
+
+
+PUMP_MOTORS = "IE3 4-pole 11 kW, 160M", "IE3 4-pole 15 kW, 160L"
+
+
+def test_the_least_boost_with_which_it_starts_is_taken():
+    """5 %, then 10 and 15; a boost that the file gives is kept."""
+    config, c = proposed("[sizing]\n", start="inverter")
+
+    def judged(needed):
+        def judge(each):
+            value = 1.0 if each.drive.parameters.inverter.boost >= needed else None
+            each.checks = {"start": Check("time to start", value, 2.0, "s")}
+            return each
+
+        return judge
+
+    for needed, taken in ((0.0, 0.05), (0.08, 0.10), (0.12, 0.15), (0.3, 0.05)):
+        best = least_boost(config, c, judged(needed))
+        assert best.drive.parameters.inverter.boost == taken and best.starts is (needed < 0.2)
+    (boost, _) = inverter_needs(least_boost(config, c, judged(0.12)), config)
+    assert boost.startswith("The inverter needs a voltage boost of 15 % ") and "with less" in boost
+    given, c = proposed("[starter.inverter]\nboost = 0.08\n[sizing]\n", start="inverter")
+    assert least_boost(given, c, judged(0.3)).drive.parameters.inverter.boost == 0.08
+
+
+def test_a_motor_that_fails_from_the_worst_angle_makes_room_for_the_next(monkeypatch):
+    """The search goes on behind it, up to a motor that starts from every angle."""
+    motors = [m for m in catalogue() if m.nameplate.poles == 4.0][:5]
+
+    def judge(config, c, duty, files, *, worst_start=False):
+        time = 5.0 if worst_start and c.power < motors[2].nameplate.power else 1.0
+        c.worst_start, c.checks = worst_start, {"start": Check("time to start", time, 2.0, "s")}
+
+    monkeypatch.setattr(sizing, "judge", judge)
+    monkeypatch.setattr(
+        sizing, "with_flywheel", lambda config, c, duty, files: judge(config, c, duty, files) or c
+    )
+    config, _ = proposed("[sizing]\ncandidates = 1\n")
+    duty = SimpleNamespace(normal=SimpleNamespace(crank_torque=np.full(10, 60.0)))
+    best, *others = sizing._search(config, motors, duty, Path(), lambda *said: None, None)
+    assert best.motor is motors[2] and best.fits and best.worst_start
+    assert sorted(c.power for c in others) == [m.nameplate.power for m in motors[:2]] and not any(
+        c.fits for c in others
+    )
+    assert all("time to start 5 s" in c.reason for c in others)
 
 
 def test_the_next_motor_without_a_flywheel_is_sought_beyond_the_candidates(tmp_path, monkeypatch):
@@ -331,3 +460,93 @@ def test_the_next_motor_without_a_flywheel_is_sought_beyond_the_candidates(tmp_p
     assert small is result.chosen_candidate and small.motor.nameplate.power == 550.0
     assert large.motor.nameplate.power == 750.0 and large.criterion is Criterion.LARGER
     assert len(result.candidates) == 2
+
+
+PRESS = """
+event = []
+[system]
+machine = "slider_crank_press.toml"
+[run]
+crank_speed = "60 rev/min"
+[gear]
+ratio = 25
+[sizing]
+fluctuation = "15 %"
+candidates = 1
+"""
+
+
+def pressed(tmp_path, monkeypatch, more="", *designations):
+    """The result of sizing for the press of the gallery, with these motors alone."""
+    motors = [m for m in catalogue() if m.designation in designations]
+    monkeypatch.setattr(sizing, "catalogue", lambda extra: motors)
+    folder = EXAMPLES / "linkages"
+    return sizing.size(parse(PRESS + more, str(folder / "press.toml")), tmp_path, lambda *said: None)
+
+
+def test_a_motor_that_stalls_in_the_peak_runs_with_a_flywheel(tmp_path, monkeypatch):
+    """The press takes 200 W in the mean and 837 W by the RMS torque: 1.1 kW was chosen as the smallest. Without a
+    flywheel the motor of 0.55 kW stalls where the ram meets the workpiece."""
+    motors = "IE3 4-pole 0.55 kW, 80M", "IE3 4-pole 1.1 kW, 90S", "IE3 4-pole 4 kW, 112M"
+    result = pressed(tmp_path, monkeypatch, "", *motors)
+    best = result.chosen_candidate
+    assert best is not None and best.motor.designation == motors[0] and best.keeps_margin and result.weak == 0
+    assert best.drive.flywheel > 20.0 * best.motor.nameplate.J and best.reason.startswith(
+        "the smallest that fits"
+    )
+    # the drive runs as its checks say, with its gear and its flywheel, in a run of its own
+    config = parse(PRESS, str(EXAMPLES / "linkages" / "press.toml"))
+    rig = Rig(config, best.drive, None)
+    with rig.from_rest() as simulation:
+        simulation.run(8.0, rig.step)
+        run = simulation.run(10.0, rig.step)
+    assert float(run["motor.w"].mean()) / best.drive.ratio == pytest.approx(2.0 * math.pi, rel=0.03)
+    current = math.sqrt(float(np.mean(run["motor.i"].values ** 2)))
+    assert current < 0.9 * best.motor.nameplate.rated_current
+    # the larger motor beside it needs none
+    assert [c.motor.designation for c in result.trade] == [motors[0], motors[2]]
+
+
+def test_a_motor_that_stalls_without_a_flywheel_is_told_so(tmp_path, monkeypatch):
+    """Its flywheels stay below the permitted ratio of inertias: none carries it through. It never ran hot."""
+    result = pressed(tmp_path, monkeypatch, "inertia_ratio = 2\n", "IE3 4-pole 0.55 kW, 80M")
+    (c,) = result.candidates
+    assert result.chosen_candidate is None
+    bare = dataclasses.replace(c, drive=dataclasses.replace(c.drive, flywheel=0.0))
+    sizing.judge(parse(PRESS, str(EXAMPLES / "linkages" / "press.toml")), bare, result.duty, None)
+    rank(alone := [bare], 2.0)
+    assert "without a flywheel it stalls at 2" in alone[0].reason and "deg" in alone[0].reason
+    assert "hot" not in alone[0].reason and bare.checks["starts"].value is None
+    # the ram meets the workpiece 10 mm above its lower dead centre, on the way down
+    turn = result.duty.normal
+    hard = turn.angle[np.abs(turn.crank_torque) > 0.5 * result.duty.numbers.torque_peak]
+    assert hard[0] - 0.2 < bare.stall_angle < hard[-1]
+
+
+def test_a_candidate_that_leaves_no_margin_is_told_apart():
+    best, barely, fits = ranked(made("b"), made("c", used=0.95), made("a, larger", power=3000.0))
+    by_name = {c.motor.designation: c.verdict for c in (best, barely, fits)}
+    assert by_name == {"b": Standing.CHOSEN, "c": Standing.BARELY, "a, larger": Standing.FITS}
+
+
+def test_the_next_motor_without_a_flywheel_is_found_below_a_gear_that_the_largest_break(
+    tmp_path, monkeypatch
+):
+    """The torque of the gear in a start grows with the motor: the largest do not fit, and one between does."""
+    config = parse(f"{HEAVY_MACHINE}[sizing]\nlarger = 1\n")
+    motors = [m for m in catalogue() if m.nameplate.poles == 4.0][:9]
+    tried = []
+
+    def bare(config, motor, duty):
+        return made(motor.designation, motor.nameplate.power)
+
+    def judge(config, c, duty, files):
+        tried.append(c.power)
+        load, hard = (Check("", used, 1.0, "1") for used in (1800.0 / c.power, c.power / 4000.0))
+        c.checks = {"rms_torque": load, "gear_start": hard}
+
+    monkeypatch.setattr(sizing, "proposal", bare)
+    monkeypatch.setattr(sizing, "judge", judge)
+    small = made("small", 550.0, flywheel=0.5)
+    found = sizing._without_flywheel(config, motors, [small], SimpleNamespace(), None)
+    assert found.power == 2200.0 and len(tried) <= 4

@@ -21,6 +21,8 @@ from chainunit.report.figure import Between, Curve
 from chainunit.report.linkage_loads import loads_on_slides
 from chainunit.report.study_motion import machine_state
 from chainunit.study import config
+from chainunit.study.event_torques import effects
+from chainunit.study.protection import CouplingEffect, spares
 from chainunit.study.run import run_study
 from chainunit.text import DEFAULT_UNITS
 
@@ -97,6 +99,15 @@ def test_the_page_of_a_press_does_not_speak_of_a_chain_unit(page):
     assert "chain unit" not in visible and "rocker" not in visible
 
 
+def test_a_title_in_a_sentence_stands_in_quotes(page):
+    """The question has no capital letter in its middle: a linkage has a title in place of a noun."""
+    assert "this Slider" not in page
+    assert (
+        "motor of the machine &quot;Slider-crank press" in page
+        or 'motor of the machine "Slider-crank press' in page
+    )
+
+
 def test_the_answer_comes_first(page):
     main = page[page.index("<main>") :]
     headings = re.findall(r'<h2 id="(\w+)-title">', main)
@@ -130,6 +141,20 @@ def test_force_over_stroke(study, figures):
     assert np.min(curves[1].y) == pytest.approx(-40e3, rel=1e-3)
 
 
+def test_a_coupling_opens_too_late_for_a_press(study):
+    """The force of the workpiece comes at once, so that the peak lies within the release time."""
+    run = study.runs["surge_press_force"].sel(time=slice(study.event["surge_press_force"], None))
+    torque, time = np.abs(study.drive.crank_torque(run)), run["time"].values
+    setting = 1.25 * np.max(np.abs(study.drive.crank_torque(study.steady)))
+    (effect,) = effects(study, setting).values()
+    trip = time[np.flatnonzero(np.abs(run["motor.tau"].values) * study.drive.ratio > setting)[0]]
+    until = torque[(time <= trip + 0.005) & (time >= trip - 0.01)]
+    assert effect.without == pytest.approx(np.max(torque)) and np.max(until) == pytest.approx(np.max(torque))
+    assert effect.with_coupling == pytest.approx(effect.without) and not spares({"surge": effect})
+    # one with the whole release before the peak would spare it
+    assert spares({"surge": CouplingEffect(effect.without, setting)})
+
+
 def test_power_over_the_turn_and_histogram(study, figures):
     (panel,) = (panel for *_, panel in figures["power-turn"].all_panels())
     curves = {item.name: item for item in panel.items if isinstance(item, Curve)}
@@ -141,9 +166,13 @@ def test_power_over_the_turn_and_histogram(study, figures):
     k = len(angle) // 2
     at = angle[k] % (2.0 * math.pi)
     assert np.interp(at, crank.x, crank.y) == pytest.approx(torque[k] * speed[k], rel=1e-9)
-    left, _ = (panel for *_, panel in figures["load-histogram"].all_panels())
-    (bars,) = (item for item in left.items if isinstance(item, Between))
-    assert np.trapezoid(bars.high, bars.x) / np.ptp(bars.x) * load_figures._CLASSES == pytest.approx(1.0)
+    panels = [panel for *_, panel in figures["load-histogram"].all_panels()]
+    both = [item for panel in panels for item in panel.items if isinstance(item, Between)]
+    for bars in both:
+        assert np.trapezoid(bars.high, bars.x) / np.ptp(bars.x) * load_figures._CLASSES == pytest.approx(1.0)
+    # the motor has another torque than the crank, not the same divided by the ratio
+    left, right = (bars.x / np.max(np.abs(bars.x)) for bars in both)
+    assert len(left) != len(right) or np.max(np.abs(left - right)) > 0.05
 
 
 def test_the_histogram_of_a_sine_is_the_arcsine_distribution():
@@ -166,9 +195,12 @@ def test_panels_stand_below_each_other_on_a_narrow_screen(figures):
         embedded = page_figures.page_figure(figure, DEFAULT_UNITS)
         panels = list(figure.all_panels())
         if len(figure.panels[0]) == 1:
-            # a long title has two lines
-            changed = {key for key in embedded.get("narrow", {}) if key != "height"}
-            assert all(key.endswith(".title.text") for key in changed), figure.name
+            # a long title has two lines, and a legend of more rows its room
+            narrow, wide = dict(embedded.get("narrow", {})), embedded.get("wide", {})
+            if "margin.b" in narrow:
+                more = narrow.pop("margin.b") - wide["margin.b"]
+                assert more == narrow["height"] - wide["height"] > 0, figure.name
+            assert all(key.endswith(".title.text") for key in narrow if key != "height"), figure.name
             continue
         narrow = embedded["narrow"]
         rows = sorted(

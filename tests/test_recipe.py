@@ -95,7 +95,7 @@ def test_icons_follow_from_the_terminals():
     }
 
     def shown(model):
-        return {kind: icons[icon(model, kind)] for kind in ("svg", "png")}
+        return {kind: icons[icon(model, kind, model.sketch())] for kind in ("svg", "png")}
 
     for name, reference in {
         "ChamberForces": "machine", "ChainUnit": "machine", "ChainUnitFlexible": "machine",

@@ -275,7 +275,7 @@ def test_peaks_are_of_both_sides(sized, tmp_path):
         loaded = simulation.run(6.0 + 2.0 * math.pi / config.run.crank_speed, config.run.step)
     peak = float(np.max(np.abs(loaded["motor.air_gap_tau"])))
     assert best.checks["peak_torque"].value == pytest.approx(peak, rel=0.01)
-    assert best.duty_torque > 1.1 * peaks["left"]
+    assert best.duty.torque > 1.1 * peaks["left"]
 
 
 @pytest.mark.parametrize(("series", "tolerance"), [("exact", 0.01), ("preferred", 0.03)])
@@ -327,7 +327,7 @@ def test_without_a_fit_the_whole_catalogue_is_tried_and_the_nearest_is_named(tmp
 
 
 def test_motors_that_are_too_weak_by_the_nameplate_are_counted(tmp_path, monkeypatch):
-    """Of five motors the two with less than 0.7 times the power of the cycle are not run, and the answer says so."""
+    """Of five motors the two that do not give the mean power of the cycle are not run, and the answer says so."""
     one = small(1)[0]
     weak = [
         dataclasses.replace(one, nameplate=dataclasses.replace(one.nameplate, power=power))
@@ -407,8 +407,11 @@ def test_a_long_soft_start_is_waited_for(tmp_path):
     config = dataclasses.replace(
         config, start="soft", starter=dataclasses.replace(config.starter, soft_start=soft)
     )
-    (c,) = sizing.size(config, tmp_path, lambda *said: None).candidates
+    c, *weak = sizing.size(config, tmp_path, lambda *said: None).candidates
+    assert c.verdict is Standing.CHOSEN and c.worst_start
     assert c.checks["start"].value is not None and c.checks["crank_speed"].utilisation < 1.0
+    # from the worst angle the smaller ones take longer, or do not start at all
+    assert all(each.power < c.power and each.worst_start for each in weak)
 
 
 def test_ctrl_c_ends_sizing(tmp_path, monkeypatch):
@@ -448,13 +451,16 @@ def test_above_the_corner_an_inverter_has_less_torque(tmp_path, monkeypatch):
     """Twice the rated frequency: the breakdown torque of the check is a quarter, roughly, of that at 50 Hz."""
     monkeypatch.setattr(sizing, "catalogue", lambda extra: small(1))
     config = dataclasses.replace(one_candidate("[gear]\nratio = 104\n", fluctuation=0.9), start="inverter")
+    # with a shorter ramp the start from the worst angle takes too long
+    config = dataclasses.replace(config, run=dataclasses.replace(config.run, ramp=3.0))
     (c,) = sizing.size(config, tmp_path, lambda *said: None).candidates
     at_50_hz = float(breakdown(c.drive.parameters, T=config.sizing.temperature).air_gap_tau)
-    assert 0.15 * at_50_hz < c.breakdown_torque < 0.4 * at_50_hz
+    breakdown_torque = c.checks["peak_torque"].limit * config.sizing.breakdown_margin
+    assert 0.15 * at_50_hz < breakdown_torque < 0.4 * at_50_hz
     rated = c.motor.nameplate.torque
     assert c.checks["rms_torque"].limit == pytest.approx(0.5 * rated, rel=0.1)
     # all feed on the right asks more than it has left, all on the left does not: a flywheel evens that
-    assert c.verdict is Standing.CHOSEN and c.drive.flywheel > 0.0 and 0.9 < c.sizes["peak_torque"] <= 1.0
+    assert c.verdict is Standing.CHOSEN and c.drive.flywheel > 0.0 and 0.89 < c.sizes["peak_torque"] <= 1.0
     monkeypatch.setattr(sizing, "torque_evening_inertia", lambda *of: 0.0)
     (light,) = sizing.size(config, tmp_path, lambda *said: None).candidates
     assert light.verdict is Standing.INSUFFICIENT and "peak torque" in light.reason

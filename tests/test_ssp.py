@@ -124,10 +124,12 @@ def test_connectors_are_the_fmus_variables(package, tmp_path):
     for node in root.iterfind("ssd:System/ssd:Elements/ssd:Component", ns):
         described = fmpy.read_model_description(str(tmp_path / node.get("source")))
         connectors = {
-            c.get("name"): (c.get("kind"), c.find("ssc:Real", ns).get("unit"))
+            c.get("name"): (c.get("kind"), c[0].tag.partition("}")[2], c[0].get("unit"))
             for c in node.iterfind("ssd:Connectors/ssd:Connector", ns)
         }
-        causal = {v.name: (v.causality, v.unit) for v in described.modelVariables if v.causality != "local"}
+        causal = {
+            v.name: (v.causality, v.type, v.unit) for v in described.modelVariables if v.causality != "local"
+        }
         assert connectors == causal
         for unit in described.unitDefinitions:
             if unit.name in units:
@@ -174,11 +176,12 @@ LIBCOSIM = """
     slaves = {info.name.decode(): info.index for info in execution.slave_infos()}
     for instance, _, variable in (name.partition(".") for name in names):
         variables = {v.name.decode(): v.reference for v in execution.slave_variables(slave_index=slaves[instance])}
-        places.append((slaves[instance], variables[variable]))
+        get = observer.last_integer_values if variable == "alarm" else observer.last_real_values
+        places.append((get, slaves[instance], variables[variable]))
     rows = []
     for _ in range(round(stop / (step or 1e-3))):
         assert execution.step(step_count=1)
-        rows.append([list(observer.last_real_values(slave_index=i, variable_references=[v]))[0] for i, v in places])
+        rows.append([list(get(slave_index=i, variable_references=[v]))[0] for get, i, v in places])
     print("values", json.dumps(rows))
 """
 ECOS = """
@@ -186,12 +189,13 @@ ECOS = """
     from ecospy import EcosSimulation
 
     file, stop, step, names = sys.argv[1], float(sys.argv[2]), float(sys.argv[3]), sys.argv[4:]
+    get = lambda name: simulation.get_integer if name.endswith(".alarm") else simulation.get_real
     with EcosSimulation(step_size=step or 1e-3, ssp_path=file) as simulation:
         assert simulation.init(parameter_set="start" if step else None)
         rows = []
         for _ in range(round(stop / (step or 1e-3))):
             simulation.step()
-            rows.append([simulation.get_real(name.replace(".", "::", 1)) for name in names])
+            rows.append([get(name)(name.replace(".", "::", 1)) for name in names])
         simulation.terminate()
     print("values", json.dumps(rows), flush=True)
     # one process in some hundred crashes in the exit handlers of TBB, which ecos runs on, with whatever FMUs

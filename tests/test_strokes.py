@@ -10,8 +10,8 @@ import pytest
 
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
+from chainunit.mechanism.courses import largest, means, roots
 from chainunit.study.linkage_turn import linkage_findings
-from chainunit.study.peaks import largest, roots
 
 LINKAGES = Path(__file__).parents[1] / "examples" / "linkages"
 
@@ -48,6 +48,8 @@ def test_a_scotch_yoke_has_its_dead_centres_at_the_ends_of_its_diameter():
     stroke = yoke.strokes["guide"]
     assert stroke.range == pytest.approx(0.12, rel=1e-12) and stroke.time_ratio == pytest.approx(1.0)
     assert yoke.dead_centres["guide"] == pytest.approx([0.0, math.pi], abs=1e-9)
+    # an angle of rounding is none
+    assert stroke.largest_at == 0.0
 
 
 def test_a_driver_that_slides_has_ends_and_no_time_ratio():
@@ -88,3 +90,52 @@ def test_roots_also_at_the_begin_of_a_turn(shift):
     assert len(found) == 2 and off[-1] < 1e-12
     (none,) = roots(lambda x: np.array([np.cos(x) ** 2]), q, around=True)
     assert not len(none)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-17])
+def test_a_part_that_rests_across_the_begin_of_a_turn_turns_back_once_at_each_end(noise):
+    """A dwell, whose speed is zero or rounding over forty degrees about the begin of the turn; the part turns back
+    in it if it comes and goes on the same side, and not if it goes on."""
+    q = np.linspace(0.0, 2.0 * math.pi, 361)
+
+    def dwell(x, back):
+        away = np.maximum(
+            np.abs(np.remainder(x + math.pi, 2.0 * math.pi) - math.pi) - math.radians(20.0), 0.0
+        )
+        side = np.sign(np.sin(x)) if back else np.cos(0.5 * np.remainder(x, 2.0 * math.pi)) ** 2
+        return away * side + noise * np.cos(1000.0 * x)
+
+    (found,) = roots(lambda x: np.array([dwell(x, True)]), q, around=True)
+    assert sorted(found) == pytest.approx([math.radians(20.0), math.pi], abs=1e-6)
+    (none, nothing) = roots(lambda x: np.array([dwell(x, False), 0.0 * x]), q, around=True)
+    assert not len(none) and not len(nothing)
+    ((end,),) = roots(
+        lambda x: np.array([np.maximum(x - 1.0, 0.0) - np.maximum(0.5 - x, 0.0)]), q, around=False
+    )
+    assert end == pytest.approx(1.0, abs=1e-6)
+
+
+def test_means_are_those_of_sharp_loads():
+    """Of a bell of a degree, of a corner, and of a polynomial, against closed forms."""
+
+    def values(x):
+        return np.array([np.exp(-(((x - 2.0) / 0.01) ** 2)), np.abs(x - 1.0), x**5 - x, 0.0 * x])
+
+    found, sizes = means(values, 0.0, 3.0)
+    bell, corner, polynomial = math.sqrt(math.pi) * 0.01, 2.5, 3.0**6 / 6.0 - 4.5
+    assert found == pytest.approx([bell / 3.0, corner / 3.0, polynomial / 3.0, 0.0], rel=1e-9)
+    # of the size, to the accuracy with which the parts of the way catch it
+    assert sizes == pytest.approx([bell / 3.0, corner / 3.0, (polynomial + 2.0 / 3.0) / 3.0, 0.0], rel=0.05)
+
+
+def test_the_mean_power_of_a_press_is_that_of_its_work():
+    """The press works over a few degrees of the crank: a place each degree misses 0.25 % of the work."""
+    f = findings("slider_crank_press")
+    q = (np.arange(36000) + 0.5) * (2.0 * math.pi / 36000)
+    out = f.machine.outputs(q * f.machine.ratio, f.speed * f.machine.ratio)
+    lost = np.mean(out.dissipated_power)
+    assert f.turn.power_mean == pytest.approx(lost, rel=1e-6) and lost > 100.0
+    assert f.turn.torque_rms == pytest.approx(np.sqrt(np.mean((out.tau * f.machine.ratio) ** 2)), rel=1e-6)
+    for name, joint in f.joints.items():
+        force = getattr(out, f.description.variable("joint", name))
+        assert joint.rms == pytest.approx(np.sqrt(np.mean(force.fx**2 + force.fy**2)), rel=1e-6), name

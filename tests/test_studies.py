@@ -68,6 +68,20 @@ def test_python_and_the_command_find_the_same(result, command, tmp_path):
     assert json.loads(result.to_json())["answers"] == python["answers"]
 
 
+def test_a_foreign_fmu_is_seen_before_earlier_results_are_removed(tmp_path):
+    (tmp_path / "fmu").mkdir()
+    (tmp_path / "fmu" / "DcMotor.fmu").write_text("mine")
+    (tmp_path / "torque.png").write_text("of an earlier run")
+    ledger.Ledger(tmp_path).add(tmp_path / "torque.png", tmp_path / "torque.png")
+    with pytest.raises(InputError, match=r"fmu/DcMotor\.fmu: would be lost, as chainunit did not write it"):
+        Study(**TABLES).run(tmp_path)
+    assert (tmp_path / "torque.png").exists() and (tmp_path / "fmu" / "DcMotor.fmu").read_text() == "mine"
+    # results of other kinds see theirs before they compute, as their commands do
+    (tmp_path / "identified.toml").write_text("mine")
+    with pytest.raises(InputError, match=r"identified\.toml: would be lost"):
+        Study(**TABLES).identify(tmp_path)
+
+
 def test_answers_are_a_table_with_units(result):
     numbers, table = json.loads(result.to_json()), result.answers
     assert list(table.columns) == ["unit", "start_up", "steady", "jam_left"]

@@ -112,6 +112,18 @@ def test_wrong_surges(tmp_path, change, words):
     assert words in str(caught.value)
 
 
+@pytest.mark.parametrize("side", ["", 'side = "left"\n'])
+def test_an_event_of_sides_is_refused_with_the_inputs_of_the_linkage(tmp_path, side):
+    """A jam needs an organ on each side: a press has one input, and a surge lets it rise."""
+    shutil.copy(PRESS, tmp_path)
+    with pytest.raises(InputError) as caught:
+        config.parse(
+            f'[[event]]\ntype = "jam"\n{side}[system]\nmachine = "{PRESS.name}"', str(tmp_path / "a.toml")
+        )
+    words = 'its inputs: press_force (type = "surge" with input = "press_force" lets one rise)'
+    assert words in str(caught.value) and 'must be given, "left"' not in str(caught.value)
+
+
 def test_an_input_that_the_machine_has_not_is_refused_with_those_that_it_has():
     with pytest.raises(InputError) as caught:
         config.parse('[[event]]\ntype = "surge"\ninput = "left.material_mas"')

@@ -100,7 +100,7 @@ def test_values_of_the_study_and_the_results():
         (L1.replace("3 mm", "-3 mm"), "must be > 0 m"),
         ("[sweep]\nmethod = 'grid'\n" + L1 + "distribution = 'normal'\n", "points that are no grid"),
         ("[sweep]\nmethod = 'grid'\n" + R + "points = 2.5\n", "must be a whole number"),
-        ("[sweep]\nmethod = 'grid'\n" + R + "points = 1\n", "must be >= 2"),
+        ("[sweep]\nmethod = 'grid'\n" + R + "points = 1\n", "must be a whole number >= 2"),
         ("[[sweep.parameter]]\nname = 'event.jam_left.force'\nvalues = [100]\n", "add sweep.measures"),
         ("[sweep]\nevent = 'jam_left'\n" + R, "is of measures"),
         ("[sweep]\nmeasures = ['stall_time']\nevent = 'jam'\n" + R, 'sweep.event = "jam": must be one of'),

@@ -36,7 +36,14 @@ FILES = [
     ("[system]\nmotor = 'DcMotr'", [(2, "system.motor", 'was "DcMotor" meant?')]),
     ("[system]\nmotor = 'IE3 4-pole 2,2 kW, 100L'", [(2, "system.motor", 'was "IE3 4-pole 2.2 kW, 100L" meant?')]),
     ("[system]\nmotor = 'pump.fmu'", [(2, "system.motor", "no such FMU")]),
-    ("[run]\nturns = '500 %'", [(2, "run.turns", "must be a pure number")]),
+    ("[run]\nturns = '500 %'", [(2, "run.turns", "must be a whole number")]),
+    (
+        "[system]\nmotor = 'InductionMotor'\n[motor]\npole_pairs = 2.5\ninverter.on = 2",
+        [
+            (4, "motor.pole_pairs = 2.5", "must be a whole number >= 1 and <= 24"),
+            (5, "motor.inverter.on = 2", "must be true or false"),
+        ],
+    ),
     ("[feed]\nleft.processing_force = '1,500 N'", [(2, "feed.left.processing_force", "must be a number in N")]),
     ("[feed]\nleft.processing_force = '2*1000 N'", [(2, "feed.left.processing_force", "must be a number in N")]),
     ('catalogue = "a\\u0000b"\n[sizing]', [(1, "catalogue", "must be the name of a file")]),

@@ -1,6 +1,6 @@
 /* The common functions of FMI 2.0 and 3.0, on top of runtime.c. The including file defines FMI(), the name of a
- * function by its name in FMI 3.0, and the types Result, Handle, Boolean, Memory, Byte and Text of its version. This file names
- * no model. */
+ * function by its name in FMI 3.0, `report`, `type_names` in the order of Type, and the types Result, Handle, Boolean,
+ * Memory, Byte and Text of its version. This file names no model. */
 
 #define INSTANCE ((Instance *)c)
 #define NEED(modes) \
@@ -20,7 +20,7 @@
  * FMU, and `word` the name of this identifier in messages. */
 static Instance *instantiate(const char *name, const char *word, const char *identifier, const char *own,
                              int model_exchange, void *environment, void (*log)(void)) {
-    Instance *c = instance_new(name && *name ? name : model.name, report);
+    Instance *c = instance_new(name && *name ? name : model.name, type_names, report);
     if (!c) return NULL;
     c->log = log;
     c->environment = environment;
@@ -55,6 +55,7 @@ Result FMI(EnterEventMode)(Handle c) {
     NEED(EVENT | CONTINUOUS);
     if (step_taken(INSTANCE)) return (Result)ERROR;
     INSTANCE->mode = EVENT;
+    INSTANCE->held = 0;
     return (Result)OK;
 }
 
@@ -117,7 +118,10 @@ Result FMI(DeserializeFMUState)(Handle c, const Byte bytes[], size_t size, Memor
 
 Result FMI(EnterContinuousTimeMode)(Handle c) {
     NEED(EVENT);
+    const Status status = settle(INSTANCE);
+    if (status) return (Result)status;
     INSTANCE->mode = CONTINUOUS;
+    INSTANCE->held = 1;
     return (Result)OK;
 }
 
@@ -170,9 +174,46 @@ Result FMI(GetNominalsOfContinuousStates)(Handle c, double x[], size_t n) {
 
 static Status set_all(Instance *c, const unsigned vr[], size_t n, const double value[]) {
     for (size_t i = 0; i < n; ++i)
-        if (set(c, vr[i], value[i])) return ERROR;
+        if (set(c, REAL, vr[i], value[i])) return ERROR;
     return OK;
 }
+
+/* The stored number as a whole one; a number that a host wrote into a saved state may be any. */
+static int32_t integer(double v) {
+    return v <= INT32_MIN ? INT32_MIN : v >= INT32_MAX ? INT32_MAX : (int32_t)v;
+}
+static int boolean(double v) { return v != 0.0; }
+
+/* The bodies of the functions that get and set values of other types. Only a number may change between events. */
+#define GET_EACH(type, as)                                              \
+    {                                                                   \
+        NEED(ANY);                                                      \
+        NOT_NULL(!n || (vr && value));                                  \
+        for (size_t i = 0; i < n; ++i) {                                \
+            double one;                                                 \
+            const Status status = get(INSTANCE, type, &vr[i], 1, &one); \
+            if (status) return (Result)status;                          \
+            value[i] = as(one);                                         \
+        }                                                               \
+        return (Result)OK;                                              \
+    }
+#define SET_EACH(type, as)                                                                  \
+    {                                                                                       \
+        NEED(n ? INSTANTIATED | INITIALIZATION | EVENT | STEP : ANY);                       \
+        NOT_NULL(!n || (vr && value));                                                      \
+        for (size_t i = 0; i < n; ++i)                                                      \
+            if (set(INSTANCE, type, vr[i], (double)as(value[i]))) return (Result)ERROR;     \
+        return (Result)OK;                                                                  \
+    }
+/* The body of those of a type that no variable has: a call for none of them is right. */
+#define NONE_OF_TYPE(name)                                                                  \
+    {                                                                                       \
+        (void)value;                                                                        \
+        NEED(ANY);                                                                          \
+        if (!n) return (Result)OK;                                                          \
+        NOT_NULL(vr);                                                                       \
+        return (Result)complain(INSTANCE, ERROR, OTHER_TYPE, vr[0], name);                  \
+    }
 
 static Status first_derivatives(Instance *c, const unsigned vr[], size_t n, const int order[], double value[]) {
     for (size_t i = 0; i < n; ++i)

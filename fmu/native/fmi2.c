@@ -8,6 +8,8 @@
 #define fmi2FullName(name) CHAINUNIT_JOIN(FMI2_FUNCTION_PREFIX, name)
 #endif
 
+static const char *const type_names[] = {"Real", "Integer", "Boolean"};
+
 static void report(const Instance *c, Status status, const char *message) {
     const fmi2CallbackLogger log = (fmi2CallbackLogger)c->log;
     if (!log) return;
@@ -73,7 +75,7 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real value[]) {
     NEED(ANY);
     NOT_NULL(!n || (vr && value));
-    return (fmi2Status)get(INSTANCE, vr, n, value);
+    return (fmi2Status)get(INSTANCE, REAL, vr, n, value);
 }
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real value[]) {
@@ -82,20 +84,13 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
     return (fmi2Status)set_all(INSTANCE, vr, n, value);
 }
 
-#define NO_SUCH_TYPE(name, type, qualifier)                                                               \
-    fmi2Status name(fmi2Component c, const fmi2ValueReference vr[], size_t n, qualifier type value[]) {   \
-        (void)vr;                                                                                         \
-        (void)value;                                                                                      \
-        NEED(ANY);                                                                                        \
-        if (n) return (fmi2Status)complain(INSTANCE, ERROR, OTHER_TYPE, "Real");                                                            \
-        return fmi2OK;                                                                                    \
-    }
-NO_SUCH_TYPE(fmi2GetInteger, fmi2Integer, )
-NO_SUCH_TYPE(fmi2GetBoolean, fmi2Boolean, )
-NO_SUCH_TYPE(fmi2GetString, fmi2String, )
-NO_SUCH_TYPE(fmi2SetInteger, fmi2Integer, const)
-NO_SUCH_TYPE(fmi2SetBoolean, fmi2Boolean, const)
-NO_SUCH_TYPE(fmi2SetString, fmi2String, const)
+#define V const fmi2ValueReference vr[], size_t n
+fmi2Status fmi2GetInteger(fmi2Component c, V, fmi2Integer value[]) GET_EACH(INTEGER, integer)
+fmi2Status fmi2SetInteger(fmi2Component c, V, const fmi2Integer value[]) SET_EACH(INTEGER, integer)
+fmi2Status fmi2GetBoolean(fmi2Component c, V, fmi2Boolean value[]) GET_EACH(BOOLEAN, boolean)
+fmi2Status fmi2SetBoolean(fmi2Component c, V, const fmi2Boolean value[]) SET_EACH(BOOLEAN, boolean)
+fmi2Status fmi2GetString(fmi2Component c, V, fmi2String value[]) NONE_OF_TYPE("String")
+fmi2Status fmi2SetString(fmi2Component c, V, const fmi2String value[]) NONE_OF_TYPE("String")
 
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknown[], size_t n_unknown,
                                         const fmi2ValueReference known[], size_t n_known, const fmi2Real seed[],
@@ -120,6 +115,7 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
                                        const fmi2Integer order[], const fmi2Real value[]) {
     NEED_STEPS(INSTANTIATED | INITIALIZATION | STEP);
     NOT_NULL(!n || (vr && order && value));
+    if (all_real(INSTANCE, vr, n)) return fmi2Error;
     begin_inputs(INSTANCE);
     for (size_t i = 0; i < n; ++i) {
         CHECK(order[i] == 1, "only the first derivative");

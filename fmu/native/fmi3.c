@@ -2,6 +2,8 @@
 #include "fmi3Functions.h"
 #include "runtime.c"
 
+static const char *const type_names[] = {"Float64", "Int32", "Boolean"};
+
 static void report(const Instance *c, Status status, const char *message) {
     const fmi3LogMessageCallback log = (fmi3LogMessageCallback)c->log;
     if (log) log(c->environment, (fmi3Status)status, status == DISCARD ? "logStatusDiscard" : "logStatusError", message);
@@ -61,13 +63,13 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean has_tolerance
     return fmi3OK;
 }
 
-/* -- values: every variable is a Float64 */
+/* -- values */
 
 fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3Float64 value[], size_t n_values) {
     NEED(ANY);
     NOT_NULL(!n || (vr && value));
     CHECK(n == n_values, "as many values as references are needed");
-    return (fmi3Status)get(INSTANCE, vr, n, value);
+    return (fmi3Status)get(INSTANCE, REAL, vr, n, value);
 }
 
 fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3Float64 value[],
@@ -78,31 +80,46 @@ fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t 
     return (fmi3Status)set_all(INSTANCE, vr, n, value);
 }
 
-#define NO_SUCH_TYPE(type)                                                                                         \
-    fmi3Status fmi3Get##type(fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3##type value[],          \
-                             size_t n_values) {                                                                    \
-        (void)vr, (void)value, (void)n_values;                                                                     \
-        NEED(ANY);                                                                                                 \
-        if (n) return (fmi3Status)complain(INSTANCE, ERROR, OTHER_TYPE, "Float64");                                                                  \
-        return fmi3OK;                                                                                             \
-    }                                                                                                              \
-    fmi3Status fmi3Set##type(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3##type value[],    \
-                             size_t n_values) {                                                                    \
-        (void)vr, (void)value, (void)n_values;                                                                     \
-        NEED(ANY);                                                                                                 \
-        if (n) return (fmi3Status)complain(INSTANCE, ERROR, OTHER_TYPE, "Float64");                                                                  \
-        return fmi3OK;                                                                                             \
+#define V const fmi3ValueReference vr[], size_t n
+#define COUNTED CHECK(n == n_values, "as many values as references are needed");
+fmi3Status fmi3GetInt32(fmi3Instance c, V, fmi3Int32 value[], size_t n_values) {
+    NEED(ANY);
+    COUNTED
+    GET_EACH(INTEGER, integer)
+}
+fmi3Status fmi3SetInt32(fmi3Instance c, V, const fmi3Int32 value[], size_t n_values) {
+    NEED(ANY);
+    COUNTED
+    SET_EACH(INTEGER, integer)
+}
+fmi3Status fmi3GetBoolean(fmi3Instance c, V, fmi3Boolean value[], size_t n_values) {
+    NEED(ANY);
+    COUNTED
+    GET_EACH(BOOLEAN, boolean)
+}
+fmi3Status fmi3SetBoolean(fmi3Instance c, V, const fmi3Boolean value[], size_t n_values) {
+    NEED(ANY);
+    COUNTED
+    SET_EACH(BOOLEAN, boolean)
+}
+
+#define NO_SUCH_TYPE(type)                                                                                    \
+    fmi3Status fmi3Get##type(fmi3Instance c, V, fmi3##type value[], size_t n_values) {                        \
+        (void)n_values;                                                                                       \
+        NONE_OF_TYPE(#type)                                                                                   \
+    }                                                                                                         \
+    fmi3Status fmi3Set##type(fmi3Instance c, V, const fmi3##type value[], size_t n_values) {                  \
+        (void)n_values;                                                                                       \
+        NONE_OF_TYPE(#type)                                                                                   \
     }
 NO_SUCH_TYPE(Float32)
 NO_SUCH_TYPE(Int8)
 NO_SUCH_TYPE(UInt8)
 NO_SUCH_TYPE(Int16)
 NO_SUCH_TYPE(UInt16)
-NO_SUCH_TYPE(Int32)
 NO_SUCH_TYPE(UInt32)
 NO_SUCH_TYPE(Int64)
 NO_SUCH_TYPE(UInt64)
-NO_SUCH_TYPE(Boolean)
 NO_SUCH_TYPE(String)
 
 #define NOT_THERE(what)                                    \
@@ -117,7 +134,6 @@ NO_SUCH_TYPE(String)
         CHECK(!n, "there are no " what);                   \
         return fmi3OK;                                     \
     }
-#define V const fmi3ValueReference vr[], size_t n
 fmi3Status fmi3GetBinary(fmi3Instance c, V, size_t sizes[], fmi3Binary value[], size_t n_values)
     NONE_OF("binary variables")
 fmi3Status fmi3SetBinary(fmi3Instance c, V, const size_t sizes[], const fmi3Binary value[], size_t n_values)

@@ -1,8 +1,8 @@
 /* The seam between the generated model and the FMI layers.
  *
  * A model fills one `Model`; it names no FMI function. The FMI files include only this header and runtime.c; they name
- * no model. All values are doubles, in the order parameters, inputs, states, outputs, derivatives of the states, time;
- * a value reference is the place in that order.
+ * no model. All values are stored as doubles, in the order parameters, inputs, states, outputs, derivatives of the
+ * states, time; a value reference is the place in that order. To the host some are whole numbers or switches.
  */
 #ifndef CHAINUNIT_MODEL_H
 #define CHAINUNIT_MODEL_H
@@ -53,6 +53,9 @@ CHAINUNIT_OLD(pow);
  * and computes and writes only the groups of results whose bits are set in `wanted`. */
 typedef void (*Kernel)(const double *const *arg, double *res, double *w, unsigned wanted);
 
+/* The types of variables. An output that is no REAL is discrete: in Model Exchange it changes at events only. */
+typedef enum { REAL, INTEGER, BOOLEAN } Type;
+
 typedef struct {
     const char *name;
     const char *unit;
@@ -61,6 +64,7 @@ typedef struct {
     double slack; /* a value that exceeds a bound by no more than this counts as the bound */
     int open_low; /* low itself is forbidden */
     int tunable;  /* may change in a run */
+    Type type;
 } Quantity;
 
 /* Outputs that are evaluated together, once per state, when one of them is read. */
@@ -103,6 +107,8 @@ typedef struct {
     const int *place;            /* of each output, by value reference, as they are stored */
     const int *group_of;         /* of each output, by value reference */
     const Group *groups;
+    int discrete;                /* the group of all discrete outputs, or -1 */
+    const Type *discrete_type;   /* of each of these, as they are stored */
     const Requirement *required; /* of the parameters, then of the states at the start */
     int start_rounds;
     int max_steps; /* the parameter that says how many steps of its own a step may take; of models with states */

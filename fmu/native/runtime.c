@@ -30,15 +30,19 @@ struct Instance {
     Mode mode;
     int model_exchange;
     double time, stop; /* stop: the last admissible time, with an allowance for rounding */
-    /* one block: parameters, inputs, their derivatives, states, derived values, derivatives, outputs, work */
-    double *block, *p, *u, *du, *x, *k, *dx, *y, *work, *w; /* w: memory of the kernels */
+    /* one block: parameters, inputs, their derivatives, states, derived values, discrete outputs, derivatives, outputs,
+     * work */
+    double *block, *p, *u, *du, *x, *k, *d, *dx, *y, *work, *w; /* w: memory of the kernels */
     size_t block_size;
     unsigned n_references;
     unsigned *slot, *needs; /* by value reference: place in the block, and the groups to evaluate for it */
+    unsigned *type;         /* by value reference: one of Type */
+    const char *const *type_names;
     unsigned fresh;         /* a bit per group of outputs; the highest bit for the derivatives */
     int changed;    /* parameters or inputs were set after the start of the states */
     int doubtful;   /* an input was set to a value out of its bounds */
     int closed;     /* the states meet the constraints at the present inputs: the last step closed them */
+    int held;       /* discrete outputs keep their values until the next event */
     int spent;      /* the derivatives of the inputs belong to the last step, and the next step needs new ones */
     double pace;    /* next step of the integrator with error control [s]; 0: unknown */
     char *name;
@@ -49,6 +53,9 @@ struct Instance {
 
 /* bits of `needs` and `fresh` in addition to those of the groups */
 enum { STARTED_BIT = 30, DERIVATIVES_BIT = 31 };
+
+static unsigned discrete_bit(void) { return model.discrete < 0 ? 0u : 1u << model.discrete; }
+static int count_discrete(void) { return model.discrete < 0 ? 0 : model.groups[model.discrete].count; }
 
 static void instance_free(Instance *c) {
     if (!c) return;
@@ -68,26 +75,46 @@ static void instance_reset(Instance *c) {
     c->changed = 1;
     c->doubtful = 0;
     c->closed = 0;
+    c->held = 0;
     c->spent = 0;
     c->pace = 0.0;
 }
 
-static Instance *instance_new(const char *name, Report report) {
+/* Tables by value reference: place in the block, groups that are needed, type. */
+static void fill_tables(Instance *c) {
+    const unsigned first = (unsigned)(model.n_p + model.n_u), started = 1u << STARTED_BIT;
+    unsigned r = 0;
+    for (; r < first; ++r) c->slot[r] = r, c->type[r] = model.declared[r].type;
+    for (int k = 0; k < model.n_x; ++k, ++r) c->slot[r] = (unsigned)(c->x - c->block + k), c->needs[r] = started;
+    for (int k = 0; k < model.n_y; ++k, ++r) {
+        const int g = model.group_of[k], at = model.place[k] - model.groups[g].first;
+        const double *value = g == model.discrete ? c->d + at : c->y + model.place[k];
+        c->slot[r] = (unsigned)(value - c->block);
+        c->needs[r] = started | 1u << g;
+        if (g == model.discrete) c->type[r] = model.discrete_type[at];
+    }
+    for (int k = 0; k < model.n_x; ++k, ++r)
+        c->slot[r] = (unsigned)(c->dx - c->block + k), c->needs[r] = started | 1u << DERIVATIVES_BIT;
+    c->slot[r] = (unsigned)(c->w - 1 - c->block); /* the time */
+}
+
+static Instance *instance_new(const char *name, const char *const *type_names, Report report) {
     const int n_in = model.n_u + model.n_x;
     int work = 4 * model.n_x + 3 * n_in + 2 * model.n_y + model.n_x + 3 * (model.n_required + model.n_start_required) + 2 * model.n_z;
     if (kernels.closed && work < 3 * model.n_u + 10 * model.n_x) work = 3 * model.n_u + 10 * model.n_x;
-    const int saved = model.n_p + n_in + model.n_u + model.n_k;
+    const int n_d = count_discrete(), saved = model.n_p + n_in + model.n_u + model.n_k + n_d;
     if (work < saved) work = saved;
     const int moved = 2 * model.n_p + model.n_u + n_in + model.n_k + 2 * (2 * model.n_x + model.n_y) + 2 * model.n_z;
     if (work < moved) work = moved;
-    const size_t n = (size_t)(model.n_p + 2 * model.n_u + 2 * model.n_x + model.n_k + model.n_y + work + 1 + model.n_w);
+    const int values = model.n_p + 2 * model.n_u + 2 * model.n_x + model.n_k + n_d + model.n_y;
+    const size_t n = (size_t)(values + work + 1 + model.n_w);
     Instance *c = calloc(1, sizeof *c);
     if (!c) return NULL;
-    c->block_size = (n - 1 - (size_t)work - (size_t)model.n_w) * sizeof(double);
+    c->block_size = (size_t)values * sizeof(double);
     c->block = calloc(n, sizeof(double));
     c->name = malloc(strlen(name) + 1);
     c->n_references = (unsigned)(model.n_p + model.n_u + 2 * model.n_x + model.n_y);
-    c->slot = malloc(2 * (c->n_references + 1) * sizeof *c->slot);
+    c->slot = calloc(3 * ((size_t)c->n_references + 1), sizeof *c->slot);
     if (!c->block || !c->name || !c->slot) {
         instance_free(c);
         return NULL;
@@ -98,21 +125,15 @@ static Instance *instance_new(const char *name, Report report) {
     c->du = c->u + model.n_u;
     c->x = c->du + model.n_u;
     c->k = c->x + model.n_x;
-    c->dx = c->k + model.n_k;
+    c->d = c->k + model.n_k;
+    c->dx = c->d + n_d;
     c->y = c->dx + model.n_x;
     c->work = c->y + model.n_y;
     c->w = c->work + work + 1;
     c->needs = c->slot + c->n_references + 1;
-    unsigned r = 0;
-    for (int k = 0; k < model.n_p + model.n_u; ++k, ++r) c->slot[r] = r, c->needs[r] = 0;
-    for (int k = 0; k < model.n_x; ++k, ++r)
-        c->slot[r] = (unsigned)(c->x - c->block + k), c->needs[r] = 1u << STARTED_BIT;
-    for (int k = 0; k < model.n_y; ++k, ++r)
-        c->slot[r] = (unsigned)(c->y - c->block + model.place[k]),
-        c->needs[r] = 1u << STARTED_BIT | 1u << model.group_of[k];
-    for (int k = 0; k < model.n_x; ++k, ++r)
-        c->slot[r] = (unsigned)(c->dx - c->block + k), c->needs[r] = 1u << STARTED_BIT | 1u << DERIVATIVES_BIT;
-    c->slot[r] = (unsigned)(c->w - 1 - c->block), c->needs[r] = 0; /* the time */
+    c->type = c->needs + c->n_references + 1;
+    fill_tables(c);
+    c->type_names = type_names;
     c->report = report;
     instance_reset(c);
     return c;
@@ -196,10 +217,13 @@ static Status step_taken(Instance *c) {
 }
 
 static Status set_experiment(Instance *c, double time, int has_stop, double stop) {
-    if (has_stop && !(stop >= time))
-        return complain(c, ERROR, STOP, stop, time);
-    c->stop = has_stop ? stop + SAME_TIME * (stop - time) + ADDED_UP * fabs(larger(stop, time)) : INFINITY;
-    return set_time(c, "start time", time);
+    if (isfinite(time) && has_stop && !(stop >= time)) return complain(c, ERROR, STOP, stop, time);
+    const Status status = set_time(c, "start time", time);
+    if (status) return status;
+    /* the allowance for an endless experiment would be no number */
+    const int ends = has_stop && isfinite(stop);
+    c->stop = ends ? stop + SAME_TIME * (stop - time) + ADDED_UP * fabs(larger(stop, time)) : INFINITY;
+    return OK;
 }
 
 static int all_finite(const double *v, int n) {
@@ -215,7 +239,8 @@ static int all_finite(const double *v, int n) {
 /* -- bounds, by the same rule as in quantities.py */
 
 static int admitted(const Quantity *q, double v) {
-    return isfinite(v) && (q->open_low ? v > q->low : v >= q->low - q->slack) && v <= q->high + q->slack;
+    return isfinite(v) && (q->open_low ? v > q->low : v >= q->low - q->slack) && v <= q->high + q->slack &&
+           (q->type == REAL || v == floor(v));
 }
 
 static double bounded(const Quantity *q, double v) { return v < q->low ? q->low : v > q->high ? q->high : v; }
@@ -314,6 +339,17 @@ static Status unknown_reference(Instance *c, unsigned reference) {
     return complain(c, ERROR, NO_REFERENCE, reference);
 }
 
+static Status other_type(Instance *c, unsigned reference, Type type) {
+    return complain(c, ERROR, OTHER_TYPE, reference, c->type_names[type]);
+}
+
+/* OK where all references that exist are those of numbers with derivatives. */
+static Status all_real(Instance *c, const unsigned *reference, size_t n) {
+    for (size_t k = 0; k < n; ++k)
+        if (reference[k] <= c->n_references && c->type[reference[k]] != REAL) return other_type(c, reference[k], REAL);
+    return OK;
+}
+
 /* Evaluate the groups of the bits in `wanted` that are not fresh. */
 static Status evaluate(Instance *c, unsigned wanted) {
     wanted &= ~c->fresh;
@@ -326,6 +362,23 @@ static Status evaluate(Instance *c, unsigned wanted) {
             return complain(c, DISCARD, NO_OUTPUT, model.name, c->time);
     c->fresh |= wanted;
     return OK;
+}
+
+/* Compute the discrete outputs, and keep them. */
+static Status settle(Instance *c) {
+    const Status status = evaluate(c, discrete_bit());
+    if (status || model.discrete < 0) return status;
+    memcpy(c->d, c->y + model.groups[model.discrete].first, (size_t)count_discrete() * sizeof(double));
+    return OK;
+}
+
+/* Whether a discrete output has another value now than the one that it keeps. */
+static Status unsettled(Instance *c, int *answer) {
+    const Status status = evaluate(c, discrete_bit());
+    *answer = 0;
+    for (int i = 0; !status && i < count_discrete(); ++i)
+        *answer |= c->d[i] != c->y[model.groups[model.discrete].first + i];
+    return status;
 }
 
 static Status derivatives(Instance *c) {
@@ -341,17 +394,20 @@ static Status derivatives(Instance *c) {
     return OK;
 }
 
-static Status get(Instance *c, const unsigned *reference, size_t n, double *value) {
+static Status get(Instance *c, Type type, const unsigned *reference, size_t n, double *value) {
     unsigned needs = 0;
     for (size_t k = 0; k < n; ++k) {
         if (reference[k] > c->n_references) return unknown_reference(c, reference[k]);
+        if (c->type[reference[k]] != type) return other_type(c, reference[k], type);
         needs |= c->needs[reference[k]];
     }
+    if (c->held) needs &= ~discrete_bit();
     if (needs) {
         /* before the start of the states only parameters and inputs have values */
         if (c->mode == INSTANTIATED) return complain(c, ERROR, "outputs cannot be read before initialization");
         Status status = c->mode == INITIALIZATION ? start(c) : OK;
         if (!status) status = evaluate(c, needs & ((1u << STARTED_BIT) - 1u));
+        if (!status && (needs & discrete_bit())) status = settle(c);
         if (!status && (needs >> DERIVATIVES_BIT)) status = derivatives(c);
         if (status) return status;
     }
@@ -366,8 +422,9 @@ static void begin_inputs(Instance *c) {
     c->spent = 0;
 }
 
-static Status set(Instance *c, unsigned reference, double value) {
+static Status set(Instance *c, Type type, unsigned reference, double value) {
     if (reference >= c->n_references) return unknown_reference(c, reference);
+    if (c->type[reference] != type) return other_type(c, reference, type);
     const int i = (int)reference, state = i - model.n_p - model.n_u;
     if (c->mode == CONTINUOUS && state >= 0 && state < model.n_x) {
         if (!isfinite(value))
@@ -532,6 +589,7 @@ static Status along(Instance *c, const unsigned *unknown, size_t n_unknown, doub
 
 static Status forward(Instance *c, const unsigned *unknown, size_t n_unknown, const unsigned *known, size_t n_known,
                const double *seed, double *sensitivity) {
+    if (all_real(c, unknown, n_unknown) || all_real(c, known, n_known)) return ERROR;
     Status status = c->mode == INITIALIZATION ? start(c) : judge_inputs(c);
     if (status) return status;
     const unsigned n_p = (unsigned)model.n_p, n = (unsigned)(model.n_u + model.n_x);
@@ -563,7 +621,8 @@ static double input_curvature(const Instance *c, int i) {
 }
 
 static Status output_derivatives(Instance *c, const unsigned *reference, size_t n, double *value) {
-    Status status = derivatives(c);
+    Status status = all_real(c, reference, n);
+    if (!status) status = derivatives(c);
     if (status) return status;
     for (int i = 0; i < model.n_u; ++i) c->work[i] = input_rate(c, i);
     memcpy(c->work + model.n_u, c->dx, (size_t)model.n_x * sizeof(double));
@@ -759,8 +818,10 @@ static int drifted(Instance *c) { return kernels.closed && off(c) > OFF_MOST; }
 static Status completed(Instance *c, int *enter_event) {
     *enter_event = 0;
     if (step_taken(c) || judge_inputs(c)) return ERROR;
-    *enter_event = drifted(c);
-    return OK;
+    int changed;
+    const Status status = unsettled(c, &changed);
+    *enter_event = !status && (changed || drifted(c));
+    return status;
 }
 
 /* Correct the states; `moved` tells whether a state changed. */
@@ -788,6 +849,7 @@ typedef struct {
     uint64_t guard; /* checksum of the model and its version: a state of another one is refused */
     int mode, model_exchange, closed, spent;
     double time, stop, pace;
+    int held;
 } Saved;
 
 static uint64_t guard(void) {
@@ -812,7 +874,8 @@ static uint64_t sum_of(const void *memory, size_t size) {
     return ~crc;
 }
 
-/* size of the saved values: parameters, inputs and their derivatives, states, derived values; others are recomputed */
+/* size of the saved values: parameters, inputs and their derivatives, states, derived values, discrete outputs; others
+ * are recomputed */
 static size_t kept(const Instance *c) { return (size_t)(c->dx - c->block); }
 
 static size_t state_size(const Instance *c) { return sizeof(Saved) + kept(c) * sizeof(double); }
@@ -850,6 +913,7 @@ static Status state_get(Instance *c, void **state) {
     saved.mode = (int)c->mode;
     saved.model_exchange = c->model_exchange;
     saved.closed = c->closed;
+    saved.held = c->held;
     saved.spent = c->spent;
     saved.time = c->time;
     saved.stop = c->stop;
@@ -871,6 +935,7 @@ static Status state_set(Instance *c, const void *state) {
     c->stop = saved.stop;
     c->pace = saved.pace;
     c->closed = saved.closed;
+    c->held = saved.held;
     c->spent = saved.spent;
     c->fresh = 0;
     c->doubtful = 1;

@@ -19,7 +19,7 @@ from .command_options import BackendOption
 from .console import finish, leave, progress_bar, study_file, terminal_console
 from .errors import InputError, InterruptedRunError, RunError, printable
 from .export_command import ExportCommand, export, export_ssp
-from .files import claim, clear, full, refuse_foreign, written
+from .files import claim, clear, full, written
 from .identify_command import identify
 from .sweep_command import sweep
 from .watch_command import watch
@@ -122,7 +122,7 @@ def study(
     from .report import study as contents
     from .study.record import INSUFFICIENT, SPEED_MISSED
 
-    with claim(output, "study"):
+    with claim(output, "study", *results.names(loaded)):
         errors = terminal_console(stderr=True)
         with progress_bar(errors) as progress:
             record = results.compute(
@@ -180,10 +180,10 @@ def optimize(
 
     Writes best.toml, report.html, result.json, result.md and pictures into the output folder.
     """
-    loaded = study_file(config)
-    with claim(output, "optimize"):
-        from .report import optimum
+    from .report import optimum
 
+    loaded = study_file(config)
+    with claim(output, "optimize", *optimum.FILES):
         with progress_bar(terminal_console(stderr=True)) as progress:
             best = optimum.compute(loaded, output, progress, backend.value if backend else None)
         contents = optimum.optimum_report(best, loaded)
@@ -265,12 +265,10 @@ def two_bar_error(
     Writes report.html, two_bar_error.json, two_bar_error.md and two_bar_error.png into the output folder.
     """
     from .papers import two_bar
+    from .report import files
 
-    with claim(output, "two-bar-error"):
-        from .report import files
-
-        names = files.names(two_bar.NAME, (two_bar.PICTURE,))
-        refuse_foreign(output, *names)
+    names = files.names(two_bar.NAME, (two_bar.PICTURE,))
+    with claim(output, "two-bar-error", *names):
         clear(output, *names)
         with progress_bar(terminal_console(stderr=True)) as progress:
             progress("bars and catenaries", 0.0, 1.0)
@@ -295,17 +293,15 @@ def linkage_command(
     from .machines.linkages.file import read_linkage
     from .machines.machine import Machine
     from .reading import option_value
+    from .report import files, linkage_report
+    from .study.linkage_turn import linkage_findings
 
     machine = Machine(read_linkage(file))
     turns = machine.model.turns
     usual, unit = ("60 rpm", "rad/s") if turns else ("0.1 m/s", "m/s")
     rate = option_value("--speed", speed or usual, unit, "speed of the driver")
-    with claim(output, "linkage"):
-        from .report import files, linkage_report
-        from .study.linkage_turn import linkage_findings
-
-        names = files.names(linkage_report.NAME, linkage_report.PICTURES)
-        refuse_foreign(output, *names)
+    names = files.names(linkage_report.NAME, linkage_report.PICTURES)
+    with claim(output, "linkage", *names):
         clear(output, *names)
         contents = linkage_report.linkage_report(linkage_findings(machine, rate), str(file))
         finish(contents, output, linkage_report.NAME)

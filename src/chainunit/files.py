@@ -91,22 +91,6 @@ def _ledger_of(file: Path) -> Ledger | None:
     return next((ledger for ledger in reversed(_ledgers) if ledger.has(file)), None)
 
 
-def refuse_foreign(folder: Path, *names: str) -> None:
-    """Refuse a folder with files of these names that no earlier run wrote; they would be lost.
-
-    Raises
-    ------
-    InputError
-        with a line for each such file.
-    """
-    faults = Faults()
-    for file in dict.fromkeys(folder / name for name in names):
-        ledger = _ledger_of(file)
-        if ledger is not None and file.is_file() and not ledger.wrote(file):
-            faults.add([InputError(f"{file}: would be lost, {_FOREIGN}")])
-    faults.refuse()
-
-
 @contextmanager
 def writing(file: Path) -> Iterator[None]:
     """Name `file` in the error of an operating system that cannot write it.
@@ -229,7 +213,8 @@ def refuse_other_result(path: Path, command: str) -> None:
 @contextmanager
 def claim(path: Path, command: str = "", *names: str) -> Iterator[Path]:
     """The `folder` at `path`, for this process alone as long as the context lasts; for a `command` of `RESULTS` it
-    must not have the result of another one, nor files of `names` or of this kind that no earlier run wrote.
+    must not have the result of another one, nor files that no earlier run wrote and that the command would write: the
+    numbers and the page, and those of the further `names`.
 
     A lock of the operating system on a file guards the folder. The file is removed at the end. The lock ends
     with the process, even if the process is killed. A file system without locks gives no protection. A folder
@@ -238,7 +223,8 @@ def claim(path: Path, command: str = "", *names: str) -> Iterator[Path]:
     Raises
     ------
     InputError
-        where another process writes there; see also `refuse_other_result`, `refuse_foreign` and `folder`.
+        where another process writes there, and with a line for each file that would be lost; see also
+        `refuse_other_result` and `folder`.
     """
     if command:
         refuse_other_result(path, command)
@@ -285,8 +271,13 @@ def _listed(path: Path, command: str, names: Sequence[str]) -> Iterator[None]:
     ledger = Ledger(path)
     _ledgers.append(ledger)
     try:
-        numbers = RESULTS[command].file
-        refuse_foreign(path, PAGE, numbers, numbers.replace(".json", ".md"), *names)
+        numbers, faults = RESULTS[command].file, Faults()
+        for file in dict.fromkeys(
+            path / name for name in (PAGE, numbers, numbers.replace(".json", ".md"), *names)
+        ):
+            if file.is_file() and not ledger.wrote(file):
+                faults.add([InputError(f"{file}: would be lost, {_FOREIGN}")])
+        faults.refuse()
         yield
     finally:
         _ledgers.remove(ledger)

@@ -26,6 +26,7 @@ class IdentificationResult(WrittenResult):
     fit found."""
 
     _command = "identify"
+    _names = (contents.FILE,)
 
     def __init__(self, found: IdentifiedMachine) -> None:
         self.found = found
@@ -77,6 +78,7 @@ class WatchResult(WrittenResult):
     """A watched recording. Its `repr` shows the alarms; `watched` has the outputs of the observer at all rows."""
 
     _command = "watch"
+    _names = watching.PICTURES
 
     def __init__(self, watched: WatchedRecording) -> None:
         self.watched = watched

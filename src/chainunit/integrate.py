@@ -24,9 +24,10 @@ class Solver:
     max_steps: Value = quantity(
         "1",
         "most steps of its own that a communication step may take; the step is discarded where it takes more",
-        default=5e5,
-        min=1.0,
-        max=1e9,
+        default=500_000,
+        min=1,
+        max=1_000_000_000,
+        type="Integer",
     )
 
 

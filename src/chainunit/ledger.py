@@ -1,7 +1,8 @@
 """The list of the files that the program wrote into a folder, by which it tells them from the files of others.
 
 A line has the SHA-256 of a file and its name in the folder, as ``sha256sum`` writes and checks it. A file that was
-changed since it was written counts as a file of others.
+changed since it was written counts as a file of others. While a file is replaced, it has two lines: a process that is
+killed leaves the old or the new one in its place, and both are its own.
 """
 
 from __future__ import annotations
@@ -10,7 +11,6 @@ import hashlib
 import re
 import secrets
 import stat
-from collections.abc import Mapping
 from pathlib import Path
 
 from .errors import InputError
@@ -37,7 +37,7 @@ class Ledger:
     def __init__(self, folder: Path) -> None:
         self.folder = folder.absolute()
         self._file = self.folder / NAME
-        self._digests: dict[str, str] = {}
+        self._digests: dict[str, tuple[str, ...]] = {}
         self._torn = False
         try:
             # a pipe would be waited for, and a link may lead anywhere
@@ -53,7 +53,7 @@ class Ledger:
         for line in text.split("\n")[:-1]:
             if not (match := _LINE.fullmatch(line)):
                 raise self._unreadable
-            self._digests[match[2]] = match[1]
+            self._note(match[2], match[1])
 
     @property
     def _unreadable(self) -> InputError:
@@ -68,34 +68,43 @@ class Ledger:
 
     def wrote(self, file: Path) -> bool:
         """Whether the program wrote this file as it is now."""
-        known = self._digests.get(self._name(file))
-        return known is not None and digest(file) == known
+        known = self._digests.get(self._name(file), ())
+        return bool(known) and digest(file) in known
+
+    def _note(self, name: str, known: str) -> None:
+        """Keep a digest of a file, as the latest one."""
+        earlier = (each for each in self._digests.get(name, ()) if each != known)
+        self._digests[name] = (*earlier, known)
 
     def add(self, file: Path, content: Path) -> None:
-        """Note that `file` is about to get this content."""
+        """Note that `file` is about to get this content; as it is now, it stays known until `close`."""
         name, known = self._name(file), digest(content)
-        if self._digests.get(name) != known:
+        if known not in self._digests.get(name, ()):
             if self._torn:
-                self._write(self._digests)
-            self._digests[name] = known
+                self._write()
+            self._note(name, known)
             with self._file.open("a", encoding="utf-8") as out:
                 out.write(f"{known}  {name}\n")
 
     def close(self) -> None:
-        """Write the list anew, without the files that are gone."""
-        there = {
-            name: known for name, known in sorted(self._digests.items()) if (self.folder / name).is_file()
-        }
+        """Write the list anew, with each file as it is now, and without those that are gone."""
+        there = {}
+        for name, known in sorted(self._digests.items()):
+            if (self.folder / name).is_file():
+                now = digest(self.folder / name) if len(known) > 1 else known[0]
+                there[name] = (now,) if now in known else known[-1:]
+        self._digests = there
         if there:
-            self._write(there)
+            self._write()
         else:
             self._file.unlink(missing_ok=True)
 
-    def _write(self, digests: Mapping[str, str]) -> None:
+    def _write(self) -> None:
         self._torn = False
         part = self._file.with_name(f"{NAME}.{secrets.token_hex(8)}.part")
+        lines = (f"{each}  {name}\n" for name, known in self._digests.items() for each in known)
         try:
-            part.write_text("".join(f"{known}  {name}\n" for name, known in digests.items()), "utf-8")
+            part.write_text("".join(lines), "utf-8")
             part.replace(self._file)
         finally:
             part.unlink(missing_ok=True)

@@ -359,8 +359,8 @@ class Model(metaclass=ModelType):
         return tuple(part.equations(xp, p, u, x, shared) for part in cls.parts)
 
     @classmethod
-    def sketch(cls) -> Sketch | None:
-        """The machine as lines, if it is a mechanism."""
+    def sketch(cls, start: Mapping[str, float] | None = None) -> Sketch | None:
+        """The machine as lines, if it is a mechanism: with the parameters `start` by name, else the declared ones."""
         return None
 
     @classmethod

@@ -18,7 +18,7 @@ import re
 from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
-from typing import Any, TypeAlias, TypeVar, dataclass_transform
+from typing import Any, Literal, TypeAlias, TypeVar, dataclass_transform
 
 from . import refusals
 
@@ -174,12 +174,24 @@ ROUNDING = 1e-9
 bound."""
 
 
+Type = Literal["Real", "Integer", "Boolean"]
+"""The type of a scalar. The equations compute with numbers of the type float alone: a count is a whole number among
+them, a switch is 0 (false) or 1 (true). An output that is a count or a switch changes only at events."""
+
+
+def written(x: float, type: Type) -> str:
+    """The exact number `x` as a file has it: ``2.0``, of a count ``2``, of a switch ``true``."""
+    if type == "Boolean":
+        return "true" if x else "false"
+    return repr(float(x)) if type == "Real" else str(round(x))
+
+
 @dataclass(frozen=True, slots=True)
 class Quantity:
     """One scalar: its unit, its description, its bounds (with `open_low` the bound `low` itself is not
     allowed), its start value (None for outputs), its `nominal` size, whether it may change in a run
     (`tunable`), the range of its `usual` sizes (a value outside it is probably a slip of the unit, and is not
-    refused), and its `kind`, which says how it is shown (see `chainunit.text`)."""
+    refused), its `kind`, which says how it is shown (see `chainunit.text`), and its `type`."""
 
     unit: str
     description: str
@@ -191,6 +203,7 @@ class Quantity:
     tunable: bool = False
     usual: tuple[float, float] | None = None
     kind: str = ""
+    type: Type = "Real"
 
     def is_usual(self, x: float) -> bool:
         """Whether the value `x` is usual for a machine of this kind."""
@@ -200,10 +213,13 @@ class Quantity:
     @property
     def allowed_range(self) -> str:
         """The allowed range in words, e.g. ``> 0 m``."""
+        if self.type == "Boolean":
+            return "true or false"
         unit = refusals.unit_behind(self.unit)
         low = f"{'>' if self.open_low else '>='} {self.low:g}{unit}" if math.isfinite(self.low) else ""
         high = f"<= {self.high:g}{unit}" if math.isfinite(self.high) else ""
-        return " and ".join(x for x in (low, high) if x) or "any number"
+        limits = " and ".join(x for x in (low, high) if x)
+        return f"a whole number {limits}".rstrip() if self.type == "Integer" else limits or "any number"
 
     @property
     def slack(self) -> float:
@@ -213,9 +229,10 @@ class Quantity:
 
     def admits(self, x: Any) -> Any:
         """Whether the number `x`, or each of an array, is finite and inside the bounds, or beyond one by rounding
-        only."""
+        only; of a count or a switch, whether it is a whole number, too."""
         above = x > self.low if self.open_low else x >= self.low - self.slack
-        return (abs(x) < math.inf) & above & (x <= self.high + self.slack)
+        whole = self.type == "Real" or x % 1 == 0
+        return (abs(x) < math.inf) & above & (x <= self.high + self.slack) & whole
 
     def within_bounds(self, x: float) -> float:
         """The admitted number `x`, set to the bound where it is beyond it by rounding."""
@@ -238,25 +255,30 @@ def quantity(
     tunable: bool = False,
     usual: tuple[float, float] | None = None,
     kind: str = "",
+    type: Type = "Real",
 ) -> Any:
     """A field that declares one scalar. `default` is its start value (outputs have none); `above` is a lower
     bound that is not allowed itself. Without `max`, a quantity with a lower bound has the upper bound of
     `MOST`; without `usual`, its usual sizes are those of `USUAL`. `kind` says how it is shown (see
-    `chainunit.text`)."""
+    `chainunit.text`). A `type` "Boolean" has the bounds 0 and 1."""
     base_units(unit)
+    if type == "Boolean":
+        min, max = 0.0, 1.0
     low = min if above is None else above
     high = MOST.get(unit, math.inf) if math.isinf(max) and math.isfinite(low) else max
+    default = None if default is None else float(default)
     q = Quantity(
         unit,
         description,
         default,
-        low,
-        high,
+        float(low),
+        float(high),
         above is not None,
         nominal,
         tunable,
         usual or USUAL.get(unit),
         kind,
+        type,
     )
     metadata = {"quantity": q}
     if default is None:
@@ -346,6 +368,11 @@ class Variable:
     def kind(self) -> str:
         """The kind by which it is shown, as in the declaration."""
         return self.quantity.kind
+
+    @property
+    def type(self) -> Type:
+        """The type, as in the declaration."""
+        return self.quantity.type
 
 
 def variables(cls: type, prefix: str = "", context: str = "", default: Any = None) -> Iterator[Variable]:

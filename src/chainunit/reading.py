@@ -45,7 +45,11 @@ def to_number(variable: Variable, given: Any) -> float:
     ValueError
         for a text that is no number, a unit of another kind, or a value out of bounds.
     """
-    if isinstance(given, bool) or not isinstance(given, int | float | str):
+    if variable.type == "Boolean":
+        fits = isinstance(given, int | float) and given in (0, 1)
+    else:
+        fits = isinstance(given, int | float | str) and not isinstance(given, bool)
+    if not fits:
         raise ValueError(f"{variable.name} = {shown(given)}: must be {_kind(variable)}")
     try:
         value = _converted(variable, given) if isinstance(given, str) else float(given)
@@ -60,6 +64,8 @@ def to_number(variable: Variable, given: Any) -> float:
 def may_be_share(variable: Variable) -> bool:
     """Whether a quantity may be given in percent: no count, and no ratio of gears."""
     low, high = variable.quantity.low, variable.quantity.high
+    if variable.type != "Real":
+        return False
     return variable.unit != "1" or variable.kind == "percent" or (low < 1.0 and high <= 100.0)
 
 
@@ -73,9 +79,12 @@ def _converted(variable: Variable, text: str) -> float:
             return units.convert(number, written, variable.unit, variable.kind) if written else number
     except ValueError:
         pass
-    meant = units.probable_text(text, variable.unit, variable.kind)
+    counted = variable.type != "Real"
+    meant = "" if counted else units.probable_text(text, variable.unit, variable.kind)
     hint = f'; was "{meant}" meant?' if meant else ""
-    raise ValueError(f"{variable.name} = {shown(text)}: must be {_kind(variable)}{hint}")
+    other = units.of_other_kind(parts[1], variable.unit) if parts is not None and parts[1] else ""
+    other = f"; {printable(other)}" if other else ""
+    raise ValueError(f"{variable.name} = {shown(text)}: must be {_kind(variable)}{other}{hint}")
 
 
 def option_value(name: str, text: str, unit: str, description: str) -> float:
@@ -92,10 +101,14 @@ def option_value(name: str, text: str, unit: str, description: str) -> float:
         others = {"rad/s": ("rev/min", "rad/s"), "m/s": ("m/s", "mm/s")}.get(unit, (unit.replace(".", " "),))
         examples = " or ".join(f'"{parts[0]:g} {other}"' for other in others)
         raise InputError(f"{name} {printable(text)}: has no unit; give it as {examples}")
-    try:
-        return to_number(
-            Variable(name, description, Quantity(unit, description, low=0.0, open_low=True)), text
+    quantity = Quantity(unit, description, low=0.0, open_low=True)
+    if parts is not None and parts[1] and not units.converts(parts[1], unit):
+        kind = units.of_other_kind(parts[1], unit) or f"{printable(parts[1])} is no known unit"
+        raise InputError(
+            f'{name} "{printable(text)}": {kind}; must be {units.with_units(unit)} ({description})'
         )
+    try:
+        return to_number(Variable(name, description, quantity), text)
     except ValueError as error:
         raise InputError(str(error)) from None
 
@@ -168,6 +181,8 @@ def _meant(variable: Variable, given: Any) -> str:
 
 def _kind(variable: Variable) -> str:
     fitting = units.fitting(variable.unit, variable.kind)
+    if variable.type != "Real":
+        return f"{variable.quantity.allowed_range} ({variable.description})"
     if variable.unit == "1":
         share = ', or a text such as "8 %"' if fitting else ""
         return f"a pure number{share} ({variable.description})"

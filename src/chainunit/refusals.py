@@ -24,7 +24,7 @@ NO_VALUE = "no value fits; {remedy}"
 FIXED = "{name} is fixed: set it before initialization or after reset"
 NO_REFERENCE = "value reference {reference:d} does not exist"
 OUTPUT_SET = "value reference {reference:d} is an output and cannot be set"
-OTHER_TYPE = "every variable is a {type}"
+OTHER_TYPE = "value reference {reference:d} is no variable of the type {type}"
 NO_OUTPUT = "an output of {model} is not a finite number at t = {time:g} s: the inputs are beyond any machine"
 
 TIME = "{which} = {time:g} s: must be a finite number"

@@ -37,6 +37,8 @@ class WrittenResult(ReportedResult):
 
     _command: ClassVar[str]
     """the command that writes the same files"""
+    _names: ClassVar[tuple[str, ...]] = ()
+    """of further files that it writes, see `claim`"""
 
     def save(self, folder: str | Path) -> list[Path]:
         """Write the files of the command of the same name with ``-o``; returns the files.
@@ -48,7 +50,7 @@ class WrittenResult(ReportedResult):
         WriteError
             for a file that cannot be written; the others are written.
         """
-        with claim(Path(folder), self._command) as place:
+        with claim(Path(folder), self._command, *self._names) as place:
             self._clear(place)
             return self._write(place)
 
@@ -57,7 +59,7 @@ class WrittenResult(ReportedResult):
         """The result of `make`, with its files in a `folder`, which is claimed before the work."""
         if folder is None:
             return make()
-        with claim(Path(folder), cls._command) as place:
+        with claim(Path(folder), cls._command, *cls._names) as place:
             result = make()
             result._clear(place)
             result._write(place)

@@ -204,7 +204,7 @@ class Study:
         if folder is None:
             result = in_temporary_folder(result_in)
         else:
-            with claim(Path(folder), "study") as place:
+            with claim(Path(folder), "study", *results.names(self.config)) as place:
                 result = result_in(place)
                 result._write(place)
         failure = result.record.failure
@@ -235,7 +235,7 @@ class Study:
         """
         if folder is None:
             return BestResult(self.config, optimum.search(self.config, progress, backend))
-        with claim(Path(folder), "optimize") as place:
+        with claim(Path(folder), "optimize", *optimum.FILES) as place:
             result = BestResult(self.config, optimum.compute(self.config, place, progress, backend))
             result._write(place)
         return result
@@ -394,7 +394,7 @@ class StudyResult:
         InputError, WriteError
             as `Study.run`.
         """
-        with claim(Path(folder), "study", *results.FILES) as place:
+        with claim(Path(folder), "study", *results.names(self.record.config)) as place:
             if place.resolve() != self._folder.resolve():
                 clear(place, *results.FILES)
                 (place / "fmu").mkdir(exist_ok=True)
@@ -425,6 +425,7 @@ class BestResult(WrittenResult):
     """The result of a search for the best machine. Its `repr` shows the answer, the parameters and what binds."""
 
     _command = "optimize"
+    _names = optimum.FILES
 
     def __init__(self, config: Config, best: Best) -> None:
         self.config = config

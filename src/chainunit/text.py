@@ -66,6 +66,14 @@ _SCALES: dict[str, dict[str, tuple[float, float]]] = {
     "millimetres": {"mm": (1e3, 0.0)},
 }
 """By kind, the units in which it may be shown, with factor and offset: shown = factor * value + offset."""
+_BY_SIZE: Mapping[str, tuple[float, float, str]] = {
+    "power": (0.0, 1.0, "W"),
+    "torque": (1e4, math.inf, "kN.m"),
+    "force": (1e4, math.inf, "kN"),
+}
+"""By kind, from which size on, up to which, and in which unit a number is shown whose unit nobody chose."""
+_ROUNDING = 1e-9
+"""Size of a power [W] below which it is rounding."""
 CHOICES = {
     kind: tuple(scales)
     for kind, scales in _SCALES.items()
@@ -118,6 +126,19 @@ def scales(unit: str, kind: str = "", units: Units = DEFAULT_UNITS) -> list[tupl
     if unit in DISPLAY_UNITS and unit != "rad/s" and kind != "difference":
         return [DISPLAY_UNITS[unit]]
     return [(unit, 1.0, 0.0)]
+
+
+def _of_size(value: float, unit: str, kind: str, units: Units) -> list[tuple[str, float, float]]:
+    """The `scales` of one number: a large torque is in kN m and a small power in W, unless the user chose another
+    unit."""
+    of = kind if kind in _SCALES else _KIND_OF.get(unit, "")
+    if of not in _BY_SIZE or units.get(of) != DEFAULT_UNITS.get(of):
+        return scales(unit, kind, units)
+    low, high, name = _BY_SIZE[of]
+    if not low <= abs(value) < high:
+        return scales(unit, kind, units)
+    factor, offset = _SCALES[of][name]
+    return [(name, 0.0 if of == "power" and abs(value) < _ROUNDING else factor, offset)]
 
 
 def unit_text(unit: str) -> str:
@@ -180,7 +201,7 @@ def forms(
     if kind == "assumed":
         value, full = float(f"{value:.0e}"), False
     texts = []
-    for name, factor, offset in scales(unit, kind, units):
+    for name, factor, offset in _of_size(value, unit, kind, units):
         texts.append((digits_text(factor * value + offset, digits, full=full), unit_text(name)))
         # beside a number as it was given the other unit is a result
         digits, full = digits if full else 3, True

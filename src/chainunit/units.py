@@ -215,6 +215,15 @@ def convert(number: float, unit_text: str, unit: str, kind: str = "") -> float:
         raise ValueError(f"{unit_text}: is no unit of {unit}") from error
 
 
+def converts(unit_text: str, unit: str) -> bool:
+    """Whether a number in the unit `unit_text` is one in the declared `unit`, too."""
+    try:
+        convert(1.0, unit_text, unit)
+    except ValueError:
+        return False
+    return True
+
+
 def scale(unit_text: str, unit: str, kind: str = "") -> tuple[float, float]:
     """Factor and offset from the unit `unit_text` to the declared `unit`; the errors are those of `convert`."""
     offset = convert(0.0, unit_text, unit, kind)
@@ -222,25 +231,36 @@ def scale(unit_text: str, unit: str, kind: str = "") -> tuple[float, float]:
 
 
 def of_other_kind(unit_text: str, unit: str) -> str:
-    """Words for a unit that is none of the declared `unit`, which measures something else: ``kg is a mass; must be a
-    speed, such as [rad/s] or [rev/min]``. Empty for an unknown unit, and for one of the same dimension.
-
-    Parameters
-    ----------
-    unit : one of which `_KINDS` has the name
-    """
+    """What a unit measures that is none of the declared `unit`: ``kg is a mass``. Empty for an unknown unit, and for
+    one of the same dimension."""
     try:
         own = dimension(unit_text)
     except ValueError:
         return ""
-    if own == dimension(unit):
+    if own == dimension("" if unit == "1" else unit):
         return ""
     is_share = not own and not any(name in _ANGLES for name, _ in _factors(_ascii(unit_text)))
     alike = {**_KINDS, "N.m": "a torque or an energy"}
     kind = next((words for each, words in alike.items() if dimension(each) == own), "of another quantity")
+    return f"{unit_text} is {'a share' if is_share else kind}"
+
+
+def must_be(unit: str) -> str:
+    """Words on the kind of the declared `unit`, one of which `_KINDS` has the name: ``must be a speed, such as
+    [rad/s] or [rev/min]``."""
     wanted = dict.fromkeys((unit.replace(".", " "), *fitting(unit)[:2]))
     such = " or ".join(f"[{each}]" for each in list(wanted)[:2])
-    return f"{unit_text} is {'a share' if is_share else kind}; must be {_KINDS[unit]}, such as {such}"
+    return f"must be {_KINDS[unit]}, such as {such}"
+
+
+def with_units(unit: str) -> str:
+    """A quantity of the declared `unit` as a person has to write it: ``a speed in rev/min, rad/s, deg/s or Hz``."""
+    *names, last = _OF_OPTIONS.get(unit, fitting(unit))
+    return f"{_KINDS.get(unit, 'a number')} in {', '.join(names)}{' or ' if names else ''}{last}"
+
+
+_OF_OPTIONS = {"rad/s": ("rev/min", "rad/s", "deg/s", "Hz")}
+"""By declared unit, the units that a refusal lists, where they are others than those in which people write it."""
 
 
 def probable_text(text: str, unit: str, kind: str = "") -> str:

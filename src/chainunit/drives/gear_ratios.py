@@ -2,7 +2,7 @@
 
 The limits are typical of standard units, and belong to no maker. A helical stage makes up to about 6.3, so that two
 stages make up to 40 and three up to 250; two-stage units of makers end between 30 and 60, three-stage units between
-200 and 350. A worm gear makes up to about 100, a V-belt up to about 6.3.
+200 and 350. A worm gear makes up to about 100, a V-belt up to about 6.3; few makers go up to 10 with a belt.
 """
 
 from __future__ import annotations
@@ -36,40 +36,63 @@ SERIES: Mapping[str, tuple[float, ...]] = MappingProxyType(
 """Preferred numbers of ISO 3 in a decade, by series, the coarsest first."""
 
 
+STAGE = 0.98
+"""Typical efficiency of one stage of helical wheels, with its bearings and seals."""
+
+
 @dataclass(frozen=True)
 class GearUnit:
-    """A gear in one housing, or one belt, with the largest ratio that it is made with."""
+    """A gear in one housing, or one belt: the ratio up to which it is usual, the largest that a maker has, and its
+    typical efficiency."""
 
     title: str
     largest: float
+    made: float
+    efficiency: float
 
 
 UNITS: Mapping[str, tuple[GearUnit, ...]] = MappingProxyType(
     {
         "helical": (
-            GearUnit("one-stage helical gear", 6.3),
-            GearUnit("two-stage helical gear", 40.0),
-            GearUnit("three-stage helical gear", 250.0),
+            GearUnit("one-stage helical gear", 6.3, 10.0, STAGE),
+            GearUnit("two-stage helical gear", 40.0, 60.0, STAGE**2),
+            GearUnit("three-stage helical gear", 250.0, 350.0, STAGE**3),
         ),
-        "worm": (GearUnit("worm gear", 100.0),),
-        "belt": (GearUnit("V-belt", 6.3),),
+        "worm": (GearUnit("worm gear", 100.0, 100.0, KINDS["worm"].efficiency),),
+        "belt": (GearUnit("V-belt", 6.3, 10.0, KINDS["belt"].efficiency),),
     }
 )
 """The units of each kind of gear, by rising ratio; bevel-helical gears count as helical ones."""
 
-EFFICIENCY: Mapping[str, float] = MappingProxyType(
-    {
-        kind: KINDS[transmission].efficiency
-        for kind, transmission in (("helical", "gear"), ("worm", "worm"), ("belt", "belt"))
-    }
-)
-"""Typical efficiency of each kind. That of a worm gear falls from 0.9 at a ratio of 5 to 0.65 at 80; the number is
-that of 50."""
+
+def gear_unit(kind: str, ratio: float, is_given: bool = False) -> GearUnit | None:
+    """The smallest unit of the `kind` that has the `ratio`; None where one unit does not suffice. A ratio that
+    `is_given` may be one that only some makers have in one unit."""
+    usual = (unit for unit in UNITS[kind] if ratio <= unit.largest)
+    last = UNITS[kind][-1]
+    return next(usual, last if is_given and ratio <= last.made else None)
 
 
-def gear_unit(kind: str, ratio: float) -> GearUnit | None:
-    """The smallest unit of the `kind` that has the `ratio`; None where one unit does not suffice."""
-    return next((unit for unit in UNITS[kind] if ratio <= unit.largest), None)
+def typical_efficiency(kind: str, ratio: float) -> float:
+    """Typical efficiency of the unit of that `kind` and `ratio`, or of as many units one behind the other as it
+    takes. A stage of helical wheels has `STAGE`, a V-belt 0.95. That of a worm gear falls from 0.9 at a ratio of 5 to
+    0.65 at 80; the number is that of 50."""
+    efficiency, last = 1.0, UNITS[kind][-1]
+    while ratio > last.made:
+        efficiency, ratio = efficiency * last.efficiency, ratio / last.largest
+    unit = gear_unit(kind, ratio, is_given=True)
+    assert unit is not None
+    return float(efficiency * unit.efficiency)
+
+
+def next_ratio(ratio: float, ratios: Sequence[float]) -> float | None:
+    """The ratio on offer above `ratio`: of the `ratios` of a catalogue of gears, or else of the finest series; None
+    where there is none."""
+    if ratios:
+        return min((each for each in ratios if each > ratio), default=None)
+    decade = 10.0 ** math.floor(math.log10(ratio))
+    above = (decade * each for each in (*SERIES["R80"], 10.0) if decade * each > ratio * (1.0 + 1e-6))
+    return float(f"{next(above):.4g}")
 
 
 def nearest(ratio: float, ratios: Iterable[float]) -> float:

@@ -111,8 +111,11 @@ class InverterSwitch:
     """Whether an inverter feeds the motor."""
 
     on: Value = quantity(
-        "1", "1: an inverter feeds the motor and follows w_ref; 0: the line does", default=0.0, min=0.0, max=1.0,
-    )  # fmt: skip
+        "1",
+        "true: an inverter feeds the motor and follows w_ref; false: the line does",
+        default=False,
+        type="Boolean",
+    )
 
 
 @declaration
@@ -133,7 +136,7 @@ class Cooling:
 class Parameters(MotorParameters):
     """Parameters of the motor. The start values are a typical 2.2 kW, 4-pole, 400 V machine."""
 
-    pole_pairs: Value = quantity("1", "pole pairs", default=2.0, min=1.0, max=24.0)
+    pole_pairs: Value = quantity("1", "pole pairs", default=2, min=1, max=24, type="Integer")
     supply: Supply = group(Supply, "supply", default=Supply())
     stator: Stator = group(Stator, "stator", default=Stator())
     main: Main = group(Main, "main flux", default=Main())

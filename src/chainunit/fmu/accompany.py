@@ -17,9 +17,10 @@ def companion_files(
     """Files by their path inside the FMU; `libraries` are the packages whose code the FMU contains: their licences
     are added."""
     model = interface.model
-    png, svg = icon(model, "png"), icon(model, "svg")
+    sketch = model.sketch({s.name: s.start for s in interface.of("parameter") if s.start is not None})
+    png, svg = (icon(model, kind, sketch) for kind in ("png", "svg"))
     files = {
-        "documentation/index.html": page(interface, version).encode(),
+        "documentation/index.html": page(interface, version, sketch).encode(),
         "documentation/licenses/license.txt": licence("chainunit", *libraries).encode(),
     }
     if fmi == 2:

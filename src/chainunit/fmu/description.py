@@ -14,13 +14,15 @@ from xml.etree.ElementTree import Element, SubElement
 from ..engines import casadi_
 from ..errors import InputError
 from ..model import About, Model
-from ..quantities import DISPLAY_UNITS, TYPES, Variable, base_units
+from ..quantities import DISPLAY_UNITS, TYPES, Type, Variable, base_units, written
 from ..trace import trace
 from .recipe import Experiment, script_of
 from .script import Script
 
 RELEASED = "2026-11-21"
 """The day of this version's release, equal to the one in CITATION.cff."""
+TYPES_3: Mapping[Type, str] = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean"}
+"""The names of the types in FMI 3.0."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +81,11 @@ class Interface:
         """The outputs that repeat another one, by name, with the signal of that one."""
         own = {signal.name: signal for signal in self.of("output")}
         return {name: own[of] for name, of in self.model.repeated.items()}
+
+    @property
+    def discrete(self) -> list[int]:
+        """Places among the outputs after the states of those that are counts or switches."""
+        return [i for i, v in enumerate(self.others) if v.type != "Real"]
 
     def of(self, causality: str) -> list[Signal]:
         """Signals of one causality, in order."""
@@ -216,13 +223,13 @@ def model_description(
 
     _definitions(root, interface, exchange, set(), add_type)
     variables = SubElement(root, "ModelVariables")
-    for attributes, real, state in _variables(interface, exchange):
+    for attributes, kind, own, state in _variables(interface, exchange):
         # an output that repeats another one has its value reference, but a place of its own
         if (one := interface.repeated.get(attributes["name"])) is not None:
             attributes["valueReference"] = str(one.reference)
         # FMI 2.0 counts variables from 1
         derivative = {} if state is None else {"derivative": str(state + 1)}
-        SubElement(SubElement(variables, "ScalarVariable", attributes), "Real", {**real, **derivative})
+        SubElement(SubElement(variables, "ScalarVariable", attributes), kind, {**own, **derivative})
     structure = SubElement(root, "ModelStructure")
     lists = {name: Element(name) for name in ("Outputs", "Derivatives", "InitialUnknowns")}
     first_state = len(interface.parameters) + len(interface.inputs)
@@ -251,12 +258,13 @@ def model_description_3(
     variables = SubElement(root, "ModelVariables")
     elements: dict[str, Element] = {}
     last = 0
-    for attributes, real, state in _variables(interface, True):
+    for attributes, kind, own, state in _variables(interface, True):
         last = int(attributes["valueReference"])
         if attributes["name"] in interface.repeated:
             continue
         derivative = {} if state is None else {"derivative": str(state)}
-        elements[attributes["name"]] = SubElement(variables, "Float64", {**attributes, **real, **derivative})
+        tag = TYPES_3[kind]
+        elements[attributes["name"]] = SubElement(variables, tag, {**attributes, **own, **derivative})
     for signal in interface.of("output"):
         if (one := interface.repeated.get(signal.name)) is not None:
             SubElement(elements[one.name], "Alias", name=signal.name, description=signal.variable.description)
@@ -279,17 +287,17 @@ def model_description_3(
 
 def _variables(
     interface: Interface, derivatives: bool
-) -> Iterator[tuple[dict[str, str], dict[str, str], int | None]]:
-    """For each variable, in the order of the value references: its attributes, the attributes of its type, and, for a
-    derivative, the value reference of its state."""
+) -> Iterator[tuple[dict[str, str], Type, dict[str, str], int | None]]:
+    """For each variable, in the order of the value references: its attributes, its type with the attributes of that,
+    and, for a derivative, the value reference of its state."""
     reinitialized = interface.reinitialized if derivatives else frozenset[str]()
     for signal in interface.signals:
-        events = {"reinit": "true"} if signal.name in reinitialized else {}
+        kind, events = signal.variable.type, {"reinit": "true"} if signal.name in reinitialized else {}
         if (value := interface.model.constant.get(signal.name)) is not None:
             constant = {"variability": "constant", "initial": "exact"}
-            yield _attributes(signal) | constant, _real(replace(signal, start=value)), None
+            yield _attributes(signal) | constant, kind, _typed(replace(signal, start=value)), None
         else:
-            yield _attributes(signal), _real(signal) | events, None
+            yield _attributes(signal), kind, _typed(signal) | events, None
     first = len(interface.parameters) + len(interface.inputs)
     for i, state in enumerate(interface.states if derivatives else ()):
         attributes = {
@@ -300,7 +308,7 @@ def _variables(
             "variability": "continuous",
             "initial": "calculated",
         }
-        yield attributes, _unit(_per_second(state.unit)), first + i
+        yield attributes, "Real", _unit(_per_second(state.unit)), first + i
 
 
 def _structure(interface: Interface, derivatives: bool) -> Iterator[tuple[str, int, list[int]]]:
@@ -396,7 +404,7 @@ def _definitions(
 ) -> None:
     """Write the definitions of all units and of those in `more`, the declared types, the categories of messages, and
     the default experiment."""
-    units = more | {s.variable.unit for s in interface.signals}
+    units = more | {s.variable.unit for s in interface.signals if s.variable.type == "Real"}
     units |= {_per_second(v.unit) for v in interface.states if derivatives}
     definitions = SubElement(root, "UnitDefinitions")
     for unit in sorted(units):
@@ -431,31 +439,36 @@ def _unit(unit: str) -> dict[str, str]:
 
 def _attributes(signal: Signal) -> dict[str, str]:
     v, q = signal.variable, signal.variable.quantity
-    variability = "tunable" if q.tunable else "fixed"
+    if signal.causality == "parameter":
+        variability = "tunable" if q.tunable else "fixed"
+    else:
+        variability = "continuous" if q.type == "Real" else "discrete"
     attributes = {
         "name": v.name,
         "valueReference": str(signal.reference),
         "description": v.description,
         "causality": signal.causality,
-        "variability": variability if signal.causality == "parameter" else "continuous",
+        "variability": variability,
     }
     if signal.causality != "input":
         attributes["initial"] = "calculated" if signal.causality == "output" else "exact"
     return attributes
 
 
-def _real(signal: Signal) -> dict[str, str]:
+def _typed(signal: Signal) -> dict[str, str]:
+    """The attributes of a variable that its type has."""
     q = signal.variable.quantity
-    real = _unit(signal.variable.unit)
+    start = {} if signal.start is None else {"start": written(signal.start, q.type)}
+    if q.type == "Boolean":
+        return start
+    own = _unit(signal.variable.unit) if q.type == "Real" else {}
     if q.low > float("-inf"):
-        real["min"] = repr(q.low)
+        own["min"] = written(q.low, q.type)
     if q.high < float("inf"):
-        real["max"] = repr(q.high)
+        own["max"] = written(q.high, q.type)
     if q.nominal is not None:
-        real["nominal"] = repr(q.nominal)
-    if signal.start is not None:
-        real["start"] = repr(float(signal.start))
-    return real
+        own["nominal"] = repr(q.nominal)
+    return own | start
 
 
 def terminals(interface: Interface) -> Element:

@@ -6,7 +6,8 @@ import inspect
 from dataclasses import fields
 from html import escape
 
-from ..model import About
+from ..model import About, Sketch
+from ..quantities import written
 from .description import Interface, Signal
 from .pictures import drawing
 
@@ -18,18 +19,21 @@ td.number { text-align: right; font-variant-numeric: tabular-nums; white-space: 
 code { font-family: ui-monospace, monospace; }
 """
 
-_FIGURE = "The machine with its start values: links, pins and supports by name; the driven link is coloured."
+_FIGURE = (
+    "The machine with its start values, its driver at about a sixth of its way: links, pins and supports by name; "
+    "the driven link is coloured."
+)
 _NOT_CONNECTED = "An input that is not connected keeps its start value."
 _MOTION = (
     " Inputs phi, w and a belong together: give all of them. As declared, the {what} stands at phi = {at:g}."
 )
 
 
-def page(interface: Interface, version: str) -> str:
-    """A self-contained page: a description of the model, and tables of its parameters, inputs and outputs."""
+def page(interface: Interface, version: str, sketch: Sketch | None) -> str:
+    """A self-contained page: a description of the model with its `sketch`, and tables of its parameters, inputs and
+    outputs."""
     model = interface.model
     text = escape(inspect.cleandoc(model.__doc__ or "") + model.notes).replace("\n\n", "</p><p>")
-    sketch = model.sketch()
     picture = f"<figure>{drawing(sketch)}<figcaption>{_FIGURE}</figcaption></figure>\n" if sketch else ""
     tables = "".join(
         f"<h2>{title}</h2>\n{_table(interface.of(causality), causality)}"
@@ -61,18 +65,20 @@ def _origin(about: About | None) -> str:
 def _table(signals: list[Signal], causality: str) -> str:
     settable = causality != "output"
     head = (
-        "<tr><th>name</th><th>unit</th>"
+        "<tr><th>name</th><th>unit or type</th>"
         + ("<th>start</th><th>allowed</th>" if settable else "")
         + "<th>meaning</th></tr>"
     )
     rows = []
     for signal in signals:
         v, q = signal.variable, signal.variable.quantity
-        cells = [f"<td><code>{escape(v.name)}</code></td>", f"<td>{escape(v.unit)}</td>"]
+        unit = v.unit if v.type == "Real" else v.type
+        cells = [f"<td><code>{escape(v.name)}</code></td>", f"<td>{escape(unit)}</td>"]
         if settable:
             bounds = escape(q.allowed_range) + (
                 "" if causality == "input" else ", tunable" if q.tunable else ", fixed"
             )
-            cells += [f'<td class="number">{signal.start:.6g}</td>', f"<td>{bounds}</td>"]
+            start = f"{signal.start:.6g}" if v.type == "Real" else written(signal.start or 0.0, v.type)
+            cells += [f'<td class="number">{start}</td>', f"<td>{bounds}</td>"]
         rows.append("<tr>" + "".join(cells) + f"<td>{escape(v.description)}</td></tr>")
     return f"<table>{head}\n" + "\n".join(rows) + "</table>\n"

@@ -12,7 +12,7 @@ from functools import cache
 from importlib import resources
 from pathlib import Path
 
-from ..model import Model
+from ..model import Model, Sketch
 from ..ports import LOAD
 from . import pictures
 from .script import Script
@@ -70,12 +70,11 @@ def often(model: type[Model]) -> set[str]:
     return {name for terminal in model.terminals for name in terminal.members.values()}
 
 
-def icon(model: type[Model], kind: str) -> bytes:
-    """The icon of a model, "svg" or "png": for a user's machine its sketch; else the file in `data/icons` with the
+def icon(model: type[Model], kind: str, sketch: Sketch | None) -> bytes:
+    """The icon of a model, "svg" or "png": for a user's machine its `sketch`; else the file in `data/icons` with the
     model's name, else the general icon of a motor (the model takes a load port), of a line (it takes one and gives
     one), or of a machine."""
-    sketch = None if model.about is None else model.sketch()
-    if sketch:
+    if sketch and model.about is not None:
         return pictures.icon_svg(sketch) if kind == "svg" else pictures.icon_png(sketch)
     folder = resources.files("chainunit") / "data" / "icons"
     takes = {t.members["tau_bias"] in model.input_layout.names for t in model.terminals if t.kind == LOAD}

@@ -11,7 +11,7 @@ import csv
 import io
 import logging
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement, register_namespace
 
@@ -19,7 +19,7 @@ import numpy as np
 
 from ..engines import MATH
 from ..ports import FLANGE, LOAD
-from ..quantities import Quantity
+from ..quantities import Quantity, Type, written
 from .description import Interface
 from .pack import xml_bytes
 
@@ -56,7 +56,8 @@ def reference_results(interface: Interface) -> dict[str, bytes]:
         READ: "outputs after the inputs of the time are set, before an event there and the step from it: of "
         "Model Exchange, and of Co-Simulation masters that read there, which the FMI standard does not allow",
     }
-    files = {f"{REFERENCE}/{name}_{end}.csv": _csv(*table) for end, table in tables.items()}
+    types = {s.name: s.variable.type for s in interface.signals}
+    files = {f"{REFERENCE}/{name}_{end}.csv": _csv(*table, types) for end, table in tables.items()}
     register_namespace("fmi-ls", _MANIFEST)
     root = Element("fmiReferences")
     root.set(f"{{{_MANIFEST}}}fmi-ls-name", STANDARD)
@@ -166,11 +167,12 @@ def _march(interface: Interface, p: Any) -> Any:
     return march
 
 
-def _csv(head: Sequence[str], rows: Sequence[Sequence[float]]) -> bytes:
+def _csv(head: Sequence[str], rows: Sequence[Sequence[float]], types: Mapping[str, Type]) -> bytes:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(head)
-    writer.writerows([repr(float(v)) for v in row] for row in rows)
+    kinds = [types.get(name, "Real") for name in head]
+    writer.writerows([written(v, kind) for v, kind in zip(row, kinds, strict=True)] for row in rows)
     return text.getvalue().encode()
 
 

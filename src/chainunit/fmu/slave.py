@@ -33,6 +33,8 @@ from ..quantities import complaint
 from .script import Script
 
 _NAN = float("nan")
+_NOTHING: dict[str, Any] = {"Real": _NAN, "Integer": 0, "Boolean": False, "String": ""}
+"""By type of FMI, what stands for a value that cannot be told."""
 _Slave = TypeVar("_Slave")
 _LIBRARIES: set[Path] = set()
 
@@ -97,6 +99,9 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
             self._ranges.append((at, at + len(part.layout.names)))
             at = self._ranges[-1][1]
         self._end = at
+        states = model.state_layout.variables if model.state_layout else ()
+        outputs = [v for part in model.parts for v in part.layout.variables]
+        self._types = {i: v.type for i, v in enumerate((*self._variables, *states, *outputs))}
         self._out = [_NAN] * (at - self._first)
         self._fresh = [False] * len(model.parts)
         self._shared: Any = None
@@ -209,16 +214,18 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
         x, self._pace = controlled(rates, close, x, step, self._pace, longest, tolerance, nominal, most)
         return x
 
-    # -- values
+    # -- values; pythonfmu would raise for a value reference of another type, which is fatal for the host
 
-    def set_real(self, vrs: list[int], values: list[float]) -> None:
-        """Set parameters and inputs; a fixed parameter only before the end of the initialization."""
+    def _assign(self, kind: str, vrs: list[int], values: list[Any]) -> None:
+        """Set parameters and inputs of that type; a fixed parameter only before the end of the initialization."""
         for vr, value in zip(vrs, values, strict=True):
-            if not 0 <= vr < self._first:
-                is_output = self._first <= vr < self._end
-                self._tell((refusals.OUTPUT_SET if is_output else refusals.NO_REFERENCE).format(reference=vr))
+            if self._types.get(vr) != kind:
+                self._tell_no(kind, vr)
                 continue
-            quantity = self._variables[vr].quantity
+            if vr >= self._first:
+                self._tell(refusals.OUTPUT_SET.format(reference=vr))
+                continue
+            quantity, value = self._variables[vr].quantity, float(bool(value) if kind == "Boolean" else value)
             if quantity.admits(value):
                 value = quantity.within_bounds(value)
             if self._set[vr] == value:
@@ -254,30 +261,50 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
         else:
             self._take(vr, value)
 
-    def get_real(self, vrs: list[int]) -> list[float]:
-        """Values by reference; outputs are evaluated at most once per state and part."""
+    set_real = partialmethod(_assign, "Real")
+    set_integer = partialmethod(_assign, "Integer")
+    set_boolean = partialmethod(_assign, "Boolean")
+    set_string = partialmethod(_assign, "String")
+
+    def _tell_no(self, kind: str, vr: int) -> None:
+        """Log that there is no variable of that type with that reference."""
+        line = refusals.OTHER_TYPE if vr in self._types else refusals.NO_REFERENCE
+        self._tell(line.format(reference=vr, type=kind))
+
+    def _read(self, kind: str, vrs: list[int]) -> list[Any]:
+        """Values of that type by reference; outputs are evaluated at most once per state and part. A value that
+        cannot be told is NaN, or 0, false or an empty text."""
+        nothing = _NOTHING[kind]
         try:
-            return self._values(vrs)
+            values = self._values(kind, vrs)
         except BaseException as reason:
             self._tell(f"values cannot be read: {reason!r}")
-            return [_NAN] * len(vrs)
+            return [nothing] * len(vrs)
+        if kind == "Real":
+            return values
+        return [type(nothing)(value) if math.isfinite(value) else nothing for value in values]
 
-    def _values(self, vrs: list[int]) -> list[float]:
+    get_real = partialmethod(_read, "Real")
+    get_integer = partialmethod(_read, "Integer")
+    get_boolean = partialmethod(_read, "Boolean")
+    get_string = partialmethod(_read, "String")
+
+    def _values(self, kind: str, vrs: list[int]) -> list[float]:
         first, states = self._first, self._first + self._n_x
         out: list[float] = []
         for vr in vrs:
-            if 0 <= vr < first:
+            if self._types.get(vr) != kind:
+                self._tell_no(kind, vr)
+                out.append(_NAN)
+            elif vr < first:
                 out.append(self._set[vr])
-            elif first <= vr < states:
+            elif vr < states:
                 out.append(_NAN if self._prepare() else self._x[vr - first])
-            elif states <= vr < self._end:
+            else:
                 for i, (low, high) in enumerate(self._ranges):
                     if low <= vr < high and not self._fresh[i]:
                         self._evaluate(i, low, high)
                 out.append(self._out[vr - first])
-            else:
-                self._tell(refusals.NO_REFERENCE.format(reference=vr))
-                out.append(_NAN)
         return out
 
     def _evaluate(self, i: int, low: int, high: int) -> None:
@@ -376,23 +403,6 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
         if reason != self._last_line:
             self._last_line = reason
             self.log(reason, Fmi2Status.error)
-
-    # every variable is a Real; pythonfmu would raise for another type, which is fatal for the host
-
-    def _get_other(self, nothing: Any, vrs: list[int]) -> list[Any]:
-        """There are no variables of this type: each value is `nothing`, and a line is logged."""
-        self._set_other(vrs, [])
-        return [nothing] * len(vrs)
-
-    def _set_other(self, vrs: list[int], values: list[Any]) -> None:
-        """There are no variables of this type: a line is logged."""
-        if vrs:
-            self._tell(refusals.OTHER_TYPE.format(type="Real"))
-
-    get_integer = partialmethod(_get_other, 0)
-    get_boolean = partialmethod(_get_other, False)
-    get_string = partialmethod(_get_other, "")
-    set_integer = set_boolean = set_string = _set_other
 
     # -- states of the FMU, and its description
 

@@ -59,12 +59,12 @@ def holding_range(
     return ends[0], ends[1]
 
 
-def cause(model: type[MachineModel], given: Mapping[str, float]) -> str:
-    """Words on the given values each of which alone spoils the machine, with the range in which all requirements
-    hold; empty where there is none. Whoever keeps to a range is not refused again."""
+def causes(model: type[MachineModel], given: Mapping[str, float]) -> dict[str, str]:
+    """The given values each of which alone spoils the machine, by name, in words with the range in which all
+    requirements hold. Whoever keeps to a range is not refused again."""
     start = model.parameter_layout.by_name(model.Parameters())
     units = {v.name: unit_behind(v.unit) for v in model.parameter_layout.variables}
-    words = []
+    words = {}
     for name in given:
         if name not in start or given[name] == start[name]:
             continue
@@ -75,8 +75,8 @@ def cause(model: type[MachineModel], given: Mapping[str, float]) -> str:
         unit = units[name]
         limits = [f">= {low}{unit}"] if found[0] not in (0.0, -math.inf) else []
         limits += [f"<= {high}{unit}"] if math.isfinite(found[1]) else []
-        words.append(f"{name} = {given[name]:g}{unit} must be {' and '.join(limits)}")
-    return f"; with all other values as they are, {', or '.join(words)}" if words else ""
+        words[name] = f"{name} = {given[name]:g}{unit} must be {' and '.join(limits)}"
+    return words
 
 
 def _inward(x: float, sense: float) -> str:

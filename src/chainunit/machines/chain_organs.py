@@ -85,7 +85,7 @@ class Parameters(chain_unit.Parameters):
         max=1e-2,
         tunable=True,
     )
-    solver: Solver = group(Solver, "internal integrator", default=Solver(max_steps=1e5))
+    solver: Solver = group(Solver, "internal integrator", default=Solver(max_steps=100_000))
 
 
 @declaration
@@ -128,10 +128,10 @@ class StartChoice:
 
     given: Value = quantity(
         "1",
-        "1: the rods start with these angles and speeds, changed as little as closes the chain; 0: they hang at rest",
-        default=0.0,
-        min=0.0,
-        max=1.0,
+        "true: the rods start with these angles and speeds, changed as little as closes the chain; false: they hang "
+        "at rest",
+        default=False,
+        type="Boolean",
     )
 
 

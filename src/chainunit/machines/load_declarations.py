@@ -226,4 +226,6 @@ class Outputs:
     imbalance: Imbalance = group(Imbalance, "imbalance")
     rocker: RockerEstimate = group(RockerEstimate, "rocker")
     grounds: Grounds = group(Grounds, "ground of the alarm")
-    alarm: Value = quantity("1", "side that is overloaded: 1 left, -1 right, 0 none")
+    alarm: Value = quantity(
+        "1", "side that is overloaded: 1 left, -1 right, 0 none", min=-1, max=1, type="Integer"
+    )

@@ -36,6 +36,13 @@ def positive(xp: Any, x: Any, width: Any) -> Any:
     return width * (t * t * t * t * (2.5 + t * (t - 3.0)) + above)
 
 
+def positive_integral(xp: Any, x: Any, width: Any) -> Any:
+    """The integral of `positive`: 0 up to -width/2."""
+    t, above = _clipped(xp, x / width + 0.5)
+    inside = t * t * t * t * t * (0.5 + t * (t / 7.0 - 0.5))
+    return width * width * (inside + 0.5 * above * (1.0 + above))
+
+
 def ramp(xp: Any, x: Any, begin: Any, end: Any) -> Any:
     """An even rise from 0 at `begin` to 1 at `end`; both corners are rounded over a tenth of the way. It falls where
     `end` is less than `begin`."""

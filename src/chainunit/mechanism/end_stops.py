@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..quantities import Value, declaration, quantity
-from .curves import positive, step
+from .curves import ROUNDED, positive, positive_integral, step
 
 CONTACT = 1e-4
 """Part of the range over which the force of a stop begins."""
@@ -30,16 +30,33 @@ def usual_stops(force: float, mass: float, length: float) -> EndStops:
     return EndStops(stiffness=stiffness, damping=(stiffness * mass) ** 0.5)
 
 
-def stop_force(xp: Any, law: EndStops, span: tuple[float, float], q: Any, w: Any) -> Any:
-    """The force against the driver at the way `q` and the speed `w` [N]: 0 within the `span`, above 0 behind its
-    upper end, below 0 before its lower one; it never pulls."""
+class StopAction(NamedTuple):
+    """The action of the end stops: the `force` against the driver [N], 0 within the range, above 0 behind its upper
+    end and below 0 before its lower one; the `energy` in their springs [J]; and the part of the force that their
+    dampers take, `lost` [N]."""
+
+    force: Any
+    energy: Any
+    lost: Any
+
+
+def stop_action(xp: Any, law: EndStops, span: tuple[float, float], q: Any, w: Any) -> StopAction:
+    """The action of the stops at both ends of the `span` [m] at way `q` [m] and speed `w` [m/s] of the driver.
+
+    A stop never pulls: where its damper would, it holds back the spring. So the spring alone is conservative, and
+    `lost` times `w` is never negative.
+    """
     low, high = span
     width = CONTACT * (high - low)
 
-    def one(depth: Any, speed: Any) -> Any:
+    def one(depth: Any, speed: Any) -> StopAction:
         depth = depth - 0.5 * width
-        push = law.stiffness * positive(xp, depth, width) + law.damping * speed * step(xp, depth, width)
-        soft = law.stiffness * width
-        return positive(xp, push - 0.5 * soft, soft)
+        spring = law.stiffness * positive(xp, depth, width)
+        damper = law.damping * speed * step(xp, depth, width)
+        # one part of the spring's force, which is 1 without a damper
+        share = positive(xp, 1.0 + damper / (spring + law.stiffness * width), ROUNDED)
+        energy = law.stiffness * positive_integral(xp, depth, width)
+        return StopAction(spring * share, energy, spring * (share - 1.0))
 
-    return one(q - high, w) - one(low - q, -w)
+    upper, lower = one(q - high, w), one(low - q, -w)
+    return StopAction(upper.force - lower.force, upper.energy + lower.energy, upper.lost - lower.lost)

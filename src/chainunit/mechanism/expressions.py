@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..engines import MATH
 from ..errors import InputError, meant, shown
@@ -56,14 +56,41 @@ _EXTREME = (
 )
 
 
+class Width(NamedTuple):
+    """The width of a smooth function in an expression: the text of its call, and the width itself. That of a `ramp`,
+    its end less its begin, may be below zero; no width may be zero."""
+
+    call: str
+    of: Expression
+    falls: bool
+
+    @property
+    def is_number(self) -> bool:
+        """Whether it depends on no quantity."""
+        return not (self.of.names or self.of.extremes or self.of.tables)
+
+    def value(self, values: Mapping[str, Any]) -> float:
+        """Its value; NaN where it has none."""
+        try:
+            return float(self.of.value(MATH, values))
+        except (ArithmeticError, ValueError):
+            return math.nan
+
+    def fault(self, value: float) -> str:
+        """Words on a value that no width can have; empty for one that is right."""
+        if self.falls:
+            return "" if abs(value) > 0.0 else f"the begin and the end of {self.call} must differ"
+        return "" if value > 0.0 else f"the width of {self.call} is {value:.6g}; must be > 0"
+
+
 class Expression:
     """An expression: its text, the `names` of the quantities in it, of its `extremes` (such as ``min(ram.C.y)``) and
-    of its `tables`, and its value, of the engine and all of these by name.
+    of its `tables`, its value, of the engine and all of these by name, and the `widths` of its smooth functions.
 
     Raises
     ------
     InputError
-        for a text that is no expression, in one line.
+        for a text that is no expression, or has a width that is a number and not above zero, in one line.
     """
 
     def __init__(self, text: str) -> None:
@@ -79,9 +106,13 @@ class Expression:
         self._names: dict[str, None] = {}
         self._extremes: dict[str, None] = {}
         self._tables: dict[str, None] = {}
+        self.widths: list[Width] = []
         self.value: Evaluation = self._compiled(tree)
         self.names, self.extremes = tuple(self._names), tuple(self._extremes)
         self.tables = tuple(self._tables)
+        for width in self.widths:
+            if width.is_number and (wrong := width.fault(width.value({}))):
+                raise InputError(f"{shown(self.text)}: {wrong}")
 
     def _compiled(self, node: ast.AST) -> Evaluation:
         match node:
@@ -115,11 +146,19 @@ class Expression:
             case ast.Call(func=ast.Name(id="table"), args=[x, *rest], keywords=[]) if rest:
                 return self._table(self._compiled(x), rest)
             case ast.Call(func=ast.Name(id="where"), args=[condition, *rest], keywords=[]) if len(rest) == 3:
-                return self._where(condition, [self._compiled(each) for each in rest])
+                value = self._where(condition, [self._compiled(each) for each in rest])
+                self._keep_width(node, ast.unparse(rest[2]))
+                return value
             case ast.Call(func=ast.Name(id=("where" | "table") as name)):
                 raise self._written(name)
             case ast.Call(func=ast.Name(id=name), args=args, keywords=[]):
-                return self._call(name, [self._compiled(each) for each in args])
+                value = self._call(name, [self._compiled(each) for each in args])
+                match name, args:
+                    case (("step" | "positive"), [_, width]):
+                        self._keep_width(node, ast.unparse(width))
+                    case "ramp", [_, begin, end]:
+                        self._keep_width(node, f"({ast.unparse(end)}) - ({ast.unparse(begin)})", falls=True)
+                return value
             case ast.Compare() | ast.IfExp() | ast.BoolOp():
                 raise InputError(f"{shown(self.text)}: {_SWITCH}")
             case ast.Attribute():
@@ -130,6 +169,9 @@ class Expression:
             f"{shown(self.text)}: {ast.unparse(node)} cannot be computed; an expression has numbers, names, "
             f"+ - * /, powers (whole ones up to {MOST_POWER}), brackets, and {', '.join(FUNCTIONS)}"
         )
+
+    def _keep_width(self, call: ast.AST, text: str, falls: bool = False) -> None:
+        self.widths.append(Width(ast.unparse(call), Expression(text), falls))
 
     @staticmethod
     def _power(base: Evaluation, power: int) -> Evaluation:

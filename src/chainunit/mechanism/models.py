@@ -30,7 +30,7 @@ from ..quantities import (
     quantity,
 )
 from .driver_ports import ROTATING, DriverPort, TurningStates
-from .end_stops import EndStops, stop_force
+from .end_stops import EndStops, StopAction, stop_action
 from .linkage import Linkage, Topology
 from .machine import MachineState, Mechanism, derived_numbers
 
@@ -188,13 +188,13 @@ class InverseMachine(LinkageModel, MachineModel):
         )
 
     @classmethod
-    def sketch(cls) -> Sketch:
+    def sketch(cls, start: Mapping[str, float] | None = None) -> Sketch:
         """See `chainunit.model.Model.sketch`; the driver is at a sixth of its `span`."""
         from .sketch import sketch_of  # here, as FMUs do without it
 
         low, high = cls.span
-        layout = cls.parameter_layout
-        p = cls.check(layout.instance([v.quantity.start for v in layout.variables]))
+        layout, given = cls.parameter_layout, start or {}
+        p = cls.check(layout.instance([given.get(v.name, v.quantity.start) for v in layout.variables]))
         return sketch_of(cls.state(MATH, p, cls.Inputs(), low + (high - low) / (2.0 * math.pi), 0.0).m)
 
     @classmethod
@@ -310,9 +310,9 @@ class DirectMachine(LinkageModel):
         super().__init_subclass__()
 
     @classmethod
-    def sketch(cls) -> Sketch:
+    def sketch(cls, start: Mapping[str, float] | None = None) -> Sketch:
         """That of the inverse model."""
-        return cls.inverse.sketch()
+        return cls.inverse.sketch(start)
 
     @classmethod
     def linkage(cls, xp: Any, p: Any, u: Any) -> Linkage:
@@ -363,33 +363,36 @@ class DirectMachine(LinkageModel):
     @classmethod
     def derivatives(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
         """Time derivatives of the states, in declared order."""
-        return [x.w, acceleration(p, u, cls.shared(xp, p, u, x), cls.stop_force(xp, p, x))]
+        stops = cls._stops(xp, p, x)
+        return [x.w, acceleration(p, u, cls.shared(xp, p, u, x), stops.force if stops else 0.0)]
 
     @classmethod
-    def stop_force(cls, xp: Any, p: Any, x: Any) -> Any:
-        """The force of the end stops against the driver that slides; 0 for one that turns."""
+    def _stops(cls, xp: Any, p: Any, x: Any) -> StopAction | None:
+        """The action of the end stops on the driver that slides; None for one that turns."""
         if cls.inverse.end_stops is None:
-            return 0.0
-        return stop_force(xp, p.end_stops, cls.inverse.span, x.phi / p.ratio, x.w / p.ratio) / p.ratio
+            return None
+        return stop_action(xp, p.end_stops, cls.inverse.span, x.phi / p.ratio, x.w / p.ratio)
 
     @classmethod
     def _outputs(cls, xp: Any, p: Any, u: Any, x: Any, s: MachineState) -> Any:
-        stop = cls.stop_force(xp, p, x)
-        a = acceleration(p, u, s, stop)
+        stops = cls._stops(xp, p, x)
+        a = acceleration(p, u, s, stops.force if stops else 0.0)
         at_crank = a / p.ratio
         fields = running(s, at_crank) | cls.inverse.probes(xp, p, u, s, at_crank)
         # the motor also drives the inertia on its own shaft
         fields["kinetic_energy"] += 0.5 * p.J_added * (x.w * x.w)
         fields["power"] = u.tau * x.w
-        if cls.inverse.end_stops is not None:
-            fields["end_stop_force"] = stop
-            fields["dissipated_power"] += stop * x.w
+        if stops is not None:
+            fields["end_stop_force"] = stops.force
+            fields["potential_energy"] += stops.energy
+            fields["dissipated_power"] += stops.lost * s.w
         return cls.Outputs(a=a, tau_bias=s.bias / p.ratio, J=s.J / (p.ratio * p.ratio), **fields)
 
 
 def acceleration(p: Any, u: Any, s: MachineState, stop: Any = 0.0) -> Any:
-    """Motor acceleration [rad/s2]: (J_added + J) a = tau - tau_bias - stop, all at the motor shaft."""
-    return (u.tau - s.bias / p.ratio - stop) / (p.J_added + s.J / (p.ratio * p.ratio))
+    """Motor acceleration [rad/s2]: (J_added + J) a = tau - tau_bias - stop/ratio at the motor shaft, with the force
+    `stop` of the end stops at the driver [N]."""
+    return (u.tau - (s.bias + stop) / p.ratio) / (p.J_added + s.J / (p.ratio * p.ratio))
 
 
 def direct_model(machine: type[InverseMachine]) -> type[DirectMachine]:

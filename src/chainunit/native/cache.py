@@ -5,8 +5,9 @@ compiler. Deleting the folder empties the cache. The environment variable CHAINU
 or is ``off``. If the folder cannot be read or written, there is no cache, but no error. Files of others in the folder
 are not deleted.
 
-The program runs the code, so that nobody else may be able to put it there. A folder that belongs to another user, or
-that others can write, is no cache, and is refused where the user named it; such a file is no entry. An entry has the
+The program runs the code, so that nobody else may be able to put it there. An own folder that others can write, as a
+umask of 002 makes it, is closed to them. A folder that belongs to another user, or that stays open to others, is no
+cache, and is refused where the user named it; such a file is no entry. An entry has the
 hash of its content together with that of its sources: a renamed one is no entry, either. On Windows, which tells no
 owners and rights in this form, the folder must be one that only the user can write.
 """
@@ -79,8 +80,10 @@ def _mark(name: str, content: bytes) -> bytes:
 
 
 def _is_safe(place: Path) -> bool:
-    """Whether nobody else can put code into the folder, which may be missing yet."""
+    """Whether nobody else can put code into the folder, which may be missing yet. An own one is closed to others."""
     try:
+        if _trouble(place.stat()) == _OPEN:
+            _close(place)
         trouble = _trouble(place.stat())
     except OSError:
         return True
@@ -98,7 +101,23 @@ def _trouble(about: os.stat_result) -> str:
         return ""
     if about.st_uid != os.geteuid():
         return "belongs to another user"
-    return "can be written by other users" if about.st_mode & (stat.S_IWGRP | stat.S_IWOTH) else ""
+    return _OPEN if about.st_mode & (stat.S_IWGRP | stat.S_IWOTH) else ""
+
+
+_OPEN = "can be written by other users"
+
+
+def _close(place: Path) -> None:
+    """Close an own folder to others, and delete the code in it, which others may have put there. A folder behind a
+    link stays as it is, as others may have put the link there."""
+    with contextlib.suppress(OSError):
+        handle = os.open(place, os.O_RDONLY | os.O_NOFOLLOW | os.O_DIRECTORY)
+        try:
+            os.fchmod(handle, 0o700)
+            for file in filter(_is_ours, place.iterdir()):
+                file.unlink(missing_ok=True)
+        finally:
+            os.close(handle)
 
 
 def _read(place: Path, name: str) -> bytes | None:

@@ -55,10 +55,14 @@ def _given(s: b.Source) -> Iterator[b.Block]:
         )
         for name in names
     )
+    of_both = any(not name.startswith(alone) for name in names)
+    if not of_both:
+        yield b.Text(s.line("All {=given_equal} given values that both have are the same."), form="short")
     yield b.Table(
         tuple(rows),
         b.heads("key", "A", "B"),
         title=s.line("Given values that differ; {=given_equal} are the same"),
+        form="both" if of_both else "long",
     )
 
 

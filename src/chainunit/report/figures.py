@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..engines import numpy_
+from ..study.bearings import hardest_run
 from ..study.cycle import Cycle
 from ..study.drive import Drive
 from ..study.record import StudyRecord
@@ -339,7 +340,7 @@ def _after(s: b.Source, study: StudyRecord, run: str) -> str:
 def _reactions(s: b.Source, study: StudyRecord) -> fig.Figure:
     reference = "steady" if "steady" in study.pins else next(iter(study.pins))
     steady, pins = study.pins[reference], list(study.pins[reference])
-    largest = {pin: max(study.pins, key=lambda run: study.pins[run][pin]["peak"] or 0.0) for pin in pins}
+    largest = {pin: hardest_run(study.pins, pin) for pin in pins}
     of_run = run_names.title(study, reference)
     places = np.arange(len(pins), dtype=float)
     bars: list[tuple[str, float, list[float | None], float, int, bool, tuple[str, ...]]] = [

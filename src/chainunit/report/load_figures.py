@@ -44,11 +44,11 @@ def power_over_turn(drive: Drive, steady: xr.Dataset, angle: fig.Axis) -> fig.Fi
 
 
 def load_histogram(drive: Drive, steady: xr.Dataset) -> fig.Figure:
-    """The share of the time in which the torque lies in each class, at the crank and at the motor's shaft."""
-    torques = {
-        "crank torque": drive.crank_torque(steady),
-        "torque at the motor's shaft": drive.motor_shaft(steady)[0],
-    }
+    """The share of the time in which the torque lies in each class: at the crank and, where it is known, in the air
+    gap of the motor, which the inertia of its rotor and a flywheel make smoother."""
+    torques = {"crank torque": drive.crank_torque(steady)}
+    if "motor.air_gap_tau" in steady:
+        torques["air-gap torque of the motor"] = steady["motor.air_gap_tau"].values
     panels = []
     for name, torque in torques.items():
         edges, shares = histogram(steady["time"].values, torque)
@@ -61,9 +61,10 @@ def load_histogram(drive: Drive, steady: xr.Dataset) -> fig.Figure:
     return fig.Figure(
         "load-histogram",
         "Histogram of the load in steady running",
-        "The share of the time in which the torque at the crank and at the motor's shaft lies in each class.",
+        f"The share of the time in which the {' and the '.join(torques)} lies in each class.",
         (tuple(panels),),
-        "Classes of equal width, over whole turns of the crank.",
+        "Classes of equal width, over whole turns of the crank. Between the crank and the air gap, rotor and "
+        "flywheel store energy.",
     )
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..files import clear, refuse_foreign, whole
+from ..files import clear, whole
 from ..fmu.backends import Backend
 from ..progress import Report as Progress
 from ..reading import in_file
@@ -72,7 +72,6 @@ def compute(
         with a line for each fault of the table [optimize].
     """
     wishes = _wishes(config)
-    refuse_foreign(folder, *FILES)
     clear(folder, *FILES)
     return _search(wishes, config, progress, backend)
 
@@ -170,7 +169,7 @@ def _machine(s: b.Source, best: Best) -> Iterator[b.Block]:
         yield b.Text(s.words("without_effect_words"))
     limited: list[tuple[Line, str]] = [(Name(name), f"quantities.{name}") for name in s.result["quantities"]]
     if s.result["least_pull"] is not None:
-        limited.append(("least pull in a web", "least_pull"))
+        limited.append(("web mean pull, least", "least_pull"))
     # where no machine meets all limits, a column marks those that the nearest one misses
     marks = () if best.met else ("limit",)
     rows = [
@@ -185,7 +184,7 @@ def _machine(s: b.Source, best: Best) -> Iterator[b.Block]:
         title=s.line("Objectives and limits, of a turn at {=speed:4}"),
     )
     if s.result["least_pull"] is not None:
-        yield b.Text(s.line("The least pull in a web is that at crank speeds up to {=slack_free_speed:4}."))
+        yield b.Text(s.line("The web mean pull is the least at crank speeds up to {=slack_free_speed:4}."))
 
 
 def _binding(s: b.Source) -> Iterator[b.Block]:

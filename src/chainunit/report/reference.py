@@ -11,6 +11,7 @@ from ..errors import InputError, near_name
 from ..fmu.description import Interface
 from ..model import Model
 from ..models import MODELS
+from ..quantities import written
 from ..refusals import unit_behind
 from ..study.keys import Key, KeyTable, catalogue_columns, key_tables
 from .blocks import Block, Report, Section, Table, TableRow, Text, heads
@@ -135,10 +136,17 @@ def _variables(model: type[Model]) -> Iterator[Block]:
     for causality in ("parameter", "input", "output"):
         for signal in interface.of(causality):
             v = signal.variable
-            start = "-" if causality == "output" else f"{v.quantity.start:g}{unit_behind(v.unit)}"
+            start, unit = (
+                f"{v.quantity.start or 0.0:g}{unit_behind(v.unit)}",
+                unit_behind(v.unit).strip() or "1",
+            )
+            if v.type != "Real":
+                start, unit = written(v.quantity.start or 0.0, v.type), v.type
             allowed = v.quantity.allowed_range if causality != "output" else "-"
-            unit = unit_behind(v.unit).strip() or "1"
-            rows.append(TableRow((v.name, causality, unit, start, allowed, v.description)))
+            shown = start if causality != "output" else "-"
+            rows.append(TableRow((v.name, causality, unit, shown, allowed, v.description)))
     yield Table(
-        tuple(rows), heads("variable", "causality", "unit", "start", "allowed", "meaning"), numeric=False
+        tuple(rows),
+        heads("variable", "causality", "unit or type", "start", "allowed", "meaning"),
+        numeric=False,
     )

@@ -6,8 +6,9 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
-from ..files import clear, refuse_foreign
+from ..files import clear
 from ..fmu.backends import Backend
+from ..models import MODELS
 from ..progress import Report as Progress
 from ..reading import in_file
 from ..study.choice import check_files
@@ -22,6 +23,12 @@ from .blocks import Report
 NAME = "result"
 FILES = (*files.names(NAME, contents.PICTURES), series.SERIES, LOAD_CYCLE)
 """The names of all files that a study may write into its folder, apart from FMUs and random overloads."""
+
+
+def names(config: Config) -> tuple[str, ...]:
+    """The names of all files that this study may write, with the FMUs."""
+    models = dict.fromkeys((*MODELS, config.machine.model.name))
+    return (*FILES, *(f"fmu/{name}.fmu" for name in models))
 
 
 def compute(
@@ -45,7 +52,6 @@ def compute(
         check_files(config)
     if scheduler is not None:
         check_workers(config, scheduler)
-    refuse_foreign(folder, *FILES)
     clear(folder, *FILES)
     if progress is not None:
         progress("the machine at constant speed", 0.0, 1.0)

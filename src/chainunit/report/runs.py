@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from ..quantities import Layout
+from ..study.bearings import hardest_run
 from ..study.measures import MEASURES, Answers, measures_of
 from ..study.monte_carlo import Sample
 from ..study.record import StudyRecord
@@ -101,7 +102,7 @@ def _pins(s: b.Source, study: StudyRecord) -> b.Table:
     sizes = list(next(iter(tables[reference].values())))
 
     def row(pin: str) -> b.TableRow:
-        worst = max(tables, key=lambda run: tables[run][pin]["peak"]["value"])
+        worst = hardest_run(study.pins, pin)
         own = (s.number(f"pins.{reference}.{pin}.{size}") for size in sizes)
         return b.TableRow(
             (

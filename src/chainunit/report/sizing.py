@@ -8,11 +8,15 @@ from typing import Any
 from ..study.candidate import Standing
 from ..study.record import StudyRecord
 from . import blocks as b
-from .lines import Aside, Line, Number, Strong, capital, line, spoken
+from .lines import Aside, Line, Number, Strong, capital, join, line, spoken
 
 _REASONS = 5  # of the candidates that do not fit; the table has all
-_SIGN = {Standing.CHOSEN: "✓", Standing.FITS: "○", Standing.INSUFFICIENT: "✗", Standing.REJECTED: "✗"}
-_SEVERITY: dict[str, b.Severity] = {Standing.CHOSEN: "good", Standing.FITS: "partly"}
+_SIGN = {Standing.CHOSEN: "✓", Standing.FITS: "○", Standing.BARELY: "△"}
+_SEVERITY: dict[str, b.Severity] = {
+    Standing.CHOSEN: "good",
+    Standing.FITS: "partly",
+    Standing.BARELY: "partly",
+}
 
 
 def answer(s: b.Source) -> Iterator[b.Block]:
@@ -22,12 +26,14 @@ def answer(s: b.Source) -> Iterator[b.Block]:
     if path is None:
         return
     motor, ratio = s.words(f"{path}.motor"), s.number(f"{path}.ratio", digits=4, as_given=True)
+    also = {"flywheel": _disc, "protection": _protection}
+    gear = (*_gear(s, path), *_gear_torque(s))
     cards = [
-        b.Card("Motor", ((motor, str(b.at(s.result, f"{path}.verdict"))),)),
-        b.Card("Gear ratio", ((ratio, "motor turns per crank turn"),), tuple(_gear(s, path))),
+        b.Card("Motor", ((motor, str(b.at(s.result, f"{path}.verdict"))),), tuple(_data(s))),
+        b.Card("Gear ratio", ((ratio, "motor turns per crank turn"),), gear),
         *(
-            b.Card(capital(name), ((size or "none", title),), tuple(more(s)))
-            for (name, title, size), more in zip(_sizes(s), (_disc, _relay), strict=False)
+            b.Card(capital(name), ((size or "none", title),), tuple(also[name](s)))
+            for name, title, size in _sizes(s)
         ),
     ]
     yield b.Cards(tuple(cards))
@@ -76,11 +82,41 @@ def _disc(s: b.Source, flywheel: str = "sizing.flywheel") -> Iterator[Line]:
         yield s.line(f"steel disc {{{flywheel}.mass}}, {{{flywheel}.diameter}} in diameter")
 
 
+def _data(s: b.Source) -> Iterator[Line]:
+    """The data of the motor of all runs."""
+    if "rated_power" in s.result.get("motor", {}):
+        names = ("rated_power", "rated_speed", "rated_torque", "rated_current")
+        yield join((s.number(f"motor.{name}") for name in names), ", ")
+
+
+def _gear_torque(s: b.Source) -> Iterator[Line]:
+    """The rated torque of the gear to be ordered."""
+    if s.result["sizing"].get("gear"):
+        yield s.line("gear with a rated output torque of at least {sizing.gear.rated_torque}")
+
+
+def _protection(s: b.Source) -> Iterator[Line]:
+    """The reason where there is no coupling, or its setting at the motor's shaft; and the relay."""
+    protection = s.result["sizing"]["protection"]
+    if protection.get("why_none"):
+        yield line("no safety coupling: ", s.words("sizing.protection.why_none"))
+    elif "trip_torque_at_motor" in protection:
+        yield s.line("{sizing.protection.trip_torque_at_motor} at the motor's shaft")
+    yield from _relay(s)
+
+
 def _relay(s: b.Source) -> Iterator[Line]:
-    """The setting of the relay, where it is not the leading number of the protection."""
+    """The setting and the class of the relay, where it is not the leading number of the protection."""
     protection = s.result["sizing"].get("protection", {})
     if "relay_current" in protection and _leading(protection) != "relay_current":
-        yield s.line("relay at {sizing.protection.relay_current}")
+        setting = s.line(f"{protection.get('device', 'relay')} at {{sizing.protection.relay_current}}")
+        yield line(setting, _class(s))
+
+
+def _class(s: b.Source) -> Line:
+    """The trip class of the relay, to follow its setting; empty for the motor protection of an inverter."""
+    protection = s.result["sizing"].get("protection", {})
+    return line(", ", s.words("sizing.protection.relay_class.value")) if "relay_class" in protection else ()
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
@@ -126,7 +162,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     tables = []
     # a machine without sides has no one-sided feed
     side_keys = () if study.config.machine.model.sides else ("one_sided_share", "torque_peak_one_sided")
-    for name in ("asked", "cycle", "flywheel", "protection"):
+    for name in ("asked", "cycle", "flywheel", "gear", "protection"):
         # the sentence on the coupling is too long for a cell of a narrow table, and stands above
         leaves = [
             leaf
@@ -144,17 +180,26 @@ def _best(s: b.Source, path: str, word: str) -> Iterator[b.Block]:
     """The sentences on the motor of all runs and on the reason for it."""
     ratio = s.number(f"{path}.ratio", digits=4, as_given=True)
     sentence = line(f"{word}: ", s.words(f"{path}.motor"), ", ratio ", ratio, _aside(_gear(s, path)))
+    why = s.result["sizing"]["protection"].get("why_none")
     for name, title, size in _sizes(s):
-        if size is None:
-            sentence += line("; no flywheel" if name == "flywheel" else "; no safety coupling")
+        if size is None and name == "flywheel":
+            sentence += line("; no flywheel")
+        elif size is None:
+            sentence += line(
+                "; no safety coupling", Aside(s.words("sizing.protection.why_none")) if why else ()
+            )
         else:
-            sentence += line(f"; {title} ", size, _aside(_disc(s)) if name == "flywheel" else ())
+            is_relay = name == "protection" and _leading(s.result["sizing"][name]) == "relay_current"
+            more = _aside(_disc(s)) if name == "flywheel" else _class(s) if is_relay else ()
+            sentence += line(f"; {title} ", size, more)
     sentence = line(sentence, *(line("; ", relay) for relay in _relay(s)))
     model = s.result["verdict"]["model"]
     doubt = s.line(" ({verdict.model.caveat})") if model is not None and model["caveat"] else ()
-    why = "Chosen: " if word == "Motor" else "Insufficient: "
+    begin = "Chosen: " if word == "Motor" else "Insufficient: "
     yield b.Text(line(sentence, doubt, "."), form="short")
-    yield b.Text(line(why, s.words(f"{path}.reason"), doubt, "."))
+    if order := [line("motor of ", each) for each in _data(s)] + [*_gear_torque(s)]:
+        yield b.Text(line("Order: ", join(order, "; "), "."), form="short")
+    yield b.Text(line(begin, s.words(f"{path}.reason"), doubt, "."))
 
 
 def _leading(section: Mapping[str, Any] | None) -> str | None:
@@ -201,7 +246,7 @@ def _candidates(s: b.Source, row_count: int) -> b.Table:
         rows.append(
             b.TableRow(
                 (motor, s.words(f"{path}.verdict"), *parts, *cells),
-                line(f"{_SIGN.get(verdict, '')} ", s.words(f"{path}.reason")),
+                line(f"{_SIGN.get(verdict, '✗')} ", s.words(f"{path}.reason")),
                 _SEVERITY.get(verdict, "bad"),
                 "both" if i < row_count else "long",
             )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ..study.event_torques import running_words
 from ..study.record import StudyRecord
 from . import blocks as b
 
@@ -14,9 +15,9 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         return
     worst = (
         "Start: the largest torque on the output of the gear is {starts.worst.gear_torque}, from a crank angle of "
-        "{starts.worst.angle}; running puts {starts.running} on it ({starts.over_running} times)."
+        "{starts.worst.angle}; {running} puts {starts.running} on it ({starts.over_running} times)."
     )
-    yield b.Text(s.line(worst))
+    yield b.Text(s.line(worst, running=running_words(study, s.result["starts"]["running_in"])))
     count = len(s.result["starts"]["from"])
     names = ("angle", "gear_torque", "coupling_torque", "start_time")
     rows = tuple(

@@ -83,11 +83,12 @@ def _motion(study: StudyRecord) -> list[b.Block]:
 
 
 def _question(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
-    noun = study.noun
+    # a linkage has its title in place of a noun
+    noun = f"this {study.noun}" if study.noun[:1].islower() else f'the machine "{study.noun}"'
     question = s.line(
-        "Which motor, gear and flywheel does this {noun} need? Its crank turns at {=run.crank_speed:4}."
+        "Which motor, gear and flywheel does {noun} need? Its crank turns at {=run.crank_speed:4}."
         if "sizing" in s.result
-        else "What does the motor of this {noun} have to give? It turns the crank through a gear of ratio "
+        else "What does the motor of {noun} have to give? It turns the crank through a gear of ratio "
         "{=machine.ratio}, in normal running at {=run.crank_speed:4}.",
         noun=noun,
     )

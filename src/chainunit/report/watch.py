@@ -27,8 +27,8 @@ _USUAL = {
     "right.processing_force": "processing force, right",
     "imbalance.force": "imbalance of the forces",
     "rocker.tau": "rocker torque",
-    "left.web_pull": "least pull in the web, left",
-    "right.web_pull": "least pull in the web, right",
+    "left.web_pull": "web end pull, left",
+    "right.web_pull": "web end pull, right",
 }
 """The rows of the table of usual values."""
 

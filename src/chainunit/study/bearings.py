@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,16 @@ def pin_loads(drive: Drive, run: xr.Dataset) -> dict[str, dict[str, float | None
             "equivalent": mean_load(forces_of_turns, angles[name]) if name in angles else None,
         }
     return table
+
+
+_ALIKE = 1e-3
+"""Relative difference of peaks up to which they count as equal: the start-up ends where steady running begins."""
+
+
+def hardest_run(pins: Mapping[str, Mapping[str, Mapping[str, float | None]]], pin: str) -> str:
+    """The run with the largest peak of a pin; of equal ones the first."""
+    peaks = {run: table[pin]["peak"] or 0.0 for run, table in pins.items()}
+    return next(run for run, peak in peaks.items() if peak >= (1.0 - _ALIKE) * max(peaks.values()))
 
 
 def mean_load(force: Any, angle: Any, exponent: float = 3.0) -> float:

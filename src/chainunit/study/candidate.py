@@ -14,6 +14,7 @@ from ..quantities import Value, declaration, quantity
 from ..text import entries, number
 from .drive import Drive
 from .limits import Check
+from .torques import DutyPeak
 
 TOLERANCES = ("crank_speed",)
 """Checks of a tolerance, which a drive may use wholly: the gear's ratio takes it, and no load does."""
@@ -38,6 +39,7 @@ class DriveNumbers:
     start_class: Value = quantity(
         "1", "trip class of the overload relay that holds in the start; 40: none up to class 30"
     )
+    inverter_current: Value = quantity("A", "least rated current of the inverter")
     mass: Value = quantity("kg", "mass of motor and flywheel, the relative cost")
     price: Value = quantity("1", "price of the motor, as the catalogue has it")
 
@@ -47,6 +49,7 @@ class Standing(StrEnum):
 
     CHOSEN = "chosen"
     FITS = "fits"
+    BARELY = "fits without margin"
     INSUFFICIENT = "insufficient"
     """the nearest candidate, where none fits; the study goes on with it"""
     REJECTED = "rejected"
@@ -81,13 +84,19 @@ class Candidate:
     series: str = ""
     """source of the ratio, such as a series of preferred numbers; empty for an exact or a given one"""
     start_class: int | None = None
-    """see `chainunit.study.start_class`; None for an inverter, or where there is no start"""
-    breakdown_torque: float = math.nan
-    """breakdown torque of the motor [N m]"""
-    duty_torque: float = math.nan
-    """peak torque at the crank in steady running, and while all feed moves to either side and stays there [N
-    m]"""
+    """see `chainunit.study.relay`; None for an inverter, or where there is no start"""
+    start_current: float | None = None
+    """largest current of the motor in a start [A]; None without a start"""
+    duty: DutyPeak | None = None
+    """the largest torque at the crank in steady running, and while all feed moves to either side and stays there;
+    None where the run failed"""
     fluctuation: float = math.nan
+    stall_angle: float | None = None
+    """crank angle at which the load stalls the motor [rad]; None for a motor that starts"""
+    heaviest: float = 0.0
+    """the heaviest flywheel that was tried with the motor [kg m2]"""
+    worst_start: bool = False
+    """whether time, class and heat of its start are those of the worst crank angle, not of the angle 0 alone"""
     verdict: Standing | None = None
     """None until the candidate is judged or ranked"""
     criterion: Criterion | None = None
@@ -135,6 +144,17 @@ class Candidate:
         return float(self.motor.nameplate.power)
 
     @property
+    def inverter_current(self) -> float | None:
+        """Least rated current of an inverter [A] that carries the duty and the peak of the starts for a short time;
+        None on the line, or without a start."""
+        if self.start_current is None or "inverter_current" not in self.checks:
+            return None
+        rated = float(self.motor.nameplate.rated_current)
+        running = self.checks["inverter_current"]
+        overload = running.limit / rated
+        return max(rated, max(self.start_current, running.value or 0.0) / overload)
+
+    @property
     def disc(self) -> Disc | None:
         """The flywheel as a disc of steel; None without one."""
         return steel_disc(self.drive.flywheel) if self.drive.flywheel else None
@@ -168,7 +188,10 @@ class Candidate:
     def as_dict(self) -> dict[str, Any]:
         """Ready for JSON, each number with its unit."""
         numbers = DriveNumbers(
-            start_class=self.start_class, mass=self.mass, price=self.motor.nameplate.price or None
+            start_class=self.start_class,
+            inverter_current=self.inverter_current,
+            mass=self.mass,
+            price=self.motor.nameplate.price or None,
         )
         return {
             "motor": self.motor.designation,

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from ..drives.catalogue import CatalogueMotor
-from ..drives.gearing import motor_side
+from ..drives.gear_ratios import typical_efficiency
+from ..drives.gearing import Transmission, motor_side
 from ..drives.induction_motor import Inverter
 from ..drives.nameplate import Nameplate
 from ..engines import numpy_
@@ -40,16 +41,16 @@ def catalogue_drive(
     InputError
         where no circuit meets the motor's nameplate.
     """
-    gear, plate, w = config.gear, motor.nameplate, config.run.crank_speed
+    plate, w = motor.nameplate, config.run.crank_speed
     model, p = motor.model()
     synchronous, rated_speed, rated_torque = plate.synchronous, plate.speed, plate.torque
     follows = config.start == "inverter"
     if gear_ratio is None and "gear.ratio" in config.given:
-        gear_ratio = gear.ratio
+        gear_ratio = config.gear.ratio
     ratio = rated_speed / w if gear_ratio is None else gear_ratio
-    speed, drag = rated_speed, gear.d
+    speed, drag = rated_speed, config.gear.d
     for _ in range(3):
-        shaft = motor_side(numpy_(), dataclasses.replace(gear, ratio=ratio), crank_torque, speed)
+        shaft = motor_side(numpy_(), gear_with(config, ratio), crank_torque, speed)
         mean = float(np.mean(shaft))
         # the slip is proportional to the torque; an inverter compensates it
         speed = rated_speed if follows else synchronous - (synchronous - rated_speed) * mean / rated_torque
@@ -67,9 +68,17 @@ def catalogue_drive(
         follows,
         rated_current=plate.rated_current,
         chain=config.chain,
-        gear_inertia=gear.J,
+        gear_inertia=config.gear.J,
         gear_friction=drag,
     )
+
+
+def gear_with(config: Config, ratio: float) -> Transmission:
+    """The gear of a study with that ratio; its efficiency is the typical one of its kind and stages, unless the file
+    gives one."""
+    typical = typical_efficiency(config.choices["sizing.gear_kind"], ratio)
+    efficiency = config.gear.efficiency if "gear.efficiency" in config.given else typical
+    return dataclasses.replace(config.gear, ratio=ratio, efficiency=efficiency)
 
 
 def with_starter(p: Any, plate: Nameplate, start: str, starter: Starter) -> Any:

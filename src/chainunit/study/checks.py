@@ -8,7 +8,6 @@ from typing import Any
 from ..errors import InputError
 from ..quantities import Layout
 from ..refusals import unit_behind
-from .sections import FileSection
 
 _ORDER = (
     ("sizing.poles_least", ">=", "sizing.poles_most"),
@@ -21,8 +20,8 @@ _ORDER = (
 LOWER_LIMITS = {high: low for low, _, high in _ORDER}
 
 
-def check_order(values: Mapping[str, Any], sections: Mapping[str, FileSection]) -> Iterator[InputError]:
-    """Refusals of limits with no value between them, and of counts that are not whole numbers."""
+def check_order(values: Mapping[str, Any]) -> Iterator[InputError]:
+    """Refusals of limits with no value between them."""
 
     def value(name: str) -> tuple[float, str]:
         section, _, key = name.partition(".")
@@ -34,9 +33,3 @@ def check_order(values: Mapping[str, Any], sections: Mapping[str, FileSection]) 
         (least, limit), (most, text) = value(low), value(high)
         if most < least or (most == least and relation == ">"):
             yield InputError(f"{high} = {text}: must be {relation} {low}, {limit}", key=high)
-    for section, table in sections.items():
-        for key in table.whole:
-            number, text = value(f"{section}.{key}")
-            if number != int(number):
-                name = f"{section}.{key}"
-                yield InputError(f"{name} = {text}: must be a whole number", key=name)

@@ -19,7 +19,7 @@ from ..fmu.backends import Backend
 from ..progress import Report
 from ..quantities import Layout
 from ..system import foreign_component
-from .catalogue_drive import catalogue_drive
+from .catalogue_drive import catalogue_drive, gear_with
 from .config import Config
 from .cycle import cycle
 from .drive import Drive
@@ -58,6 +58,21 @@ def _drive_of_file(config: Config) -> Drive:
         drive = Drive(motor, p, config.machine, motor.follows(p), chain=config.chain)
     flywheel = 0.0 if config.flywheel is None else config.flywheel.J
     return replace(drive, feed_forward=config.feed_forward, flywheel=flywheel)
+
+
+def as_chosen(config: Config, drive: Drive) -> Config:
+    """The study with the values that follow from the drive with a motor of the catalogue: the efficiency of the gear
+    by its stages, and the boost of the inverter."""
+    if not config.of_catalogue:
+        return config
+    boost = drive.parameters.inverter.boost
+    inverter = replace(config.starter.inverter, boost=boost) if drive.follows else config.starter.inverter
+    efficiency = gear_with(config, drive.ratio).efficiency
+    return replace(
+        config,
+        gear=replace(config.gear, efficiency=efficiency),
+        starter=replace(config.starter, inverter=inverter),
+    )
 
 
 def check_files(config: Config) -> None:

@@ -10,11 +10,10 @@ from typing import Any
 
 from ..drives.cardan import check
 from ..drives.catalogue import CatalogueMotor
-from ..drives.gear_ratios import EFFICIENCY
 from ..drives.gearing import Transmission
 from ..drives.motor import Motor
 from ..errors import Faults, GeometryError, InputError, each_refusal, refusal_prefix
-from ..machines.admissible import cause
+from ..machines.admissible import causes
 from ..machines.api import machine_of, ratios
 from ..machines.chain_unit import SideName
 from ..machines.machine import Machine
@@ -263,7 +262,7 @@ def _of_values(data: Mapping[str, Any], parts: Parts, source: str) -> Config:
     declared = {name: section.declaration for name, section in parts.sections.items()}
     unusual = tuple(slips(declared, data, {"run.crank_speed": parts.machine.usual_speed}))
     with each_refusal(lambda fault: _with_hints(fault, unusual)):
-        events = read_events(form.event)
+        events = read_events(form.event, parts.machine)
         if "event" in data:
             kinds = {f"event.{name}": event.Parameters for name, event in events.items()}
             tables = dict(zip(events, data["event"], strict=True))
@@ -296,7 +295,7 @@ def _config(
     """The study of a file each of whose values is allowed."""
     sections, faults = parts.sections, Faults()
     tables, values = _read_sections(sections, checked, faults)
-    faults.add(check_order(values, sections))
+    faults.add(check_order(values))
     of_study = {name: values[name] for name in ("feed", "run", "monte_carlo", "gear", "starter", "torsion")}
     of_study |= {
         name: values[name] if name in data else None for name, each in sections.items() if each.optional
@@ -304,9 +303,6 @@ def _config(
     if "sizing" in data and checked.start != "inverter" and "inertia_ratio" not in tables["sizing"]:
         # for motors on the line only where the file gives it
         of_study["sizing"] = dataclasses.replace(of_study["sizing"], inertia_ratio=math.inf)
-    if "sizing" in data and "efficiency" not in tables["gear"]:
-        typical = EFFICIENCY[checked.sizing.gear_kind]
-        of_study["gear"] = dataclasses.replace(of_study["gear"], efficiency=typical)
     chain, own_motors = values["chain"] if checked.organ == "chain" else None, None
     with faults.collected(), refusal_prefix("catalogue = ", "catalogue"):
         own_motors = beside(checked.catalogue, source) if checked.catalogue else None
@@ -482,9 +478,11 @@ def _machine(parts: Parts, given: dict[str, float], of_papers: Mapping[str, floa
         return of(parts.machine, given)
     except InputError as error:
         names = error.names if isinstance(error, GeometryError) else ()
-        key = next((f"machine.{name}" for name in names if name in given), "machine")
+        found = causes(parts.machine, given) if isinstance(error, GeometryError) and not of_papers else {}
+        # the value that spoils the machine, and not one whose range that value sets
+        key = next((f"machine.{name}" for name in (*found, *names) if name in given), "machine")
         line = f"machine: {error}{_taken_over(error, parts.machine, given)}"
-        line += cause(parts.machine, given) if isinstance(error, GeometryError) and not of_papers else ""
+        line += f"; with all other values as they are, {', or '.join(found.values())}" if found else ""
         raise InputError(line, key="ratios" if of_papers else key) from error
 
 

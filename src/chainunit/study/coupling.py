@@ -5,46 +5,79 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ..quantities import variables
 from ..text import number
 from .event import Role
-from .event_torques import peaks_in_events, running_torque
-from .protection import MARGIN, Alternative, Obstacle, Setting, Way, WayNumbers
+from .event_torques import effects, peaks_in_events, running_peak, running_words
+from .judgement import wrong_runs
+from .protection import MARGIN, Alternative, CouplingEffect, Obstacle, Setting, Way, WayNumbers, spares
 from .ram_force import TIMES, rams
 from .record import StudyRecord
+from .sections import Coupling
 from .starts import StartAnalysis
 from .torques import on_coupling
+from .verdict import START, STEADY
 from .window import BURNT
 
 
 def recommended_setting(study: StudyRecord) -> Setting | None:
     """The recommended safety coupling of a sized drive, judged by the events of the study. None where no
     motor was chosen, where the file gives a coupling, or where the study ended before steady running."""
-    if not study.sizing or study.insufficient or study.config.coupling or "steady" not in study.answers:
+    if not study.sizing or study.insufficient or study.config.coupling or STEADY not in study.answers:
         return None
-    return Setting(
-        running=running_torque(study),
-        start=max(peak for peak, _ in start_peaks(study)),
+    events, wrong = study.config.events, wrong_runs(study)
+    normal = [n for n in wrong if n not in events or events[n].from_rest or events[n].role is Role.DUTY]
+    shocks = peaks_in_events(study, Role.SHOCK)
+    setting = Setting(
+        running=running_peak(study).torque,
+        start=hardest_start(study).torque,
         motor=pull_out(study),
         gear=study.config.gear.torque_limit,
-        overloads=peaks_in_events(study, Role.SHOCK),
-        disturbances=peaks_in_events(study, Role.DISTURBANCE),
+        overloads={} if normal else {n: peak for n, peak in shocks.items() if n not in wrong},
+        disturbances={n: x for n, x in peaks_in_events(study, Role.DISTURBANCE).items() if n not in wrong},
+        wrong=normal or [n for n in wrong if n in shocks],
     )
+    if setting.obstacle is not None:
+        return setting
+    tried = effects(study, setting.least)
+    return replace(setting, effects={n: tried[n] for n in setting.opens})
 
 
-def start_peaks(study: StudyRecord) -> list[tuple[float, str]]:
-    """The largest torques on the coupling, at the crank [N m], in the parts of the start, each with its title: the
-    start-up with the settling under a feed that comes later, starts from other crank angles, starts under load."""
+@dataclass(frozen=True)
+class StartPeak:
+    """The largest torque of a start on the coupling, at the crank [N m]: in the run of that name, or in a start from
+    a crank angle [rad] without a run of its own."""
+
+    torque: float
+    run: str = START
+    angle: float | None = None
+
+    def title(self, study: StudyRecord) -> str:
+        """The start in words."""
+        return study.title_of(self.run) if self.angle is None else f"start from {number(self.angle, 'rad')}"
+
+    def named(self, study: StudyRecord) -> str:
+        """The start in words, with its article."""
+        return f"{'the' if self.run == START and self.angle is None else 'a'} {self.title(study)}"
+
+
+def start_peaks(study: StudyRecord) -> list[StartPeak]:
+    """The largest torques on the coupling in the parts of the start: the start-up with the settling under a feed that
+    comes later, starts from other crank angles, starts under load."""
     events, peaks = study.config.events, peaks_in_events(study)
-    run = study.runs["start_up"].sel(time=slice(None, study.steady_begin))
-    parts = [(on_coupling(study.drive, run), "start-up")]
+    run = study.runs[START].sel(time=slice(None, study.steady_begin))
+    parts = [StartPeak(on_coupling(study.drive, run))]
     if findings := study.findings.get(StartAnalysis.name):
-        parts += [
-            (start.coupling_torque, f"start from {number(start.angle, 'rad')}") for start in findings.starts
-        ]
-    return parts + [(peak, study.title_of(name)) for name, peak in peaks.items() if events[name].from_rest]
+        parts += [StartPeak(start.coupling_torque, angle=start.angle) for start in findings.starts]
+    return parts + [StartPeak(peak, name) for name, peak in peaks.items() if events[name].from_rest]
+
+
+def hardest_start(study: StudyRecord) -> StartPeak:
+    """The part of the start with the largest torque on the coupling."""
+    return max(start_peaks(study), key=lambda start: start.torque)
 
 
 def pull_out(study: StudyRecord) -> float:
@@ -54,6 +87,11 @@ def pull_out(study: StudyRecord) -> float:
 
 def _torque(value: float) -> str:
     return number(value, "N.m")
+
+
+def _at_both(study: StudyRecord, value: float) -> str:
+    """A torque at the crank, and at the motor's shaft, on which the coupling sits."""
+    return f"{_torque(value)} at the crank, {_torque(value / study.drive.ratio)} at the motor's shaft"
 
 
 def _list_of(study: StudyRecord, peaks: Mapping[str, float]) -> str:
@@ -69,8 +107,33 @@ _OBSTACLES = {
     Obstacle.GEAR: "No safety coupling protects this drive: it has to open above {above}, and the gear may carry "
     "{gear}.",
     Obstacle.OVERLOADS: "No safety coupling is recommended: it has to open above {above}, and {bound}.",
+    Obstacle.RELEASE: "No safety coupling is recommended: one that opens at {setting}, opens too late. The largest "
+    "torques until no torque passes it, {release} after its trip: {effects}. {why}.",
+    Obstacle.ENERGY: "No safety coupling is recommended: the energy balance is not kept in {wrong}, so that no "
+    "setting follows from its numbers.",
 }
 """By obstacle, the sentence on it."""
+
+
+_REASONS = {
+    Obstacle.START: "a start puts {start} on it",
+    Obstacle.MOTOR: "the motor gives {motor} at most",
+    Obstacle.GEAR: "the gear may carry {gear}",
+    Obstacle.OVERLOADS: "no overload of this study would open it",
+    Obstacle.RELEASE: "it opens too late",
+    Obstacle.ENERGY: "the energy balance of its runs is not kept",
+}
+"""By obstacle, a few words on it."""
+
+
+def why_none(study: StudyRecord) -> str:
+    """A few words on the reason why no coupling is recommended; empty where one is."""
+    setting = study.setting
+    if setting is None or setting.obstacle is None:
+        return ""
+    return _REASONS[setting.obstacle].format(
+        start=_torque(setting.start), motor=_torque(setting.motor), gear=_torque(setting.gear)
+    )
 
 
 def coupling_sentence(study: StudyRecord) -> str:
@@ -79,14 +142,19 @@ def coupling_sentence(study: StudyRecord) -> str:
     setting = study.setting
     assert setting is not None
     caveat = f" ({study.verdict.caveat})" if study.verdict and study.verdict.caveat else ""
-    start_torque, start = max(start_peaks(study))
-    start = f"the {start}" if start == "start-up" else f"a {start}" if start.startswith("start") else start
-    of = f"that {start} puts on it" if setting.start_decides else "of normal duty"
-    above = f"{_torque(setting.least)}, {MARGIN:g} times the {_torque(setting.normal)} {of}"
+    hardest, running = hardest_start(study), running_peak(study)
+    start = hardest.named(study)
+    of = f"that {start}" if setting.start > setting.running else f"that {running_words(study, running.run)}"
+    above = f"{_torque(setting.least)}, {MARGIN:g} times the {_torque(setting.normal)} {of} puts on it"
     if setting.obstacle is not None:
         return _OBSTACLES[setting.obstacle].format(
             start=start,
-            start_torque=_torque(start_torque),
+            setting=_at_both(study, setting.least),
+            release=number(Coupling().release_time, "s"),
+            effects=_effects(study, setting.effects),
+            why=f"The gear may carry {_torque(setting.gear)}" if setting.passed else "That saves nothing",
+            wrong=", ".join(map(study.title_of, setting.wrong)),
+            start_torque=_torque(hardest.torque),
             least=_torque(setting.least),
             least_in_running=_torque(setting.least_in_running),
             above=above,
@@ -96,10 +164,15 @@ def coupling_sentence(study: StudyRecord) -> str:
         )
     shut = {name: peak for name, peak in setting.overloads.items() if name not in setting.opens}
     text = (
-        f"Recommended safety coupling{caveat}: {above}, {'above' if setting.stalls else 'below'} the "
-        f"{_torque(setting.motor)} that the motor gives at the crank. It opens where {_list_of(study, setting.opens)}"
+        f"Recommended safety coupling{caveat}: {_at_both(study, setting.least)}; this is {MARGIN:g} times the "
+        f"{_torque(setting.normal)} {of} puts on it, and {'above' if setting.stalls else 'below'} the "
+        f"{_torque(setting.motor)} that the motor gives at the crank. It opens where "
+        f"{_effects(study, setting.effects)}"
     )
     text += f"; it stays shut where {_list_of(study, shut)}." if shut else "."
+    if setting.wrong:
+        names = ", ".join(map(study.title_of, setting.wrong))
+        text += f" Left out, as the energy balance is not kept: {names}."
     if setting.stalls:
         text += (
             " A load that rises slowly stalls the motor and does not open it: the relay has to trip there."
@@ -110,6 +183,15 @@ def coupling_sentence(study: StudyRecord) -> str:
     if setting.start_decides:
         text += f" For running alone {_torque(setting.least_in_running)} would do."
     return text
+
+
+def _effects(study: StudyRecord, effects: Mapping[str, CouplingEffect]) -> str:
+    """A list of overloads with the effects of a coupling in them, in words."""
+    return ", ".join(
+        f"{study.title_of(name)} ({_torque(effect.with_coupling)} at the output of the gear in place of "
+        f"{_torque(effect.without)})"
+        for name, effect in effects.items()
+    )
 
 
 def _bound(setting: Setting) -> str:
@@ -157,6 +239,8 @@ def way_words(study: StudyRecord, each: Alternative) -> str:
         for v in variables(WayNumbers)
         if (value := getattr(each.numbers, v.name)) is not None
     }
+    if each.numbers.setting is not None:
+        numbers["setting"] = _at_both(study, each.numbers.setting)
     return _WAYS[each.way].format(**numbers, opens=_list_of(study, each.opens), set=_set(study, each))
 
 
@@ -165,10 +249,12 @@ def _set(study: StudyRecord, each: Alternative) -> str:
     gear = study.config.gear.torque_limit
     if each.numbers.setting is None:
         return f"no setting is left below the {_torque(gear)} that the gear may carry"
-    text = f"set to {_torque(each.numbers.setting)} it opens "
+    text = f"set to {_at_both(study, each.numbers.setting)}, it opens "
     if not each.opens:
         return text + "in no overload of this study and protects nothing"
-    text += f"where {_list_of(study, each.opens)}"
+    text += f"where {_effects(study, each.effects) if each.effects else _list_of(study, each.opens)}"
+    if each.effects and not spares(each.effects):
+        text += ", too late to save anything"
     assert study.setting is not None
     if shut := {n: p for n, p in study.setting.overloads.items() if n not in each.opens}:
         text += f", but stays shut where {', '.join(map(study.title_of, shut))}"
@@ -184,16 +270,15 @@ def remark_on_coupling(study: StudyRecord, trip: float) -> None:
     peaks, shocks = peaks_in_events(study), peaks_in_events(study, Role.SHOCK)
     amounts = {"trip": (trip, "N.m")} | ({} if most is None else {"motor": (most, "N.m")})
     warn = study.warn
-    above = [(peak, title) for peak, title in start_peaks(study) if peak > trip]
-    if above:
-        start, title = max(above)
+    start = hardest_start(study)
+    if start.torque > trip:
         warn(
             "coupling opens in start",
             "The safety coupling opens at {trip}, and a start puts up to {start} on it ({where}): it opens in some "
             'of the starts. Set it higher, or start softer (start = "soft" or "inverter").',
             "start_up",
-            where=title,
-            start=(start, "N.m"),
+            where=start.title(study),
+            start=(start.torque, "N.m"),
             **amounts,
         )
     openings = [name for name in peaks if study.answers[name].coupling_trip_time is not None]
@@ -257,7 +342,7 @@ def remark_on_rams(study: StudyRecord) -> None:
             _RAM + (_RAM_WITHIN if quantities else _RAM_ALWAYS) + _RAM_END,
             trip=(torque, "N.m"),
             ram=ram.ram,
-            dead=(float(ram.angle[ram.dead]), "rad"),
+            dead=(ram.dead, "rad"),
             fastest=(ram.least(torque), "N"),
             thirty=(ram.before(torque, math.radians(30.0)), "N"),
             ten=(ram.before(torque, math.radians(10.0)), "N"),

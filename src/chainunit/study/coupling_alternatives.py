@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 import xarray as xr
@@ -20,8 +19,9 @@ from ..system.graph import in_line
 from .arrays import peak
 from .catalogue_drive import with_starter
 from .cycle import cycle
+from .drive import Drive
 from .event import Role
-from .event_torques import peaks_in_events
+from .event_torques import effects, peaks_in_events
 from .limits import starting
 from .measures import STARTED
 from .protection import MARGIN, Alternative, Setting, Way, WayNumbers
@@ -29,7 +29,8 @@ from .record import StudyRecord
 from .rig import Rig, join
 from .start_runs import StartNumbers, from_angle, hardest, longest_start, start_from, starts_from_all
 from .starts import StartAnalysis
-from .torques import on_coupling
+from .torques import PeakOf, all_feed_on, duty_peak, on_coupling
+from .verdict import STEADY
 
 SOFT_STARTERS = ((0.5, 1.0), (0.5, 3.0), (0.4, 2.0), (0.4, 5.0), (0.3, 5.0), (0.3, 10.0))
 """Share of the voltage and ramp [s] of the soft starters that are tried, in this order."""
@@ -150,10 +151,25 @@ def _soft_starter(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative
         return Alternative(Way.SOFT_STARTER, WayNumbers.of(), {})
     _, starts, numbers = best
     found = _as_numbers(setting, setting.running, starts, **numbers)
-    return Alternative(Way.SOFT_STARTER, found, _opened(setting.overloads, found))
+    return _tried(study, Way.SOFT_STARTER, found, setting.overloads)
 
 
-def _opened(overloads: dict[str, float] | Any, numbers: WayNumbers) -> dict[str, float]:
+def _tried(
+    study: StudyRecord,
+    way: Way,
+    numbers: WayNumbers,
+    overloads: Mapping[str, float],
+    runs: Mapping[str, xr.Dataset] | None = None,
+) -> Alternative:
+    """A way whose coupling was tried in the `overloads`, peaks by name; for `runs` see `effects`."""
+    if numbers.setting is None:
+        return Alternative(way, numbers, {})
+    opens, tried = _opened(overloads, numbers), effects(study, numbers.setting, runs)
+    return Alternative(way, numbers, opens, {name: tried[name] for name in opens})
+
+
+def _opened(overloads: Mapping[str, float], numbers: WayNumbers) -> dict[str, float]:
+    """The overloads, peaks by name, that open a coupling."""
     if numbers.setting is None:
         return {}
     return {name: torque for name, torque in overloads.items() if torque > numbers.setting}
@@ -179,16 +195,18 @@ def _inverter(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative:
         return Alternative(Way.INVERTER, WayNumbers.of(), {})
     fed, starts, numbers = best
     fed = dataclasses.replace(fed, fed_from=None)
-    running, overloads = _runs(study, fed)
+    running, shocks = _runs(study, fed, on_coupling)
     found = _as_numbers(setting, running, starts, **numbers)
-    return Alternative(Way.INVERTER, found, _opened(overloads, found))
+    overloads = {name: on_coupling(fed.drive, run) for name, run in shocks.items()}
+    return _tried(study, Way.INVERTER, found, overloads, shocks)
 
 
-def _runs(study: StudyRecord, rig: Rig) -> tuple[float, dict[str, float]]:
-    """The largest torque of normal duty on the coupling of another drive, at the crank [N m], and its peaks in the
-    overloads, by name."""
+def _runs(study: StudyRecord, rig: Rig, of: PeakOf) -> tuple[float, dict[str, xr.Dataset]]:
+    """The largest torque `of` normal duty of another drive, at the crank [N m], and its runs with the overloads from
+    their begin on, by name."""
     config = rig.config
-    peaks: dict[Role, dict[str, float]] = {role: {} for role in Role}
+    duty: list[tuple[str, xr.Dataset]] = []
+    shocks: dict[str, xr.Dataset] = {}
     with rig.from_rest() as simulation:
         start_up = rig.start_up(simulation, config.stop, lambda time: None, {})
         rig = start_up.rig
@@ -203,14 +221,19 @@ def _runs(study: StudyRecord, rig: Rig) -> tuple[float, dict[str, float]]:
         leads = rig.leads(simulation, [*events.values()], float(angle[-1]), float(np.mean(speed)))
         for (name, event), lead in zip(events.items(), leads, strict=True):
             at = begin + lead
-            run = rig.follow(simulation, event, at, at + event.follow(config.turn)).run
-            peaks[event.role][name] = on_coupling(rig.drive, run.sel(time=slice(at, None)))
+            run = rig.follow(simulation, event, at, at + event.follow(config.turn)).run.sel(
+                time=slice(at, None)
+            )
+            if event.role is Role.DUTY:
+                duty.append((name, run))
+            elif event.role is Role.SHOCK:
+                shocks[name] = run
         assert study.sizing is not None
         for side in study.sizing.duty.one_sided:
             event = config.one_sided(side)
             run = rig.follow(simulation, event, begin, begin + event.p.shift + 2.0 * config.turn).run
-            peaks[Role.DUTY][f"all on the {side}"] = on_coupling(rig.drive, run)
-    return max(on_coupling(rig.drive, steady), *peaks[Role.DUTY].values(), 0.0), peaks[Role.SHOCK]
+            duty.append((all_feed_on(side), run))
+    return duty_peak(rig.drive, [(STEADY, steady), *duty], of).torque, shocks
 
 
 def slip_run(rig: Rig, start: StartNumbers, setting: float) -> xr.Dataset | None:
@@ -276,7 +299,7 @@ def _higher(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative:
         start=setting.start,
         rocker=_rocker_until(study, setting.least),
     )
-    return Alternative(Way.HIGHER, numbers, _opened(setting.overloads, numbers))
+    return _tried(study, Way.HIGHER, numbers, setting.overloads)
 
 
 def _rocker_until(study: StudyRecord, setting: float) -> float | None:
@@ -293,10 +316,9 @@ def _rocker_until(study: StudyRecord, setting: float) -> float | None:
     return max(peaks, default=None)
 
 
-def on_motor_side(rig: Rig, run: xr.Dataset) -> float:
+def on_motor_side(drive: Drive, run: xr.Dataset) -> float:
     """Peak torque in a run on a coupling between rotor and flywheel, at the crank [N m]: that behind the flywheel,
     and the torque that accelerates flywheel and gear."""
-    drive = rig.drive
     inertia = drive.flywheel + drive.gear_inertia
     torque = run["motor.tau"].values + inertia * run["motor.a"].values
     return peak(torque + drive.gear_friction * run["motor.w"].values) * drive.ratio
@@ -304,16 +326,13 @@ def on_motor_side(rig: Rig, run: xr.Dataset) -> float:
 
 def _before_flywheel(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative | None:
     """The coupling between motor and flywheel, where the drive has a flywheel; else None."""
-    if not rig.drive.flywheel:
+    if not rig.drive.flywheel or study.start is None:
         return None
-    steady = on_motor_side(rig, study.steady)
-    run = study.runs["start_up"].sel(time=slice(None, study.steady_begin))
-    events = study.config.events
-    peaks: dict[Role, dict[str, float]] = {role: {} for role in Role}
-    for name, begin in study.event.items():
-        if name in study.runs and not events[name].from_rest:
-            peaks[events[name].role][name] = on_motor_side(rig, study.runs[name].sel(time=slice(begin, None)))
-    running, start = max(steady, *peaks[Role.DUTY].values(), 0.0), on_motor_side(rig, run)
-    least = MARGIN * max(running, start)
-    numbers = WayNumbers.of(setting=least if least < setting.gear else None, running=running, start=start)
-    return Alternative(Way.BEFORE_FLYWHEEL, numbers, _opened(peaks[Role.SHOCK], numbers))
+    events = [e for e in study.config.events.values() if e.from_rest and e.name in study.answers]
+    starts = starts_from_all(rig, longest_start(study.config, study.start.start_time), events, on_motor_side)
+    if any(start.start_time is None for start in starts):
+        return None
+    running, shocks = _runs(study, dataclasses.replace(rig, fed_from=None), on_motor_side)
+    numbers = _as_numbers(setting, running, starts)
+    peaks = {name: on_motor_side(rig.drive, run) for name, run in shocks.items()}
+    return Alternative(Way.BEFORE_FLYWHEEL, numbers, _opened(peaks, numbers))

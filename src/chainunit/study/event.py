@@ -105,8 +105,6 @@ class Event(metaclass=EventType):
     inputs jump to them"""
     draws: ClassVar[Mapping[str, tuple[float, float]]] = {}
     """range of each quantity that random overloads draw, if the study file gives none: from, to"""
-    counts: ClassVar[tuple[str, ...]] = ()
-    """quantities that are whole numbers"""
     has_input: ClassVar[bool] = False
     """whether the study file names the input that the event changes, see `of_input`"""
     Parameters: ClassVar[type] = Timing

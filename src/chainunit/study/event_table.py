@@ -24,6 +24,7 @@ from pydantic import BaseModel
 
 from ..errors import Faults, InputError, each_refusal, near_name, shown
 from ..machines.chain_unit import SIDES
+from ..mechanism.models import MachineModel
 from ..quantities import Layout, Variable, variables
 from ..reading import given_values, instance, read_table, schema, to_number
 from .event import TYPES, AnySide, Event, on_side
@@ -36,8 +37,16 @@ LONGEST_NAME = 40
 _NAME = re.compile(rf"[a-z][a-z0-9_]{{0,{LONGEST_NAME - 1}}}")
 
 
-def read_events(tables: Sequence[Any]) -> dict[str, Event]:
-    """Events by the names of their runs, in the order of the tables.
+def inputs_of(machine: type[MachineModel]) -> str:
+    """Words on the inputs of a machine, and on the event that lets one of them rise."""
+    names = Layout(machine.Feed).names
+    if not names:
+        return "it has no inputs"
+    return f'its inputs: {", ".join(names)} (type = "surge" with input = "{names[0]}" lets one rise)'
+
+
+def read_events(tables: Sequence[Any], machine: type[MachineModel] | None = None) -> dict[str, Event]:
+    """Events by the names of their runs, in the order of the tables; of the `machine`, where it is known.
 
     Raises
     ------
@@ -53,7 +62,10 @@ def read_events(tables: Sequence[Any]) -> dict[str, Event]:
             where, place = f"event {k} ({of.kind})", f"event.{k}"
             side = _side(of, table, where, place, faults)
             if "side" not in table and of.has_side:
-                faults.add([InputError(f'{where}: side: must be given, "left" or "right"', place)])
+                words = 'side: must be given, "left" or "right"'
+                if machine is not None and not machine.sides:
+                    words = f"the {machine.name} has no sides; {inputs_of(machine)}"
+                faults.add([InputError(f"{where}: {words}", place)])
             usual = of.on(side).name if side or not of.has_side else of.kind
             name = _name(table, usual, events, where, place, faults)
             events[name] = of.on(side, _parameters(of, table, f"event.{name}.", f"{place}."), name)
@@ -227,12 +239,4 @@ def _parameters(of: type[Event], table: Mapping[str, Any], prefix: str, place: s
     with `prefix`."""
     own = {name: x for name, x in table.items() if name not in _TEXTS}
     with each_refusal(lambda fault: InputError(f"{prefix}{fault}", (place or prefix) + fault.key)):
-        values = given_values(read_table(_form(of.Parameters), own))
-        p = instance(of.Parameters, values)
-        broken = [name for name in of.counts if getattr(p, name) != int(getattr(p, name))]
-        lines = [
-            InputError(f"{name} = {getattr(p, name):g}: must be a whole number", name) for name in broken
-        ]
-        if lines:
-            raise InputError.of(lines)
-    return p
+        return instance(of.Parameters, given_values(read_table(_form(of.Parameters), own)))

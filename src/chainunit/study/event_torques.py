@@ -2,9 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+
 from .event import Role
+from .protection import CouplingEffect
 from .record import StudyRecord
-from .torques import PeakOf, on_coupling
+from .sections import Coupling
+from .torques import DutyPeak, PeakOf, at_gear, duty_peak, on_coupling
+from .verdict import STEADY
 
 
 def peaks_in_events(study: StudyRecord, *roles: Role, of: PeakOf = on_coupling) -> dict[str, float]:
@@ -17,12 +25,49 @@ def peaks_in_events(study: StudyRecord, *roles: Role, of: PeakOf = on_coupling) 
     }
 
 
-def running_torque(study: StudyRecord, of: PeakOf = on_coupling) -> float:
-    """Largest torque of normal duty without the starts [N m]: steady running, and events that may last."""
+def running_peak(study: StudyRecord, of: PeakOf = on_coupling) -> DutyPeak:
+    """The largest torque of normal duty without the starts: of steady running, of events that may last, and of the
+    runs of sizing with all feed on either side."""
     events = study.config.events
-    lasting = peaks_in_events(study, Role.DUTY, of=of).items()
-    return max(
-        of(study.drive, study.steady),
-        *(torque for name, torque in lasting if not events[name].from_rest),
-        0.0 if study.sizing is None or study.insufficient else study.sizing.best.duty_torque,
-    )
+    lasting = [
+        (name, study.runs[name].sel(time=slice(begin, None)))
+        for name, begin in study.event.items()
+        if name in study.runs and events[name].role is Role.DUTY and not events[name].from_rest
+    ]
+    peaks = [duty_peak(study.drive, [(STEADY, study.steady), *lasting], of)]
+    if study.sizing is not None and not study.insufficient and study.sizing.best.duty is not None:
+        peaks.append(study.sizing.best.duty)
+    return max(peaks, key=lambda peak: peak.torque)
+
+
+def running_words(study: StudyRecord, run: str) -> str:
+    """The case of normal duty of a run, in words."""
+    title = study.title_of(run)
+    return title if run == STEADY else f"running ({title})"
+
+
+def effects(
+    study: StudyRecord, setting: float, runs: Mapping[str, xr.Dataset] | None = None
+) -> dict[str, CouplingEffect]:
+    """The effect of a coupling with this setting [N m at the crank] in each shock that opens it, by name; it passes
+    torque for the declared release time. `runs` are other runs of the shocks without a coupling, from their begin on;
+    by default those of the study."""
+    drive, release = study.drive, Coupling().release_time
+    if runs is None:
+        names = peaks_in_events(study, Role.SHOCK)
+        runs = {name: study.runs[name].sel(time=slice(study.event[name], None)) for name in names}
+    found = {}
+    for name, run in runs.items():
+        time, torque = run["time"].values, np.abs(run["motor.tau"].values) * drive.ratio
+        passed = np.flatnonzero(torque > setting)
+        if not passed.size:
+            continue
+        k = int(passed[0])
+        before = slice(max(k - 1, 0), k + 1)
+        end = float(np.interp(setting, torque[before], time[before])) + release
+        # up to the opening the run is the same as without the coupling
+        until = run.sel(time=slice(None, end))
+        rows = until.sizes["time"]
+        last = run.isel(time=slice(rows - 1, rows + 1)).interp(time=[min(end, float(time[-1]))])
+        found[name] = CouplingEffect(at_gear(drive, run), max(at_gear(drive, until), at_gear(drive, last)))
+    return found

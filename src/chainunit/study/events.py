@@ -65,13 +65,12 @@ class Lumps(Jam):
 
     kind, run = "lumps", "lumps_{side}"
     words, heading = "lumps come one after the other on the {side}", "lumps {side}"
-    counts = ("number",)
 
     @declaration
     class Parameters(Jam.Parameters):
         """Quantities of the lumps, which are all alike."""
 
-        number: Value = quantity("1", "number of lumps", default=4.0, min=1.0, max=1000.0)
+        number: Value = quantity("1", "number of lumps", default=4, min=1, max=1000, type="Integer")
         pause: Value = quantity(
             "s", "time between two lumps", default=0.4, min=1e-3, max=1e4, usual=(1e-3, 60.0)
         )

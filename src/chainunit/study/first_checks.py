@@ -35,7 +35,7 @@ def check_values(data: Mapping[str, Any], source: str) -> tuple[Parts | None, li
         read_table(known.form, own)
     with faults.collected():
         if isinstance(data.get("event", []), list):
-            read_events(data.get("event", []))
+            read_events(data.get("event", []), known.machine if parts else None)
     with faults.collected():
         random = named_table(data, "monte_carlo").get("event")
         if isinstance(random, Mapping):
@@ -137,7 +137,7 @@ def independent(
     further: Collection[InputError], faults: Collection[InputError], parts: Parts
 ) -> list[InputError]:
     """The refusals of values that do not fit together, without those that depend on a refused value. The
-    remaining ones concern other tables, a count, or two limits that are both right."""
+    remaining ones concern other tables, or two limits that are both right."""
     wrong = set(map(_key, faults))
     tables = {_table(key) for key in wrong}
     if tables & {"system", ""}:
@@ -148,14 +148,12 @@ def independent(
     if "sweep.method" in wrong:
         # it decides whether the parameters have points
         further = [fault for fault in further if fault.key.split(".")[::3] != ["sweep", "points"]]
-    counts = {f"{name}.{key}" for name, section in parts.sections.items() for key in section.whole}
     return [
         fault
         for fault in further
         if fault.key not in wrong
         and (
             _table(fault.key) not in tables
-            or fault.key in counts
             or (fault.key in LOWER_LIMITS and LOWER_LIMITS[fault.key] not in wrong)
         )
     ]

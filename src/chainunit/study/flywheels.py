@@ -21,12 +21,12 @@ from .config import Config
 from .cycle import needed_inertia
 from .drive import Drive
 from .limits import given_motor
-from .measures import CREEPS, Answers, read_answers
+from .measures import Answers, read_answers
 from .record import Amount, StudyRecord
 from .rig import Rig, worst_residual
 from .shaft import remedies
 from .turn import Turn, TurnAnalysis
-from .verdict import RESIDUAL, STEADY
+from .verdict import CREEPS, RESIDUAL, STEADY
 from .wheel import FlywheelAnswers, Wheel
 from .window import Phase, Window, whole_turns
 

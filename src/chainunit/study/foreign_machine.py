@@ -94,7 +94,7 @@ def _quantity(c: Connector) -> Any:
         unit, words = c.unit or "1", c.description
     except ValueError:
         unit, words = "1", f"{c.description} [{c.unit}]"
-    return quantity(unit, words, default=c.start, min=c.least, max=c.most)
+    return quantity(unit, words, default=c.start, min=c.least, max=c.most, type=c.type)
 
 
 class ForeignMachine(Machine):

@@ -14,6 +14,8 @@ from .organs import OrganAnalysis
 from .quantiles import runs_needed
 from .record import StudyRecord
 from .rig import worst_residual
+from .start_runs import longest_of
+from .starts import StartAnalysis
 from .verdict import RESIDUAL, STEADY, Holds, Verdict, shown_speed
 
 
@@ -56,6 +58,13 @@ def model_verdict(study: StudyRecord) -> Verdict:
     )
 
 
+def wrong_runs(study: StudyRecord) -> list[str]:
+    """The runs whose energy balance is not kept, so that their numbers count as wrong; start-up and steady running
+    are one run."""
+    # a balance of NaN is not kept either
+    return [name for name, residual in _residuals(study).items() if not residual < RESIDUAL]
+
+
 def _residuals(study: StudyRecord) -> dict[str, float]:
     """By run, the largest energy residual over the energy moved; start-up and steady running are one run."""
     return {
@@ -70,9 +79,12 @@ def motor_limits(study: StudyRecord) -> dict[str, Check]:
     steady, start = study.answers.get(STEADY), study.start
     if steady is None or start is None:
         return {}
-    return given_motor(
-        study.config, study.drive, steady.winding_temperature, steady.current_rms, start.start_time
-    )
+    time, found = start.start_time, study.findings.get(StartAnalysis.name)
+    if found is not None:
+        # the worst crank angle counts
+        others = longest_of(found.starts)
+        time = None if others is None or time is None else max(time, others)
+    return given_motor(study.config, study.drive, steady.winding_temperature, steady.current_rms, time)
 
 
 _EXCESSES = {
@@ -102,9 +114,8 @@ def motor_verdict(study: StudyRecord) -> dict[str, Any] | None:
     steady, requested = study.answers.get(STEADY), study.config.run.crank_speed
     if steady is None:
         return None
-    residuals, keeps_speed = _residuals(study), reaches(steady.speed_mean, requested)
-    # a balance of NaN is not kept either
-    left_out = [name for name in study.answers if not residuals.get(name, 0.0) < RESIDUAL]
+    keeps_speed, wrong = reaches(steady.speed_mean, requested), wrong_runs(study)
+    left_out = [name for name in study.answers if name in wrong]
     reserves = {
         name: a.torque_reserve
         for name, a in study.answers.items()

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import typing
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -19,7 +19,7 @@ from ..drives.motors import MOTORS
 from ..drives.shafts import SECTIONS as PROFILES
 from ..drives.shafts import Shaft
 from ..models import MACHINES
-from ..quantities import Layout, Variable, variables
+from ..quantities import Layout, Variable, variables, written
 from ..text import CHOICES as UNITS
 from ..units import shortest_text
 from .config import Config, parse
@@ -31,6 +31,8 @@ from .sweep_table import SweepEntry
 
 _FOLLOWS = {
     "gear.ratio": "the one that gives the crank its speed under the mean load; with [sizing] the nearest on offer",
+    "gear.efficiency": "98 % a stage of a helical gear, 70 % of a worm gear, 95 % of a V-belt; see sizing.gear_kind",
+    "starter.inverter.boost": "5 %; with [sizing] the least of 5, 10 and 15 % with which the machine starts",
     "sizing.inertia_ratio": '10 with start = "inverter", else none',
     "chain.sweep_highest": "twice run.crank_speed, or 1.2 times the lowest mode of an organ if that is more",
     "motor.speed_control.kp": "tuned",
@@ -80,8 +82,6 @@ class Key:
     """a value is a number or a text with a unit, of a quantity that another key names"""
     left_out: str = ""
     """the value of a key that a file leaves out, as a file would write it; empty where there is none"""
-    whole: bool = False
-    """whether the number must be a whole number"""
     items: Variable | None = None
     """the quantity of the entries of a list"""
     most: int = 0
@@ -182,22 +182,20 @@ def _study(machine: str = "ChamberForces", motor: str = "") -> Config:
     return parse("\n".join(["[system]", *names]))
 
 
-def _numbers(
-    declared: type, values: Any = None, prefix: str = "", table: str = "", whole: Collection[str] = ()
-) -> Iterator[Key]:
-    """Keys of declared quantities. `values` are the values of a file that leaves them out; `whole` has the
-    names of whole numbers."""
+def _numbers(declared: type, values: Any = None, prefix: str = "", table: str = "") -> Iterator[Key]:
+    """Keys of declared quantities. `values` are the values of a file that leaves them out."""
     known = Layout(declared).by_name(values) if values is not None else {}
     for v in variables(declared):
         value = known.get(v.name, v.quantity.start)
         left_out = "" if value is None else shortest_text(value, v.unit, v.kind)
+        if value is not None and v.type != "Real":
+            left_out = written(value, v.type)
         follows = _FOLLOWS.get(f"{table}.{v.name}", "")
         yield Key(
             prefix + v.name,
             v.description,
             v,
             left_out="" if follows else left_out,
-            whole=v.name in whole,
             follows=follows,
         )
 
@@ -218,7 +216,7 @@ def _of_section(name: str) -> Iterator[Key]:
     values = getattr(_study(), name)
     if values is None:
         values = section.default or section.declaration()
-    yield from _numbers(section.declaration, values, table=name, whole=section.whole)
+    yield from _numbers(section.declaration, values, table=name)
     for key in _of_fields(section.keys):
         follows = _FOLLOWS.get(f"{name}.{key.name}", "")
         yield dataclasses.replace(key, follows=follows) if follows else key
@@ -280,7 +278,7 @@ def _of_event(of: type[Event]) -> Iterator[Key]:
     if of.has_input:
         yield Key("input", "input of the machine that rises, as [feed] has it", sort="text")
     yield Key("name", "name of its run, in small letters, digits and _", sort="text", follows="type and side")
-    yield from _numbers(of.Parameters, of.Parameters(), whole=of.counts)
+    yield from _numbers(of.Parameters, of.Parameters())
 
 
 def _of_entry(name: str) -> Iterator[Key]:

@@ -1,6 +1,6 @@
 """A linkage over the way of its driver at constant speed, by inverse dynamics: motion, torque, inertia, reactions.
 
-Extremes are those of the whole way, not those at the `PLACES` of the curves."""
+Extremes and means are those of the whole way, not those at the `PLACES` of the curves."""
 
 from __future__ import annotations
 
@@ -16,11 +16,12 @@ from ..machines.linkages.model import LinkageDescription
 from ..machines.linkages.structure import CYLINDER
 from ..machines.machine import Machine
 from ..mechanism.assur import PRISMATIC
+from ..mechanism.courses import largest, means, roots
 from ..quantities import Value, declaration, quantity
-from .arrays import rms
-from .peaks import largest, roots
 
 PLACES = 361
+_LOSSLESS = 1e-9
+"""Part of the mean size of a torque below which its mean is that of a machine without losses."""
 STANDS = 1e-9
 """A way [m] or an angle [rad] over which a part moves, below which it stands."""
 
@@ -179,16 +180,26 @@ def linkage_findings(machine: Machine, speed: float) -> LinkageFindings:
     places, values = largest(sizes, q, around=turns)
     at = {name: _folded(float(place), turns) for name, place in zip(names, places, strict=True)}
     top = dict(zip(names, map(float, values), strict=True))
-    torque = np.broadcast_to(state.bias, q.shape)
-    mean = float(np.mean(torque[:-1]))
+
+    def squares(q: Any) -> Any:
+        """The torque, and the squares of the torque and of the forces in the joints, of which the means count."""
+        state, at = way.state(q)
+        bias = np.broadcast_to(state.bias, q.shape)
+        return np.array(
+            [bias, bias**2, *(at[f"{joint}.fx"] ** 2 + at[f"{joint}.fy"] ** 2 for joint in joints.values())]
+        )
+
+    (mean, *mean_squares), (size, *_) = means(squares, *description.span)
     # the mean of a torque without losses is rounding
-    mean = mean if abs(mean) > 1e-12 * np.max(np.abs(torque)) else 0.0
+    mean = float(mean) if abs(mean) > _LOSSLESS * size else 0.0
+    torque_rms, *forces_rms = map(math.sqrt, mean_squares)
+    torque = np.broadcast_to(state.bias, q.shape)
     losses = sum(effect.dissipative for load, effect in state.effects.items() if load in ("pins", "guides"))
     gap = np.abs(state.torque_by_reactions(0.0) + losses - torque)
     sign = np.sign(np.broadcast_to(way.state(places[:1])[0].bias, 1)[0])
     turn = LinkageTurn(
         torque_peak=float(sign * top["torque"]),
-        torque_rms=_rms(torque),
+        torque_rms=torque_rms,
         torque_mean=mean,
         power_mean=mean * speed,
         inertia_least=-top["-inertia"],
@@ -207,10 +218,10 @@ def linkage_findings(machine: Machine, speed: float) -> LinkageFindings:
             name: JointTurn(
                 peak=top[f"force {name}"],
                 peak_at=at[f"force {name}"],
-                rms=_rms(np.hypot(outputs[f"{variable}.fx"], outputs[f"{variable}.fy"])),
+                rms=force_rms,
                 moment=top.get(f"{variable}.moment"),
             )
-            for name, variable in joints.items()
+            for (name, variable), force_rms in zip(joints.items(), forces_rms, strict=True)
         },
         {name: motion for name, motion, _ in motions if isinstance(motion, Stroke)},
         {name: motion for name, motion, _ in motions if isinstance(motion, Swing)},
@@ -267,9 +278,4 @@ def _motions(
 def _folded(q: float, turns: bool) -> float:
     """A place of the driver; the angle of one that turns from 0 to a whole turn."""
     folded = q % (2.0 * math.pi) if turns else q
-    return 0.0 if turns and 2.0 * math.pi - folded < STANDS else folded
-
-
-def _rms(x: Any) -> float:
-    """Over the way of the driver; its two ends count as one."""
-    return rms(x[:-1])
+    return 0.0 if turns and min(folded, 2.0 * math.pi - folded) < STANDS else folded

@@ -11,15 +11,15 @@ import numpy as np
 import xarray as xr
 
 from ..quantities import Layout, Value, Variable, declaration, quantity
-from . import protection
 from .arrays import peak
 from .drive import AbsentError
 from .limits import reaches
+from .protection import stall
+from .relay import relay_trip
 from .stored import energy_gap, energy_held, stored_shares
+from .verdict import CREEPS
 from .window import Phase, Window, drift, end_gap
 
-CREEPS = 0.5
-"""Share of the requested speed below which a machine counts as standing."""
 STARTED = 0.95
 """Share of the speed at which a start ends, see `time_to_start`."""
 
@@ -68,8 +68,8 @@ def _recovery(w: Window) -> float | None:
 
 
 def _relay(w: Window) -> float | None:
-    """Time after the event at which the thermal relay trips, set to the motor's rated current. None after the
-    coupling opened, as no load is left that could trip the relay."""
+    """Time after the event at which the thermal relay trips, set to the motor's rated current and of the class that
+    the start of the drive needs. None after the coupling opened, as no load is left that could trip the relay."""
     setting = w.drive.rated_current
     if setting is None or w.trip is not None:
         return None
@@ -77,7 +77,7 @@ def _relay(w: Window) -> float | None:
     current = w.value(w.current)
     # the current at the end is assumed to flow on
     lasts = float(np.sqrt(np.mean(current[-max(1, len(current) // 5) :] ** 2)))
-    return protection.relay_trip(w.since, current, setting, w.steady.rms(w.current), lasts)
+    return relay_trip(w.since, current, setting, w.steady.rms(w.current), lasts, w.relay_class)
 
 
 def _slack_time(w: Window) -> float | None:
@@ -297,8 +297,8 @@ class Answers:
         during=_AT_SPEED,
     )
     recovery_time: Value = measure("s", "recovery", _recovery, during=_EVENTS)
-    web_pull_least: Value = measure("N", "least pull in a web", lambda w: w.least_pull("web"), during=_ALL)
-    wall_pull_least: Value = measure("N", "least pull in a wall", lambda w: w.least_pull("wall"), during=_ALL)
+    web_pull_least: Value = measure("N", "web end pull, least", lambda w: w.least_pull("web"), during=_ALL)
+    wall_pull_least: Value = measure("N", "wall end pull, least", lambda w: w.least_pull("wall"), during=_ALL)
     slack_time: Value = measure(
         "1", "share of the time with a slack rod", _slack_time, kind="percent", during=_ALL
     )
@@ -331,7 +331,7 @@ class Answers:
     stall_time: Value = measure(
         "s",
         "crank stands after",
-        lambda w: protection.stall(w.since, w.speed, w.normal_speed),
+        lambda w: stall(w.since, w.speed, w.normal_speed),
         during=_EVENTS,
     )
     thermal_trip_time: Value = measure("s", "thermal relay trips after", _relay, during=_EVENTS)

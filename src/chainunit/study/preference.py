@@ -131,18 +131,28 @@ def _judge(c: Candidate) -> None:
     if c.fits:
         loads = [check for name, check in c.checks.items() if name not in TOLERANCES]
         most = max(loads, key=lambda check: check.utilisation or 0.0)
-        c.verdict = Standing.FITS
+        c.verdict = Standing.FITS if c.keeps_margin else Standing.BARELY
         c.reason = f"most used: {most.title}, {number(c.use, '1', 'used')}"
     elif not c.checks:
         # the run failed, and the reason is already set
         c.verdict = Standing.REJECTED
     elif not c.starts:
-        c.verdict, c.reason = Standing.REJECTED, "it does not bring the machine up to speed"
+        c.verdict, c.reason = Standing.REJECTED, _unstarted(c)
     else:
         over = [check for name, check in c.checks.items() if c.sizes[name] > 1.0]
         c.verdict, c.reason = Standing.REJECTED, "; ".join(check.excess for check in over)
     if c.disc:
         c.reason += f", with a flywheel of {c.flywheel_words}"
+
+
+def _unstarted(c: Candidate) -> str:
+    """The reason of a candidate that does not bring the machine up to speed."""
+    if c.stall_angle is None:
+        return "it does not bring the machine up to speed"
+    reason = f"without a flywheel it stalls at {number(c.stall_angle, 'rad')} of the crank"
+    if c.heaviest:
+        reason += f", and no flywheel of up to {number(c.heaviest, 'kg.m2')} carries it through"
+    return reason
 
 
 def _chosen(best: Candidate, ranking: Sequence[Candidate]) -> str:

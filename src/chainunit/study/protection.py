@@ -1,10 +1,8 @@
-"""The protection of a drive by thermal relay and safety coupling, and the stall from which they protect
-it."""
+"""The protection of a drive by a safety coupling, and the stall from which it protects."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
@@ -12,48 +10,6 @@ from typing import Any
 import numpy as np
 
 from ..quantities import Value, declaration, quantity, variables
-
-TRIP_CLASS = 10.0
-"""Time in which a relay of this class trips at 7.2 times its setting, from cold [s] (IEC 60947-4-1)."""
-_PICK_UP = 1.1  # middle of the range 1.05 .. 1.2 in which such a relay has to trip
-
-
-def relay_time_constant(trip_class: float = TRIP_CLASS) -> float:
-    """Time constant [s] of a thermal image that trips after `trip_class` seconds at 7.2 times the setting."""
-    heating = 7.2**2
-    return trip_class / math.log(heating / (heating - _PICK_UP**2))
-
-
-def relay_image(time: Any, current: Any, setting: float, before: float) -> Any:
-    """Thermal image of a relay, set to `setting` [A], over `time` [s] with `current` [A], shape (n,); it
-    trips at 1.
-
-    The image is of first order in the square of the current; `before` is the RMS current before the run [A].
-    """
-    tau = relay_time_constant()
-    heating = (np.asarray(current) / (setting * _PICK_UP)) ** 2
-    image = np.empty(len(heating))
-    image[0] = (before / (setting * _PICK_UP)) ** 2
-    step = np.diff(np.asarray(time))
-    decay = np.exp(-step / tau)
-    middle = 0.5 * (heating[1:] + heating[:-1])
-    for k in range(len(step)):
-        image[k + 1] = middle[k] + (image[k] - middle[k]) * decay[k]
-    return image
-
-
-def relay_trip(time: Any, current: Any, setting: float, before: float, holds: float) -> float | None:
-    """Time at which the relay trips [s], also after the run, with the lasting current `holds` [A]; None where
-    it never trips."""
-    image = relay_image(time, current, setting, before)
-    over = np.flatnonzero(image >= 1.0)
-    if over.size:
-        return float(time[over[0]])
-    final = (holds / (setting * _PICK_UP)) ** 2
-    if final <= 1.0:
-        return None
-    return float(time[-1]) + relay_time_constant() * math.log((final - image[-1]) / (final - 1.0))
-
 
 MARGIN = 1.25
 """Ratio of the setting of a safety coupling to the largest torque of normal duty."""
@@ -74,6 +30,28 @@ class Obstacle(StrEnum):
     """the gear may not carry the torque of the setting"""
     OVERLOADS = "the overloads"
     """no overload reaches the torque of the setting"""
+    RELEASE = "the release"
+    """until no torque passes the opening coupling, the gear carries as much as without it, or more than it may"""
+    ENERGY = "the energy balance"
+    """the energy balance is not kept in the runs from which the setting follows"""
+
+
+_SPARED = 0.05
+"""Share of the torque at the output of the gear that a coupling has to spare it in an overload."""
+
+
+@dataclass(frozen=True)
+class CouplingEffect:
+    """The effect of a safety coupling in an overload: the largest torque at the output of the gear [N m] without it,
+    and with it until no torque passes it any more."""
+
+    without: float
+    with_coupling: float
+
+
+def spares(effects: Mapping[str, CouplingEffect]) -> bool:
+    """Whether a coupling spares the gear a part of its torque in one of the overloads."""
+    return any(effect.with_coupling < (1.0 - _SPARED) * effect.without for effect in effects.values())
 
 
 @dataclass(frozen=True)
@@ -94,6 +72,10 @@ class Setting:
     gear: float
     overloads: Mapping[str, float]
     disturbances: Mapping[str, float] = field(default_factory=dict)
+    effects: Mapping[str, CouplingEffect] = field(default_factory=dict)
+    """the effect of the least setting in each overload that opens it; empty until it was tried"""
+    wrong: Sequence[str] = ()
+    """runs that were left out, as their energy balance is not kept; without steady running there are no overloads"""
 
     @property
     def normal(self) -> float:
@@ -125,14 +107,26 @@ class Setting:
     @property
     def obstacle(self) -> Obstacle | None:
         """The reason why there is no setting; None where there is one."""
+        if self.wrong and not self.overloads:
+            return Obstacle.ENERGY
         if self._protects(self.least):
-            return None
+            return None if self.spares else Obstacle.RELEASE
         if self.start_decides and self._protects(self.least_in_running):
             return Obstacle.START
         if self.least >= self.gear:
             return Obstacle.GEAR
         weak = self.overloads and self.least_in_running >= self.motor
         return Obstacle.MOTOR if weak else Obstacle.OVERLOADS
+
+    @property
+    def passed(self) -> dict[str, CouplingEffect]:
+        """The overloads in which the gear carries more than it may, though the coupling opens."""
+        return {name: effect for name, effect in self.effects.items() if effect.with_coupling > self.gear}
+
+    @property
+    def spares(self) -> bool:
+        """Whether a coupling of the least setting spares the gear something, and enough; True until it was tried."""
+        return not self.effects or (spares(self.effects) and not self.passed)
 
     @property
     def torque(self) -> float | None:
@@ -189,16 +183,13 @@ class WayNumbers:
 
 @dataclass(frozen=True)
 class Alternative:
-    """A way with its numbers, and the peaks of the overloads in which its coupling opens or slips, by name."""
+    """A way with its numbers, the peaks of the overloads in which its coupling opens or slips, by name, and its
+    effects in those that open it."""
 
     way: Way
     numbers: WayNumbers
     opens: Mapping[str, float]
-
-    @property
-    def holds(self) -> bool:
-        """Whether the coupling has a setting that the start does not reach, and opens in an overload."""
-        return self.numbers.setting is not None and bool(self.opens)
+    effects: Mapping[str, CouplingEffect] = field(default_factory=dict)
 
 
 def stall(time: Any, speed: Any, requested: float, share: float = 0.1) -> float | None:

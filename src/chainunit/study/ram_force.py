@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..mechanism.assur import GROUND, PRISMATIC, REVOLUTE
+from ..mechanism.courses import ROUNDING, roots
 from .record import StudyRecord
 from .turn import TurnAnalysis
 
@@ -25,39 +26,43 @@ TIMES = 2.0
 
 @dataclass(frozen=True)
 class RamForce:
-    """A ram over a turn of the crank: `angle` [rad], `lever` = |ds/dphi| [m] and `way` [m], each of shape (n,); the
-    largest `working` force of normal running along the guide [N]; and the index `dead` of the dead centre before
-    which it works."""
+    """A ram over a turn of the crank: `angle` [rad] and `rate` = ds/dphi [m], each of shape (n,); the largest
+    `working` force of normal running along the guide [N]; and the angle `dead` of the dead centre before which it
+    works [rad], between the angles of the turn."""
 
     ram: str
     angle: Any
-    lever: Any
-    way: Any
+    rate: Any
     working: float
-    dead: int
+    dead: float
+
+    def lever(self, before: Any) -> Any:
+        """|ds/dphi| at so much crank angle [rad] before the dead centre [m]."""
+        return np.abs(np.interp(self.dead - before, self.angle, self.rate, period=2.0 * math.pi))
 
     def least(self, torque: float) -> float:
         """The force where the ram is fastest [N], for a torque of the crank [N m]."""
-        return float(torque / np.max(self.lever))
+        return float(torque / np.max(np.abs(self.rate)))
 
     def before(self, torque: float, angle: float) -> float:
-        """The force at so much crank angle [rad] before the dead centre [N]."""
-        turn = 2.0 * math.pi
-        lever = np.interp(self.angle[self.dead] - angle, self.angle, self.lever, period=turn)
-        return float(torque / lever)
+        """The force at so much crank angle [rad] before the dead centre [N]; without limit at the dead centre."""
+        lever = float(self.lever(angle))
+        return torque / lever if lever > ROUNDING * float(np.max(np.abs(self.rate))) else math.inf
 
     def overloaded(self, torque: float) -> tuple[float, float] | None:
         """Crank angle [rad] and way [m] before the dead centre within which `torque` [N m] stands for more than
         `TIMES` the working force; None where it does at every angle."""
         n, limit = len(self.angle), torque / (TIMES * self.working)
-        places = (self.dead - np.arange(n)) % n  # backwards from the dead centre
-        lever, way = self.lever[places], self.way[places]
+        before = np.arange(n) * (2.0 * math.pi / n)
+        lever = self.lever(before)
         k = int(np.argmax(lever >= limit))
         if lever[k] < limit:
             return None
+        # at the dead centre itself, where k is 0 for a limit of 0, the lever is nothing
         share = (limit - lever[k - 1]) / (lever[k] - lever[k - 1]) if k else 0.0
-        at = way[k - 1] + share * (way[k] - way[k - 1]) if k else way[0]
-        return (max(k - 1, 0) + share) * 2.0 * math.pi / n, float(abs(way[0] - at))
+        angle = float(before[max(k - 1, 0)] + share * before[1])
+        within = np.append(before[:k], angle)
+        return angle, float(np.trapezoid(self.lever(within), within))
 
 
 def rams(study: StudyRecord) -> Iterator[RamForce]:
@@ -76,12 +81,11 @@ def rams(study: StudyRecord) -> Iterator[RamForce]:
             continue
         guide, force = (attrgetter(description.variable("joint", each))(turn.outputs) for each in (name, pin))
         shape = turn.angle.shape
-        lever = np.abs(np.broadcast_to(guide.v, shape)) / study.config.run.crank_speed
-        way = np.broadcast_to(guide.s, shape)
+        rate = np.broadcast_to(guide.v, shape) / study.config.run.crank_speed
         size = np.broadcast_to(_along(guide, force), shape)
-        dead = max(_dead_centres(guide.v, lever), key=lambda k: _before(size, k), default=None)
+        dead = max(_dead_centres(turn.angle, rate), key=lambda q: _before(turn.angle, size, q), default=None)
         if dead is not None and np.max(size) > 0.0:
-            yield RamForce(ram, turn.angle, lever, way, float(np.max(size)), dead)
+            yield RamForce(ram, turn.angle, rate, float(np.max(size)), dead)
 
 
 def _along(guide: Any, force: Any) -> Any:
@@ -96,14 +100,17 @@ def _along(guide: Any, force: Any) -> Any:
     return np.abs(force.fx * across[1] - force.fy * across[0]) / size
 
 
-def _dead_centres(v: Any, lever: Any) -> list[int]:
-    """The places at which the speed of the ram changes its sign, the one nearer to rest of each pair."""
-    changes = [int(k) for k in np.flatnonzero(v * np.roll(v, -1) < 0.0)]
-    pairs = [(k, (k + 1) % len(v)) for k in changes]
-    return [min(pair, key=lambda k: float(lever[k])) for pair in pairs]
+def _dead_centres(angle: Any, rate: Any) -> list[float]:
+    """The crank angles at which the ram turns back [rad]."""
+
+    def rate_at(q: Any) -> Any:
+        return np.interp(q, angle, rate, period=2.0 * math.pi)[None]
+
+    (found,) = roots(rate_at, np.append(angle, angle[0] + 2.0 * math.pi), around=True)
+    return [float(q) % (2.0 * math.pi) for q in found]
 
 
-def _before(size: Any, place: int) -> float:
+def _before(angle: Any, size: Any, place: float) -> float:
     """Mean of a force over the thirty degrees before a place."""
-    count = max(1, len(size) // 12)
-    return float(np.mean([size[(place - k) % len(size)] for k in range(1, count + 1)]))
+    places = place - np.radians(np.arange(0.5, 30.0))
+    return float(np.mean(np.interp(places, angle, size, period=2.0 * math.pi)))

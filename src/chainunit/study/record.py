@@ -23,6 +23,7 @@ from .monte_carlo import MonteCarloResult
 from .parts import LENGTHS
 from .protection import Alternative, Setting
 from .pulls import LeastPull
+from .relay import LIGHT
 from .shaft import Cycles, ShaftAnswers
 from .sizing import SizingResult
 from .statics import DriveStatics
@@ -43,6 +44,9 @@ Amount: TypeAlias = (
 )
 """A number and its unit; optionally the kind by which it is shown, and the number of digits."""
 
+
+_CHOSEN = ("gear.efficiency", "starter.inverter.boost")
+"""Values that sizing chooses where the file leaves them out, see `chainunit.study.choice.as_chosen`."""
 
 Origins: TypeAlias = Literal["file", "example", "declared", "tuned", "catalogue", "sizing"]
 """The origin of a value."""
@@ -138,6 +142,8 @@ class StudyRecord:
     """ways to a coupling that a start does not open, where the start is more than running"""
     ripple_without: float | None = None
     """fluctuation of the speed in steady running without the study's feed-forward"""
+    relay_class: int = LIGHT
+    """trip class of the thermal relay that holds in the start, of a motor of the catalogue on the line"""
     findings: dict[str, Any] = field(default_factory=dict)
     """`Findings` of each analysis, by its name"""
     chain: ChainResult | None = None
@@ -182,6 +188,8 @@ class StudyRecord:
         example, tuning, the catalogue (by the motor that the file names or that sizing chose), or its
         declaration."""
         section, _, parameter = name.partition(".")
+        if name in _CHOSEN and self.sizing is not None and self._of(name) == "declared":
+            return "sizing"
         if section == "motor" and self.tuning is not None and parameter in self.tuning.parameters:
             return "file" if name in self.config.given else "tuned"
         if section == "machine" and parameter in LENGTHS and self.config.gives("ratios"):
@@ -220,7 +228,7 @@ class StudyRecord:
     @property
     def kind(self) -> str:
         """The heading of a report on this kind of study."""
-        return f"{self.noun.capitalize()}: forces, torque and overload"
+        return f"{self.noun[:1].upper()}{self.noun[1:]}: forces, torque and overload"
 
     @property
     def noun(self) -> str:
@@ -289,7 +297,7 @@ class StudyRecord:
         steady = None
         if phase in (Phase.START_UP, Phase.EVENT, Phase.LOADED_START):
             steady = Window(Phase.STEADY, self.steady, self.drive, sides, requested)
-        return Window(phase, run, self.drive, sides, requested, begin, steady, trip)
+        return Window(phase, run, self.drive, sides, requested, begin, steady, trip, self.relay_class)
 
     @property
     def motor(self) -> Any:

@@ -327,32 +327,26 @@ def _happenings(study: StudyRecord, name: str) -> Iterator[tuple[str, str, dict[
         yield "not recovered", "", {}
 
 
-_SHORT_TIME = 1.5
-"""Current that an inverter gives for a short time, over the rated current; few give twice the rated
-current."""
-
-
 def _on_inverter(study: StudyRecord) -> None:
     """Note the runs with a current that an inverter can hardly give; its own limit is not in the model of the
     motor."""
     rated_current = study.drive.rated_current
     if rated_current is None or study.config.start != "inverter":
         return
+    limit = study.config.starter.overload
     runs = {name: a.current_peak for name, a in (("start_up", study.start), *study.answers.items()) if a}
-    high = {
-        name: peak for name, peak in runs.items() if peak is not None and peak > _SHORT_TIME * rated_current
-    }
+    high = {name: peak for name, peak in runs.items() if peak is not None and peak > limit * rated_current}
     if high:
         where = (
             f"{study.title_of(name)} ({number(peak / rated_current, '1')})" for name, peak in high.items()
         )
         study.note(
             "inverter current",
-            "The inverter's own current limit is not in the model, and usual ones give {limit} to 2 times the rated "
-            "current of their motor for a short time. Take one for the peak current, or the motor gives less torque "
-            "than here. Times the rated {rated}: {where}.",
+            "The inverter's own current limit is not in the model, and one of the rated current of the motor gives "
+            "{limit} times that for up to 60 s (starter.overload). Take one for the peak current, or the motor gives "
+            "less torque than here. Times the rated {rated}: {where}.",
             *high,
-            limit=f"{_SHORT_TIME:g}",
+            limit=f"{limit:g}",
             rated=(rated_current, "A"),
             where="; ".join(where),
             **{f"{name}.current_peak": (peak, "A") for name, peak in high.items()},

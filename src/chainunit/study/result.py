@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from .. import __version__
 from ..drives.catalogue import CatalogueMotor
 from ..quantities import variables
 from ..text import entries, entry, shown_in, turning
-from .coupling import coupling_sentence, way_words
+from .coupling import coupling_sentence, way_words, why_none
+from .event_torques import running_peak, running_words
 from .given import given_sections
 from .judgement import motor_verdict
 from .measures import measures_of
+from .protection import CouplingEffect
 from .record import StudyRecord
+from .relay import class_words
+from .starts import LARGE, StartAnalysis
+from .torques import at_gear
+from .verdict import STEADY
 from .window import Phase
 
 
@@ -165,7 +172,7 @@ def _parts(study: StudyRecord) -> dict[str, Any]:
     config = study.config
     parts = {name: findings.as_dict() for name, findings in study.findings.items()}
     if study.sizing:
-        parts["sizing"] = study.sizing.as_dict() | {"protection": _protection(study)}
+        parts["sizing"] = study.sizing.as_dict() | {"gear": _gear(study), "protection": _protection(study)}
     if study.monte_carlo:
         parts["monte_carlo"] = study.monte_carlo.as_dict()
     if study.statics.torsion is not None:
@@ -175,31 +182,56 @@ def _parts(study: StudyRecord) -> dict[str, Any]:
     return parts
 
 
+def _gear(study: StudyRecord) -> dict[str, Any]:
+    """The torques by which the gear of the drive that sizing chose is ordered; empty without steady running, and for
+    an insufficient motor."""
+    if study.insufficient or STEADY not in study.answers:
+        return {}
+    running, starts = running_peak(study, at_gear), study.findings.get(StartAnalysis.name)
+    given = "gear.start_factor" in study.config.given
+    factor = study.config.gear.start_factor if given else LARGE
+    start = starts.worst.gear_torque if starts else 0.0
+    titles = {
+        "rated_torque": f"gear, rated output torque at least, with {factor:g} times that in a start",
+        "running": f"largest torque of {running_words(study, running.run)} on the output of the gear",
+        "start": "largest torque of a start on the output of the gear",
+    }
+    torques = {"rated_torque": max(running.torque, start / factor), "running": running.torque}
+    torques |= {"start": start} if starts else {}
+    return {name: entry(torque, "N.m") | {"title": titles[name]} for name, torque in torques.items()}
+
+
 def _protection(study: StudyRecord) -> dict[str, Any]:
     """Settings of the protection of the drive that sizing chose; empty where the motor is insufficient."""
     assert study.sizing is not None
     if study.insufficient:
         return {}
     current = study.sizing.best.motor.nameplate.rated_current
-    relay = entry(current, "A") | {"title": "thermal relay, setting"}
+    relay = _relay(study, current)
     setting = study.setting
     if setting is None:
-        return {"relay_current": relay}
+        return relay
 
     def torque(value: float | None, title: str) -> dict[str, Any]:
         return entry(value, "N.m") | {"title": title}
 
     return {
         "trip_torque": torque(setting.torque, "safety coupling, trip torque at the crank"),
-        "relay_current": relay,
+        "trip_torque_at_motor": torque(
+            setting.torque and setting.torque / study.drive.ratio,
+            "safety coupling, trip torque at the motor's shaft",
+        ),
+        **relay,
         "coupling": coupling_sentence(study),
         "obstacle": setting.obstacle,
+        "why_none": why_none(study),
         "normal_torque": torque(
             setting.normal, "largest torque of normal duty on the coupling, at the crank"
         ),
         "running_torque": torque(setting.running, "largest torque of running on the coupling"),
         "start_torque": torque(setting.start, "largest torque of a start on the coupling"),
         "breakdown_torque": torque(setting.motor, "most that the motor gives at the crank"),
+        "effects": _effects(study, setting.effects),
         "overloads": {
             name: torque(
                 peak, f"{study.title_of(name)}: {'opens it' if name in setting.opens else 'leaves it shut'}"
@@ -219,9 +251,37 @@ def _protection(study: StudyRecord) -> dict[str, Any]:
                 "words": way_words(study, each),
                 **entries(each.numbers, with_titles=True),
                 "opens": {name: entry(peak, "N.m") for name, peak in each.opens.items()},
+                "effects": _effects(study, each.effects),
             }
             for each in study.alternatives
         ],
+    }
+
+
+def _effects(study: StudyRecord, effects: Mapping[str, CouplingEffect]) -> dict[str, Any]:
+    """The effects of a safety coupling as it was tried, by overload."""
+    titles = {"without": "without a coupling", "with_coupling": "with it"}
+    return {
+        name: {
+            key: entry(getattr(effect, key), "N.m")
+            | {"title": f"{study.title_of(name)}: peak at the output of the gear, {words}"}
+            for key, words in titles.items()
+        }
+        for name, effect in effects.items()
+    }
+
+
+def _relay(study: StudyRecord, rated: float) -> dict[str, Any]:
+    """The device that protects the motor from heat, its setting, and its trip class, which that of an inverter does
+    not need."""
+    if study.drive.follows:
+        device = "electronic motor protection of the inverter"
+        return {"relay_current": entry(rated, "A") | {"title": f"{device}, setting"}, "device": device}
+    words = class_words(study.relay_class)
+    return {
+        "relay_current": entry(rated, "A") | {"title": "thermal relay, setting"},
+        "relay_class": {"value": words, "unit": "1", "title": "thermal relay, trip class of IEC 60947-4-1"},
+        "device": "relay",
     }
 
 

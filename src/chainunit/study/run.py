@@ -21,7 +21,7 @@ from . import verdict
 from .analyses import ANALYSES
 from .bearings import pin_loads
 from .chain import study_chain
-from .choice import choose
+from .choice import as_chosen, choose
 from .config import Config
 from .coupling import recommended_setting
 from .coupling_alternatives import alternatives
@@ -32,9 +32,11 @@ from .monte_carlo import run as run_monte_carlo
 from .observation import with_observer
 from .pulls import least_pulls
 from .record import Spread, StudyRecord
+from .relay import start_class
 from .remarks import conclude
 from .rig import Rig, Transient
 from .shaft import shaft_answers, with_rigid
+from .starts import StartAnalysis
 from .statics import statics
 from .torques import on_coupling
 from .window import Phase, Trip, whole_turns
@@ -83,6 +85,7 @@ def _run_study(
 ) -> StudyRecord:
     """See `run_study`."""
     choice = choose(config, folder / "fmu", report, backend)
+    config = as_chosen(config, choice.drive)
     drive = with_observer(config, choice.drive)
     if check and drive.outsiders:
         titles = " and ".join(drive.outsiders)
@@ -105,6 +108,7 @@ def _run_study(
             task = Task(config, replace(drive, observer=None), files, runner.stop, runner.rig.fed_from)
             study.monte_carlo = run_monte_carlo(task, folder, report, scheduler=scheduler)
         _analyse(study, runner.rig, report, needs_runs=True)
+        _with_class_of_all_starts(study)
         study.setting = recommended_setting(study)
         study.alternatives = alternatives(study, runner.rig, report)
     except RunError as error:
@@ -128,6 +132,22 @@ def _analyse(study: StudyRecord, rig: Rig, report: Report, *, needs_runs: bool) 
             findings = analysis.find(study, rig, report)
             if findings is not None:
                 study.findings[analysis.name] = findings
+
+
+def _with_class_of_all_starts(study: StudyRecord) -> None:
+    """Where a start from another crank angle takes a relay of a heavier class, read its trips in the events once
+    more."""
+    found = study.findings.get(StartAnalysis.name)
+    if found is None or found.start_class <= study.relay_class:
+        return
+    study.relay_class = found.start_class
+    for name in study.overloads:
+        if study.answers[name].coupling_trip_time is None:
+            begin = study.event[name]
+            phase = Phase.LOADED_START if study.config.events[name].from_rest else Phase.EVENT
+            window = study.window(phase, study.runs[name].sel(time=slice(begin, None)), begin)
+            later = read_measure("thermal_trip_time", window)
+            study.answers[name] = replace(study.answers[name], thermal_trip_time=later)
 
 
 def _check_random(config: Config, rig: Rig) -> None:
@@ -248,6 +268,7 @@ class Runner:
         whole = study.window(Phase.START_UP, run.sel(time=slice(None, begin)))
         start_time = read_measure("start_time", whole)
         study.start = replace(read_answers(study.window(Phase.START_UP, start)), start_time=start_time)
+        self._relay(run)
         study.fed_from = rig.fed_from
         self._pins_and_pulls(verdict.START, start)
         if rig.fed_from is not None:
@@ -260,6 +281,20 @@ class Runner:
                 f"the safety coupling opens in steady running, which puts {number(torque, 'N.m', digits=4)} on it; "
                 "coupling.trip_torque must be above that"
             )
+
+    def _relay(self, run: xr.Dataset) -> None:
+        """Record the trip class of the relay that the start-up needs; that of a motor chosen by sizing holds from
+        every crank angle."""
+        study, drive = self.study, self.rig.drive
+        assert study.start is not None
+        time, rated = study.start.start_time, drive.rated_current
+        if time is None or rated is None or drive.follows:
+            return
+        rise = run.sel(time=slice(None, time))
+        current = rise[f"motor.{drive.motor.current}"].values
+        study.relay_class = start_class(rise["time"].values, current, rated)
+        if study.sizing is not None:
+            study.relay_class = max(study.relay_class, study.sizing.best.start_class or 0)
 
     def _event(self, simulation: Simulation, event: Event, begin: float, before: float) -> Transient:
         stop = begin + event.follow(self.study.config.turn)

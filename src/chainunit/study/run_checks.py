@@ -11,6 +11,7 @@ from ..machines.chain_unit import SideLoads
 from ..quantities import Layout
 from ..refusals import unit_behind
 from ..system.signals import Profile
+from .event_table import inputs_of
 
 MOST_STEPS = 1e6
 """Most steps of a study."""
@@ -41,11 +42,10 @@ def loads_beyond(config: Any) -> Iterator[InputError]:
         if not needed <= set(inputs):
             asked = config.monte_carlo.runs or where != "monte_carlo.event"
             if asked and config.foreign is None and not needed <= {*inputs, *of_motors}:
-                loads = Layout(model.Feed).names
-                near = "".join(near_name(name, loads) for name in needed)
+                near = "".join(near_name(name, Layout(model.Feed).names) for name in needed)
                 yield InputError(
-                    f"{where}: the {model.name} has no input {' or '.join(sorted(needed))}{near}; its inputs: "
-                    f"{', '.join(loads)}",
+                    f"{where}: the {model.name} has no input {' or '.join(sorted(needed))}{near}; "
+                    f"{inputs_of(model)}",
                     key=key,
                 )
             # an input of the motor: the study checks whether the motor has it

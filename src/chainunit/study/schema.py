@@ -189,7 +189,7 @@ class _Schema:
     def _form(self, key: Key, table: KeyTable) -> dict[str, Any]:
         description = {"description": _sentence(key)}
         if key.variable is not None:
-            return self._quantity(key.variable, whole=key.whole) | description
+            return self._quantity(key.variable) | description
         if key.sort == "switch":
             return {"type": "boolean"} | description
         if key.sort == "list" and key.items is None:
@@ -219,15 +219,17 @@ class _Schema:
         outline = {"type": "array", "items": corner, "minItems": 3}
         return {"type": "array", "items": outline} if key.name.endswith("holes") else outline
 
-    def _quantity(self, variable: Variable, *, whole: bool = False) -> dict[str, Any]:
-        """A number within its bounds, or a text with a unit that fits."""
+    def _quantity(self, variable: Variable) -> dict[str, Any]:
+        """A number within its bounds, or a text with a unit that fits; or a switch."""
         q = variable.quantity
+        if q.type == "Boolean":
+            return {"anyOf": [{"type": "boolean"}, {"enum": [0, 1]}]}
         form: dict[str, Any] = {"type": "number"}
         if math.isfinite(q.low):
             form |= {"exclusiveMinimum": q.low} if q.open_low else {"minimum": q.low - q.slack}
         if math.isfinite(q.high):
             form["maximum"] = q.high + q.slack
-        if whole:
+        if whole := q.type == "Integer":
             form["multipleOf"] = 1
         positive = q.open_low and q.low == 0.0 and q.unit != "K"
         text = (pattern(q, whole=whole, share=may_be_share(variable)), positive)

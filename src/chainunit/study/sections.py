@@ -25,7 +25,7 @@ from .identification import table as identify_table
 from .observer_table import ObserverTable
 from .optimum import table as optimize_table
 from .sizing_table import SIZING_KEYS, Sizing
-from .sweep_table import FIELDS, WHOLE, SweepTable
+from .sweep_table import FIELDS, SweepTable
 
 
 @declaration
@@ -61,9 +61,10 @@ class Run:
     turns: Value = quantity(
         "1",
         "whole crank turns of steady running that are evaluated and that load_cycle.csv holds",
-        default=1.0,
-        min=1.0,
-        max=1e4,
+        default=1,
+        min=1,
+        max=10_000,
+        type="Integer",
     )
     winding_temperature: Value = quantity(
         "K",
@@ -100,11 +101,15 @@ class Coupling:
 class MonteCarlo:
     """Overloads at random crank angles and times."""
 
-    runs: Value = quantity("1", "number of runs; with 0 there are none", default=0.0, min=0.0, max=1e6)
+    runs: Value = quantity(
+        "1", "number of runs; with 0 there are none", default=0, min=0, max=1_000_000, type="Integer"
+    )
     duration: Value = quantity(
         "s", "time that is followed after the event", default=2.0, min=0.05, max=1e4, usual=(0.05, 600.0)
     )
-    seed: Value = quantity("1", "seed of the random numbers", default=1.0, min=0.0, max=1e9)
+    seed: Value = quantity(
+        "1", "seed of the random numbers", default=1, min=0, max=1_000_000_000, type="Integer"
+    )
 
 
 @declaration
@@ -129,6 +134,13 @@ class Starter:
 
     soft_start: SoftStart = group(SoftStart, "soft starter", default=SoftStart(voltage=0.5, time=1.0))
     inverter: InverterControl = group(InverterControl, "inverter", default=InverterControl())
+    overload: Value = quantity(
+        "1",
+        "largest current of an inverter, for up to 60 s, over the rated current of the motor",
+        default=1.5,
+        min=1.0,
+        max=5.0,
+    )
 
 
 @declaration
@@ -157,7 +169,7 @@ class TorsionTable:
         "1", "largest speed, in parts of that of normal running", default=2.0, above=0.0, max=1e3
     )
     points: Value = quantity(
-        "1", "number of speeds of the resonance curve", default=200.0, min=10.0, max=5000.0
+        "1", "number of speeds of the resonance curve", default=200, min=10, max=5000, type="Integer"
     )
     margin: Value = quantity(
         "1",
@@ -172,15 +184,15 @@ class TorsionTable:
     )
     bend_low: Value = quantity("rad", "least bend of the map", default=0.0, min=0.0, max=1.5)
     bend_high: Value = quantity("rad", "largest bend of the map", default=0.7, min=0.0, max=1.5)
-    speeds: Value = quantity("1", "number of speeds of the map", default=64.0, min=2.0, max=1000.0)
-    bends: Value = quantity("1", "number of bends of the map", default=14.0, min=2.0, max=1000.0)
+    speeds: Value = quantity("1", "number of speeds of the map", default=64, min=2, max=1000, type="Integer")
+    bends: Value = quantity("1", "number of bends of the map", default=14, min=2, max=1000, type="Integer")
 
 
 @declaration
 class ChainOrgans(OrganLaw):
     """The organs as chains, where `organ` is "chain", and the sweep over crank speeds with them."""
 
-    rods: Value = quantity("1", "number of rods of an organ", default=8.0, min=float(LEAST), max=float(MOST))
+    rods: Value = quantity("1", "number of rods of an organ", default=8, min=LEAST, max=MOST, type="Integer")
     sweep_lowest: Value = quantity(
         "rad/s", "lowest crank speed of the sweep", default=1.0, min=0.01, max=1000.0
     )
@@ -190,15 +202,26 @@ class ChainOrgans(OrganLaw):
     sweep_points: Value = quantity(
         "1",
         "number of speeds of the sweep, to which run.crank_speed is added; with 0 it is alone",
-        default=15.0,
-        min=0.0,
-        max=200.0,
+        default=15,
+        min=0,
+        max=200,
+        type="Integer",
     )
     starts: Value = quantity(
-        "1", "starts at each speed, evenly over the turn: at least 10", default=10.0, min=10.0, max=1000.0
+        "1",
+        "starts at each speed, evenly over the turn: at least 10",
+        default=10,
+        min=10,
+        max=1000,
+        type="Integer",
     )
     turns: Value = quantity(
-        "1", "crank turns that are evaluated of each start: at least 30", default=30.0, min=30.0, max=1e4
+        "1",
+        "crank turns that are evaluated of each start: at least 30",
+        default=30,
+        min=30,
+        max=10_000,
+        type="Integer",
     )
 
 
@@ -300,8 +323,6 @@ class FileSection:
     declaration: type
     default: Any = None
     optional: bool = False
-    whole: tuple[str, ...] = ()
-    """quantities that are whole numbers"""
     keys: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     """other keys than quantities, as pydantic fields with their descriptions"""
     title: str = ""
@@ -316,11 +337,10 @@ class FileSection:
 
 
 SECTIONS: Mapping[str, FileSection] = {
-    "run": FileSection(Run, whole=("turns",), title="Run"),
+    "run": FileSection(Run, title="Run"),
     "coupling": FileSection(Coupling, optional=True, title="Safety coupling"),
     "monte_carlo": FileSection(
         MonteCarlo,
-        whole=("runs", "seed"),
         keys={
             "event": (
                 dict[str, Any],
@@ -355,13 +375,12 @@ SECTIONS: Mapping[str, FileSection] = {
     "optimize": FileSection(
         optimize_table.Optimize,
         optional=True,
-        whole=optimize_table.WHOLE,
         keys=optimize_table.FIELDS,
         title="Search for the best machine",
         is_used=lambda config: False,
         apart=True,
     ),
-    "chain": FileSection(ChainOrgans, whole=("rods", "sweep_points", "starts", "turns"), title="Chains"),
+    "chain": FileSection(ChainOrgans, title="Chains"),
     "driveline": FileSection(
         Driveline,
         optional=True,
@@ -372,7 +391,6 @@ SECTIONS: Mapping[str, FileSection] = {
     ),
     "torsion": FileSection(
         TorsionTable,
-        whole=("points", "speeds", "bends"),
         keys={
             "joint": (Literal[JOINTS], Field("alpha1", description="bend that the map of stability varies")),
             "damping_ratios": (
@@ -385,7 +403,6 @@ SECTIONS: Mapping[str, FileSection] = {
     "identify": FileSection(
         identify_table.IdentifyTable,
         optional=True,
-        whole=identify_table.WHOLE,
         keys=identify_table.FIELDS,
         title="Identification from recordings",
         is_used=lambda config: False,
@@ -400,9 +417,7 @@ SECTIONS: Mapping[str, FileSection] = {
         apart=True,
     ),
     "observer": FileSection(ObserverTable, optional=True, title="Load observer", apart=True),
-    "sweep": FileSection(
-        SweepTable, optional=True, whole=WHOLE, keys=FIELDS, title="Sweep", is_used=lambda config: False
-    ),
+    "sweep": FileSection(SweepTable, optional=True, keys=FIELDS, title="Sweep", is_used=lambda config: False),
 }
 """The tables of every study file, except those of its machine, its feed, and its motor."""
 

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from ..drives.catalogue import CatalogueMotor, catalogue
-from ..drives.gear_ratios import UNITS, gear_unit, ratio_on_offer
+from ..drives.gear_ratios import UNITS, gear_unit, next_ratio, ratio_on_offer
 from ..errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
 from ..native.compilers import compiler
@@ -28,16 +28,19 @@ from .catalogue_drive import catalogue_drive
 from .chain import HIGH
 from .config import Config
 from .duty import CycleNumbers, Duty, duty_of
+from .inverter import inverter_needs, least_boost, misses_by_a_hair
 from .limits import SPEED_DEVIATION
 from .preference import ORDER, choice, poles_rank, rank
+from .relay import HEAVIEST, LIGHT, class_words
 from .sizing_table import SIZING_KEYS
-from .start_class import CLASSES
 from .trial import try_motor
 
 _EVENED = ("speed", "rms_torque", "peak_torque", "temperature")
 """Checks that a flywheel improves: it evens the speed, and with it the torque of a varying load."""
 _WORSE_WITH_INERTIA = ("start", "inertia")
 """Checks that a flywheel makes worse."""
+_WORSE_WITH_POWER = ("gear_start",)
+"""Checks that a larger motor makes worse."""
 _SMALL = 0.1
 """Inertia of a flywheel, relative to all other inertia, below which it hardly evens the speed."""
 _TOLERANCE = SPEED_DEVIATION - 0.005
@@ -57,8 +60,8 @@ class SizingResult:
     """number of motors of the catalogue with a permitted number of poles; `candidates` are those that were
     tried"""
     weak: int = 0
-    """number of motors that were left out, as their rated power is less than 0.7 times the power that the
-    cycle needs"""
+    """number of motors that were left out, as their rated power does not give the mean power of the cycle with the
+    margin"""
 
     @property
     def chosen_candidate(self) -> Candidate | None:
@@ -155,57 +158,117 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
     motors = [
         m for m in catalogue(config.catalogue) if limits.poles_least <= m.nameplate.poles <= limits.poles_most
     ]
-    # the search begins below the power that the cycle needs, so that the first motor that fits is the
-    # smallest
-    power = max(numbers.power_mean, numbers.torque_rms * config.run.crank_speed)
+    # a flywheel evens the torque of a cycle, but gives no mean power
+    power = numbers.power_mean / (1.0 - limits.margin)
     motors.sort(key=lambda m: (m.nameplate.power, poles_rank(m.nameplate.poles)))
     if not motors:
         raise InputError(
             f"sizing.poles_least = {limits.poles_least:g}, sizing.poles_most = {limits.poles_most:g}: the catalogue "
             "has no motor with so many poles"
         )
-    strong = [m for m in motors if m.nameplate.power >= 0.7 * power]
+    strong = [m for m in motors if m.nameplate.power >= power]
     if not strong:
         notes.append(
-            "No motor of the catalogue has 0.7 times the power of the cycle, "
-            f"{number(0.7 * power, 'W')}: the largest were tried."
+            "No motor of the catalogue gives the mean power of the cycle with the margin, "
+            f"{number(power, 'W')}: the largest were tried."
         )
         strong = [m for m in motors if m.nameplate.power == motors[-1].nameplate.power]
-    candidates: list[Candidate] = []
-    files: Mapping[str, Path] | None = {}
-    for k, motor in enumerate(strong):
-        if len(candidates) >= limits.candidates and _is_settled(candidates, motor, limits.larger):
-            break
-        report(f"simulating {motor.designation}", float(k), float(len(strong)))
-        candidate = proposal(config, motor, duty)
-        if compiler() is not None and backend != "python" and not candidate.drive.outsiders:
-            files = None  # the candidates run on the compiled system
-        elif not files:
-            files, _ = candidate.drive.export(folder, backend, partial(_exporting, report))
-        candidates.append(with_flywheel(config, candidate, duty, files))
-    rank(candidates, limits.larger)
-    if candidates[0].fits and candidates[0].drive.flywheel:
-        report("a larger motor without a flywheel", 0.0, 1.0)
-        if (larger := _without_flywheel(config, strong, candidates, duty, files)) is not None:
-            candidates.append(larger)
-            rank(candidates, limits.larger)
+    candidates = _search(config, strong, duty, folder, report, backend)
     notes += _needs(candidates[0], config)
     return SizingResult(config, duty, candidates, notes, len(motors), len(motors) - len(strong))
 
 
+def _search(
+    config: Config,
+    motors: list[CatalogueMotor],
+    duty: Duty,
+    folder: Path,
+    report: Report,
+    backend: Backend | None,
+) -> list[Candidate]:
+    """The candidates that `size` tries of the `motors`, in the order of their rank. The start of the best one is that
+    from the worst crank angle; a candidate that fails in it makes room for the next."""
+    limits = config.sizing
+    assert limits is not None
+    candidates: list[Candidate] = []
+    files: Mapping[str, Path] | None = {}
+    rest = iter(motors)
+    following = next(rest, None)
+
+    def is_over() -> bool:
+        if following is None:
+            return True
+        return len(candidates) >= limits.candidates and _is_settled(candidates, following, limits.larger)
+
+    while not candidates or not is_over():
+        while following is not None and not is_over():
+            report(f"simulating {following.designation}", float(len(candidates)), float(len(motors)))
+            candidate = proposal(config, following, duty)
+            if compiler() is not None and backend != "python" and not candidate.drive.outsiders:
+                files = None  # the candidates run on the compiled system
+            elif not files:
+                files, _ = candidate.drive.export(folder, backend, partial(_exporting, report))
+            candidates.append(_tried(config, candidate, duty, files))
+            following = next(rest, None)
+        _from_all_angles(config, candidates, duty, files)
+    if candidates[0].fits and candidates[0].drive.flywheel:
+        report("a larger motor without a flywheel", 0.0, 1.0)
+        if (larger := _without_flywheel(config, motors, candidates, duty, files)) is not None:
+            candidates.append(larger)
+            _from_all_angles(config, candidates, duty, files)
+    return candidates
+
+
+def _tried(config: Config, bare: Candidate, duty: Duty, files: Mapping[str, Path] | None) -> Candidate:
+    """The candidate with the least flywheel, and with an inverter with the least boost. Where it then misses its
+    limits by a hair, it gets the ratio above, as an inverter keeps the speed of the crank with either ratio."""
+
+    def tried(c: Candidate) -> Candidate:
+        return least_boost(config, c, lambda each: with_flywheel(config, each, duty, files))
+
+    candidate = tried(bare)
+    if not bare.drive.follows or "gear.ratio" in config.given or not misses_by_a_hair(candidate):
+        return candidate
+    above = next_ratio(bare.drive.ratio, config.choices["sizing.ratios"])
+    if above is None:
+        return candidate
+    other = tried(proposal(config, bare.motor, duty, above))
+    return other if other.keeps_margin else candidate
+
+
+def _from_all_angles(
+    config: Config, candidates: list[Candidate], duty: Duty, files: Mapping[str, Path] | None
+) -> None:
+    """Rank the candidates, with the start of the best one from all crank angles."""
+    assert config.sizing is not None
+
+    def judged(c: Candidate) -> Candidate:
+        judge(config, c, duty, files, worst_start=True)
+        return c
+
+    rank(candidates, config.sizing.larger)
+    while candidates[0].fits and not candidates[0].worst_start:
+        candidates[0] = least_boost(config, candidates[0], judged)
+        rank(candidates, config.sizing.larger)
+
+
 def _needs(best: Candidate, config: Config) -> Iterator[str]:
-    """What has to be ordered beside the usual parts: a relay for a heavy start, a second gear unit."""
-    if best.start_class and best.start_class > CLASSES[0][0]:
-        relay = (
-            f"of class {best.start_class}" if best.start_class <= CLASSES[-1][0] else "heavier than class 30"
-        )
-        yield f"The start takes an overload relay {relay}; one of class {CLASSES[0][0]} may trip in it."
-    if best.unit is None and "gear.ratio" not in config.given:
+    """What has to be ordered beside the usual parts: a relay for a heavy start or the settings of the inverter, a
+    second gear unit."""
+    if best.start_class and best.start_class > LIGHT:
+        relay = f"{'of ' if best.start_class <= HEAVIEST else ''}{class_words(best.start_class)}"
+        yield f"The start takes an overload relay {relay}; one of class {LIGHT} may trip in it."
+    if best.drive.follows:
+        yield from inverter_needs(best, config)
+    if best.unit is None:
         largest = UNITS[config.choices["sizing.gear_kind"]][-1]
-        yield (
-            f"A ratio of {best.drive.ratio:g} takes two gear units: a {largest.title} ends at about "
-            f"{largest.largest:g}."
+        is_given = "gear.ratio" in config.given or config.choices["sizing.ratios"]
+        end = (
+            f"even of makers with large ratios ends at about {largest.made:g}"
+            if is_given
+            else (f"ends at about {largest.largest:g}")
         )
+        yield f"A ratio of {best.drive.ratio:g} takes two gear units: a {largest.title} {end}."
 
 
 def _is_settled(candidates: list[Candidate], following: CatalogueMotor, larger: float) -> bool:
@@ -215,7 +278,7 @@ def _is_settled(candidates: list[Candidate], following: CatalogueMotor, larger: 
     if not keeping:
         return False
     best, _ = choice(keeping, larger)
-    is_light = best.unit is not None and (best.start_class or 0) <= CLASSES[0][0] and not best.drive.flywheel
+    is_light = best.unit is not None and (best.start_class or 0) <= LIGHT and not best.drive.flywheel
     if is_light and poles_rank(best.motor.nameplate.poles) <= poles_rank(following.nameplate.poles):
         return best.power < following.nameplate.power
     return following.nameplate.power > larger * min(c.power for c in keeping)
@@ -246,13 +309,15 @@ def _without_flywheel(
         judge(config, candidate, duty, files)
         return candidate
 
-    # a larger motor runs more evenly, so that the motors that fit are the last ones of the list
-    if not rest or not (least := bare(rest.pop())).keeps_margin:
-        return None
+    # a larger motor runs more evenly, but puts more on the gear in its start: the largest may not fit
+    least = None
     while rest:
         middle = len(rest) // 2
         candidate = bare(rest[middle])
-        least, rest = (candidate, rest[:middle]) if candidate.keeps_margin else (least, rest[middle + 1 :])
+        if candidate.keeps_margin:
+            least = candidate
+        too_weak = any(candidate.exceeds(name) for name in candidate.checks if name not in _WORSE_WITH_POWER)
+        rest = rest[middle + 1 :] if too_weak else rest[:middle]
     return least
 
 
@@ -264,7 +329,7 @@ def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[st
     """The candidate with the least flywheel, to about a tenth, that keeps the permitted fluctuation and the
     limits of torque and temperature. It has no flywheel where none is needed, or where it exceeds a limit
     that no flywheel improves. If such a flywheel exceeds another limit, it is the flywheel that comes nearest
-    to all limits.
+    to all limits. A motor that stalls in the peak of the cycle may run with a flywheel, which carries it through.
 
     The largest flywheel that is tried is that of the hand formulas for speed and torque. It is on the safe
     side for the speed, as the formula leaves out that a motor's torque falls with speed, which evens the
@@ -279,6 +344,9 @@ def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[st
         return candidate
 
     def heavy_enough(candidate: Candidate) -> bool:
+        if candidate.checks and not candidate.starts:
+            # it stalls for want of inertia, unless it starts with less
+            return any(c.starts for c in trials if c.drive.flywheel < candidate.drive.flywheel)
         return too_heavy(candidate) or is_even(candidate)
 
     first = trial_with(0.0)
@@ -295,7 +363,7 @@ def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[st
             break
         below = share
     else:
-        return min(trials, key=lambda c: c.violation)
+        return _nearest(trials)
     for _ in range(3):
         middle = 0.5 * (below + share)
         if heavy_enough(trial_with(middle * whole)):
@@ -303,11 +371,14 @@ def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[st
         else:
             below = middle
     solutions = [c for c in trials if is_even(c) and not too_heavy(c)]
-    return (
-        min(solutions, key=lambda c: c.drive.flywheel)
-        if solutions
-        else min(trials, key=lambda c: c.violation)
-    )
+    return min(solutions, key=lambda c: c.drive.flywheel) if solutions else _nearest(trials)
+
+
+def _nearest(trials: list[Candidate]) -> Candidate:
+    """The trial that comes nearest to all limits; where none starts, the one without a flywheel."""
+    best = min(trials, key=lambda c: c.violation)
+    best.heaviest = max(c.drive.flywheel for c in trials)
+    return best
 
 
 def torque_evening_inertia(c: Candidate, numbers: CycleNumbers, crank_speed: float) -> float:
@@ -338,7 +409,7 @@ def torque_evening_inertia(c: Candidate, numbers: CycleNumbers, crank_speed: flo
 
 def is_even(c: Candidate) -> bool:
     """Whether the candidate keeps every limit that a flywheel improves, with the margin."""
-    return not any(c.exceeds(name) and c.sizes[name] < math.inf for name in _EVENED)
+    return not any(map(c.exceeds, _EVENED))
 
 
 def too_heavy(c: Candidate) -> bool:
@@ -351,29 +422,40 @@ def too_heavy(c: Candidate) -> bool:
     )
 
 
-def proposal(config: Config, motor: CatalogueMotor, duty: Duty) -> Candidate:
-    """A candidate without a flywheel, with the ratio that the file gives, or the ratio on offer that is nearest to
-    the one at which the crank has its speed."""
+def proposal(config: Config, motor: CatalogueMotor, duty: Duty, chosen: float | None = None) -> Candidate:
+    """A candidate without a flywheel, with the `chosen` ratio, or that which the file gives, or the ratio on offer
+    that is nearest to the one at which the crank has its speed."""
     limits, kind, series = config.sizing, config.choices["sizing.gear_kind"], ""
     assert limits is not None
     torque = duty.normal.crank_torque
-    drive = catalogue_drive(config, motor, torque, limits.ambient)
-    if "gear.ratio" not in config.given:
-        offer = config.choices["sizing.ratio_series"], config.choices["sizing.ratios"]
-        ratio, series = ratio_on_offer(drive.ratio, *offer, _TOLERANCE)
+    ratios = config.choices["sizing.ratios"]
+    drive = catalogue_drive(config, motor, torque, limits.ambient, chosen)
+    if chosen is not None:
+        series = "own list" if ratios else "R80"
+    elif "gear.ratio" not in config.given:
+        ratio, series = ratio_on_offer(drive.ratio, config.choices["sizing.ratio_series"], ratios, _TOLERANCE)
         drive = catalogue_drive(config, motor, torque, limits.ambient, ratio)
-    return Candidate(motor, drive, {}, limits.margin, gear_unit(kind, drive.ratio), series)
+    unit = gear_unit(kind, drive.ratio, is_given=bool("gear.ratio" in config.given or ratios))
+    return Candidate(motor, drive, {}, limits.margin, unit, series)
 
 
-def judge(config: Config, c: Candidate, duty: Duty, files: Mapping[str, Path] | None) -> None:
-    """Try a candidate and fill in its checks."""
+def judge(
+    config: Config,
+    c: Candidate,
+    duty: Duty,
+    files: Mapping[str, Path] | None,
+    *,
+    worst_start: bool = False,
+) -> None:
+    """Try a candidate and fill in its checks; with `worst_start` its start is that from the worst crank angle."""
+    c.worst_start = worst_start
     try:
-        trial = try_motor(config, c.motor, c.drive, duty, files)
+        trial = try_motor(config, c.motor, c.drive, duty, files, worst_start=worst_start)
     except InterruptedRunError:
         raise
     except RunError as error:
-        c.reason = f"its run failed: {error}"
+        c.checks, c.reason = {}, f"its run failed: {error}"
         return
     c.checks, c.fluctuation = trial.checks(), trial.fluctuation
-    c.breakdown_torque, c.duty_torque = trial.breakdown_torque, trial.duty_torque
-    c.start_class = trial.start_class
+    c.duty, c.stall_angle = trial.duty, trial.stall_angle
+    c.start_class, c.start_current = trial.start_class, trial.start_current

@@ -57,8 +57,8 @@ class Sizing:
     temperature: Value = quantity(
         "K", "permitted temperature of the winding", default=393.15, min=330.0, max=500.0
     )
-    poles_least: Value = quantity("1", "least number of poles", default=2.0, min=2.0, max=48.0)
-    poles_most: Value = quantity("1", "largest number of poles", default=6.0, min=2.0, max=48.0)
+    poles_least: Value = quantity("1", "least number of poles", default=2, min=2, max=48, type="Integer")
+    poles_most: Value = quantity("1", "largest number of poles", default=6, min=2, max=48, type="Integer")
     larger: Value = quantity(
         "1",
         "power of a motor, relative to the smallest that fits, up to which it may be preferred: without a "
@@ -70,9 +70,10 @@ class Sizing:
     candidates: Value = quantity(
         "1",
         "least number of motors that are tried; more follow until one fits and none behind it can be preferred",
-        default=9.0,
-        min=1.0,
-        max=200.0,
+        default=9,
+        min=1,
+        max=200,
+        type="Integer",
     )
 
 

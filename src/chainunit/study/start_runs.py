@@ -10,11 +10,13 @@ from dataclasses import replace
 import numpy as np
 
 from ..quantities import Value, declaration, quantity
+from .arrays import peak
 from .config import Config
 from .event import Event
 from .measures import STARTED, time_to_start
+from .relay import start_class
 from .rig import Rig, join
-from .torques import at_gear, on_coupling
+from .torques import PeakOf, at_gear, on_coupling
 
 START_ANGLES = 8
 """Number of crank angles, evenly over the turn, from which the machine is started."""
@@ -34,6 +36,12 @@ class StartNumbers:
         "N.m", "largest torque on a coupling on the motor's shaft, at the crank"
     )
     start_time: Value = quantity("s", "start-up time")
+    start_class: Value = quantity(
+        "1", "trip class of the overload relay that holds; 40: none up to class 30; none for an inverter"
+    )
+    current: Value = quantity("A", "largest current of the motor")
+    heat: Value = quantity("J", "heat of the winding until shortly after the start")
+    followed: Value = quantity("s", "time of that heat")
 
 
 def from_angle(rig: Rig, angle: float) -> Rig:
@@ -45,7 +53,9 @@ def from_angle(rig: Rig, angle: float) -> Rig:
     return replace(rig, drive=drive, fed_from=None)
 
 
-def start_from(rig: Rig, angle: float, longest: float, event: Event | None = None) -> StartNumbers:
+def start_from(
+    rig: Rig, angle: float, longest: float, event: Event | None = None, of: PeakOf = on_coupling
+) -> StartNumbers:
     """A start from the crank angle [rad], with the `event` of a start, if one is given.
 
     It is followed until the crank has its speed and a little longer, at most to the time `longest` [s]; `start_time`
@@ -64,24 +74,42 @@ def start_from(rig: Rig, angle: float, longest: float, event: Event | None = Non
             time, speed = run["time"].values, run[name].values / ratio
             final = float(np.mean(speed[time >= time[-1] - rig.config.turn]))
             reached = time_to_start(time, speed, final, rig.config.run.crank_speed)
+    time, current = run["time"].values, run[f"motor.{rig.drive.motor.current}"].values
+    relay, rated = None, rig.drive.rated_current
+    if reached is not None and rated is not None and not rig.drive.follows:
+        relay = start_class(time[time <= reached], current[time <= reached], rated)
     return StartNumbers(
         angle=angle,
         gear_torque=at_gear(rig.drive, run),
-        coupling_torque=on_coupling(rig.drive, run),
+        coupling_torque=of(rig.drive, run),
         start_time=reached,
+        start_class=relay,
+        current=peak(current),
+        heat=float(np.trapezoid(run["motor.heat"].values, time)),
+        followed=float(time[-1]),
     )
 
 
 def longest_start(config: Config, start_time: float) -> float:
     """Time after which a start counts as failed [s], where that from the first angle takes `start_time` [s]."""
-    return max(config.ramp_end, 3.0 * start_time) + 1.0
+    voltage = config.starter.soft_start.time if config.start == "soft" else 0.0
+    return float(max(config.ramp_end, voltage, 3.0 * start_time) + 1.0)
 
 
-def starts_from_all(rig: Rig, longest: float, events: Sequence[Event] = ()) -> list[StartNumbers]:
-    """Starts from `START_ANGLES` angles over the turn; each of the `events`, which are starts, from the angle 0."""
+def starts_from_all(
+    rig: Rig, longest: float, events: Sequence[Event] = (), of: PeakOf = on_coupling
+) -> list[StartNumbers]:
+    """Starts from `START_ANGLES` angles over the turn; each of the `events`, which are starts, from the angle 0. `of`
+    gives the torque on the coupling."""
     angles = [2.0 * math.pi * k / START_ANGLES for k in range(START_ANGLES)]
-    starts = [start_from(rig, angle, longest) for angle in angles]
-    return starts + [start_from(rig, 0.0, longest, event) for event in events]
+    starts = [start_from(rig, angle, longest, of=of) for angle in angles]
+    return starts + [start_from(rig, 0.0, longest, event, of) for event in events]
+
+
+def longest_of(starts: Sequence[StartNumbers]) -> float | None:
+    """The longest start-up [s]; None where one of the starts does not come to its speed."""
+    times = [start.start_time for start in starts]
+    return None if None in times else max(times)
 
 
 def hardest(starts: Sequence[StartNumbers]) -> float:

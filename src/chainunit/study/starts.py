@@ -11,7 +11,7 @@ from ..text import entries, entry, number
 from .analysis import Analysis, Findings
 from .config import Config
 from .drive import Drive
-from .event_torques import running_torque
+from .event_torques import running_peak, running_words
 from .record import StudyRecord
 from .rig import Rig
 from .start_runs import StartNumbers, longest_start, starts_from_all
@@ -24,17 +24,23 @@ gears of catalogues commonly permit about twice their rated torque for the momen
 
 @dataclass(frozen=True)
 class StartFindings(Findings):
-    """The starts, the largest torque of `running` at the output of the gear [N m], and the permitted torque of the
-    gear in a start [N m], infinite where none is given."""
+    """The starts, the largest torque of `running` at the output of the gear [N m], the permitted torque of the gear
+    in a start [N m], infinite where none is given, and the run in which running puts most on the gear."""
 
     starts: tuple[StartNumbers, ...]
     running: float
     limit: float
+    running_in: str
 
     @property
     def worst(self) -> StartNumbers:
         """The start with the largest torque at the output of the gear."""
         return max(self.starts, key=lambda start: start.gear_torque)
+
+    @property
+    def start_class(self) -> int:
+        """Trip class of the relay that holds in every start that reaches its speed; 0 for an inverter."""
+        return int(max((start.start_class or 0 for start in self.starts), default=0))
 
     @property
     def stuck(self) -> list[StartNumbers]:
@@ -47,6 +53,7 @@ class StartFindings(Findings):
             "from": [entries(start) for start in self.starts],
             "worst": entries(self.worst),
             "running": entry(self.running, "N.m"),
+            "running_in": self.running_in,
             "over_running": entry(self.worst.gear_torque / self.running, "1"),
             "limit": entry(self.limit, "N.m"),
         }
@@ -76,11 +83,13 @@ class StartFindings(Findings):
             study.warn(
                 "start at gear",
                 "{start} from a crank angle of {angle} puts {torque} on the output of the gear, {over} times the "
-                "{running} of running. Gears of catalogues commonly permit about {large} times their rated torque in "
-                "a start: choose the gear by this torque (gear.torque_limit, gear.start_factor), or {remedy}.",
+                "{running} of {running_in}. Gears of catalogues commonly permit about {large} times their rated "
+                "torque in a start: choose the gear by this torque (gear.torque_limit, gear.start_factor), or "
+                "{remedy}.",
                 "start_up",
                 start=start,
                 large=f"{LARGE:g}",
+                running_in=running_words(study, self.running_in),
                 remedy=_remedy(study.config.start),
                 **numbers,
             )
@@ -130,4 +139,5 @@ class StartAnalysis(Analysis):
         report("starts from other crank angles", 1.0, 1.0)
         starts = starts_from_all(rig, longest_start(config, study.start.start_time))
         limit = config.gear.start_limit if "gear.torque_limit" in config.given else math.inf
-        return StartFindings(tuple(starts), running_torque(study, at_gear), limit)
+        running = running_peak(study, at_gear)
+        return StartFindings(tuple(starts), running.torque, limit, running.run)

@@ -50,7 +50,7 @@ class Sweepable:
                 each
                 for name, event in events.items()
                 for each in named_values(event.p, f"event.{name}.")
-                if each[0].name.removeprefix(f"event.{name}.") not in event.counts
+                if each[0].type == "Real"
             ),
         ]
         return cls({v.name: v for v, _ in own}, {v.name: x for v, x in own}, events)
@@ -274,10 +274,8 @@ class _EntryReader(Faults):
             return math.nan
 
     def _count(self, default: int) -> int:
-        q = Quantity("1", "number of values", low=2.0, high=float(MOST_VALUES))
+        q = Quantity("1", "number of values", low=2.0, high=float(MOST_VALUES), type="Integer")
         count = self._number("points", self._given.get("points", default), Variable("", q.description, q))
-        if math.isfinite(count) and count != int(count):
-            self._fault("points", f"is {count:g}: must be a whole number")
         return int(count) if math.isfinite(count) else default
 
     def _without(self, key: str, words: str) -> None:

@@ -36,14 +36,18 @@ class SweepTable(CycleBasis):
     """A sweep over parameters of the study."""
 
     points: Value = quantity(
-        "1", "number of points; of a grid that of its parameters", default=1024.0, min=1.0, max=1e9
+        "1",
+        "number of points; of a grid that of its parameters",
+        default=1024,
+        min=1,
+        max=1_000_000_000,
+        type="Integer",
     )
-    seed: Value = quantity("1", "seed of the points, except of a grid", default=1.0, min=0.0, max=1e9)
-    angles: Value = quantity("1", "crank angles of a turn", default=720.0, min=8.0, max=1e5)
+    seed: Value = quantity(
+        "1", "seed of the points, except of a grid", default=1, min=0, max=1_000_000_000, type="Integer"
+    )
+    angles: Value = quantity("1", "crank angles of a turn", default=720, min=8, max=100_000, type="Integer")
 
-
-WHOLE = ("points", "seed", "angles")
-"""Quantities of the table that are whole numbers."""
 
 FIELDS: Mapping[str, Any] = {
     "method": (

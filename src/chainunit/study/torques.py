@@ -3,7 +3,8 @@ motor's shaft, and at the output of the gear."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 
 import xarray as xr
 
@@ -25,3 +26,22 @@ def at_gear(drive: Drive, run: xr.Dataset) -> float:
     there, else at the crank."""
     behind_gear = drive.line is not None and drive.driven_machine.ratio == 1.0
     return on_coupling(drive, run) if behind_gear else peak(drive.crank_torque(run))
+
+
+@dataclass(frozen=True)
+class DutyPeak:
+    """The largest torque of normal duty without the starts, at the crank [N m], and the run in which it is."""
+
+    torque: float
+    run: str
+
+
+def duty_peak(drive: Drive, runs: Iterable[tuple[str, xr.Dataset]], of: PeakOf) -> DutyPeak:
+    """The largest torque `of` the runs of normal duty, each with its name: steady running, events that may last, and
+    all feed on either side (`all_feed_on`)."""
+    return max((DutyPeak(of(drive, run), name) for name, run in runs), key=lambda peak: peak.torque)
+
+
+def all_feed_on(side: str) -> str:
+    """The name of the run with all feed on a side, and while it moves there."""
+    return f"all_feed_on_the_{side}"

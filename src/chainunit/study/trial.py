@@ -24,20 +24,24 @@ from .config import Config
 from .drive import Drive
 from .duty import Duty, rms
 from .limits import Check, heating, keeping_speed, starting
-from .measures import CREEPS, time_to_start
+from .measures import time_to_start
+from .relay import start_class
 from .rig import PATIENCE, Rig
-from .start_class import start_class
-from .start_runs import StartNumbers, starts_from_all
+from .start_runs import StartNumbers, longest_of, longest_start, starts_from_all
+from .torques import DutyPeak, all_feed_on, at_gear, duty_peak
+from .verdict import CREEPS, SETTLING, STEADY
 from .window import BURNT, is_settled
 
 _GAP = "motor.air_gap_tau"
+_STANDS = 0.25
+"""Turns that a crank which stands, and swings against its load, makes in a run at most."""
 
 
 @dataclass(frozen=True)
 class Trial:
     """Runs of a motor from the catalogue in a `drive`: a start, steady running, and steady running with all
-    feed on each side. The runs `shifts` are between these: in them the feed comes or moves and the motor
-    settles."""
+    feed on each side. The runs `shifts` are between these, each with its name: in them the feed comes or moves and
+    the motor settles."""
 
     config: Config
     motor: CatalogueMotor
@@ -45,29 +49,56 @@ class Trial:
     heavier: SideName | None
     start: xr.Dataset
     steady: xr.Dataset
-    shifts: tuple[xr.Dataset, ...]
+    shifts: tuple[tuple[str, xr.Dataset], ...]
     one_sided: Mapping[SideName, xr.Dataset]
     starts: Sequence[StartNumbers] = ()
-    """starts from other crank angles, where the torque of the gear is limited"""
+    """starts from all crank angles; none where the start from the angle 0 stands for them"""
 
     @cached_property
     def start_time(self) -> float | None:
-        """Time to start [s]; None where the motor does not bring the machine up to speed."""
+        """Longest time to start [s]; None where the motor does not bring the machine up to speed."""
+        if self._first is None or not self.starts:
+            return self._first
+        others = longest_of(self.starts)
+        return None if others is None else max(self._first, others)
+
+    @cached_property
+    def _first(self) -> float | None:
+        """Time of the start from the angle 0 [s]; None where it fails."""
         runs = (self.start, self.steady)
         speed, time = (np.concatenate([run[name].values for run in runs]) for name in ("motor.w", "time"))
         requested = self.config.run.crank_speed * self.drive.ratio
         return time_to_start(time, speed, self.speed, requested) if self.speed > CREEPS * requested else None
 
     @cached_property
+    def stall_angle(self) -> float | None:
+        """Crank angle at which the load stalls the motor [rad]; None for a motor that starts, or that only turns too
+        slowly."""
+        if self.start_time is not None or self.drive.turns(self.steady) > _STANDS:
+            return None
+        return float(np.max(self.drive.crank_motion(self.steady)[0])) % (2.0 * math.pi)
+
+    @cached_property
     def start_class(self) -> int | None:
-        """Trip class of the relay that holds in the start; None for an inverter, or without a start."""
-        if self.start_time is None or self.drive.follows:
+        """Trip class of the relay that holds in each start; None for an inverter, or without a start."""
+        if self._first is None or self.start_time is None or self.drive.follows:
             return None
         runs = (self.start, self.steady)
         names = ("time", f"motor.{self.drive.motor.current}")
         time, current = (np.concatenate([run[name].values for run in runs]) for name in names)
-        starting = time <= self.start_time
-        return start_class(time[starting], current[starting], self.motor.nameplate.rated_current)
+        starting = time <= self._first
+        first = start_class(time[starting], current[starting], self.motor.nameplate.rated_current)
+        return max(first, *(start.start_class for start in self.starts), 0)
+
+    def _peak_current(self, *runs: xr.Dataset) -> float:
+        return max(peak(run[f"motor.{self.drive.motor.current}"].values) for run in runs)
+
+    @cached_property
+    def start_current(self) -> float | None:
+        """Largest current in a start [A]; None without a start."""
+        if self.start_time is None:
+            return None
+        return max([self._peak_current(self.start), *(start.current for start in self.starts)])
 
     @cached_property
     def speed(self) -> float:
@@ -81,17 +112,19 @@ class Trial:
         return float(np.ptp(w[len(w) // 2 :])) / self.speed if self.speed > 0.0 else math.inf
 
     @cached_property
-    def duty_torque(self) -> float:
-        """Peak torque at the crank in steady running, and while the feed comes, moves to either side and
-        stays there [N m]."""
-        runs = (self.steady, *self.shifts, *self.one_sided.values())
-        return max(peak(self.drive.crank_torque(run)) for run in runs)
+    def duty(self) -> DutyPeak:
+        """The largest torque at the crank in steady running, and while the feed comes, moves to either side and stays
+        there."""
+        sides = [(all_feed_on(side), run) for side, run in self.one_sided.items()]
+        return duty_peak(self.drive, [(STEADY, self.steady), *self.shifts, *sides], at_gear)
 
     @cached_property
     def frequency(self) -> float:
-        """Frequency of the supply in steady running [Hz]."""
+        """Frequency of the supply in steady running [Hz]; the rated one for a motor that does not start."""
         plate = self.motor.nameplate
-        return max(self.speed * plate.poles / (4.0 * math.pi), 1.0) if self.drive.follows else plate.frequency
+        if not self.drive.follows or self._first is None:
+            return plate.frequency
+        return max(self.speed * plate.poles / (4.0 * math.pi), 1.0)
 
     @cached_property
     def breakdown_torque(self) -> float:
@@ -143,13 +176,15 @@ class Trial:
 
     @cached_property
     def _heat(self) -> tuple[float, float]:
-        """Heat of the duty [W], and the additional heat of a start [J] beyond that of the running which
+        """Heat of the duty [W], and the additional heat of the worst start [J] beyond that of the running which
         follows it: of the duty or, for a machine that starts empty, of a turn without feed."""
         steady = after = sum(share * float(np.mean(run["motor.heat"])) for share, run in self._cases)
         time, heat = self.start["time"].values, self.start["motor.heat"].values
         if self.config.empty_start:
             after = float(np.mean(heat[time >= time[-1] - self.config.turn]))
-        return steady, max(0.0, float(np.trapezoid(heat - after, time)))
+        extra = [float(np.trapezoid(heat - after, time))]
+        extra += [start.heat - after * start.followed for start in self.starts]
+        return steady, max(0.0, *extra)
 
     @property
     def _cases(self) -> list[tuple[float, xr.Dataset]]:
@@ -176,7 +211,10 @@ class Trial:
         if self.drive.follows:
             start = dataclasses.replace(start, limit=1.0 + 1.2 * self.config.run.ramp)
         weaker = min(1.0, plate.frequency / self.frequency)
-        cooling = min(1.0, self._cooling / self.drive.motor.cooling(MATH, p, plate.speed))
+        # the limits of a motor that does not start are those that it has at its speed
+        cooling = (
+            1.0 if self.start_time is None else self._cooling / self.drive.motor.cooling(MATH, p, plate.speed)
+        )
         breakdown = self.breakdown_torque / demands.breakdown_margin
         requested_speed = self.drive.ratio * self.config.run.crank_speed
         checks = {
@@ -184,7 +222,7 @@ class Trial:
             "rms_torque": check(
                 "RMS torque",
                 rms(*((share, run[_GAP].values) for share, run in self._cases)),
-                plate.torque * weaker * math.sqrt(cooling),
+                plate.torque * weaker * math.sqrt(min(1.0, cooling)),
                 "N.m",
             ),
             "peak_torque": check(
@@ -194,12 +232,14 @@ class Trial:
                 "N.m",
             ),
             "temperature": at_speed(heating(self.temperature, p.ambient.T, demands.temperature)),
-            "starts": Check(
-                "starts per hour",
-                demands.starts_per_hour,
-                self.permitted_starts,
-                "1",
-                forbidden="no start is permitted, as running alone is too hot",
+            "starts": at_speed(
+                Check(
+                    "starts per hour",
+                    demands.starts_per_hour,
+                    self.permitted_starts,
+                    "1",
+                    forbidden="no start is permitted, as running alone is too hot",
+                )
             ),
             "crank_speed": at_speed(keeping_speed(self.speed, requested_speed)),
             "speed": check("speed fluctuation", self.fluctuation, demands.fluctuation, "1", "percent"),
@@ -208,19 +248,32 @@ class Trial:
             inertia = float(np.max(self.drive.load_inertia(self.steady)))
             ratio = (inertia + p.rotor.J - plate.J) / plate.J
             checks["inertia"] = Check("inertia ratio", ratio, demands.inertia_ratio, "1")
+        if self.drive.follows:
+            most = self.config.starter.overload * plate.rated_current
+            current = self._peak_current(
+                self.steady, *(run for _, run in self.shifts), *self.one_sided.values()
+            )
+            checks["inverter_current"] = check("peak current of the inverter", current, most, "A")
         if "gear.torque_limit" in self.config.given:
             gear = self.config.gear
-            checks["gear"] = Check("torque of the gear", self.duty_torque, gear.torque_limit, "N.m")
-            hardest = max([peak(self.drive.crank_torque(self.start)), *(s.gear_torque for s in self.starts)])
+            checks["gear"] = Check("torque of the gear", self.duty.torque, gear.torque_limit, "N.m")
+            hardest = max([at_gear(self.drive, self.start), *(s.gear_torque for s in self.starts)])
             title = "torque of the gear in a start"
             checks["gear_start"] = Check(title, hardest, gear.start_limit, "N.m")
         return checks
 
 
 def try_motor(
-    config: Config, motor: CatalogueMotor, drive: Drive, duty: Duty, files: Mapping[str, Path] | None
+    config: Config,
+    motor: CatalogueMotor,
+    drive: Drive,
+    duty: Duty,
+    files: Mapping[str, Path] | None,
+    *,
+    worst_start: bool = False,
 ) -> Trial:
-    """Simulate a motor in its drive, by the FMU `files`, or without them on the compiled system.
+    """Simulate a motor in its drive, by the FMU `files`, or without them on the compiled system. With `worst_start`
+    it starts from all crank angles, too, if its organs are no chains.
 
     Raises
     ------
@@ -245,18 +298,19 @@ def try_motor(
             rig = dataclasses.replace(rig, fed_from=simulation.time)
             simulation.signals = rig.signals(ramp=True)
             window += max(1.0, config.run.settle_turns) * turn
-            shifts.append(simulation.run(window, rig.step))
+            shifts.append((SETTLING, simulation.run(window, rig.step)))
         *settling, steady = _until_settled(rig, simulation, window + 2.0 * turn)
-        shifts += settling
+        shifts += [(SETTLING, run) for run in settling]
         event = simulation.save()
         for side in duty.one_sided:
             feed = config.one_sided(side)
-            shifts.append(rig.follow(simulation, feed, event, event + feed.p.shift + turn).run)
+            shift = rig.follow(simulation, feed, event, event + feed.p.shift + turn).run
+            shifts.append((all_feed_on(side), shift))
             one_sided[side] = simulation.run(simulation.time + turn, rig.step)
-    starts: list[StartNumbers] = []
-    if "gear.torque_limit" in config.given and drive.chain is None:
-        starts = starts_from_all(rig, window)
-    return Trial(config, motor, drive, duty.heavier, start, steady, tuple(shifts), one_sided, starts)
+    trial = Trial(config, motor, drive, duty.heavier, start, steady, tuple(shifts), one_sided)
+    if not worst_start or drive.chain is not None or trial.start_time is None:
+        return trial
+    return dataclasses.replace(trial, starts=starts_from_all(rig, longest_start(config, trial.start_time)))
 
 
 def _until_settled(rig: Rig, simulation: Simulation, stop: float) -> list[xr.Dataset]:

@@ -97,6 +97,13 @@ _TOPICS = {
     ),
 }
 """By kind of fault: its words in the verdict, the begin of the line with its numbers, and its remedy."""
+_UP_TO = {
+    "slack speed": "A web goes slack from a crank speed of {} on",
+    "crank torque": "The crank torque of two bars is good to 10 % only up to a crank speed of {}, the rocker torque "
+    "less far",
+    "rocker torque": "The rocker torque of two bars is good to 10 % only up to a crank speed of {}",
+}
+"""By kind of fault at a crank speed: the line that names its limit."""
 
 
 @dataclass(frozen=True)
@@ -119,14 +126,19 @@ class Reason:
     @property
     def numbers(self) -> str:
         """The value in words, with the limit if the words of the topic do not give it."""
-        rod = f"{self.quantity.partition('_')[0]} " if self.quantity.endswith("_pull") else ""
+        rod, _, pull = self.quantity.partition("_")
+        rod = f"{rod} {'mean' if pull == 'mean_pull' else 'end'} pull " if pull.endswith("pull") else ""
         rod += f"at {self.place} " if self.place else ""
         names_limit = self.topic in ("pushed", "end pushed", "slack")
         value, limit = (number(x, self.unit, self.kind, beside=False) for x in (self.value, self.limit))
-        limit = "" if names_limit else f", limit {limit}"
+        return f"{rod}{value}{'' if names_limit else f', limit {limit}'}"
+
+    @property
+    def speed_limit(self) -> str:
+        """The begin of a line on a crank speed that passes this limit: the verdict itself gives the speed."""
         if self.topic == "slack speed" and self.limit == 0.0:
-            limit = ", and it is slack at rest already"
-        return f"{rod}{value}{limit}"
+            return "A web is slack at rest already"
+        return _UP_TO[self.topic].format(_speed(self.limit))
 
 
 @dataclass(frozen=True)
@@ -165,6 +177,11 @@ class Verdict:
         return self._turns != self._judged_speed
 
     @property
+    def _stalls(self) -> bool:
+        """Whether the crank hardly turns."""
+        return self.actual is not None and abs(self.actual) < CREEPS * self.speed
+
+    @property
     def caveat(self) -> str:
         """Words to add to results of a model that does not hold; empty where it holds, or holds in part."""
         if self.holds != "false":
@@ -191,7 +208,8 @@ class Verdict:
             runs = {reason.run for reason in self.reasons if reason.topic == topic}
             if runs:
                 why.append(short + _where(runs))
-                remedies.append(remedy)
+                # a crank that hardly turns moves no energy that a residual could be compared with
+                remedies.append("" if topic == "energy" and self._stalls else remedy)
         # a remedy for several faults is named once
         return "; ".join((line, *why, *dict.fromkeys(filter(None, remedies)))) + "."
 
@@ -200,19 +218,21 @@ class Verdict:
         lines = []
         for topic, (_, begin, _) in _TOPICS.items():
             runs: dict[str, list[str]] = {}
+            limits: dict[str, list[str]] = {}
             for reason in self.reasons:
-                if reason.topic == topic:
+                if reason.topic != topic:
+                    continue
+                if reason.quantity == "crank_speed":
+                    limits.setdefault(reason.speed_limit, []).append(reason.run)
+                else:
                     runs.setdefault(reason.run, []).append(reason.numbers)
+            for limit, where in limits.items():
+                of = "; ".join(titles.get(run, run) for run in where if run)
+                lines.append(f"{limit}{of and f': {of}'}.")
             each = [
                 f"{titles.get(run, run)} ({', '.join(sizes)})" if run else ", ".join(sizes)
                 for run, sizes in runs.items()
             ]
-            if (
-                each
-                and self._is_at_requested_speed
-                and any(r.quantity == "crank_speed" for r in self.reasons if r.topic == topic)
-            ):
-                begin = f"{begin}, judged at the requested speed; the crank turns at {self._turns}"
             if each:
                 lines.append(f"{begin}: {'; '.join(each)}.")
         return lines
@@ -241,8 +261,10 @@ class Verdict:
         }
 
 
+CREEPS = 0.5
+"""Share of the requested speed below which a machine counts as standing."""
 _STANDS = 1e-3
-"""Share of the requested speed below which a crank stands."""
+"""Share of the requested speed below which a speed is shown as 0."""
 
 
 def shown_speed(speed: float, requested: float) -> float:

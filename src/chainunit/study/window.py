@@ -15,6 +15,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from .arrays import peak
 from .drive import Drive
+from .relay import LIGHT
 from .stored import energy_behind, energy_gap, energy_held
 
 BURNT = 2000.0
@@ -67,6 +68,8 @@ class Window:
     begin: float = 0.0
     steady: Window | None = None
     trip: Trip | None = None
+    relay_class: int = LIGHT
+    """trip class of the thermal relay"""
 
     def value(self, name: str) -> Any:
         """A variable of the run, shape (time,)."""

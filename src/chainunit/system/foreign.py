@@ -25,7 +25,7 @@ from ..model import Terminal
 from ..ports import FLANGE, LOAD, LoadPort, flange, load_terminal
 from ..quantities import Layout, base_units
 from .graph import Connector, FmuComponent
-from .instance import Fmu, Kind
+from .instance import NUMBERS, Fmu, Kind
 
 Role = Literal["motor", "machine"]
 """The side of a shaft on which an FMU stands."""
@@ -74,8 +74,8 @@ def fmu_component(
     names, file = dict(names or {}), Path(file)
     fmu = Fmu(file, kind)
     try:
-        real = [v for v in fmu.description.modelVariables if v.type == "Real"]
-        known = {v.name for v in real}
+        variables = [v for v in fmu.description.modelVariables if v.type in NUMBERS]
+        known = {v.name for v in variables}
         for name, theirs in names.items():
             if theirs not in known:
                 raise InputError(f"{file}: has no variable {printable(theirs)}, which was given for {name}")
@@ -91,13 +91,14 @@ def fmu_component(
                 name,
                 v.causality,
                 v.unit or "",
-                _dimension(v.unit, units),
-                float(v.start or 0.0),
+                _dimension(v.unit, units) if v.type == "Real" else {},
+                float({"true": 1, "false": 0}.get(v.start, v.start) or 0.0),
                 printable(v.description or ""),
                 float(-math.inf if v.min is None else v.min),
                 float(math.inf if v.max is None else v.max),
+                v.type,
             )
-            for v in real
+            for v in variables
             if v.causality in ("parameter", "input", "output")
             for name in [ours.get(v.name, v.name)]
         }
@@ -108,7 +109,7 @@ def fmu_component(
     for terminal in terminals:
         units = {v: _UNITS[member] for member, v in terminal.members.items() if member in _UNITS}
         for variable in units:
-            if variable not in connectors:
+            if variable not in connectors or connectors[variable].type != "Real":
                 raise InputError(
                     f"{file}: terminal {terminal.name} has the member {printable(variable)}, which is no Real "
                     "parameter, input or output of the FMU"

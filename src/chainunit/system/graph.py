@@ -19,7 +19,7 @@ from typing import Any
 from ..errors import InputError, shown
 from ..model import Model, Terminal
 from ..ports import FLANGE, LOAD, PortSlopes
-from ..quantities import Layout, base_units
+from ..quantities import Layout, Type, base_units
 
 Connection = tuple[str, str]
 """Source and target by full name, such as ``("motor.phi", "machine.phi")``."""
@@ -29,7 +29,7 @@ Connection = tuple[str, str]
 class Connector:
     """A variable of a component at which a connection can begin or end, or that has a `start` value: `causality` is
     "parameter", "input" or "output". `dimension` holds the powers of the base units; None where the unit is unknown.
-    For a foreign FMU it also holds the bounds and the `description`."""
+    For a foreign FMU it also holds the bounds and the `description`. A switch of the `type` Boolean is 0 or 1."""
 
     name: str
     causality: str
@@ -39,6 +39,7 @@ class Connector:
     description: str = ""
     least: float = -math.inf
     most: float = math.inf
+    type: Type = "Real"
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,9 @@ class ModelComponent:
             "output": (*states, *outputs),
         }
         return {
-            v.name: Connector(v.name, causality, v.unit, base_units(v.unit), float(v.quantity.start or 0.0))
+            v.name: Connector(
+                v.name, causality, v.unit, base_units(v.unit), float(v.quantity.start or 0.0), type=v.type
+            )
             for causality, variables in variables_of.items()
             for v in variables
         }
@@ -130,7 +133,7 @@ class System:
     ------
     InputError
         for an unknown name, a terminal that is joined twice, terminals that do not fit, an input with two sources,
-        and units that differ.
+        and units or types that differ.
     """
 
     components: Mapping[str, Component]
@@ -154,7 +157,7 @@ class System:
         for source, target in self.connections:
             if target in sources:
                 raise InputError(f"{target}: is connected to {sources[target]} and to {source}")
-            self._check_units(source, target)
+            self._check_ends(source, target)
             sources[target] = source
         for full in self.start:
             self.connector(full, "parameter", "input")
@@ -228,11 +231,13 @@ class System:
                 )
         return pairs
 
-    def _check_units(self, source: str, target: str) -> None:
+    def _check_ends(self, source: str, target: str) -> None:
         one, other = self.connector(source), self.connector(target)
         comparable = one.dimension is not None and other.dimension is not None
         if comparable and one.dimension != other.dimension:
             raise InputError(f"{source} in {one.unit} cannot be connected to {target} in {other.unit}")
+        if other.type not in ("Real", one.type):
+            raise InputError(f"{source}, a {one.type}, cannot be connected to {target}, a {other.type}")
 
     @cached_property
     def bonds(self) -> list[Bond]:

@@ -18,6 +18,12 @@ from ..errors import InputError, RunError, printable, shown
 
 log = logging.getLogger("chainunit.fmu")
 _WARNING, _DISCARD, _FATAL = 1, 2, 4  # of fmi2Status
+NUMBERS: Mapping[str, Any] = {"Real": ctypes.c_double, "Integer": ctypes.c_int, "Boolean": ctypes.c_int}
+"""By type of the variables that this package takes for numbers, how FMI 2.0 passes them: false is 0, true is 1."""
+_WHOLE = {
+    "Integer": (-(2.0**31), 2.0**31 - 1.0, "a whole number of 32 bits"),
+    "Boolean": (0.0, 1.0, "0 or 1"),
+}
 Kind = Literal["Co-Simulation", "Model Exchange"]
 """Interface of an FMU."""
 _working_directory = threading.Lock()
@@ -95,7 +101,7 @@ class Fmu:
 
     def outputs(self) -> list[str]:
         """Names of the outputs that are numbers, in declared order."""
-        return [name for name, v in self.variables.items() if v.causality == "output" and v.type == "Real"]
+        return [name for name, v in self.variables.items() if v.causality == "output" and v.type in NUMBERS]
 
     def feedthrough(self) -> dict[str, set[str] | None]:
         """By output, the inputs on which it depends directly; None where the FMU does not declare them."""
@@ -122,6 +128,37 @@ def _unloadable(fmu: Fmu, error: Exception) -> str:
     there = sorted(p.name for p in Path(fmu.folder, "binaries").glob("*"))
     has = f"it has those for {printable(', '.join(there))}" if there else "it has none"
     return f"has no library for this machine, {library}; {has}"
+
+
+class Handle:
+    """Variables by their value references, with room for their `values`. Variables of one type have this type as
+    `kind`; those of several types have `parts`, each with the places of its variables and their own handle."""
+
+    def __init__(self, variables: Sequence[Any]) -> None:
+        self.n, self.names = len(variables), [v.name for v in variables]
+        kinds = {v.type for v in variables} or {"Real"}
+        self.kind = kinds.pop() if len(kinds) == 1 else "Real"
+        self.references = (ctypes.c_uint * self.n)(*(v.valueReference for v in variables))
+        self.values: Any = (NUMBERS[self.kind] * self.n)()
+        places = [[i for i, v in enumerate(variables) if v.type == kind] for kind in kinds]
+        self.parts = [(own, Handle([variables[i] for i in own])) for own in places]
+
+    def put(self, new: Sequence[float]) -> None:
+        """Take values of variables of one type.
+
+        Raises
+        ------
+        InputError
+            for a count that is no whole number, and a switch that is neither 0 nor 1.
+        """
+        if self.kind == "Real":
+            self.values[:] = new
+            return
+        least, most, words = _WHOLE[self.kind]
+        for i, value in enumerate(new):
+            if not (least <= value <= most and value % 1.0 == 0.0):
+                raise InputError(f"{self.names[i]} = {value:g}: must be {words}")
+            self.values[i] = int(value)
 
 
 class Instance:
@@ -174,7 +211,8 @@ class Instance:
         self._alive = True
         # a run calls these functions at every step: without fmpy's layer, which takes twice their time
         self._library, self._component = self._fmi.dll, self._fmi.component
-        self._get, self._set = self._library.fmi2GetReal, self._library.fmi2SetReal
+        self._getters = {kind: getattr(self._library, f"fmi2Get{kind}") for kind in NUMBERS}
+        self._setters = {kind: getattr(self._library, f"fmi2Set{kind}") for kind in NUMBERS}
 
     def _call(self, what: str, function: Any, *args: Any) -> Any:
         from fmpy.fmi1 import FMICallException
@@ -205,23 +243,29 @@ class Instance:
         """Leave the initialization mode."""
         self._call("initialization", self._fmi.exitInitializationMode)
 
-    def handle(self, names: Sequence[str]) -> tuple[Any, Any, int]:
-        """Value references and room for their values, for `read` and `write`."""
-        n = len(names)
-        references = (ctypes.c_uint * n)(*(self.fmu.variables[name].valueReference for name in names))
-        return references, (ctypes.c_double * n)(), n
+    def handle(self, names: Sequence[str]) -> Handle:
+        """The variables of these names, for `read` and `write`."""
+        return Handle([self.fmu.variables[name] for name in names])
 
-    def read(self, handle: tuple[Any, Any, int]) -> Sequence[float]:
-        """Values behind a handle."""
-        references, values, n = handle
-        self._check(self._get(self._component, references, n, values), "reading values")
+    def read(self, handle: Handle) -> Sequence[float]:
+        """Values behind a handle; a switch is 0 or 1."""
+        values = handle.values
+        for places, part in handle.parts:
+            for i, value in zip(places, self.read(part), strict=True):
+                values[i] = value
+        if not handle.parts:
+            get = self._getters[handle.kind]
+            self._check(get(self._component, handle.references, handle.n, values), "reading values")
         return values
 
-    def write(self, handle: tuple[Any, Any, int], new: Sequence[float]) -> None:
-        """Set the values behind a handle."""
-        references, values, n = handle
-        values[:] = new
-        self._check(self._set(self._component, references, n, values), "setting values")
+    def write(self, handle: Handle, new: Sequence[float]) -> None:
+        """Set the values behind a handle; see `Handle.put`."""
+        for places, part in handle.parts:
+            self.write(part, [new[i] for i in places])
+        if not handle.parts:
+            handle.put(new)
+            put = self._setters[handle.kind]
+            self._check(put(self._component, handle.references, handle.n, handle.values), "setting values")
 
     def get(self, names: Sequence[str]) -> list[float]:
         """Values by name."""

@@ -23,6 +23,7 @@ from ..fmu.backends import Backend
 from ..fmu.backends import export as export_fmu
 from ..fmu.pack import interface_of, pack, xml_bytes
 from ..model import Model
+from ..quantities import written
 from .graph import Connector, FmuComponent, System
 
 PARAMETER_SET = "start"
@@ -172,7 +173,7 @@ def _root(tag: str, name: str, prefixes: Iterable[str], description: str = "") -
 
 
 def _units(parent: Element, prefix: str, connectors: Iterable[Connector]) -> None:
-    dimensions = {c.unit: c.dimension for c in connectors if c.unit}
+    dimensions = {c.unit: c.dimension for c in connectors if c.unit and c.type == "Real"}
     if not dimensions:
         return
     group = SubElement(parent, f"{prefix}:Units")
@@ -181,8 +182,10 @@ def _units(parent: Element, prefix: str, connectors: Iterable[Connector]) -> Non
         SubElement(node, "ssc:BaseUnit", {base: str(power) for base, power in (dimension or {}).items()})
 
 
-def _real(node: Element, tag: str, c: Connector, attributes: Mapping[str, str] | None = None) -> None:
-    SubElement(node, tag, {**(attributes or {}), **({"unit": c.unit} if c.unit else {})})
+def _typed(node: Element, prefix: str, c: Connector, attributes: Mapping[str, str] | None = None) -> None:
+    """Add the element of the type of a variable."""
+    unit = {"unit": c.unit} if c.unit and c.type == "Real" else {}
+    SubElement(node, f"{prefix}:{c.type}", {**(attributes or {}), **unit})
 
 
 def _parameter_set(part: _Part, connectors: Sequence[Connector]) -> Element:
@@ -191,7 +194,7 @@ def _parameter_set(part: _Part, connectors: Sequence[Connector]) -> Element:
     group = SubElement(root, "ssv:Parameters")
     for c in connectors:
         node = SubElement(group, "ssv:Parameter", name=part.name(c.name), description=c.description)
-        _real(node, "ssv:Real", c, {"value": repr(part.start.get(c.name, c.start))})
+        _typed(node, "ssv", c, {"value": written(part.start.get(c.name, c.start), c.type)})
     _units(root, "ssv", connectors)
     return root
 
@@ -249,7 +252,7 @@ def _component(elements: Element, name: str, part: _Part, source: str) -> None:
         node = SubElement(
             connectors, "ssd:Connector", name=part.name(c.name), description=c.description, kind=c.causality
         )
-        _real(node, "ssc:Real", c)
+        _typed(node, "ssc", c)
     bindings = SubElement(component, "ssd:ParameterBindings")
     SubElement(
         bindings, "ssd:ParameterBinding", type="application/x-ssp-parameter-set", source=_parameter_file(name)

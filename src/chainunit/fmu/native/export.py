@@ -100,7 +100,7 @@ def export(
     units = ("kernels.c", "model.c", of_version.layer)
 
     kinds = dict(of_version.kinds)
-    if fmi == 3 and model.state_layout:
+    if fmi == 3 and (model.state_layout or interface.discrete):
         # FMI 2.0 expects the call from every importer
         kinds["ModelExchange"] = {**kinds["ModelExchange"], "needsCompletedIntegratorStep": "true"}
 

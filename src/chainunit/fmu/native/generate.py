@@ -21,17 +21,18 @@ from ..description import Interface
 
 
 def groups(interface: Interface) -> list[list[int]]:
-    """Outputs that are evaluated together, as places among the declared outputs."""
+    """Outputs that are evaluated together, as places among the declared outputs: last all discrete ones."""
     lists: list[list[int]] = []
+    discrete = interface.discrete
     terminal_outputs, at = recipe.often(interface.model), 0
     for part in interface.model.parts:
-        places = {name: at + i for i, name in enumerate(part.layout.names)}
-        at += len(places)
+        places = {name: at + i for i, name in enumerate(part.layout.names) if at + i not in discrete}
+        at += len(part.layout.names)
         often = [i for name, i in places.items() if name in terminal_outputs - part.by_differences]
         apart = [i for name, i in places.items() if name in part.by_differences]
         rest = [i for i in places.values() if i not in often and i not in apart]
         lists += [group for group in (often, rest, apart) if group]
-    return lists
+    return [*lists, discrete] if discrete else lists
 
 
 def difference_groups(interface: Interface) -> set[int]:
@@ -67,6 +68,8 @@ def _programs(interface: Interface) -> Iterator[Program]:
     yield Program("values", point, values, offsets, "OFTEN")
     du, dx = casadi.SX.sym("du", us.shape[0]), casadi.SX.sym("dx", xs.shape[0])
     apart = difference_groups(interface)
+    if interface.discrete:
+        apart.add(len(values) - 1)
     smooth = [casadi.SX(0, 1) if g in apart else group for g, group in enumerate(values)]
     smooth.append(casadi.vertcat(*derivatives))
     slopes = [casadi.jtimes(row, casadi.vertcat(us, xs), casadi.vertcat(du, dx)) for row in smooth]
@@ -166,7 +169,7 @@ def tables(interface: Interface, guid: str, room: int) -> str:
         q = v.quantity
         return (
             f"{{{_text(v.name)}, {_unit(v.unit)}, {_text(q.allowed_range)}, {number(q.low)}, {number(q.high)}, "
-            f"{number(q.slack)}, {int(q.open_low)}, {int(q.tunable)}}}"
+            f"{number(q.slack)}, {int(q.open_low)}, {int(q.tunable)}, {q.type.upper()}}}"
         )
 
     def rate_of(name: str) -> int:
@@ -197,6 +200,7 @@ def tables(interface: Interface, guid: str, room: int) -> str:
         _array("int", "place", [str(place[i]) for i in range(n_y)]),
         _array("int", "group_of", [str(group_of[i]) for i in range(n_y)]),
         _array("Group", "group", group_rows),
+        _array("Type", "discrete_type", [interface.others[i].type.upper() for i in interface.discrete]),
     ]
     requirements = (*model.required, *model.start_required)
     for i, r in enumerate(requirements):
@@ -228,6 +232,8 @@ def tables(interface: Interface, guid: str, room: int) -> str:
         "place": "place",
         "group_of": "group_of",
         "groups": "group",
+        "discrete": len(group_rows) - 1 if interface.discrete else -1,
+        "discrete_type": "discrete_type",
         "required": "required" if rows else "NULL",
         "start_rounds": model.start_rounds,
         "max_steps": parameter_names.index(MAX_STEPS) if interface.states else -1,

@@ -121,6 +121,18 @@ class EntryReader:
             raise InputError(f"is {shown(given)}; must be finite")
         return value
 
+    def limit(self, end: str, whole: Mapping[str, Any], unit: str) -> float:
+        """The `end` (min or max) of a parameter; where its unit does not fit that of the value, either may be the
+        wrong one, so that both are named."""
+        given = whole[end]
+        parts = units.split(given) if isinstance(given, str) else None
+        if "unit" not in whole and parts is not None and parts[1] and not units.converts(parts[1], unit):
+            raise InputError(
+                f"has value = {shown(whole['value'])} and {end} = {shown(given)}, which are of different kinds; "
+                "correct the unit of one of them"
+            )
+        return self.number("", given, unit)
+
     def entry(
         self, key: str, given: Any, unit: str, motion: Known | None = None, inputs: bool = False
     ) -> Any:
@@ -147,6 +159,12 @@ class EntryReader:
             if each.names == (given.strip(),) and self.units.get(given.strip(), "") is None:
                 self.units[given.strip()] = unit
             checked_dimension(each.text, known, unit)
+            for width in each.widths:
+                if moving := {*width.of.names} & ({*self.inputs} | {*(motion or {})}) or {*width.of.tables}:
+                    raise InputError(
+                        f"is {shown(given)}; the width of {width.call} changes with {', '.join(sorted(moving))}; "
+                        "must be a number or an expression of parameters"
+                    )
             return given
         return 0.0
 
@@ -280,12 +298,11 @@ class EntryReader:
             with self.at(key):
                 value, unit = self.with_unit(whole.get("value"), whole.get("unit"))
                 limits = {
-                    each: self.number(key, whole[each], unit or "1")
-                    for each in ("min", "max")
-                    if each in whole
+                    each: self.limit(each, whole, unit or "1") for each in ("min", "max") if each in whole
                 }
                 if not limits.get("min", -math.inf) <= value <= limits.get("max", math.inf):
-                    raise InputError(f"is {value:g}; must be from min to max")
+                    ends = [f"{end} = {shown(whole[end])}" for end in limits]
+                    raise InputError(f"is {shown(whole['value'])}; must be within {' and '.join(ends)}")
                 self.units[name] = unit
                 entries.append(
                     {
@@ -358,13 +375,7 @@ def _is_quantity(text: str) -> bool:
 
 def _is_unit(text: str) -> bool:
     """Whether a text is a unit of a linkage, such as kg*m2 or N/(m s)."""
-    for each in UNITS:
-        try:
-            units.convert(1.0, text, each)
-        except ValueError:
-            continue
-        return True
-    return False
+    return any(units.converts(text, each) for each in UNITS)
 
 
 def is_given(value: Any) -> str:

@@ -3,13 +3,16 @@ tables over the coordinate. Standard library only: FMUs carry this file."""
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from ...errors import InputError
 from ...groups.loads import Effect, Moving, Wrench
 from ...mechanism.curves import TableCurve
-from ...mechanism.expressions import expression, value_of
+from ...mechanism.expressions import Width, expression, value_of
+from ...model import Requirement
 from ...planar import ZERO, Vec2
 
 Entry = float | str
@@ -27,9 +30,51 @@ _EXTREME = re.compile(r"(min|max)\((.+)\)")
 
 def extremes_of(loads: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
     """The names of the extremes of the motion in the expressions of loads, each once."""
-    entries = [each for load in loads for each in (*load.get("force", ()), load.get("torque", 0.0))]
-    texts = [each for each in entries if isinstance(each, str)]
-    return tuple(dict.fromkeys(name for text in texts for name in expression(text).extremes))
+    return tuple(dict.fromkeys(name for _, text in _texts(loads) for name in expression(text).extremes))
+
+
+def widths_of(loads: Sequence[Mapping[str, Any]]) -> tuple[tuple[str, Width], ...]:
+    """The key of a load and each width in its expressions that depends on parameters."""
+    return tuple(
+        (key, width)
+        for key, text in _texts(loads)
+        for width in expression(text).widths
+        if not width.is_number
+    )
+
+
+def checked_widths(
+    loads: Sequence[Mapping[str, Any]], values: Mapping[str, Any]
+) -> tuple[tuple[str, Width, float], ...]:
+    """The widths that depend on parameters, each behind the key of its load and with its sign at these `values`.
+
+    Raises
+    ------
+    InputError
+        in one line, for one that is zero, or below zero where it must not.
+    """
+    checked = []
+    for key, width in widths_of(loads):
+        value = width.value(values)
+        if wrong := width.fault(value):
+            given = ", ".join(f"{name} = {values[name]:.6g}" for name in width.of.names)
+            raise InputError(f"{wrong}{f' ({given})' * bool(given)}", key=key)
+        checked.append((key, width, math.copysign(1.0, value)))
+    return tuple(checked)
+
+
+def requirement_of_width(key: str, width: Width, sign: float, parameters: Collection[str]) -> Requirement:
+    """The requirement that a width keeps its sign."""
+    subject = f"{'width' if sign > 0.0 else 'fall'} of {width.call} in {key}"
+    given = tuple(name for name in width.of.names if name in parameters)
+    return Requirement(subject, "1", "the function cannot change over it", given)
+
+
+def _texts(loads: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, str]]:
+    """The expressions of forces and torques, each behind its key."""
+    for load in loads:
+        for key, entries in (("force", load.get("force", ())), ("torque", (load.get("torque", 0.0),))):
+            yield from ((f"loads.{load['name']}.{key}", each) for each in entries if isinstance(each, str))
 
 
 def place_of(extreme: str) -> tuple[str, str, str, str]:

@@ -33,13 +33,19 @@ from ...planar import ZERO
 from ...quantities import Value, declared_class, group, quantity
 from ...refusals import unit_behind
 from .closing import dead_group, gap_hint, open_group
-from .declarations import (
-    LinkageMotion,
-    LinkBody,
-    common_parameters,
-    field_of,
+from .declarations import LinkageMotion, LinkBody, common_parameters, field_of
+from .loads import (
+    ForceLaw,
+    LinkAngle,
+    SpringDamper,
+    TorqueLaw,
+    checked_widths,
+    extremes_of,
+    name_of_load,
+    place_of,
+    requirement_of_width,
+    widths_of,
 )
-from .loads import ForceLaw, LinkAngle, SpringDamper, TorqueLaw, extremes_of, name_of_load, place_of
 from .narrow import check_triads, lesser, lows, turns_of_triads
 from .outputs import DescribedLinkage, LinkageOutputs
 from .parts import LinkageParts
@@ -104,6 +110,9 @@ class LinkageDescription(LinkageOutputs):
         self.sides |= turns_of_triads(self.linkage(MATH, p, u))
         self.turning = self._followed(p, u)
         self._check_extremes()
+        self.widths = (
+            checked_widths(data["loads"], self.values(self._ready(), u)) if widths_of(data["loads"]) else ()
+        )
 
     # declarations
 
@@ -335,16 +344,18 @@ class LinkageDescription(LinkageOutputs):
 
     # the model
 
+    def _ready(self) -> Any:
+        """The start values of the parameters, with the numbers that are derived from them."""
+        p = self.Parameters()
+        object.__setattr__(p, "derived", derived_numbers(MATH, self.linkage(MATH, p, self.Inputs())))
+        return p
+
     def end_stops(self) -> EndStops | None:
         """The usual end stops of a driver that slides, for its start values; None for one that turns."""
         if not self.structure.driver.linear:
             return None
-        p = self.Parameters()
-        u = self.Inputs()
-        linkage = self.linkage(MATH, p, u)
-        derived = derived_numbers(MATH, linkage)
-        object.__setattr__(p, "derived", derived)
-        linkage = self.linkage(MATH, p, u)
+        p, u = self._ready(), self.Inputs()
+        linkage, derived = self.linkage(MATH, p, u), p.derived
         states = [MachineState(MATH, Mechanism(MATH, linkage, q, derived), 0.0) for q in self.places()]
         mass = max(state.J for state in states)
         low, high = self.span
@@ -372,7 +383,7 @@ class LinkageDescription(LinkageOutputs):
             for subject, why in words.items()
             for each in self.structure.groups
             if subject.startswith("least") or each.kind == "triad"
-        )
+        ) + tuple(requirement_of_width(*each, given) for each in self.widths)
 
         class FileMachine(InverseMachine):
             __doc__ = f"{data['title'] or data['name']}."
@@ -449,6 +460,9 @@ class LinkageDescription(LinkageOutputs):
             last += each.derived
             if each.derived:
                 yield derived[last - 2], -math.inf, MOST_MISFIT
+        values = self.values(p, u)
+        for _, width, sign in self.widths:
+            yield sign * width.of.value(xp, values), 0.0, math.inf
 
     @cached_property
     def _signs(self) -> list[float]:

@@ -11,13 +11,12 @@ from typing import Any
 from ...engines import MATH
 from ...errors import InputError
 from ...groups.triad import MOST_MISFIT, Triad
+from ...mechanism.extremes import lowest
 from ...mechanism.linkage import Linkage
 from ...mechanism.machine import Mechanism, derived_numbers
 
 NEAR = 0.35
 """Between two places the margin may fall from here to zero."""
-_GOLDEN = 0.6180339887498949
-_STEPS = 24
 
 
 def lows(
@@ -39,26 +38,7 @@ def lows(
         for k, here in enumerate(course):
             low, high = max(k - 1, 0), min(k + 1, last)
             if here < NEAR and here <= course[low] and here <= course[high]:
-                yield group, *_lowest(margin, places[low], places[high])
-
-
-def _lowest(margin: Callable[[float], float], low: float, high: float) -> tuple[float, float]:
-    """The place of the least margin in a range, and that margin, by golden sections; the first that is NaN."""
-    a, b = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-    at_a, at_b = margin(a), margin(b)
-    for _ in range(_STEPS):
-        for q, value in ((a, at_a), (b, at_b)):
-            if math.isnan(value):
-                return q, value
-        if at_a < at_b:
-            high, b, at_b = b, a, at_a
-            a = high - _GOLDEN * (high - low)
-            at_a = margin(a)
-        else:
-            low, a, at_a = a, b, at_b
-            b = low + _GOLDEN * (high - low)
-            at_b = margin(b)
-    return (a, at_a) if at_a < at_b else (b, at_b)
+                yield group, *lowest(margin, places[low], places[high])
 
 
 def turns_of_triads(linkage: Linkage) -> dict[str, float]:

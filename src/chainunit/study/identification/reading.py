@@ -289,8 +289,8 @@ def _parameter(
     deviation = _deviation(f"{place}.deviation", given["deviation"], variable, value)
     if not low <= value <= high:
         raise InputError(
-            f"{place} ({name}): its value in the study, {value:g}{unit}, must lie between from and to, as its "
-            "deviation is counted from it",
+            f"{place} ({name}): its value in the study, {value:g}{unit}, must lie between from and to, here from "
+            f"{low:g} to {high:g}{unit}, as its deviation is counted from it",
             place,
         )
     return Unknown(name, variable.unit, value, low, high, deviation)

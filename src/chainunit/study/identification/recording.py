@@ -15,7 +15,7 @@ import numpy as np
 from ...errors import Faults, InputError, meant, near_name, printable
 from ...files import whole
 from ...reading import decoded, file_bytes
-from ...units import of_other_kind, scale
+from ...units import must_be, of_other_kind, scale
 from .measurands import MEASURANDS, Measurand
 
 FEWEST = 100
@@ -224,7 +224,7 @@ def _scale(file: Path, head: str, quantity: Measurand, unit: str) -> tuple[float
         )
     other = of_other_kind(unit, quantity.unit)
     if other:
-        raise InputError(f"{file}, column {head}: {other}")
+        raise InputError(f"{file}, column {head}: {other}; {must_be(quantity.unit)}")
     try:
         return scale(unit, quantity.unit)
     except ValueError as error:

@@ -1,6 +1,6 @@
 """Whether a fit describes the recordings. A wrong model leaves orders of the crank in the residuals, or strains
 clocks and sensors: a wrong gear is described by a clock that runs too fast. A machine whose speed or load was not
-steady leaves residuals that change slowly."""
+steady leaves residuals that change slowly, beside the orders."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ class ResidualCheck:
     `statistic` is the sum of the squares of the parts of the residuals along cosine and sine of all orders, in
     standard deviations of noise of the same size; noise exceeds `limit` in the permitted share of fits. `orders` are
     the three largest orders with their amplitudes in the unit of the column. `noise` is the standard deviation of the
-    rest, in parts of the stated noise of the sensor. `slow` is the sum of the squares of the means of parts of the
-    run, in the same deviations, with its limit, and `changes` the standard deviation of these means in the unit of
-    the column.
+    rest, in parts of the stated noise of the sensor. `slow` is the sum of the squares of the means of the rest over
+    parts of the run, in the same deviations, with its limit, and `changes` the standard deviation of these means in
+    the unit of the column.
     """
 
     run: str
@@ -129,15 +129,16 @@ def check(of: Comparison, level: float) -> ResidualCheck:
     count = len(sizes)
     along = combinations.T @ (waves.T @ residuals) / sizes
     free = rows - count - 1
-    noise = math.sqrt(max(0.0, float(residuals @ residuals - along @ along)) / free)
+    rest = residuals - waves @ (combinations @ (along / sizes))
+    noise = math.sqrt(float(rest @ rest) / free)
     # the noise is measured, too
     limit = count * float(f.ppf(level, count, free))
     parts = combinations @ (along / sizes)
     amplitudes = np.hypot(parts[::2], parts[1::2]) * of.size
     largest = np.argsort(-amplitudes)[:3]
     found = tuple((int(k) + 1, float(amplitudes[k])) for k in largest)
-    statistic = float(along @ along) / noise**2
-    slow = _slow(residuals, of.angle, level)
+    statistic = _over(float(along @ along), noise**2)
+    slow = _slow(rest, of.angle, level)
     return ResidualCheck(of.run, of.column, statistic, limit, found, noise, *slow[:2], slow[2] * of.size)
 
 
@@ -153,7 +154,14 @@ def _slow(residuals: Any, angle: Any, level: float) -> tuple[float, float, float
     between = float(np.sum(sizes * means**2))
     within = (float(residuals @ residuals) - between) / (rows - count)
     limit = (count - 1) * float(f.ppf(level, count - 1, rows - count))
-    return between / within, limit, math.sqrt(between / rows)
+    return _over(between, within), limit, math.sqrt(between / rows)
+
+
+def _over(part: float, noise: float) -> float:
+    """A part of the residuals over their noise; 0 where neither is there, as of a recording that the model made."""
+    if noise > 0.0:
+        return part / noise
+    return math.inf if part > 0.0 else 0.0
 
 
 def _waves(angle: Any, orders: int) -> Iterator[Any]:

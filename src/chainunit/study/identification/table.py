@@ -37,13 +37,10 @@ class IdentifyTable:
         kind="percent",
     )
     starts: Value = quantity(
-        "1", "number of starts of the fit, spread over the bounds", default=1.0, min=1.0, max=100.0
+        "1", "number of starts of the fit, spread over the bounds", default=1, min=1, max=100, type="Integer"
     )
-    seed: Value = quantity("1", "seed of the starts", default=1.0, min=0.0, max=1e9)
+    seed: Value = quantity("1", "seed of the starts", default=1, min=0, max=1_000_000_000, type="Integer")
 
-
-WHOLE = ("starts", "seed")
-"""Quantities of the table that are whole numbers."""
 
 FIELDS: Mapping[str, Any] = {
     "parameter": (

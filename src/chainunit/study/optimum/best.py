@@ -56,8 +56,8 @@ class Best:
     found: Mapping[str, float]
     """quantities of the best machine, or of the nearest one"""
     pulls: tuple[float, float] | None
-    """least pull in the webs up to the slack-free speed, of today's machine and of the best or nearest one [N]; None
-    without that wish"""
+    """least mean pull along a web up to the slack-free speed, of today's machine and of the best or nearest one [N];
+    None without that wish"""
     neighbours: Neighbours | None
     fmu: Mapping[str, FmuValue]
     front: tuple[FrontPoint, ...]

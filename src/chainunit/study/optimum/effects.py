@@ -67,7 +67,7 @@ def _changes(search: Search) -> np.ndarray:
     blocks = [([search.columns.whole(name) for name in names], space.speed) for names in columns]
     relative = [len(names) > 1 for names in columns]
     if wishes.slack_free_speed:
-        blocks.append(([k for name in search.webs for k in search.columns.lower(name)], space.slack_speed))
+        blocks.append((search.mean_pulls, space.slack_speed))
         relative.append(False)
     largest = np.zeros(space.n)
     for x in [search.base, *search.starts(_MACHINES)[0]]:

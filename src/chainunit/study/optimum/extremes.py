@@ -9,15 +9,15 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ...mechanism.courses import means
 from .kernel import Kernel
 
 Sense = Literal["max", "min", "peak"]
 _ROUNDS = 12
 _EXACT = 1e-11
 """Step of the search for an extreme angle [rad] at which it ends; the value is exact to the square of the step."""
-_CLOSE = 1e-9
-"""Change of a mean, relative to its size, at which doubling the angles ends."""
 MOST_ANGLES = 2**15
+"""Largest number of angles of a grid."""
 
 
 def grid(points: int) -> Any:
@@ -115,9 +115,8 @@ class TurnValues:
 
     def mean(self, x: Any, column: int, power: int) -> float:
         """The mean of a column, or of its square, over the continuous turn."""
-        points, before = 256, math.nan
-        while True:
-            mean = float(np.mean(self.kernel.values(x, *self._lanes(grid(points)))[column, 0] ** power))
-            if abs(mean - before) <= _CLOSE * abs(mean) or points >= MOST_ANGLES or not math.isfinite(mean):
-                return mean
-            points, before = 2 * points, mean
+
+        def values(q: Any) -> Any:
+            return self.kernel.values(x, *self._lanes(q))[column] ** power
+
+        return float(means(values, 0.0, 2.0 * math.pi)[0][0])

@@ -92,6 +92,14 @@ class Columns:
         """The places of the pieces whose least value a column is."""
         return self._of(column, "FMIN")
 
+    def mean(self, column: str) -> int:
+        """The place of the mean of the pieces whose least value a column is."""
+        if (column, "mean") not in self._places:
+            own = [self.expressions[k] for k in self.lower(column)]
+            self._places[column, "mean"] = (len(self.expressions),)
+            self.expressions.append(sum(own[1:], own[0]) / len(own))
+        return self._places[column, "mean"][0]
+
     def upper(self, column: str) -> tuple[int, ...]:
         """The places of the pieces whose largest value a column is."""
         return self._of(column, "FMAX")
@@ -185,12 +193,10 @@ class RowMaker:
         self.rows.append(ExtremeRow(owner, "min", -bound, scale, equal=True, terms=self._terms(q, -1.0)))
 
     def slack_free(self, columns: Sequence[str], owner: str, scale: float) -> None:
-        """Rows by which the pulls in the webs stay above 0 at the speeds of the slack-free range."""
-        for column in columns:
-            self.rows += [
-                PointRow(owner, "min", 0.0, scale, column=k, factor=-1.0, slack=True)
-                for k in self.columns.lower(column)
-            ]
+        """Rows by which the mean pull along each web, of those at its two ends, stays above 0 at the speeds of the
+        slack-free range."""
+        places = map(self.columns.mean, columns)
+        self.rows += [PointRow(owner, "min", 0.0, scale, column=k, factor=-1.0, slack=True) for k in places]
 
     def _mean(self, own: dict[str, Any], column: str, factor: float, rms: bool) -> None:
         self.rows.append(MeanRow(**own, column=self.columns.whole(column), factor=factor, rms=rms))

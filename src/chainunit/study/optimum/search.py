@@ -94,9 +94,14 @@ class Search:
 
     @property
     def webs(self) -> list[str]:
-        """The outputs with the pulls in the webs of the loaded sides."""
+        """The outputs with the least pulls at the ends of the webs of the loaded sides."""
         machine = self.wishes.machine
         return [f"{side}.web_pull" for side in machine.loaded_sides(self.wishes.feed)]
+
+    @property
+    def mean_pulls(self) -> list[int]:
+        """The places of the mean pulls along these webs."""
+        return [self.columns.mean(column) for column in self.webs]
 
     def _maker(self, aux: list[float]) -> RowMaker:
         def new_aux(scale: float) -> int:
@@ -164,10 +169,10 @@ class Search:
         ]
 
     def least_pull(self, x: Any) -> float:
-        """The least pull in the webs up to the highest speed of the slack-free range [N]."""
+        """The least mean pull along a web up to the highest speed of the slack-free range [N]."""
         from scipy.optimize import minimize_scalar
 
-        places = [k for column in self.webs for k in self.columns.lower(column)]
+        places = self.mean_pulls
         q, highest = grid(FINE), self.wishes.slack_free_speed
 
         def pull(part: float) -> float:
@@ -219,7 +224,7 @@ class Search:
 
     @property
     def _pull_scale(self) -> float:
-        places = [k for column in self.webs for k in self.columns.lower(column)]
+        places = self.mean_pulls
         q = grid(COARSE)
         return float(np.max(np.abs(self.space.kernel.values(self.base, q, np.zeros(len(q)))[places]))) or 1.0
 

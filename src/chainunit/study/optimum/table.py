@@ -34,21 +34,20 @@ class Optimize(CycleBasis):
     )
     slack_free_speed: Value = quantity(
         "rad/s",
-        "crank speed up to which the webs keep their pull; with 0 there is no such limit",
+        "crank speed up to which no web goes slack: its mean pull stays above 0; with 0 there is no such limit",
         default=0.0,
         min=0.0,
         max=1000.0,
         kind="speed",
     )
-    starts: Value = quantity("1", "number of starts, spread over the bounds", default=20.0, min=1.0, max=1e4)
-    seed: Value = quantity("1", "seed of the starts", default=1.0, min=0.0, max=1e9)
+    starts: Value = quantity(
+        "1", "number of starts, spread over the bounds", default=20, min=1, max=10_000, type="Integer"
+    )
+    seed: Value = quantity("1", "seed of the starts", default=1, min=0, max=1_000_000_000, type="Integer")
     pareto_points: Value = quantity(
-        "1", "number of points of the front of two objectives", default=9.0, min=2.0, max=200.0
+        "1", "number of points of the front of two objectives", default=9, min=2, max=200, type="Integer"
     )
 
-
-WHOLE = ("starts", "seed", "pareto_points")
-"""Quantities of the table that are whole numbers."""
 
 FIELDS: Mapping[str, Any] = {
     "objectives": (

@@ -13,7 +13,7 @@ from ..cycle_quantities import CycleBasis, CycleQuantity
 TURNS = "clearance"
 """The limit that the machine turns, with a distance."""
 SLACK = "slack_free_speed"
-"""The limit that the webs keep their pull up to a speed."""
+"""The limit that no web goes slack up to a speed."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Wishes:
     clearance: float
     """distance from the requirements of the model, as a share of the value of today"""
     slack_free_speed: float = 0.0
-    """crank speed up to which the webs keep their pull [rad/s]; 0 without that wish"""
+    """crank speed up to which no web goes slack [rad/s]; 0 without that wish"""
     basis: CycleBasis = field(default_factory=CycleBasis)
     starts: int = 20
     seed: int = 1

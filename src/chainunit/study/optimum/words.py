@@ -89,7 +89,7 @@ def sentence(best: Best, each: Binding) -> str:
     others = best.wishes.objectives[1:]
     held = "".join(f", with {q.name} held at {number(best.found[q.name], q.unit, q.kind)}" for q in others)
     if each.name == SLACK:
-        return f"{each.step_words} of least pull in the webs at that speed {verb} {objective.name} by {amount}{held}"
+        return f"{each.step_words} of web mean pull at that speed {verb} {objective.name} by {amount}{held}"
     return f"{each.step_words} more of {each.name}.{each.side} {verb} {objective.name} by {amount}{held}"
 
 

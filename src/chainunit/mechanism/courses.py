@@ -1,0 +1,123 @@
+"""Extremes, roots and means of sampled quantities over the way of a driver, between the places at which they are
+sampled, too. No FMU carries this file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+_CANDIDATES = 2
+"""So many of the largest samples of a quantity may lie beside its largest value."""
+_POINTS = 9
+_ROUNDS = 10
+"""Points of a range around a sample, and rounds in which the range shrinks to two of its steps."""
+_HALVINGS = 48
+ROUNDING = 1e-14
+"""Part of the largest size of a quantity below which it counts as zero."""
+_PARTS, _NODES = 48, 8
+"""Parts of the way at first, and points in each, of a mean."""
+_AGREE = 1e-9
+"""Difference of two rules on a part, in parts of the integral of the quantity's size, at which they agree."""
+_DEEPEST = 24
+
+
+def largest(values_at: Callable[[Any], Any], q: Any, *, around: bool) -> tuple[Any, Any]:
+    """The place and the largest value of each quantity, each of shape (quantities,).
+
+    The search needs no derivative, so that a corner or a jump of a load does not mislead it.
+
+    Parameters
+    ----------
+    values_at : gives the quantities at places of shape (n,), shape (quantities, n)
+    q : evenly spaced places, close enough that at most one extreme lies between two neighbours
+    around : whether the last place is the first one again, after a whole turn
+    """
+    samples, step = np.asarray(values_at(q)), float(q[1] - q[0])
+    rows = np.arange(len(samples))
+    best, place = np.max(samples, axis=1), q[np.argmax(samples, axis=1)]
+    high_before = np.pad(samples, ((0, 0), (1, 1)), constant_values=-np.inf)
+    local = (samples >= high_before[:, :-2]) & (samples >= high_before[:, 2:])
+    ranked = np.argsort(np.where(local, -samples, np.inf), axis=1, kind="stable")
+    for k in range(min(_CANDIDATES, len(q))):
+        middle, reach = q[ranked[:, k]], step
+        for _ in range(_ROUNDS):
+            at = middle[:, None] + np.linspace(-reach, reach, _POINTS)
+            if not around:
+                at = np.clip(at, q[0], q[-1])
+            values = _own(values_at, at)
+            top = np.argmax(values, axis=1)
+            middle, value = at[rows, top], values[rows, top]
+            more = value > best
+            best, place = np.where(more, value, best), np.where(more, middle, place)
+            reach *= 2.0 / (_POINTS - 1)
+    return place, best
+
+
+def roots(values_at: Callable[[Any], Any], q: Any, *, around: bool) -> list[Any]:
+    """The places at which each quantity changes its sign, a sorted array for each. The arguments are those of
+    `largest`; a quantity that only touches zero has no root there."""
+    found: list[Any] = []
+    rows = np.asarray(values_at(q))
+    for row, samples in enumerate(rows[:, :-1] if around else rows):
+        nothing = ROUNDING * float(np.max(np.abs(samples)))
+
+        def signs_of(values: Any, nothing: float = nothing) -> Any:
+            return np.where(np.abs(values) <= nothing, 0.0, np.sign(values))
+
+        signs = signs_of(samples)
+        there = np.flatnonzero(signs)
+        if not len(there):
+            found.append(np.empty(0))
+            continue
+        # a zero belongs to the range before it, of a turn also across its begin
+        last = np.searchsorted(there, np.arange(len(signs)), side="right") - 1
+        signs = signs[there[last if around else np.maximum(last, 0)]]
+        changes = np.flatnonzero(np.diff(signs, append=signs[:1] if around else []))
+        low, high, sign = q[changes], q[changes + 1], signs[changes]
+        for _ in range(_HALVINGS if len(changes) else 0):
+            middle = 0.5 * (low + high)
+            same = signs_of(np.asarray(values_at(middle))[row]) != -sign
+            low, high = np.where(same, middle, low), np.where(same, high, middle)
+        found.append(0.5 * (low + high))
+    return found
+
+
+def means(values_at: Callable[[Any], Any], low: float, high: float) -> tuple[Any, Any]:
+    """The mean of each quantity from the place `low` to `high`, and that of its size, each of shape (quantities,).
+
+    Gauss's rule on parts of the way; a part is halved until both rules agree, so that a load that acts over a short
+    way counts as it is.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
+
+    def integrals(begin: Any, end: Any) -> tuple[Any, Any]:
+        half = 0.5 * (end - begin)
+        at = 0.5 * (begin + end)[:, None] + half[:, None] * nodes
+        values = np.asarray(values_at(at.ravel())).reshape(-1, *at.shape)
+        return (values @ weights) * half, (np.abs(values) @ weights) * half
+
+    edges = np.linspace(low, high, _PARTS + 1)
+    begin, end = edges[:-1], edges[1:]
+    whole, sizes = integrals(begin, end)
+    size = np.sum(sizes, axis=1)
+    total = np.zeros(len(whole))
+    for k in range(_DEEPEST):
+        middle = 0.5 * (begin + end)
+        halves = [integrals(begin, middle)[0], integrals(middle, end)[0]]
+        better = halves[0] + halves[1]
+        rough = np.any(np.abs(better - whole) > _AGREE * size[:, None], axis=0) & (k < _DEEPEST - 1)
+        total += np.sum(better[:, ~rough], axis=1)
+        if not np.any(rough):
+            break
+        begin, end = (np.concatenate([x[rough], y[rough]]) for x, y in ((begin, middle), (middle, end)))
+        whole = np.concatenate([half[:, rough] for half in halves], axis=1)
+    return total / (high - low), size / (high - low)
+
+
+def _own(values_at: Callable[[Any], Any], at: Any) -> Any:
+    """The values of each quantity at its own places `at`, shape (quantities, points)."""
+    count, points = at.shape
+    values = np.asarray(values_at(at.ravel())).reshape(count, count, points)
+    return values[np.arange(count), np.arange(count)]

@@ -1,0 +1,79 @@
+"""Candidates of sizing with an inverter: the boost that the start needs, and the ratio that spares a larger motor."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterator
+
+from ..text import number
+from .candidate import Candidate
+from .config import Config
+
+BOOSTS = (0.05, 0.10, 0.15)
+"""Shares of the voltage at frequency zero that are tried, in this order."""
+HAIR = 1.1
+"""Factor by which a candidate may exceed the share of a limit that the margin leaves, so that it is tried with the
+ratio above: a step of the finest series is 3 %, and the heat of a winding changes with the square of the torque."""
+_RELIEVED = ("rms_torque", "peak_torque", "temperature", "inverter_current")
+"""Checks that a larger ratio improves: the motor turns faster and gives less torque."""
+
+
+def _boosts(config: Config, c: Candidate) -> list[float]:
+    """The boosts to try, that of the candidate first; it alone where the file gives it, or on the line."""
+    own = float(c.drive.parameters.inverter.boost)
+    if not c.drive.follows or "starter.inverter.boost" in config.given:
+        return [own]
+    return [own, *(boost for boost in BOOSTS if boost > own)]
+
+
+def _with_boost(c: Candidate, boost: float) -> Candidate:
+    p = c.drive.parameters
+    p = dataclasses.replace(p, inverter=dataclasses.replace(p.inverter, boost=boost))
+    return dataclasses.replace(c, drive=dataclasses.replace(c.drive, parameters=p))
+
+
+def least_boost(config: Config, c: Candidate, judged: Callable[[Candidate], Candidate]) -> Candidate:
+    """The candidate, as `judged`, with the least boost with which it starts; where it starts with none, with the
+    first."""
+    trials = []
+    for boost in _boosts(config, c):
+        trials.append(judged(_with_boost(c, boost)))
+        if trials[-1].starts or not trials[-1].checks:
+            return trials[-1]
+    return trials[0]
+
+
+def misses_by_a_hair(c: Candidate) -> bool:
+    """Whether the candidate exceeds what the margin leaves of its limits by so little, and in such checks, that the
+    ratio above may do."""
+    over = [name for name in c.checks if c.exceeds(name)]
+    left = HAIR * (1.0 - c.margin)
+    return bool(over) and all(name in _RELIEVED and c.sizes[name] <= left for name in over)
+
+
+def inverter_needs(best: Candidate, config: Config) -> Iterator[str]:
+    """What the inverter has to be, and what it has to be set to."""
+    boost = best.drive.parameters.inverter.boost
+    if "starter.inverter.boost" not in config.given and best.starts:
+        text = f"The inverter needs a voltage boost of {_percent(boost)} at frequency zero (starter.inverter.boost)"
+        less = "; with less the motor does not start the machine from every crank angle"
+        yield f"{text}{less if boost > BOOSTS[0] else ''}."
+    if best.inverter_current is not None and best.start_current is not None:
+        rated, overload = float(best.motor.nameplate.rated_current), _percent(config.starter.overload)
+        text = f"The inverter carries {overload} of its rated current for up to 60 s (starter.overload)"
+        if best.inverter_current <= rated:
+            yield f"{text}: one with the rated current of the motor suffices, also for the start."
+        else:
+            yield (
+                f"{text}, and the start takes {number(best.start_current, 'A')}, {best.start_current / rated:.2g} "
+                f"times the rated current of the motor: order one of at least {number(best.inverter_current, 'A')}, "
+                "or lengthen run.ramp."
+            )
+    yield (
+        "The electronic motor protection of the inverter stands in place of a thermal relay: set it to the rated "
+        "current of the motor. No trip class is to be chosen for it."
+    )
+
+
+def _percent(share: float) -> str:
+    return number(share, "1", "percent", full=False)
