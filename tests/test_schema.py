@@ -12,6 +12,7 @@ from wrong_files import FILES
 
 from chainunit import units
 from chainunit.errors import InputError
+from chainunit.models import MACHINES
 from chainunit.places import lines_of
 from chainunit.reading import in_file
 from chainunit.study.commented import commented
@@ -211,6 +212,65 @@ WRONG += [
 def test_a_wrong_file_is_marked_where_a_schema_can_see_the_fault(text):
     assert refused(text)
     assert bool(marks(text)) == (text not in UNSEEN)
+
+
+LINKAGE = f"'{ROOT.as_posix()}/examples/linkages/slider_crank_press.toml'"
+DRIVES = {
+    "": {},
+    **{name: {"system": f"machine = '{name}'"} for name in MACHINES},
+    "linkage in [system]": {"system": f"machine = {LINKAGE}"},
+    "linkage in [machine]": {"machine": f"linkage = {LINKAGE}"},
+    "motor by designation": {"system": "motor = 'IE3 4-pole 0.75 kW, 80M'"},
+    "motor by type": {"system": "motor = 'InductionMotor'"},
+    "chains": {"": "organ = 'chain'"},
+    "driveline": {"driveline": ""},
+    "sizing": {"sizing": ""},
+}
+TABLES = {
+    **{
+        name: {name: ""}
+        for name in ("ratios", "chain", "sizing", "gear", "starter", "observer", "torsion", "motor")
+    },
+    **{name: {name: ""} for name in ("coupling", "driveline", "flywheel", "monte_carlo", "report", "run")},
+    "flywheel.J": {"flywheel": "J = 1"},
+    "winding temperature": {"run": "winding_temperature = 400"},
+    "one-sided share": {"sizing": "one_sided_share = 1"},
+    "organ": {"": "organ = 'chain'"},
+    "organ of bars": {"": "organ = 'two-bar'"},
+    "feed-forward": {"": "feed_forward = true"},
+    "start": {"": "start = 'soft'"},
+    "machine.ratio": {"machine": "ratio = 20"},
+    "watch": {"watch": f"file = '{ROOT.as_posix()}/README.md'"},
+    "random": {"monte_carlo": "runs = 5"},
+    "sweep of a grid": {
+        "sweep": "method = 'grid'\npoints = 3\nparameter = [{ name = 'run.crank_speed', values = [1, 2] }]"
+    },
+    "sweep": {"sweep": "parameter = [{ name = 'run.crank_speed', from = 1, to = 2 }]"},
+    "quantities": {
+        "sweep": "parameter = [{ name = 'run.crank_speed', from = 1, to = 2 }]\nquantities = ['peak(crank_torque)']"
+    },
+    "optimize": {"optimize": "objectives = ['peak(crank_torque)']\nfree = { g = { min = 9, max = 10 } }"},
+}
+
+
+def _file(*parts):
+    """The text of a file of several parts, by their tables; a later part goes on in a table of an earlier one."""
+    tables = {"": ""}
+    for part in parts:
+        for name, lines in part.items():
+            tables[name] = f"{tables.get(name, '')}\n{lines}"
+    return tables.pop("") + "".join(f"\n[{name}]{lines}" for name, lines in tables.items())
+
+
+@pytest.mark.parametrize("drive", DRIVES)
+def test_each_table_beside_each_machine(drive):
+    """The reader and the schema refuse the same pairs of a drive and a table."""
+    off = {}
+    for name, table in TABLES.items():
+        text = _file(DRIVES[drive], table)
+        if _is_toml(text) and bool(refused(text)) != bool(marks(text)):
+            off[name] = refused(text) or marks(text)
+    assert not off
 
 
 def test_each_unit_that_is_read_is_matched_and_no_other_of_one_name():

@@ -472,10 +472,6 @@ def _machine(parts: Parts, given: dict[str, float], of_papers: Mapping[str, floa
     if of_papers:
         with refusal_prefix("ratios: ", "ratios"):
             lengths = ratios(**filled(Ratios, of_papers))
-        twice = sorted(set(lengths) & set(given))
-        if twice:
-            words = "given beside [ratios], which sets it; leave out one of the two"
-            raise InputError.of([InputError(f"machine.{name}: {words}", f"machine.{name}") for name in twice])
         given = given | lengths
     try:
         of: Any = ForeignMachine if issubclass(parts.machine, ForeignModel) else machine_of

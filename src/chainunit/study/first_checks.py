@@ -13,9 +13,10 @@ from ..errors import Faults, InputError, refusal_prefix, shown
 from ..models import MACHINES
 from ..reading import read_table
 from ..text import chosen_units
-from .checks import LOWER_LIMITS, check_company
+from .checks import LOWER_LIMITS
 from .event_table import read_events, read_random_event
 from .parts import Parts, beside, is_designation, named_table, parts_of
+from .rules import refusals
 
 _OF_MACHINE = ("machine", "ratios", "feed", "motor", "system")
 """Tables that cannot be checked without machine and motor."""
@@ -46,7 +47,7 @@ def check_values(data: Mapping[str, Any], source: str) -> tuple[Parts | None, li
         if isinstance(units, Mapping):
             chosen_units(units)
     if parts is not None:
-        faults.add(check_company(data, parts))
+        faults.add(refusals(data, parts))
     return parts, _without_repeated(faults.errors)
 
 

@@ -146,11 +146,6 @@ def _points(form: Any, points: int, parameters: list[SweptParameter]) -> int:
                 "sweep.points",
             )
         return points
-    if "points" in form.model_fields_set:
-        raise InputError(
-            "sweep.points: a grid has the points of its parameters; leave it out, or give another method",
-            "sweep.points",
-        )
     product = math.prod(len(each.values) for each in parameters)
     if product > _MOST_OF_GRID:
         raise InputError(

@@ -1,0 +1,237 @@
+"""The rules of the keys of a study file that do not go together. Each stands once: the reader evaluates it, and the
+JSON Schema prints it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+from ..drives.motors import MOTORS
+from ..errors import InputError, shown
+from ..machines.api import ratios
+from ..models import MACHINES
+from ..reading import filled
+from .conditions import (
+    Condition,
+    Schema,
+    ends_with,
+    given,
+    has_entries,
+    has_entry,
+    is_above_zero,
+    is_empty_table,
+    is_one_of,
+)
+from .foreign_machine import ForeignModel
+from .parts import Parts, parts_of
+from .sections import Ratios
+
+FMU = ".fmu"
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A key that is refused on a condition."""
+
+    key: str
+    on: Condition
+    words: str
+    """the reason and the remedy; with {machine}, {motor} and the motor's {type} in place of their names"""
+    refused: Condition | None = None
+    """values of the key that are refused; None for any"""
+
+    @property
+    def whole(self) -> Condition:
+        """The condition of a file that breaks the rule."""
+        return self.on & (self.refused or given(self.key))
+
+    def schema(self) -> Schema:
+        """The JSON Schema that the files meet which keep the rule."""
+        return {"not": self.whole.schema()}
+
+
+def refusals(data: Mapping[str, Any], parts: Parts) -> list[InputError]:
+    """A refusal for each rule that a file breaks, whose machine and motor are `parts`."""
+    names = {
+        "machine": "an FMU" if issubclass(parts.machine, ForeignModel) else parts.machine.name,
+        "motor": shown(parts.named_motor),
+        "type": "" if parts.file else parts.motor.name,
+    }
+    broken = (rule for rule in all_rules() if rule.whole.holds(data))
+    return [InputError(f"{rule.key}: {rule.words.format(**names)}", key=rule.key) for rule in broken]
+
+
+def machine_is(name: str) -> Condition:
+    """Whether the file has this packaged machine, by its name or as it names none."""
+    named = is_one_of("system.machine", name)
+    return (
+        named | ~(given("system.machine") | given("machine.linkage"))
+        if name == _default().machine.name
+        else named
+    )
+
+
+def motor_is(*names: str) -> Condition:
+    """Whether the file names one of these models of motors."""
+    return is_one_of("system.motor", *names)
+
+
+def _default(machine: str = "") -> Parts:
+    """Machine and motor of a file that names that machine and no motor."""
+    return parts_of({"system": {"machine": machine}} if machine else {}, "")
+
+
+def _any(conditions: list[Condition]) -> Condition:
+    joined, *rest = conditions
+    for each in rest:
+        joined = joined | each
+    return joined
+
+
+MACHINE_FMU, MOTOR_FMU = ends_with("system.machine", FMU), ends_with("system.motor", FMU)
+DESIGNATION = given("system.motor") & ~(motor_is(*MOTORS) | MOTOR_FMU)
+CHAINS = is_one_of("organ", "chain")
+
+
+@cache
+def has_sides() -> Condition:
+    """Whether the machine has two sides with organs."""
+    return _any([machine_is(name) for name, model in MACHINES.items() if model.sides])
+
+
+@cache
+def motor_of_catalogue() -> Condition:
+    """Whether the motor is one of a catalogue, by its designation or that of the machine's example."""
+    by_example = _any([machine_is(name) for name in MACHINES if _default(name).designation])
+    return DESIGNATION | (by_example & ~(given("system.motor") | given("motor") | given("sizing")))
+
+
+@cache
+def all_rules() -> tuple[Rule, ...]:
+    """The rules, in the order in which their refusals come."""
+    return (*_of_parts(), *_of_sides(), *_of_motors(), *_of_sweeps(), *_of_tasks(), *_of_lines())
+
+
+_NEEDS_MODEL = "needs a model of the machine, which is an FMU; leave it out"
+_TWO_BARS = 'quantities of a turn are of organs with two bars; leave out organ = "chain"'
+
+
+def _of_parts() -> Iterator[Rule]:
+    """Rules of the table [system], and of keys that need models of its parts."""
+    yield Rule(
+        "system",
+        given("system"),
+        'names nothing; add motor = "file.fmu", or leave [system] out',
+        is_empty_table("system"),
+    )
+    for part, foreign in (("motor", MOTOR_FMU), ("machine", MACHINE_FMU)):
+        words = f'are of an FMU of somebody else; add {part} = "file.fmu", or leave them out'
+        yield Rule(f"system.{part}_names", ~foreign, words)
+    yield Rule("feed_forward", MACHINE_FMU, _NEEDS_MODEL, is_one_of("feed_forward", True))
+    yield Rule("monte_carlo.runs", MACHINE_FMU, _NEEDS_MODEL, is_above_zero("monte_carlo.runs"))
+    words = "draws jams of two sides, and the machine is {machine}; give the event in monte_carlo.event"
+    some = is_above_zero("monte_carlo.runs")
+    yield Rule("monte_carlo.runs", ~(has_sides() | MACHINE_FMU | given("monte_carlo.event")), words, some)
+    yield Rule("sweep", MACHINE_FMU, _NEEDS_MODEL)
+    yield Rule("optimize", MACHINE_FMU, _NEEDS_MODEL)
+
+
+def _of_sides() -> Iterator[Rule]:
+    """Rules of keys of the chain unit, which has two sides."""
+    for name in ("ratios", "chain", "organ"):
+        words = "is of the chain unit, and the machine is {machine}; leave it out"
+        yield Rule(name, ~has_sides(), words)
+    yield Rule(
+        "sizing.one_sided_share", ~has_sides(), "is of two sides, and the machine is {machine}; leave it out"
+    )
+    yield Rule(
+        "chain", has_sides() & ~CHAINS, 'is of organs that are chains; add organ = "chain", or leave it out'
+    )
+    for name in ratios(**filled(Ratios, {})):
+        words = "given beside [ratios], which sets it; leave out one of the two"
+        yield Rule(f"machine.{name}", has_sides() & has_entries("ratios"), words)
+    words = (
+        "is of the chain unit, and the machine is {machine}: the observer compares the feed and the force of two "
+        "sides, which this machine does not have; leave it out. chainunit identify finds the loads of this machine "
+        "from its recordings"
+    )
+    yield Rule("watch", ~has_sides(), words)
+    yield Rule("observer", ~has_sides(), "knows the chain unit, and the machine is {machine}; leave it out")
+
+
+def _of_motors() -> Iterator[Rule]:
+    """Rules of the motor and of the tables that choose one."""
+    beside = "given beside system.motor = {motor}, which is the motor; leave out one of the two"
+    yield Rule("motor", DESIGNATION | MOTOR_FMU, beside)
+    yield Rule("sizing", given("system.motor"), beside)
+    deaf = motor_is(*(name for name, motor in MOTORS.items() if "tau_ff" not in motor.input_layout.names))
+    words = "a motor of the type {type} has no input for the torque; leave it out"
+    switched_on = is_one_of("feed_forward", True)
+    yield Rule("feed_forward", ~given("sizing") & (motor_of_catalogue() | deaf), words, switched_on)
+    another = "is of the DC motor, and [sizing] picks another; leave out one of the two"
+    yield Rule("motor", given("sizing"), another, has_entries("motor"))
+    yield Rule("feed_forward", given("sizing"), another, switched_on)
+    words = "sizing finds its own; leave out one of the two"
+    yield Rule("flywheel", given("sizing"), words, has_entries("flywheel"))
+    yield Rule(
+        "run.winding_temperature", given("sizing"), "is sizing.temperature with [sizing]; leave it out"
+    )
+    yield Rule("machine.ratio", given("sizing"), "[sizing] finds it; to have it kept, give gear.ratio")
+    for name in ("gear", "start", "starter", "catalogue"):
+        words = "is of a motor of the catalogue; add [sizing] or system.motor, or leave it out"
+        yield Rule(name, ~(given("sizing") | motor_of_catalogue()), words)
+    words = "follows from the motor's rated speed; to have another, give gear.ratio"
+    yield Rule("machine.ratio", ~given("sizing") & motor_of_catalogue(), words)
+
+
+def _of_sweeps() -> Iterator[Rule]:
+    """Rules of the tables [sweep] and [optimize]."""
+    yield Rule(
+        "sweep", given("sizing"), "varies one drive, and [sizing] tries many; leave out one of the two"
+    )
+    yield Rule(
+        "sweep.points",
+        is_one_of("sweep.method", "grid"),
+        "a grid has the points of its parameters; leave it out, or give another method",
+    )
+    yield Rule(
+        "sweep.measures",
+        ~given("coupling"),
+        "coupling_trip_time is of a safety coupling; add [coupling], or leave it out",
+        has_entry("sweep.measures", "coupling_trip_time"),
+    )
+    words = "need a model of the motor, which is an FMU; leave them out"
+    yield Rule("sweep.measures", MOTOR_FMU, words, has_entries("sweep.measures"))
+    yield Rule("sweep.quantities", CHAINS, f"{_TWO_BARS}, or give measures", has_entries("sweep.quantities"))
+    yield Rule("optimize", CHAINS, _TWO_BARS)
+
+
+def _of_tasks() -> Iterator[Rule]:
+    """Rules of tables that compare the drive with recordings."""
+    unfit = (
+        (MACHINE_FMU, "machine is an FMU"),
+        (MOTOR_FMU, "motor is an FMU"),
+        (given("sizing"), "motor is not known before it is chosen"),
+        (given("driveline"), "driveline stands between motor and machine"),
+        (CHAINS, "organs are chains"),
+    )
+    for name in ("identify", "watch"):
+        for condition, words in unfit:
+            yield Rule(
+                name,
+                condition,
+                f"needs a motor and a machine of two-bar organs as models, and here the {words}",
+            )
+    yield Rule("observer", MOTOR_FMU, "needs a model of the motor, which is an FMU; leave it out")
+    yield Rule(
+        "observer",
+        given("driveline"),
+        "takes the shaft between motor and machine for rigid; leave out [driveline] or [observer]",
+    )
+
+
+def _of_lines() -> Iterator[Rule]:
+    """Rules of the line between motor and machine."""
+    yield Rule("torsion", ~given("driveline"), "is of a driveline; add [driveline], or leave it out")
