@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 from figures import parser, save, table
 
-from chainunit import engines
+from chainunit.core import engines
 from chainunit.fmu.native.export import export
 from chainunit.machines.flexible import flexible
 from chainunit.machines.load_filter import SIZE, TRIANGLE, UNKNOWNS

@@ -24,7 +24,7 @@ import numpy as np
 from figures import least, parser, save
 
 from chainunit import ChainUnitMachine
-from chainunit.engines import MATH
+from chainunit.core.engines import MATH
 from chainunit.machines.chain_unit import ChamberForces
 
 W = 3.0  # rad/s of the crank

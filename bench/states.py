@@ -25,8 +25,8 @@ from other_engines import LOADS, W
 
 from chainunit import ChainUnitMachine, batch
 from chainunit.batch.equations import outputs_of
+from chainunit.core.native.compilers import compiler
 from chainunit.machines.chain_unit import ChamberForces
-from chainunit.native.compilers import compiler
 
 ALL = tuple(v.name for v in outputs_of(ChamberForces))
 CHOSEN = (

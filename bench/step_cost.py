@@ -21,14 +21,15 @@ from figures import parser, save
 from rich.console import Console
 from rich.table import Table
 
-from chainunit import ChainUnitMachine, engines
+from chainunit import ChainUnitMachine
+from chainunit.core import engines
+from chainunit.core.integrators import rk4
+from chainunit.core.model import Model, Part
+from chainunit.core.quantities import Value, declaration, quantity
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.fmu.backends import export
 from chainunit.fmu.native import export as native
-from chainunit.integrate import rk4
 from chainunit.machines.chain_unit import ChamberForces
-from chainunit.model import Model, Part
-from chainunit.quantities import Value, declaration, quantity
 from chainunit.system.instance import Fmu, Instance
 
 

@@ -30,7 +30,7 @@ from figures import least
 from chainunit.batch.equations import arguments_of, equations
 from chainunit.batch.native import aligned, load
 from chainunit.batch.vector_code import VectorCode, c_file
-from chainunit.native.compilers import compiler
+from chainunit.core.native.compilers import compiler
 
 CHAINS, TURNS, ROUNDS = 12, 20_000, 30
 SUMS = {"ADD", "SUB", "TWICE"}

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import typer.main
 
-from chainunit.cli import app
+from chainunit.app.cli import app
 from chainunit.report.markdown import markdown
 from chainunit.report.reference import reference
 

@@ -8,6 +8,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from chainunit.core.planar import Vec2
+from chainunit.core.ports import PortValues
+from chainunit.core.quantities import declaration, group, quantity
 from chainunit.groups.body import Bar
 from chainunit.groups.driver import Crank
 from chainunit.groups.dyad import Dyad
@@ -16,9 +19,6 @@ from chainunit.machines.machine import Machine
 from chainunit.machines.parts import Force, Pin, Processing, Rod, force
 from chainunit.mechanism.linkage import Linkage
 from chainunit.mechanism.models import InverseMachine, ShaftMotion
-from chainunit.planar import Vec2
-from chainunit.ports import PortValues
-from chainunit.quantities import declaration, group, quantity
 
 # %% [markdown]
 # The declarations: parameters, inputs and outputs with their units, titles and bounds.

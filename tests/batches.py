@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from chainunit.job import Coordinate, Job, ResultVariable
-from chainunit.runner import run
+from chainunit.work.job import Coordinate, Job, ResultVariable
+from chainunit.work.runner import run
 
 VARIABLES = (
     ResultVariable("height", "m", "height of a point"),

@@ -8,7 +8,7 @@ import os
 from dataclasses import dataclass
 from unittest import mock
 
-from chainunit.cli import main
+from chainunit.app.cli import main
 
 
 @dataclass(frozen=True)

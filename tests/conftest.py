@@ -1,7 +1,7 @@
 """Fixtures that the tests share. A run without named files is parallel, a file at a time for each worker.
 
 An FMU costs a test little: what exports compile is kept in a folder of the session, whichever worker, test or
-process asks (see `chainunit.native.cache`). Beyond that,
+process asks (see `chainunit.core.native.cache`). Beyond that,
 
 - `fmus` has the Python FMU of every model, `native_fmus` the native ones: take them where start values do not matter;
 - `once` fills a folder once a session, for all workers: take it for a study that tests of several files read, or for
@@ -24,10 +24,10 @@ import threading
 import fmpy
 import pytest
 
+from chainunit.core.native.cache import VARIABLE
 from chainunit.fmu.export import export
 from chainunit.fmu.native.export import export as export_native
 from chainunit.models import MODELS
-from chainunit.native.cache import VARIABLE
 
 
 @pytest.hookimpl(tryfirst=True)

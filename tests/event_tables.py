@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from chainunit.quantities import Layout
+from chainunit.core.quantities import Layout
 from chainunit.study.event import TYPES
 
 STANDARD = ("right_empties", "left_empties", "feed_left", "feed_right", "jam_left", "jam_right")

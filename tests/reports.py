@@ -6,9 +6,9 @@ import io
 
 from rich.console import Console
 
+from chainunit.reading.text import DEFAULT_UNITS
 from chainunit.report import files, html, motion, series, terminal
 from chainunit.report import study as study_report
-from chainunit.text import DEFAULT_UNITS
 
 
 def page_of(study, result=None):

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from chainunit.engines import MATH, Dual, dual, numpy_, slope
+from chainunit.core.engines import MATH, Dual, dual, numpy_, slope
+from chainunit.core.native.compilers import compiler
 from chainunit.fmu.native.export import export
 from chainunit.machines.accelerator import Accelerator
 from chainunit.machines.api import machine_of
-from chainunit.native.compilers import compiler
 
 MODEL = Accelerator
 UNEVEN = {"rotor.s": 0.03, "joint_damping": 0.4, "pin.friction": 0.1, "ratio": 2.5}

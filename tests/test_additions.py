@@ -102,7 +102,7 @@ class House:
 
     def run(self, *command: str) -> str:
         env = os.environ | {"PYTHONPATH": str(self.package.parent)}
-        call = [sys.executable, "-c", "from chainunit.cli import main; main()", *command]
+        call = [sys.executable, "-c", "from chainunit.app.cli import main; main()", *command]
         process = subprocess.run(call, cwd=self.folder, env=env, capture_output=True, text=True)
         assert process.returncode == 0, process.stderr
         return process.stdout

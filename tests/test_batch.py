@@ -18,12 +18,12 @@ from chainunit.batch import native
 from chainunit.batch.equations import arguments_of, outputs_of
 from chainunit.batch.reductions import REDUCTIONS
 from chainunit.batch.vector_code import c_file
-from chainunit.engines import MATH
+from chainunit.core.engines import MATH
+from chainunit.core.native.compilers import Compiler, compiler
+from chainunit.core.quantities import quotient
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.machines.machine import Machine
 from chainunit.models import MODELS
-from chainunit.native.compilers import Compiler, compiler
-from chainunit.quantities import quotient
 
 NEEDS_COMPILER = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 ENGINES = [pytest.param("native", marks=NEEDS_COMPILER), "numpy"]

@@ -13,12 +13,12 @@ from pathlib import Path
 import pytest
 
 from chainunit import InputError, RunError
+from chainunit.core.native import cache
+from chainunit.core.native.cache import OFF, VARIABLE, entry
+from chainunit.core.native.compilers import Compiler, compile_code
 from chainunit.fmu.native import platforms
 from chainunit.fmu.native.export import export
 from chainunit.models import MODELS
-from chainunit.native import cache
-from chainunit.native.cache import OFF, VARIABLE, entry
-from chainunit.native.compilers import Compiler, compile_code
 
 COUNTING = """#!/bin/sh
 if [ "$1" != --version ]; then echo called >> "$(dirname "$0")/calls"; fi
@@ -111,7 +111,7 @@ def test_off_keeps_nothing(store, monkeypatch, tmp_path):
         assert entry(b"key", lambda: calls.append(1) or b"code") == b"code"
     assert len(calls) == 2 and cache.folder() is None and not store.exists()
     environment = os.environ | {VARIABLE: str(store.parent)}
-    command = [sys.executable, "-m", "chainunit.cli", "--no-cache", "export", "DcMotor"]
+    command = [sys.executable, "-m", "chainunit.app.cli", "--no-cache", "export", "DcMotor"]
     subprocess.run(command, cwd=tmp_path, env=environment, check=True, capture_output=True)
     assert (tmp_path / "DcMotor.fmu").exists() and not store.exists()
 

@@ -12,9 +12,9 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 
 from chainunit import InputError
+from chainunit.core.engines import MATH, numpy_
 from chainunit.drives import cardan, shafts
 from chainunit.drives.cardan import Cardan, Twist
-from chainunit.engines import MATH, numpy_
 
 POINTS = json.loads((Path(__file__).parent / "data" / "cardan.json").read_text())["points"]
 

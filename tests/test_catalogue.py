@@ -12,15 +12,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chainunit import engines
+from chainunit.core import engines
+from chainunit.core.errors import InputError
+from chainunit.core.integrators import rk4
+from chainunit.core.quantities import Layout
 from chainunit.drives.catalogue import LAYOUT, catalogue, heading, motor_of_catalogue
 from chainunit.drives.gearing import KINDS, W_REST, Transmission, motor_side
 from chainunit.drives.induction_motor import InductionMotor, breakdown, steady
 from chainunit.drives.nameplate import LAYOUT as NAMEPLATE
 from chainunit.drives.nameplate import TYPICAL, Assumptions, Nameplate, check, identify
-from chainunit.errors import InputError
-from chainunit.integrate import rk4
-from chainunit.quantities import Layout
 
 MOTORS = catalogue()
 STATES = InductionMotor.state_layout

@@ -13,12 +13,12 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from chainunit import ChainUnitMachine, GeometryError, SideLoads
-from chainunit.engines import MATH
+from chainunit.core.engines import MATH
+from chainunit.core.planar import ZERO, Motion, Vec2
 from chainunit.groups.chain import Chain, Rods, close, end_motion
 from chainunit.groups.driver import crank
 from chainunit.groups.dyad import SolvedDyad
 from chainunit.machines import hanging
-from chainunit.planar import ZERO, Motion, Vec2
 
 DATA = json.loads((Path(__file__).parent / "data" / "chain_organ.json").read_text())
 M = DATA["machine"]
@@ -256,8 +256,8 @@ def test_dynamic_reference(case, hand):
 def test_two_rods_in_motion_are_the_two_bar_machine():
     """The dyad's reactions on a rocker that moves anyhow, with material on the organ: the same forces, another
     route."""
+    from chainunit.core.planar import Link
     from chainunit.machines.chain_unit import Inputs, organ
-    from chainunit.planar import Link
 
     machine, feed = ChainUnitMachine(), SideLoads(material_mass=30.0, processing_force=0.0)
     p = machine.p

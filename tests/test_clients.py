@@ -20,10 +20,10 @@ import numpy as np
 import pytest
 from systems import pair as pair_of
 
-from chainunit.engines import MATH, numpy_
+from chainunit.core.engines import MATH, numpy_
+from chainunit.core.native.compilers import compiler
 from chainunit.fmu.native.export import export
 from chainunit.models import MODELS
-from chainunit.native.compilers import compiler
 from chainunit.system import CoSimulation, compiled
 from chainunit.system.instance import Fmu, Instance
 

@@ -11,12 +11,12 @@ import casadi
 import numpy as np
 import pytest
 
-from chainunit.engines import casadi_
+from chainunit.core.engines import casadi_
+from chainunit.core.native import code
+from chainunit.core.native.compilers import compile_code, compiler
 from chainunit.fmu.description import Interface
 from chainunit.fmu.native import generate
 from chainunit.models import MODELS
-from chainunit.native import code
-from chainunit.native.compilers import compile_code, compiler
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 HEAD = """

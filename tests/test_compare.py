@@ -8,11 +8,11 @@ import shutil
 import pytest
 from command import chainunit
 
+from chainunit.reading.text import number as shown
 from chainunit.study.comparison import compare, read_result
 from chainunit.study.config import parse
 from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
-from chainunit.text import number as shown
 
 STUDY = """
 title = "{title}"

@@ -13,16 +13,16 @@ import pytest
 from systems import component, pair, whole_systems
 
 from chainunit import InputError
-from chainunit.composite import composed
-from chainunit.composition import SOLVER
+from chainunit.core.composite import composed
+from chainunit.core.composition import SOLVER
+from chainunit.core.engines import MATH, casadi_, numpy_
+from chainunit.core.errors import GeometryError
+from chainunit.core.model import Model, Part
+from chainunit.core.ports import LoadPort
+from chainunit.core.quantities import Layout, Value, declaration, quantity
 from chainunit.drives.gear import Gear
-from chainunit.engines import MATH, casadi_, numpy_
-from chainunit.errors import GeometryError
 from chainunit.machines.linkages.file import read_linkage
-from chainunit.model import Model, Part
 from chainunit.models import MODELS
-from chainunit.ports import LoadPort
-from chainunit.quantities import Layout, Value, declaration, quantity
 from chainunit.system import ModelComponent, System, compiled, shaft_joints
 
 GALLERY = Path(__file__).parents[1] / "examples" / "linkages"
@@ -180,7 +180,7 @@ def test_another_process_gets_the_same_model(system):
     assert pickle.loads(pickle.dumps((p, u, x))) == (p, u, x)
     script = (
         "import pickle, sys; model, p, u, x = pickle.load(sys.stdin.buffer)\n"
-        "from chainunit.engines import MATH; print(*model.derivatives(MATH, p, u, x))"
+        "from chainunit.core.engines import MATH; print(*model.derivatives(MATH, p, u, x))"
     )
     run = subprocess.run(
         [sys.executable, "-c", script],

@@ -17,10 +17,10 @@ from systems import initialized, whole_systems
 from test_fmi_rules import reinitialized
 
 from chainunit import RunError
+from chainunit.core.native.compilers import compiler
 from chainunit.fmu.description import Interface, model_description, terminals
 from chainunit.fmu.native.export import export
 from chainunit.machines.load_observer import LoadObserver
-from chainunit.native.compilers import compiler
 from chainunit.study import config
 from chainunit.study.choice import choose
 from chainunit.study.package import left_out, study_system, whole_system

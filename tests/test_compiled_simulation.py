@@ -9,7 +9,7 @@ import pytest
 from systems import pair
 
 from chainunit import InputError, RunError
-from chainunit.native.compilers import compiler
+from chainunit.core.native.compilers import compiler
 from chainunit.system import CompiledSimulation, CoSimulation, Jump, Profile, export, monolithic
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")

@@ -7,10 +7,10 @@ import re
 
 import pytest
 
-from chainunit.errors import InputError
+from chainunit.core.errors import InputError
 from chainunit.machines.chain_unit import Parameters
 from chainunit.models import MODELS
-from chainunit.reading import to_number
+from chainunit.reading.tables import to_number
 from chainunit.study.config import load, parse
 from chainunit.study.event import TYPES
 from chainunit.study.events import Jam

@@ -14,14 +14,14 @@ from machines import random_machine
 from systems import component, pair
 
 from chainunit import ChainUnitMachine, InputError, RunError, SideLoads
-from chainunit.errors import InterruptedRunError
+from chainunit.core.errors import InterruptedRunError
+from chainunit.core.native.compilers import compiler
 from chainunit.fmu.native.export import export as export_native
-from chainunit.interrupts import stoppable
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.models import MODELS
-from chainunit.native.compilers import compiler
 from chainunit.system import CoSimulation, Profile, System, energy_residual, hold_loads, monolithic
 from chainunit.system.instance import Fmu
+from chainunit.work.interrupts import stoppable
 
 RATIO, SPEED = 50.0, 6.0
 FEED = SideLoads()

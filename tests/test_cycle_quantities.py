@@ -10,10 +10,10 @@ import pytest
 import xarray as xr
 
 from chainunit import ChainUnitMachine, InputError
+from chainunit.core.native.compilers import compiler
 from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
-from chainunit.native.compilers import compiler
 from chainunit.study.cycle import cycle
 from chainunit.study.cycle_quantities import CycleBasis, cycle_quantity, evaluate
 

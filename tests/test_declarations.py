@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chainunit.engines import MATH, numpy_
-from chainunit.errors import InputError
+from chainunit.core.engines import MATH, numpy_
+from chainunit.core.errors import InputError
+from chainunit.core.quantities import Layout, Quantity, base_units, variables, within_bounds
 from chainunit.fmu.description import Interface, model_description, model_description_3
 from chainunit.models import MODELS
-from chainunit.quantities import Layout, Quantity, base_units, variables, within_bounds
-from chainunit.reading import to_number
+from chainunit.reading.tables import to_number
 
 NAMES = Path(__file__).parent / "data" / "variables.json"
 

@@ -10,10 +10,11 @@ import pytest
 from machines import random_loads, random_machine, random_state
 from scipy.integrate import solve_ivp
 
-from chainunit import EMPTY, ChainUnitMachine, GeometryError, engines
+from chainunit import EMPTY, ChainUnitMachine, GeometryError
+from chainunit.core import engines
+from chainunit.core.native.compilers import compiler
 from chainunit.fmu.native.export import export
 from chainunit.machines.chain_unit import ChamberForces
-from chainunit.native.compilers import compiler
 from chainunit.system.instance import Fmu, Instance
 
 MODEL = ChamberForces.direct()

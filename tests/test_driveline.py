@@ -12,15 +12,16 @@ import pytest
 from scipy.integrate import solve_ivp
 from systems import component
 
-from chainunit import InputError, RunError, engines
+from chainunit import InputError, RunError
+from chainunit.core import engines
+from chainunit.core.errors import GeometryError
+from chainunit.core.ports import LoadPort
+from chainunit.core.quantities import Layout
 from chainunit.drives import cardan
 from chainunit.drives.cardan import ShaftLine, Twist
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.driveline import CardanDriveline
-from chainunit.errors import GeometryError
 from chainunit.machines.chain_unit import ChamberForces
-from chainunit.ports import LoadPort
-from chainunit.quantities import Layout
 from chainunit.system import CoSimulation, Profile, System, certify, export, monolithic, rigid, shaft_joints
 
 LAYOUT = CardanDriveline.state_layout

@@ -16,12 +16,14 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from chainunit import InputError, cli
+from chainunit import InputError
+from chainunit.app import cli
+from chainunit.core.engines import MATH, numpy_
+from chainunit.core.quantities import Layout
 from chainunit.drives import shafts, torsion
 from chainunit.drives.cardan import Cardan, Twist, frozen_frequency, two_joints
 from chainunit.drives.torsion import rigid, settling_time, simulate, steady, with_damping_ratio
-from chainunit.engines import MATH, numpy_
-from chainunit.quantities import Layout
+from chainunit.reading.text import number
 from chainunit.report import blocks, figure
 from chainunit.report import torsion as torsion_report
 from chainunit.report.torsion import PICTURES
@@ -35,7 +37,6 @@ from chainunit.study.statics import statics
 from chainunit.study.torsion import Rotation, analyse
 from chainunit.study.torsion_findings import TorsionAnalysis, as_dict
 from chainunit.system import CoSimulation
-from chainunit.text import number
 
 SYSTEM = '[system]\nmachine = "Accelerator"\n'
 EVENT = '[[event]]\ntype = "overload"\ntorque = 200\nduration = 0.05\n'

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from machines import random_loads, random_machine, random_state
 
-from chainunit import engines
+from chainunit.core import engines
 from chainunit.machines.chain_unit import ChamberForces
 
 MODEL = ChamberForces

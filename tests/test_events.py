@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from event_tables import STANDARD, event_line
 
+from chainunit.core.errors import InputError
+from chainunit.core.quantities import Layout, Value, declaration, quantity
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor
-from chainunit.errors import InputError
-from chainunit.quantities import Layout, Value, declaration, quantity
 from chainunit.study import config
 from chainunit.study.catalogue_drive import catalogue_drive
 from chainunit.study.cycle import cycle

@@ -9,7 +9,7 @@ import casadi
 import numpy as np
 import pytest
 
-from chainunit.engines import MATH, casadi_, numpy_
+from chainunit.core.engines import MATH, casadi_, numpy_
 from chainunit.mechanism.extremes import extreme
 
 TURN = [2.0 * math.pi * k / 48 for k in range(48)]

@@ -27,7 +27,7 @@ import math
 import numpy as np
 import pytest
 
-from chainunit.engines import MATH, numpy_
+from chainunit.core.engines import MATH, numpy_
 from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.mechanism.machine import Mechanism
 

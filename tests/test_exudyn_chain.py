@@ -53,10 +53,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from test_chain import G, M, acceleration, organ, reach, rocker
 
-from chainunit.engines import MATH
+from chainunit.core.engines import MATH
+from chainunit.core.planar import Motion, Vec2
 from chainunit.groups.chain import Chain, Rods, close, end_motion
 from chainunit.machines import hanging
-from chainunit.planar import Motion, Vec2
 
 exudyn = pytest.importorskip("exudyn")
 item = pytest.importorskip("exudyn.itemInterface")

@@ -15,9 +15,9 @@ from pathlib import Path
 import pytest
 from command import chainunit
 
-from chainunit import ending, ledger
-from chainunit.errors import InputError, WriteError
-from chainunit.files import LOCK, claim, clear, folder, whole
+from chainunit.core import ledger, temporary_folders
+from chainunit.core.errors import InputError, WriteError
+from chainunit.core.files import LOCK, claim, clear, folder, whole
 
 SHORT = """
 event = []
@@ -77,7 +77,7 @@ def test_one_process_at_a_time_and_the_lock_goes_with_it(tmp_path):
         """
         import time
         from pathlib import Path
-        from chainunit.files import claim
+        from chainunit.core.files import claim
         with claim(Path("out")):
             print("has it", flush=True)
             time.sleep(600)
@@ -100,7 +100,7 @@ def test_a_second_study_in_a_folder_is_refused_and_takes_nothing_away(tmp_path):
     with claim(out):
         (out / "result.json").write_text("of the first")
         second = subprocess.run(
-            [sys.executable, "-m", "chainunit.cli", "study", "-o", "out"],
+            [sys.executable, "-m", "chainunit.app.cli", "study", "-o", "out"],
             cwd=tmp_path,
             capture_output=True,
             text=True,
@@ -142,7 +142,7 @@ def test_a_full_disk_is_named_and_costs_no_more_than_the_file(tmp_path):
     command = python(
         """
         import resource, sys
-        from chainunit.cli import main
+        from chainunit.app.cli import main
         from chainunit.study import run
 
         study = run.run_study
@@ -172,7 +172,7 @@ def test_a_disk_that_is_full_from_the_start_is_named(tmp_path):
     command = python(
         """
         import resource, sys
-        from chainunit.cli import main
+        from chainunit.app.cli import main
         from chainunit.fmu import pack
         from chainunit.fmu.native import export
         written = export.pack
@@ -200,7 +200,7 @@ def test_sigterm_ends_in_order(tmp_path):
     scratch.mkdir()
     (tmp_path / "long.toml").write_text(SHORT.replace("turns = 1", "turns = 300"))
     running = subprocess.Popen(
-        [sys.executable, "-m", "chainunit.cli", "study", "long.toml", "-o", "out"],
+        [sys.executable, "-m", "chainunit.app.cli", "study", "long.toml", "-o", "out"],
         cwd=tmp_path,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -220,7 +220,7 @@ def test_sigterm_ends_in_order(tmp_path):
 
 
 def test_the_command_leaves_the_signals_as_they_were(monkeypatch, capsys):
-    from chainunit.cli import main
+    from chainunit.app.cli import main
 
     before = signal.getsignal(signal.SIGTERM)
     monkeypatch.setattr(sys, "argv", ["chainunit", "--version"])
@@ -236,7 +236,7 @@ def test_the_command_leaves_the_signals_as_they_were(monkeypatch, capsys):
 @pytest.mark.parametrize("at", ["chainunit.study.config.load", "chainunit.fmu.export._build"])
 def test_an_early_end_is_told_and_leaves_nothing(sent, status, command, at, tmp_path, monkeypatch, capsys):
     """While the file is read, and while an FMU is made, into folders that were not there."""
-    from chainunit import cli
+    from chainunit.app import cli
 
     (tmp_path / "mine.toml").write_text(SHORT)
     folder, where = tmp_path / "out", tmp_path / "mine.toml"
@@ -324,7 +324,7 @@ def test_a_run_that_is_killed_while_it_replaces_a_file_leaves_its_own(moment, tm
     kill = "os.kill(os.getpid(), signal.SIGKILL)"
     renames = "real(part, file);" if moment == "after" else ""
     code = (
-        "import os, signal; from pathlib import Path; from chainunit.files import claim, whole\n"
+        "import os, signal; from pathlib import Path; from chainunit.core.files import claim, whole\n"
         "real = Path.replace\n"
         "def replace(part, file):\n"
         f"    {renames} {kill}\n"
@@ -356,7 +356,7 @@ def test_a_command_leaves_a_foreign_page_alone(tmp_path):
 KILLED = """
 import os, signal
 from pathlib import Path
-from chainunit.ending import temporary_folder
+from chainunit.core.temporary_folders import temporary_folder
 print(temporary_folder("chainunit_fmu"), flush=True)
 (Path(os.environ["TMPDIR"]) / "more").mkdir()
 {end}
@@ -380,8 +380,8 @@ def test_folders_of_killed_processes_are_removed_at_the_next_start(tmp_path, mon
     for each in (old, foreign):
         os.utime(each, (1.0, 1.0))
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    monkeypatch.setattr(ending, "_cleaned", set())
-    with ending.scratch() as own:
+    monkeypatch.setattr(temporary_folders, "_cleaned", set())
+    with temporary_folders.scratch() as own:
         assert {p.name for p in tmp_path.glob("chainunit*")} == {p.name for p in (stays, new, foreign, own)}
     assert not own.exists()
     alive.terminate()

@@ -20,25 +20,18 @@ from systems import pair
 from test_chain import DATA, M
 
 from chainunit import ChainUnitMachine, GeometryError, InputError, RunError
+from chainunit.core.engines import MATH
+from chainunit.core.errors import InterruptedRunError
+from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
-from chainunit.engines import MATH
-from chainunit.errors import InterruptedRunError
 from chainunit.fmu.export import export as export_python
 from chainunit.fmu.native.export import export as export_native
 from chainunit.machines import hanging
 from chainunit.machines.chain_organs import OrganLaw
-from chainunit.machines.chain_unit import (
-    ChamberForces,
-    Inputs,
-    SideLoads,
-    SideMasses,
-    drive,
-    rocker_motion,
-)
+from chainunit.machines.chain_unit import ChamberForces, Inputs, SideLoads, SideMasses, drive, rocker_motion
 from chainunit.machines.flexible import flexible
 from chainunit.machines.parts import Pin, Processing, Stop
 from chainunit.mechanism.machine import MachineState, Mechanism
-from chainunit.native.compilers import compiler
 from chainunit.study import config
 from chainunit.study.chain import numbers_at, study_chain
 from chainunit.study.drive import Drive

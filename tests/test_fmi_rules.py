@@ -21,8 +21,8 @@ from fmpy.fmi2 import FMU2Model, FMU2Slave
 from fmpy.fmi3 import FMU3Model, FMU3Slave
 from lxml import etree
 
+from chainunit.core.native.compilers import compiler
 from chainunit.models import MODELS
-from chainunit.native.compilers import compiler
 
 HERE = Path(__file__).parent
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")

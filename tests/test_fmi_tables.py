@@ -12,10 +12,10 @@ import pytest
 from fmi_tables import MORE, NO_VALUE_YET, TABLES, read
 from systems import whole_systems
 
+from chainunit.core.native.compilers import compiler
 from chainunit.fmu.native.export import export
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.models import MODELS
-from chainunit.native.compilers import compiler
 from chainunit.system import export_compiled
 
 GALLERY = sorted((Path(__file__).parents[1] / "examples" / "linkages").glob("*.toml"))

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from chainunit.core.native.compilers import compiler
 from chainunit.fmu.accompany import companion_files
 from chainunit.fmu.description import Interface
 from chainunit.fmu.native.export import export
 from chainunit.models import MODELS
-from chainunit.native.compilers import compiler
 from chainunit.study.config import load
 from chainunit.study.package import start_of
 from chainunit.system import ModelComponent, System, monolithic, shaft_joints

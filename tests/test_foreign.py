@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 from reports import said_of
 
-from chainunit.errors import InputError, RunError, printable, shown
+from chainunit.core.errors import InputError, RunError, printable, shown
+from chainunit.core.native.compilers import compiler
 from chainunit.fmu.native.export import export
 from chainunit.models import MODELS
-from chainunit.native.compilers import compiler
 from chainunit.study import config
 from chainunit.system.instance import Fmu, Instance
 

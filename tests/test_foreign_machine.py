@@ -23,7 +23,8 @@ from test_ssp import TOOLS, connections
 from test_ssp import run as run_in
 
 from chainunit import InputError, Study
-from chainunit.quantities import Value, declaration, quantity
+from chainunit.core.quantities import Value, declaration, quantity
+from chainunit.reading.text import number as text_of
 from chainunit.study import config
 from chainunit.study.choice import choose
 from chainunit.study.cycle import cycle
@@ -33,7 +34,6 @@ from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
 from chainunit.study.sizing import size
 from chainunit.system import CoSimulation, Profile, certify
-from chainunit.text import number as text_of
 
 SCRIPT = Path(__file__).parent / "foreign_machine.py"
 RATIO, SPEED, MASS, PRESSURE, BURST = 25.0, 6.0, 60.0, 3e3, 8e4

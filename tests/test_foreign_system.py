@@ -18,9 +18,9 @@ from systems import component, pair
 from test_foreign import changed
 
 from chainunit import InputError
+from chainunit.core.model import Terminal
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.motor import Motor
-from chainunit.model import Terminal
 from chainunit.study import config, run
 from chainunit.study.choice import with_motor
 from chainunit.study.drive import Drive

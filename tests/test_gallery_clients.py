@@ -14,10 +14,10 @@ from test_clients import test_ecos as test_ecos
 from test_clients import test_libcosim as test_libcosim
 from test_native import random_calls
 
+from chainunit.core.native.compilers import compiler
 from chainunit.fmu.native.export import export
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
-from chainunit.native.compilers import compiler
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 GALLERY = sorted((Path(__file__).parents[1] / "examples" / "linkages").glob("*.toml"))

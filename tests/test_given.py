@@ -11,8 +11,8 @@ from test_foreign_machine import MACHINE, SCRIPT
 from test_foreign_machine import STUDY as PUMP
 from test_foreign_system import build
 
-from chainunit.errors import InputError
-from chainunit.quantities import Layout
+from chainunit.core.errors import InputError
+from chainunit.core.quantities import Layout
 from chainunit.report import blocks
 from chainunit.report.study import report
 from chainunit.study import remarks

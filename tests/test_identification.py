@@ -11,9 +11,9 @@ from scipy.optimize import nnls
 from scipy.stats import f
 
 from chainunit import InputError, RunError
+from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor
-from chainunit.native.compilers import compiler
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 from chainunit.study.identification import fit as fitting

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chainunit.native.compilers import compiler
+from chainunit.core.native.compilers import compiler
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 

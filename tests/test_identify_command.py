@@ -12,8 +12,8 @@ import pytest
 from command import chainunit
 
 from chainunit import InputError, Study
+from chainunit.core.native.compilers import compiler
 from chainunit.machines.load_observer import LoadObserver
-from chainunit.native.compilers import compiler
 from chainunit.report import blocks
 from chainunit.report import identification as report
 from chainunit.study import config as study_files

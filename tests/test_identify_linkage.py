@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from command import chainunit
 
+from chainunit.core.native.compilers import compiler
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
-from chainunit.native.compilers import compiler
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 GALLERY = Path(__file__).parents[1] / "examples" / "linkages"

@@ -23,7 +23,7 @@ DEPENDENCIES = {
     ("code", "needed"),
     [
         ("import chainunit", set()),
-        ("from chainunit.cli import app; app(['--help'], standalone_mode=False)", {"typer", "rich"}),
+        ("from chainunit.app.cli import app; app(['--help'], standalone_mode=False)", {"typer", "rich"}),
         ("import chainunit; chainunit.ChainUnitMachine", {"numpy", "scipy"}),
     ],
 )

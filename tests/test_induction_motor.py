@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from chainunit import engines
+from chainunit.core import engines
+from chainunit.core.integrators import rk4
 from chainunit.drives.induction_motor import InductionMotor, breakdown, skin, steady, volts_per_hertz
 from chainunit.drives.motor import T_RATED
-from chainunit.integrate import rk4
 
 LAYOUT = InductionMotor.state_layout
 SKIN = {"cage.skin_R": 0.9, "cage.skin_L": 0.3}

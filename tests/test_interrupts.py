@@ -15,8 +15,8 @@ import pytest
 import xarray as xr
 from command import chainunit
 
-from chainunit import interrupts
 from chainunit.report import series
+from chainunit.work import interrupts
 
 PRESS = Path(__file__).parents[1] / "examples" / "linkages" / "slider_crank_press.toml"
 
@@ -164,7 +164,7 @@ main()
 @pytest.mark.parametrize(
     ("module", "error", "sent"),
     [
-        ("chainunit.cli", "error", "SIGINT"),
+        ("chainunit.app.cli", "error", "SIGINT"),
         ("rich.console", "ImportError from error", "SIGINT"),
         ("typer", "error", "SIGTERM"),
         ("", "error", "SIGINT"),

@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 from command import chainunit
 
+from chainunit.core.errors import InputError
+from chainunit.core.quantities import Layout
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.motors import MOTORS
-from chainunit.errors import InputError
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.models import MACHINES
-from chainunit.quantities import Layout
 from chainunit.study.commented import commented
 from chainunit.study.config import parse
 from chainunit.study.event import TYPES

@@ -11,7 +11,7 @@ import pytest
 from systems import component
 
 from chainunit import GeometryError, InputError
-from chainunit.engines import MATH, Dual, dual, numpy_, slope
+from chainunit.core.engines import MATH, Dual, dual, numpy_, slope
 from chainunit.fmu.native.export import export
 from chainunit.groups.triad import HARMONICS, pose_of_series
 from chainunit.machines.knife_drive import KnifeDrive, modes

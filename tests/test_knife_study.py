@@ -14,11 +14,12 @@ from reports import said_of, write
 from scipy.integrate import solve_ivp
 
 from chainunit import InputError, RunError
+from chainunit.core.engines import MATH
+from chainunit.core.quantities import Layout
 from chainunit.drives.induction_motor import steady
-from chainunit.engines import MATH
 from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.models import MACHINES
-from chainunit.quantities import Layout
+from chainunit.reading.text import entry, number
 from chainunit.report.study import report
 from chainunit.report.study_motion import motion
 from chainunit.study import flywheels
@@ -39,7 +40,6 @@ from chainunit.study.turn import TurnAnalysis
 from chainunit.study.wheel import FlywheelAnswers, Wheel
 from chainunit.study.window import Phase, Window
 from chainunit.system import CoSimulation, energy_residual, monolithic
-from chainunit.text import entry, number
 
 HEAD = 'event = []\n[system]\nmachine = "KnifeDrive"\n'
 SMALL = """

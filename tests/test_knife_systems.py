@@ -10,8 +10,8 @@ import pytest
 from reports import page_of
 from scipy.integrate import cumulative_trapezoid, solve_ivp
 
-from chainunit.engines import MATH
-from chainunit.quantities import Layout
+from chainunit.core.engines import MATH
+from chainunit.core.quantities import Layout
 from chainunit.report.study import report
 from chainunit.study.config import parse
 from chainunit.study.run import run_study

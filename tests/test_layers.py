@@ -80,7 +80,7 @@ def test_the_scan_sees_every_way_of_importing(tmp_path, monkeypatch):
         "from .. import __version__, errors\n"
         "from ..errors import InputError\n"
         "def f():\n    from chainunit.fmu.export import export\n"
-        "    from chainunit.fmu import export\n    import chainunit.cli\n"
+        "    from chainunit.fmu import export\n    import chainunit.app.cli\n"
     )
     (package / "cli.py").write_text("from .groups import chain\n")
     monkeypatch.setattr(HOUSE, "PACKAGE", package)

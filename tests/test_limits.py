@@ -9,8 +9,8 @@ import pytest
 from event_tables import event_line
 
 from chainunit import InputError
+from chainunit.core.engines import MATH
 from chainunit.drives import induction_motor as induction
-from chainunit.engines import MATH
 from chainunit.study.config import parse
 from chainunit.study.judgement import motor_limits, motor_verdict
 from chainunit.study.limits import SPEED_DEVIATION, heating

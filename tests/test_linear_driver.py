@@ -12,15 +12,15 @@ import pytest
 from command import chainunit
 from fmpy.validation import validate_fmu
 
-from chainunit.engines import MATH, numpy_
-from chainunit.errors import InputError
+from chainunit.core.engines import MATH, numpy_
+from chainunit.core.errors import InputError
+from chainunit.core.integrators import controlled
+from chainunit.core.native.compilers import compiler
 from chainunit.fmu.native.export import export
-from chainunit.integrate import controlled
 from chainunit.machines.linkages.file import description_of, read_linkage
 from chainunit.machines.linkages.model import machine_of
 from chainunit.machines.machine import Machine
 from chainunit.mechanism.end_stops import EndStops, stop_action
-from chainunit.native.compilers import compiler
 from chainunit.study import config
 
 LIFT = Path(__file__).parents[1] / "examples" / "linkages" / "cylinder_lift.toml"

@@ -15,8 +15,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from chainunit.engines import MATH, Dual, casadi_, dual, numpy_, slope
-from chainunit.errors import GeometryError
+from chainunit.core.engines import MATH, Dual, casadi_, dual, numpy_, slope
+from chainunit.core.errors import GeometryError
+from chainunit.core.planar import Vec2
+from chainunit.core.ports import PortValues
+from chainunit.core.quantities import Value, declaration, group, quantity
 from chainunit.groups.body import Bar, Mass
 from chainunit.groups.chain import Rods
 from chainunit.groups.driver import Crank
@@ -30,9 +33,6 @@ from chainunit.mechanism.chains import ChainedState
 from chainunit.mechanism.linkage import Linkage
 from chainunit.mechanism.machine import MachineState, Mechanism
 from chainunit.mechanism.models import MACHINES, InverseMachine, ShaftMotion
-from chainunit.planar import Vec2
-from chainunit.ports import PortValues
-from chainunit.quantities import Value, declaration, group, quantity
 
 DATA = json.loads((Path(__file__).parent / "data" / "stephenson.json").read_text())
 BODIES = {body["name"]: body for body in DATA["description"]["bodies"]}

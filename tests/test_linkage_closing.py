@@ -7,11 +7,11 @@ import re
 
 import pytest
 
-from chainunit.errors import InputError
+from chainunit.core.errors import InputError
 from chainunit.machines.linkages.file import description_of
 from chainunit.machines.linkages.model import machine_of
 from chainunit.machines.machine import Machine
-from chainunit.reading import toml
+from chainunit.reading.tables import toml
 
 FOUR_BAR = """
 [parameters]

@@ -13,11 +13,11 @@ import pytest
 from command import chainunit
 from linkage_files import MACHINES, pressed_both_ways
 
-from chainunit.errors import GeometryError
+from chainunit.core.errors import GeometryError
+from chainunit.core.native.compilers import compiler
 from chainunit.fmu.native.export import export
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
-from chainunit.native.compilers import compiler
 from chainunit.study import config
 
 PRESS = Path(__file__).parents[1] / "examples" / "linkages" / "slider_crank_press.toml"

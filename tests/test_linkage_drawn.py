@@ -10,7 +10,7 @@ import pytest
 from chainunit.machines.linkages.file import description_of
 from chainunit.machines.linkages.model import machine_of
 from chainunit.machines.machine import Machine
-from chainunit.reading import toml
+from chainunit.reading.tables import toml
 from chainunit.report import linkage
 from chainunit.report.drawing import drawing
 

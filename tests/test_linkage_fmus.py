@@ -14,7 +14,7 @@ import pytest
 from wrong_linkages import PRESS
 
 import chainunit
-from chainunit.engines import MATH
+from chainunit.core.engines import MATH
 from chainunit.fmu.accompany import companion_files
 from chainunit.fmu.backends import export
 from chainunit.fmu.description import Interface, model_description, model_description_3

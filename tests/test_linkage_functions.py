@@ -11,13 +11,13 @@ import casadi
 import numpy as np
 import pytest
 
-from chainunit.engines import MATH, Dual, casadi_, dual, numpy_, slope
-from chainunit.errors import InputError
+from chainunit.core.engines import MATH, Dual, casadi_, dual, numpy_, slope
+from chainunit.core.errors import InputError
 from chainunit.machines.linkages.file import description_of, read_linkage
 from chainunit.machines.linkages.model import machine_of
 from chainunit.machines.machine import Machine
 from chainunit.mechanism.expressions import expression
-from chainunit.reading import toml
+from chainunit.reading.tables import toml
 
 EXAMPLES = Path(__file__).parents[1] / "examples" / "linkages"
 PRESS = (EXAMPLES / "slider_crank_press.toml").read_text("utf-8")

@@ -12,8 +12,8 @@ import pytest
 from multibody import Multibody
 from random_linkages import DYADS, random_linkage
 
-from chainunit.engines import MATH, Dual, dual, slope
-from chainunit.errors import InputError
+from chainunit.core.engines import MATH, Dual, dual, slope
+from chainunit.core.errors import InputError
 from chainunit.machines.linkages.file import description_of
 from chainunit.machines.linkages.model import machine_of
 

@@ -11,14 +11,14 @@ import pytest
 from linkage_files import MACHINES, expected, model, tables
 from test_reference import deviation
 
-from chainunit.engines import MATH
-from chainunit.errors import InputError
+from chainunit.core.engines import MATH
+from chainunit.core.errors import InputError
+from chainunit.core.native.compilers import compiler
 from chainunit.fmu.export import export as export_python
 from chainunit.fmu.native.export import export
 from chainunit.machines.linkages.file import description_of
 from chainunit.machines.linkages.model import machine_of
 from chainunit.machines.machine import Machine
-from chainunit.native.compilers import compiler
 
 STATES = [(name, state) for name, each in MACHINES.items() for state in each["states"]]
 KINDS = {

@@ -7,7 +7,7 @@ import re
 import pytest
 from wrong_linkages import CHANGES, FILES, PRESS, R
 
-from chainunit.errors import InputError
+from chainunit.core.errors import InputError
 from chainunit.machines.linkages.file import read_linkage
 
 

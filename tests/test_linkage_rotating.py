@@ -9,7 +9,7 @@ import pytest
 from multibody import Multibody
 from test_linkage_random import by_the_machine, deviations
 
-from chainunit.errors import InputError
+from chainunit.core.errors import InputError
 from chainunit.machines.linkages.file import description_of
 from chainunit.machines.linkages.model import machine_of
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from chainunit.engines import MATH, Dual, casadi_, dual, numpy_, slope
+from chainunit.core.engines import MATH, Dual, casadi_, dual, numpy_, slope
 from chainunit.machines.linkages.file import description_of
 from chainunit.machines.linkages.model import machine_of
 from chainunit.machines.machine import Machine

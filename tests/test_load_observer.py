@@ -15,7 +15,8 @@ from scipy.linalg import expm
 from scipy.stats import norm
 
 from chainunit import InputError
-from chainunit.engines import MATH, numpy_
+from chainunit.core.engines import MATH, numpy_
+from chainunit.core.native.compilers import compiler
 from chainunit.fmu.native.export import export
 from chainunit.machines import load_filter
 from chainunit.machines.chain_unit import ChamberForces, SideLoads
@@ -30,7 +31,6 @@ from chainunit.machines.load_observer import (
     sizes,
 )
 from chainunit.models import MODELS
-from chainunit.native.compilers import compiler
 from chainunit.study.false_loads import ANGLES, false_loads
 
 native = pytest.mark.skipif(compiler() is None, reason="no C compiler")

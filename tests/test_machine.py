@@ -10,7 +10,8 @@ import pytest
 from test_linkage import SixBar
 
 from chainunit import ChainUnitMachine, InputError
-from chainunit.engines import MATH
+from chainunit.core.engines import MATH
+from chainunit.core.quantities import Layout
 from chainunit.machines import api, machine
 from chainunit.machines.api import machine_of
 from chainunit.machines.chain_unit import ChamberForces
@@ -18,7 +19,6 @@ from chainunit.machines.flexible import flexible
 from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.machines.machine import Machine
 from chainunit.models import MACHINES
-from chainunit.quantities import Layout
 from chainunit.study.config import parse
 
 MODELS = {**MACHINES, "SixBar": SixBar}

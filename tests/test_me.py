@@ -15,8 +15,8 @@ from systems import component, pair
 from test_ssp import OBSERVED
 
 from chainunit import InputError, RunError
+from chainunit.core.native.compilers import compiler
 from chainunit.machines.flexible import flexible
-from chainunit.native.compilers import compiler
 from chainunit.system import (
     CoSimulation,
     Jump,

@@ -9,8 +9,8 @@ import pytest
 import xarray as xr
 
 from chainunit import ChainUnitMachine
+from chainunit.core.quantities import Layout
 from chainunit.drives.dc_motor import DcMotor
-from chainunit.quantities import Layout
 from chainunit.study.drive import Drive
 from chainunit.study.limits import reaches
 from chainunit.study.measures import MEASURES, Answers, measures_of, read_answers, read_measure

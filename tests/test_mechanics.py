@@ -12,8 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from machines import random_loads, random_machine, random_state
 
-from chainunit import EMPTY, ChainUnitMachine, GeometryError, InputError, SideLoads, engines
-from chainunit.engines import numpy_
+from chainunit import EMPTY, ChainUnitMachine, GeometryError, InputError, SideLoads
+from chainunit.core import engines
+from chainunit.core.engines import numpy_
 from chainunit.machines.api import FREE
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.machines.crank_rocker import half_width_range

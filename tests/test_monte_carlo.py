@@ -23,10 +23,10 @@ import pytest
 import xarray as xr
 from command import chainunit
 
+from chainunit.core.errors import RunError
+from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
-from chainunit.errors import RunError
-from chainunit.job import CHECKS
-from chainunit.native.compilers import compiler
+from chainunit.reading.text import number as shown
 from chainunit.report import runs as report_runs
 from chainunit.report.blocks import Source
 from chainunit.report.terminal import plain_line
@@ -40,7 +40,7 @@ from chainunit.study.quantiles import Estimate
 from chainunit.study.random_remarks import remark_on_random_overloads
 from chainunit.study.rig import Rig
 from chainunit.system import CoSimulation, monolithic
-from chainunit.text import number as shown
+from chainunit.work.job import CHECKS
 
 needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 RUNS = 50

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from chainunit import engines
+from chainunit.core import engines
+from chainunit.core.errors import InputError
+from chainunit.core.integrators import rk4
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.speed_control import loop, tune
-from chainunit.errors import InputError
-from chainunit.integrate import rk4
 from chainunit.study.choice import tune as tune_motor
 from chainunit.study.config import load
 from chainunit.study.drive import Drive

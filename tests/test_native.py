@@ -28,8 +28,12 @@ from scipy.integrate import solve_ivp
 from test_fmu import Running
 from test_reference import POINTS, deviation
 
-from chainunit import ChainUnitMachine, GeometryError, InputError, RunError, integrate, refusals
-from chainunit.engines import MATH
+from chainunit import ChainUnitMachine, GeometryError, InputError, RunError
+from chainunit.core import integrators
+from chainunit.core.engines import MATH
+from chainunit.core.native.cache import OFF, VARIABLE
+from chainunit.core.native.compilers import compile_code, compiler
+from chainunit.core.quantities import TYPES
 from chainunit.fmu.description import Interface
 from chainunit.fmu.export import export as export_python
 from chainunit.fmu.native.export import export
@@ -39,9 +43,6 @@ from chainunit.fmu.reference import INPUTS, READ, REFERENCE, STANDARD, STEPPED, 
 from chainunit.fmu.reference import reference_results as reference_results_of
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.models import MODELS
-from chainunit.native.cache import OFF, VARIABLE
-from chainunit.native.compilers import compile_code, compiler
-from chainunit.quantities import TYPES
 from chainunit.system.instance import Fmu, Instance
 
 HERE = Path(__file__).parent
@@ -484,7 +485,7 @@ def test_every_word_of_python_is_in_native_code():
     assert "%" not in re.sub(r"%[sgu]", "", text)
     numbers = re.findall(r"STAGES\[7\]\[6\] = {(.*?)};", text, re.DOTALL)[0]
     rows = [[float(x) for x in re.findall(r"[-\d.e]+", row)] for row in numbers.strip().splitlines()]
-    assert [row or [0.0] for row in map(list, integrate.STAGES)] == rows
+    assert [row or [0.0] for row in map(list, integrators.STAGES)] == rows
 
 
 def test_bad_calls_end_in_an_error_and_one_line(native):
@@ -905,7 +906,7 @@ def test_a_machine_that_turns_by_itself_has_reference_results(ratio):
 
 def test_the_command_says_where_an_fmu_comes_without_reference_results(tmp_path):
     """With a budget that no model meets, as a model with very many states would take minutes."""
-    small = "import chainunit.fmu.reference as a, chainunit.cli as c; a._MOST_STEPS = 1; c.main()"
+    small = "import chainunit.fmu.reference as a, chainunit.app.cli as c; a._MOST_STEPS = 1; c.main()"
     command = [sys.executable, "-c", small, "export", "DcMotor", "--backend", "python"]
     process = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert process.returncode == 0, process.stderr

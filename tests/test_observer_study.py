@@ -11,13 +11,13 @@ from fmpy.ssp.ssd import read_ssd
 from reports import page_of, said_of
 
 from chainunit import InputError
+from chainunit.core.engines import MATH
+from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor, steady
 from chainunit.drives.motor import Motor
 from chainunit.drives.terminal_signals import terminal_signals
-from chainunit.engines import MATH
 from chainunit.machines.load_observer import FARTHEST, Inputs, rotor_torque
-from chainunit.native.compilers import compiler
 from chainunit.study import config
 from chainunit.study.choice import choose
 from chainunit.study.observation import with_observer

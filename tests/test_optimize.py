@@ -14,11 +14,12 @@ import pytest
 from command import chainunit
 from linkage_files import pressed_both_ways
 
-from chainunit import ChainUnitMachine, Study, ledger
+from chainunit import ChainUnitMachine, Study
+from chainunit.core import ledger
+from chainunit.core.native.compilers import compiler
 from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
-from chainunit.native.compilers import compiler
 from chainunit.report.optimum import optimum_report
 from chainunit.report.terminal import plain
 from chainunit.study import config as study_files

@@ -22,6 +22,8 @@ from reports import page_of, pictures, said_of, write
 from chainunit import EMPTY, InputError, RunError
 from chainunit.drives.induction_motor import SoftStart
 from chainunit.machines.chain_unit import Feed
+from chainunit.reading.text import DEFAULT_UNITS, digits_text, forms, scales, unit_text
+from chainunit.reading.text import number as told_as
 from chainunit.report import html, page_figures, study_motion
 from chainunit.report import study as study_report
 from chainunit.report.blocks import at
@@ -33,8 +35,6 @@ from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
 from chainunit.study.sections import Starter
 from chainunit.study.verdict import CRANK_GOOD, ROCKER_GOOD_EMPTY
-from chainunit.text import DEFAULT_UNITS, digits_text, forms, scales, unit_text
-from chainunit.text import number as told_as
 
 SHORT = """
 title = "A mill <b>& more</b> </script><!--"

@@ -5,7 +5,7 @@ import tomllib
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from chainunit.places import lines_of, statements
+from chainunit.reading.toml_lines import lines_of, statements
 
 ODD = '''title = "a\u2028b"   # a separator of lines in a text, and \u0085 in a comment
 [m]

@@ -17,13 +17,13 @@ import pytest
 from test_native import HERE, host_arguments, host_torque
 
 from chainunit import InputError, RunError
+from chainunit.core.native import compilers
+from chainunit.core.native.compilers import Compiler
 from chainunit.fmu.backends import export as export_any
 from chainunit.fmu.native import platforms
 from chainunit.fmu.native.export import export
 from chainunit.fmu.native.platforms import PLATFORMS
 from chainunit.models import MODELS
-from chainunit.native import compilers
-from chainunit.native.compilers import Compiler
 
 here = pytest.mark.skipif(platforms.host() != "linux64", reason="run on 64-bit Linux")
 zig = pytest.mark.skipif(importlib.util.find_spec("ziglang") is None, reason="ziglang is not installed")

@@ -10,12 +10,12 @@ import pytest
 from machines import random_machine
 from reports import page_of, said_of
 
+from chainunit.core.errors import InputError
+from chainunit.core.quantities import Layout
 from chainunit.drives.dc_motor import DcMotor
-from chainunit.errors import InputError
 from chainunit.machines.chain_unit import ChamberForces, Feed
 from chainunit.models import MODELS
-from chainunit.quantities import Layout
-from chainunit.reading import slips
+from chainunit.reading.tables import slips
 from chainunit.study import config
 
 MM = {"r": 150, "l": 1500, "h": 1000, "c": 1492.48, "hy": 1000, "e": 810, "l1": 1350, "l2": 540, "z": 853.815}

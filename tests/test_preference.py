@@ -21,6 +21,7 @@ from chainunit.drives.gear_ratios import (
     ratio_on_offer,
     typical_efficiency,
 )
+from chainunit.reading.text import number
 from chainunit.study import sizing
 from chainunit.study.candidate import Candidate, Criterion, Standing
 from chainunit.study.catalogue_drive import gear_with
@@ -33,7 +34,6 @@ from chainunit.study.preference import ORDER, poles_rank, rank
 from chainunit.study.relay import HEAVIER, start_class
 from chainunit.study.rig import Rig
 from chainunit.study.start_runs import starts_from_all
-from chainunit.text import number
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 DOCS = Path(__file__).parents[1] / "docs"

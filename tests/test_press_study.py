@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from reports import page_of, pictures
 
+from chainunit.reading.text import DEFAULT_UNITS
 from chainunit.report import load_figures, page_figures, study_motion
 from chainunit.report import study as study_report
 from chainunit.report.figure import Between, Curve
@@ -24,7 +25,6 @@ from chainunit.study import config
 from chainunit.study.event_torques import effects
 from chainunit.study.protection import CouplingEffect, spares
 from chainunit.study.run import run_study
-from chainunit.text import DEFAULT_UNITS
 
 PRESS = Path(__file__).parents[1] / "examples" / "linkages" / "slider_crank_press.toml"
 STUDY = """

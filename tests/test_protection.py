@@ -12,12 +12,13 @@ from event_tables import HEAVY_MACHINE, event_line
 from reports import said_of
 from scipy.integrate import solve_ivp
 
+from chainunit.core.engines import MATH
+from chainunit.core.errors import InputError
 from chainunit.drives.induction_motor import InductionMotor, steady
 from chainunit.drives.motor import T_RATED
 from chainunit.drives.slip_clutch import SlipClutch
-from chainunit.engines import MATH
-from chainunit.errors import InputError
 from chainunit.machines.chain_unit import SIDES
+from chainunit.reading.text import entry
 from chainunit.report import blocks, terminal
 from chainunit.report.sizing import _best
 from chainunit.study import config, sizing
@@ -35,7 +36,6 @@ from chainunit.study.sections import Coupling
 from chainunit.study.start_runs import from_angle
 from chainunit.study.window import Phase
 from chainunit.system import ModelComponent, System, monolithic
-from chainunit.text import entry
 
 
 def test_a_relay_of_class_10_trips_when_its_class_says():

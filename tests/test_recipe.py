@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 import chainunit
+from chainunit.core.model import Model, Part, Terminal
+from chainunit.core.ports import NO_LOAD, LoadPort, PortSlopes, PortValues, flanges, load_terminal
+from chainunit.core.quantities import Value, declaration, group, quantity
 from chainunit.fmu import export as python
 from chainunit.fmu.description import Interface
 from chainunit.fmu.recipe import icon, often, script_of
 from chainunit.fmu.reference import excitation
 from chainunit.fmu.script import Script
-from chainunit.model import Model, Part, Terminal
 from chainunit.models import MODELS
-from chainunit.ports import NO_LOAD, LoadPort, PortSlopes, PortValues, flanges, load_terminal
-from chainunit.quantities import Value, declaration, group, quantity
 
 
 @declaration

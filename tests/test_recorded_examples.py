@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.machines.chain_unit import ChamberForces
-from chainunit.native.compilers import compiler
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 from chainunit.study.identification.fit import fit

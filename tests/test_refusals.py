@@ -8,11 +8,11 @@ import pytest
 from command import chainunit
 from wrong_files import FILES
 
+from chainunit.core.errors import InputError, shown
 from chainunit.drives.motors import MOTORS
-from chainunit.errors import InputError, shown
 from chainunit.models import MACHINES
-from chainunit.places import lines_of
-from chainunit.reading import in_file
+from chainunit.reading.tables import in_file
+from chainunit.reading.toml_lines import lines_of
 from chainunit.study.config import parse
 from chainunit.study.keys import key_tables
 from chainunit.study.parts import example

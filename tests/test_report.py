@@ -14,6 +14,7 @@ import pytest
 from rich.console import Console
 
 import chainunit.report
+from chainunit.reading.text import DEFAULT_UNITS, chosen_units
 from chainunit.report import blocks as b
 from chainunit.report import figure as fig
 from chainunit.report import html, page_figures, print_figures, terminal
@@ -21,7 +22,6 @@ from chainunit.report.lines import Aside, Number, Strong, Words, join, line
 from chainunit.report.markdown import markdown
 from chainunit.report.motion import Animation, Arrow, Clip, DrawnLink, Reading, pictures
 from chainunit.study.config import Run
-from chainunit.text import DEFAULT_UNITS, chosen_units
 
 RESULT = {
     "speed": {"value": 314.159, "unit": "rad/s", "kind": "speed"},

@@ -14,7 +14,7 @@ from command import chainunit
 from chainunit.papers import PAPERS, paper000, paper003, reproduce
 from chainunit.papers.output import markdown
 from chainunit.papers.table import _row
-from chainunit.reading import packaged, toml
+from chainunit.reading.tables import packaged, toml
 
 ROWS = reproduce()
 

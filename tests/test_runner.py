@@ -20,10 +20,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from chainunit import runner
-from chainunit.batch_store import BatchStore
-from chainunit.errors import InputError, InterruptedRunError, RunError
-from chainunit.job import CHECKS, Job, ResultVariable, text_array, texts
+from chainunit.core.errors import InputError, InterruptedRunError, RunError
+from chainunit.work import runner
+from chainunit.work.job import CHECKS, Job, ResultVariable, text_array, texts
+from chainunit.work.store import BatchStore
 
 HERE = Path(__file__).parent
 
@@ -83,7 +83,7 @@ def test_a_script_that_is_run_by_its_workers_is_told_what_to_do(tmp_path):
     """Each local process imports the script, which then starts processes itself."""
     script = tmp_path / "script.py"
     script.write_text(
-        "import sys; from pathlib import Path; import batches\nfrom chainunit.runner import run\n"
+        "import sys; from pathlib import Path; import batches\nfrom chainunit.work.runner import run\n"
         "run(batches.job(), Path(sys.argv[1]), print, workers=2)\n"
     )
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(HERE), *filter(None, sys.path)])}

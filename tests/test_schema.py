@@ -10,11 +10,11 @@ import jsonschema
 import pytest
 from wrong_files import FILES
 
-from chainunit import units
-from chainunit.errors import InputError
+from chainunit.core import units
+from chainunit.core.errors import InputError
 from chainunit.models import MACHINES
-from chainunit.places import lines_of
-from chainunit.reading import in_file
+from chainunit.reading.tables import in_file
+from chainunit.reading.toml_lines import lines_of
 from chainunit.study.commented import commented
 from chainunit.study.config import parse
 from chainunit.study.keys import key_tables

@@ -16,8 +16,8 @@ import pytest
 from fmpy.validation import validate_fmu
 from lxml import etree
 
+from chainunit.core.native.compilers import host
 from chainunit.models import MODELS
-from chainunit.native.compilers import host
 
 FOLDER = Path(__file__).parents[1] / "fmu"
 OPTIONS = ("--handle-state", "--serialize-state")
@@ -134,7 +134,7 @@ def test_a_script_with_a_class_and_imports_of_its_own(tmp_path):
     script.write_text(
         text.replace("class ChamberForces", "class MyChamber").replace(
             "from chainunit.machines import chain_unit",
-            "import chainunit.integrate as steps\nfrom chainunit.drives import cardan, dc_motor, driveline\n"
+            "import chainunit.core.integrators as steps\nfrom chainunit.drives import cardan, dc_motor, driveline\n"
             "from chainunit.machines import chain_unit",
         )
         + '    experiment = {"stop": 3.0}\n'

@@ -9,8 +9,8 @@ import pytest
 from derivatives import check_derivatives
 
 from chainunit import InputError
+from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
-from chainunit.native.compilers import compiler
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 from chainunit.study.identification.fit import fit

@@ -15,12 +15,12 @@ from event_tables import HEAVY_MACHINE, event_line
 from systems import component
 from typer.testing import CliRunner
 
+from chainunit.core.engines import MATH
+from chainunit.core.errors import InputError, InterruptedRunError
 from chainunit.drives.catalogue import catalogue
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor, breakdown, steady
 from chainunit.drives.motor import T_RATED
-from chainunit.engines import MATH
-from chainunit.errors import InputError, InterruptedRunError
 from chainunit.fmu.backends import export
 from chainunit.machines.chain_unit import Feed, SideLoads
 from chainunit.study import sizing
@@ -382,7 +382,7 @@ def test_poles_that_no_motor_has_are_refused(tmp_path):
 
 def test_without_a_fit_the_study_goes_on_with_the_nearest(tmp_path, monkeypatch):
     """All that was asked is run, marked as insufficient, and the command ends with 1."""
-    from chainunit import cli
+    from chainunit.app import cli
 
     monkeypatch.setattr(sizing, "catalogue", lambda extra: small(2))
     (tmp_path / "weak.toml").write_text(

@@ -8,7 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from chainunit.engines import MATH, Dual, dual, slope
+from chainunit.core.engines import MATH, Dual, dual, slope
+from chainunit.core.planar import Vec2
 from chainunit.groups.body import Bar, Mass
 from chainunit.groups.driver import Crank, Ram
 from chainunit.groups.dyad import Dyad
@@ -20,7 +21,6 @@ from chainunit.groups.triad import Pose, Triad
 from chainunit.groups.yokes import PRP, RPP
 from chainunit.mechanism.linkage import Linkage
 from chainunit.mechanism.machine import MachineState, Mechanism, derived_numbers
-from chainunit.planar import Vec2
 
 PIN = SimpleNamespace(friction=0.1, diameter=0.05, w_smooth=0.02)
 GUIDE = SimpleNamespace(friction=0.15, v_smooth=0.02)

@@ -20,9 +20,10 @@ from command import chainunit
 from fmpy.ssp.ssd import read_ssd, read_ssv
 from systems import component, pair
 
-from chainunit import InputError, RunError, cli
+from chainunit import InputError, RunError
+from chainunit.app import cli
+from chainunit.core.errors import WriteError
 from chainunit.drives.catalogue import catalogue
-from chainunit.errors import WriteError
 from chainunit.models import MODELS
 from chainunit.study import config, sizing
 from chainunit.study.choice import choose

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from chainunit import cli
+from chainunit.app import cli
 from chainunit.machines.api import machine_of
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.study import config, sizing

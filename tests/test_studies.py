@@ -13,8 +13,10 @@ import pytest
 import xarray as xr
 from command import chainunit
 
-from chainunit import ChainUnitMachine, InputError, RunError, Study, StudyResult, ledger, studies
-from chainunit.files import claim
+from chainunit import ChainUnitMachine, InputError, RunError, Study, StudyResult
+from chainunit.app import studies
+from chainunit.core import ledger
+from chainunit.core.files import claim
 from chainunit.study.record import StudyRecord
 
 FILE = """

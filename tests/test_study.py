@@ -17,7 +17,7 @@ from fmpy.validation import validate_fmu
 from reports import write
 
 from chainunit import EMPTY, ChainUnitMachine, SideLoads
-from chainunit.ledger import NAME, Ledger
+from chainunit.core.ledger import NAME, Ledger
 from chainunit.machines.chain_unit import Feed
 from chainunit.report import study as study_report
 from chainunit.study.cycle import cycle
@@ -221,7 +221,7 @@ def test_bad_input_ends_with_2_in_one_line_and_writes_nothing(tmp_path):
     ],
 )
 def test_what_chains_are_refused(text, told):
-    from chainunit.errors import InputError
+    from chainunit.core.errors import InputError
     from chainunit.study import config
 
     with pytest.raises(InputError, match=re.escape(told)):

@@ -12,7 +12,7 @@ import pytest
 import xarray as xr
 from command import chainunit
 
-from chainunit.errors import InputError
+from chainunit.core.errors import InputError
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
 from chainunit.study import config

@@ -22,11 +22,9 @@ from command import chainunit
 from scipy.stats import qmc, spearmanr
 
 from chainunit import GeometryError, InputError, Study
-from chainunit.batch_store import made_anew
-from chainunit.errors import InputError as Refusal
-from chainunit.job import CHECKS
-from chainunit.ledger import Ledger
-from chainunit.native.compilers import compiler
+from chainunit.core.errors import InputError as Refusal
+from chainunit.core.ledger import Ledger
+from chainunit.core.native.compilers import compiler
 from chainunit.report import sweep as sweep_page
 from chainunit.report import sweep_figures
 from chainunit.report.figure import Hatch, hatch_lines
@@ -37,6 +35,8 @@ from chainunit.study.config import parse
 from chainunit.study.cycle import cycle
 from chainunit.study.sweep_summary import _correlation, _explained
 from chainunit.study.verdict import two_bars
+from chainunit.work.job import CHECKS
+from chainunit.work.store import made_anew
 
 HERE = Path(__file__).parent
 NATIVE = pytest.mark.skipif(compiler() is None, reason="no C compiler")

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from chainunit import InputError
+from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor
-from chainunit.native.compilers import compiler
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 from chainunit.study.identification.measurands import COUNTS

@@ -7,10 +7,10 @@ import pytest
 from systems import component, pair
 
 from chainunit import InputError
+from chainunit.core.ports import LoadPort, PortSlopes
+from chainunit.core.quantities import Layout
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.driveline import CardanDriveline
-from chainunit.ports import LoadPort, PortSlopes
-from chainunit.quantities import Layout
 from chainunit.study import config
 from chainunit.study.drive import Drive
 from chainunit.system import Jump, Profile, System, export, hold_loads, rigid, shaft_joints, without

@@ -6,9 +6,9 @@ import math
 
 import pytest
 
-from chainunit.errors import InputError
+from chainunit.core.errors import InputError
+from chainunit.reading.text import chosen_units, entry, forms, number
 from chainunit.study.measures import torque_reserve
-from chainunit.text import chosen_units, entry, forms, number
 
 
 @pytest.mark.parametrize(

@@ -7,10 +7,10 @@ import pytest
 
 from chainunit import InputError
 from chainunit.batch.transients import Transients, profile_rows
+from chainunit.core.engines import MATH
+from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
-from chainunit.engines import MATH
 from chainunit.machines.chain_unit import ChamberForces
-from chainunit.native.compilers import compiler
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 from chainunit.system import Profile, compiled, monolithic

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from chainunit.engines import MATH, Dual, dual, slope
+from chainunit.core.engines import MATH, Dual, dual, slope
+from chainunit.core.planar import Motion, Vec2
 from chainunit.groups.legs import rods_at
 from chainunit.groups.triad import LEGS, Pose, SolvedTriad, assembly_modes, correct_pose
-from chainunit.planar import Motion, Vec2
 
 
 def random_triad(rng, collinear=False):

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from command import chainunit
 
-from chainunit import ChainUnitMachine, ledger
+from chainunit import ChainUnitMachine
+from chainunit.core import ledger
 from chainunit.papers.two_bar import loads, statement, two_bar_error
 
 

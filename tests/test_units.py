@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from chainunit.errors import InputError
-from chainunit.quantities import Quantity, Variable
-from chainunit.reading import to_number
-from chainunit.text import forms, number
-from chainunit.units import FITTING, fitting, split
+from chainunit.core.errors import InputError
+from chainunit.core.quantities import Quantity, Variable
+from chainunit.core.units import FITTING, fitting, split
+from chainunit.reading.tables import to_number
+from chainunit.reading.text import forms, number
 
 # by hand: what a text means in the declared unit
 WAYS = {

@@ -12,8 +12,8 @@ import pytest
 from command import chainunit
 
 from chainunit import InputError, Study
+from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
-from chainunit.native.compilers import compiler
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 from chainunit.study.identification import watch as watching

@@ -13,12 +13,12 @@ from command import chainunit
 from event_tables import event_line
 from reports import said_of
 
+from chainunit.reading.text import chosen_units, number, shown_in, turning
 from chainunit.report.markdown import markdown
 from chainunit.report.study import report
 from chainunit.study.config import parse
 from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
-from chainunit.text import chosen_units, number, shown_in, turning
 
 UNITS = 'units = { speed = "rev/min", torque = "kN.m", force = "kN", power = "W" }\n'
 SHORT = """

@@ -25,12 +25,12 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
-    from .errors import GeometryError, InputError, RunError
-    from .identifications import IdentificationResult, WatchResult
+    from .app.identifications import IdentificationResult, WatchResult
+    from .app.studies import BestResult, Study, StudyResult
+    from .app.sweeps import SweepResult
+    from .core.errors import GeometryError, InputError, RunError
     from .machines.api import EMPTY, ChainUnitMachine
     from .machines.chain_unit import ChamberForces, SideLoads
-    from .studies import BestResult, Study, StudyResult
-    from .sweeps import SweepResult
 
     __version__: str
 else:

@@ -9,14 +9,15 @@ import os
 
 
 def main() -> None:
-    """Run the command line; see `chainunit.cli.main`."""
+    """Run the command line; see `chainunit.app.cli.main`."""
     status = 130
     try:
-        from . import interrupts
+        from .work import interrupts
 
         interrupts.begin()
         try:
-            from . import cli, console, ending
+            from .app import cli, console
+            from .core import temporary_folders
         except Exception:
             # a library may turn the interrupt of its import into another error
             if interrupts.received() is None:
@@ -26,7 +27,7 @@ def main() -> None:
         try:
             cli.main()
         finally:
-            ending.remove_folders()
+            temporary_folders.remove_folders()
             interrupts.ignore()
     except KeyboardInterrupt:
         if "interrupts" in locals():

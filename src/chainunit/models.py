@@ -5,14 +5,14 @@ from pathlib import Path
 from pkgutil import iter_modules
 
 from . import machines
+from .core.errors import InputError, near_name
+from .core.model import Model
 from .drives.driveline import CardanDriveline
 from .drives.motors import MOTORS
-from .errors import InputError, near_name
 from .machines.flexible import ChainUnitFlexible
 from .machines.linkages.file import read_linkage
 from .machines.load_observer import LoadObserver
 from .mechanism.models import MACHINES as MACHINES
-from .model import Model
 
 for _module in iter_modules(machines.__path__):
     import_module(f"{machines.__name__}.{_module.name}")

@@ -7,6 +7,9 @@ C dT/dt = R(T) i^2 - (T - T_ambient)/R_th
 
 from __future__ import annotations
 
+from chainunit.core.model import Part
+from chainunit.core.ports import LoadInput
+from chainunit.core.quantities import Value, declaration, group, quantity
 from chainunit.drives.motor import (
     T_RATED,
     Motor,
@@ -17,9 +20,6 @@ from chainunit.drives.motor import (
     friction_time,
 )
 from chainunit.drives.speed_control import Tuning
-from chainunit.model import Part
-from chainunit.ports import LoadInput
-from chainunit.quantities import Value, declaration, group, quantity
 
 
 @declaration

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-from ..engines import casadi_
-from ..errors import InputError, near_name
-from ..model import Model
-from ..native.operations import Operations
-from ..quantities import Variable, quotient
-from ..trace import trace
+from ..core.engines import casadi_
+from ..core.errors import InputError, near_name
+from ..core.model import Model
+from ..core.native.operations import Operations
+from ..core.quantities import Variable, quotient
+from ..core.symbolic_trace import trace
 
 
 @dataclass(frozen=True)

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..errors import InputError, RemarkWarning, RunError
-from ..model import Model
-from ..native.operations import ARGUMENT
-from ..quantities import Variable
-from ..units import scale
+from ..core.errors import InputError, RemarkWarning, RunError
+from ..core.model import Model
+from ..core.native.operations import ARGUMENT
+from ..core.quantities import Variable
+from ..core.units import scale
 from . import arrays
 from .equations import Equations, Result, equations, find, names_of, outputs_of
 from .native import Reductions, aligned, native_kernel

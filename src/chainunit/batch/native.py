@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from ..ending import scratch
-from ..native.compilers import Compiler, compile_code, compiler, for_this_processor
+from ..core.native.compilers import Compiler, compile_code, compiler, for_this_processor
+from ..core.temporary_folders import scratch
 from .equations import Equations
 from .reductions import REDUCTIONS
 from .vector_code import VectorCode, c_file

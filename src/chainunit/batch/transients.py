@@ -1,7 +1,7 @@
 """Transients of a model in blocks: many runs side by side, in one native loop without Python between the steps.
 
 Runs differ in parameters, states at the start, signals, and end. Each is integrated by the method of the model's FMU,
-with equal steps or with error control of its own (`chainunit.integrate`), and its signals are evaluated at every
+with equal steps or with error control of its own (`chainunit.core.integrators`), and its signals are evaluated at every
 stage. Without constraints a step need not end at a row: the rows are interpolated (the dense output of Dormand and
 Prince, of fourth order, with scipy's coefficients).
 
@@ -24,14 +24,14 @@ from typing import Any
 import numpy as np
 from scipy.integrate import RK45
 
-from .. import integrate
-from ..engines import MATH, casadi_
-from ..errors import InputError, RunError
-from ..model import Model
-from ..native.code import constant
-from ..native.compilers import Compiler, compiler
-from ..native.operations import ARGUMENT, Operations
-from ..trace import trace
+from ..core import integrators
+from ..core.engines import MATH, casadi_
+from ..core.errors import InputError, RunError
+from ..core.model import Model
+from ..core.native.code import constant
+from ..core.native.compilers import Compiler, compiler
+from ..core.native.operations import ARGUMENT, Operations
+from ..core.symbolic_trace import trace
 from .equations import arguments_of, find, names_of, outputs_of
 from .native import load, threads
 from .vector_code import VectorCode, c_file
@@ -39,7 +39,7 @@ from .vector_code import VectorCode, c_file
 _NUMBERS = (
     "RK4_NODES RK4_WEIGHTS NODES STAGES ERRORS SHORTEST FIRST SAFETY ERROR_POWER LEAST_GROWTH MOST_GROWTH NO_ERROR"
 ).split()
-"""The numbers of `chainunit.integrate` that the loops need."""
+"""The numbers of `chainunit.core.integrators` that the loops need."""
 _LANES = 8
 """The number of runs is filled up to a multiple of it, a multiple of the lanes of every vector."""
 
@@ -205,7 +205,7 @@ class Transients:
             step,
             longest or float(model.internal_step(MATH, p)),
             float(model.tolerance(MATH, p)) if model.controlled else 0.0,
-            model.parameter_layout.by_name(parameters)[integrate.MAX_STEPS],
+            model.parameter_layout.by_name(parameters)[integrators.MAX_STEPS],
         ]
 
         def piece(ends_of: tuple[int, int]) -> None:
@@ -291,7 +291,7 @@ def _compiled(
         "PUT": " ".join(put),
         "GUARDED": " ".join(guards),
     }
-    constants = {name: value for name, value in vars(integrate).items() if name in _NUMBERS}
+    constants = {name: value for name, value in vars(integrators).items() if name in _NUMBERS}
     constants["DENSE"] = tuple(map(tuple, RK45.P))
     constants["NOMINAL"] = tuple(v.quantity.nominal or 1.0 for v in states)
     source = "\n".join(

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from functools import cached_property
 from importlib import resources
 
-from ..native.code import forms, number
-from ..native.operations import ARGUMENT, NUMBER, Operation, Operations
+from ..core.native.code import forms, number
+from ..core.native.operations import ARGUMENT, NUMBER, Operation, Operations
 
 _ARITHMETIC = {"ADD", "SUB", "MUL", "SQ", "TWICE", "NEG", "ASSIGN"}
 """Operations that C has for vectors, or for a vector and a number; all others are functions of vectors."""

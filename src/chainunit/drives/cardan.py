@@ -12,8 +12,8 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from ..errors import InputError
-from ..quantities import Layout, Value, declaration, quantity, violations
+from ..core.errors import InputError
+from ..core.quantities import Layout, Value, declaration, quantity, violations
 
 RIGHT = 0.5 * math.pi
 
@@ -132,7 +132,7 @@ def frequency_band(p: Cardan, points: int = 3600) -> FrequencyBand:
     """
     import numpy as np
 
-    from ..engines import numpy_
+    from ..core.engines import numpy_
 
     check(p)
     xp = numpy_()
@@ -152,7 +152,7 @@ def sensitivity(p: Cardan, i: float = 1.0) -> dict[str, float]:
     dual numbers."""
     import dataclasses
 
-    from ..engines import MATH, Dual, dual, slope, value
+    from ..core.engines import MATH, Dual, dual, slope, value
 
     shares = {}
     for name in ("J1", "J4", "c2", "c3"):

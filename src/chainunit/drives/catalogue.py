@@ -23,10 +23,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from .. import places, units
-from ..errors import Faults, InputError, each_refusal, near_name, shown
-from ..quantities import DISPLAY_UNITS, Layout, Value, Variable, declaration, quantity
-from ..reading import file_text, in_file, packaged, to_number, toml
+from ..core import units
+from ..core.errors import Faults, InputError, each_refusal, near_name, shown
+from ..core.quantities import DISPLAY_UNITS, Layout, Value, Variable, declaration, quantity
+from ..reading import toml_lines
+from ..reading.tables import file_text, in_file, packaged, to_number, toml
 from .induction_motor import InductionMotor
 from .motor import Motor
 from .nameplate import Identification, Nameplate, check, identify
@@ -307,7 +308,7 @@ def _with_unit(cell: str, unit: str) -> str:
 
 
 def _toml_rows(text: str, file: str, faults: Faults) -> Iterator[_Row]:
-    with in_file(file, lambda: places.lines_of(text)):
+    with in_file(file, lambda: toml_lines.lines_of(text)):
         data = toml(text)
         tables = data.pop("motor", None)
         wrong = Faults()
@@ -320,7 +321,7 @@ def _toml_rows(text: str, file: str, faults: Faults) -> Iterator[_Row]:
         ):
             wrong.add([InputError(f"motor = {shown(tables)}: each motor must be a table [[motor]]", "motor")])
         wrong.refuse()
-    lines = places.lines_of(text)
+    lines = toml_lines.lines_of(text)
     for number, table in enumerate(tables, 1):
         own = {name: lines.get(f"motor.{number}.{name}", 0) for name in table}
         yield _Row(file, lines.get(f"motor.{number}", 0), table, f"motor {number}: ", own)

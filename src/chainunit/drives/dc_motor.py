@@ -9,7 +9,7 @@ and `L` armature resistance and inductance, `w` rotor speed, `T` winding tempera
 
 `tau_ff` is a feed-forward torque, such as the load at the machine's angle from a model in the controller.
 
-The load is the linearised load of the port (see `chainunit.ports`): the motor solves for the acceleration. The speed
+The load is the linearised load of the port (see `chainunit.core.ports`): the motor solves for the acceleration. The speed
 controller gives a current reference, limited to the current limit. The current controller gives a voltage, limited to
 that of the supply. Back-calculation keeps the integrators from winding up at a limit.
 """
@@ -20,10 +20,10 @@ import math
 from collections.abc import Container, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from ..engines import MATH
-from ..model import Part, Requirement
-from ..ports import LoadInput, measured_terminal
-from ..quantities import Value, declaration, group, quantity
+from ..core.engines import MATH
+from ..core.model import Part, Requirement
+from ..core.ports import LoadInput, measured_terminal
+from ..core.quantities import Value, declaration, group, quantity
 from .motor import T_RATED, Motor, MotorOutputs, MotorParameters, MotorPoint, ShaftStates, friction_time
 
 if TYPE_CHECKING:

@@ -22,9 +22,9 @@ from collections.abc import Iterator
 from types import MappingProxyType
 from typing import Any
 
-from ..engines import Dual, dual, slope
-from ..model import Model, Part, Requirement
-from ..ports import (
+from ..core.engines import Dual, dual, slope
+from ..core.model import Model, Part, Requirement
+from ..core.ports import (
     LoadState,
     PortSlopes,
     PortValues,
@@ -35,7 +35,7 @@ from ..ports import (
     load_terminal,
     shaft_motion,
 )
-from ..quantities import Value, declaration, group, quantity
+from ..core.quantities import Value, declaration, group, quantity
 from .cardan import BENDS, RIGHT, ShaftLine, Twist, two_joints
 
 W_SMALL = 0.1

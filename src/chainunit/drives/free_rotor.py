@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..model import Part
-from ..ports import LoadInput
-from ..quantities import declaration
+from ..core.model import Part
+from ..core.ports import LoadInput
+from ..core.quantities import declaration
 from .motor import Motor, MotorOutputs, MotorParameters, MotorPoint, ShaftStates, friction_time
 
 

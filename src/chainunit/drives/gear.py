@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..model import Model, Part
-from ..ports import (
+from ..core.model import Model, Part
+from ..core.ports import (
     PortSlopes,
     PortValues,
     ShaftInput,
@@ -15,7 +15,7 @@ from ..ports import (
     load_terminal,
     load_torque,
 )
-from ..quantities import Value, declaration, group, quantity
+from ..core.quantities import Value, declaration, group, quantity
 
 
 @declaration

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
-from ..quantities import Value, declaration, quantity
+from ..core.quantities import Value, declaration, quantity
 
 W_REST = 1e-3
 """Speed of the motor [rad/s] below which friction in the transmission fades out: at rest it has no direction."""

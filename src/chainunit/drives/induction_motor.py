@@ -23,11 +23,11 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar, NamedTuple
 
-from ..engines import MATH
-from ..model import Part, Requirement
-from ..planar import Vec2
-from ..ports import LoadInput, measured_terminal
-from ..quantities import Value, declaration, group, quantity
+from ..core.engines import MATH
+from ..core.model import Part, Requirement
+from ..core.planar import Vec2
+from ..core.ports import LoadInput, measured_terminal
+from ..core.quantities import Value, declaration, group, quantity
 from .motor import (
     T_RATED,
     Motor,

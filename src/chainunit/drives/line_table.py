@@ -16,9 +16,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, Field
 
-from ..errors import Faults, InputError, refusal_prefix
-from ..quantities import Quantity, Value, Variable, declaration, quantity, variables
-from ..reading import number, schema, to_number
+from ..core.errors import Faults, InputError, refusal_prefix
+from ..core.quantities import Quantity, Value, Variable, declaration, quantity, variables
+from ..reading.tables import number, schema, to_number
 from .cardan import ShaftLine
 from .shafts import SECTIONS, Shaft, stiffness_of
 

@@ -6,10 +6,10 @@ import math
 from collections.abc import Container, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from ..engines import MATH
-from ..model import Model, Terminal
-from ..ports import LoadState, Start, flanges, load_terminal, shaft_motion
-from ..quantities import Value, declaration, group, quantity
+from ..core.engines import MATH
+from ..core.model import Model, Terminal
+from ..core.ports import LoadState, Start, flanges, load_terminal, shaft_motion
+from ..core.quantities import Value, declaration, group, quantity
 
 if TYPE_CHECKING:
     from .speed_control import Loop, Tuning

@@ -27,9 +27,9 @@ from typing import Any
 
 import numpy as np
 
-from ..engines import MATH, Dual, dual, slope, value
-from ..errors import Faults, InputError
-from ..quantities import Layout, Value, declaration, quantity, violations
+from ..core.engines import MATH, Dual, dual, slope, value
+from ..core.errors import Faults, InputError
+from ..core.quantities import Layout, Value, declaration, quantity, violations
 from .induction_motor import InductionMotor, Parameters, Steady, breakdown, steady
 from .motor import T_RATED
 

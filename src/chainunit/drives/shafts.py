@@ -7,8 +7,8 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from ..errors import InputError
-from ..quantities import Value, declaration, quantity
+from ..core.errors import InputError
+from ..core.quantities import Value, declaration, quantity
 
 Point = tuple[float, float]
 STEEL = 8.0e10

@@ -12,8 +12,8 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import Any
 
-from ..model import Model, Part
-from ..ports import (
+from ..core.model import Model, Part
+from ..core.ports import (
     PortSlopes,
     PortValues,
     ShaftInput,
@@ -23,7 +23,7 @@ from ..ports import (
     load_terminal,
     shaft_motion,
 )
-from ..quantities import Value, declaration, group, quantity
+from ..core.quantities import Value, declaration, group, quantity
 from .driveline import Driven, DrivenState, States
 
 

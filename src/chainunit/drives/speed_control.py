@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ..errors import InputError
-from ..text import entry
+from ..core.errors import InputError
+from ..reading.text import entry
 
 
 @dataclass(frozen=True)

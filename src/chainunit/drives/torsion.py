@@ -25,9 +25,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..engines import Dual, dual, numpy_, value
-from ..integrate import rk4
-from ..progress import Progress
+from ..core.engines import Dual, dual, numpy_, value
+from ..core.integrators import rk4
+from ..work.progress import Progress
 from .cardan import Cardan, Twist, frozen_frequency, middle_angle, two_joints
 
 HALF_TURN = np.array([math.pi, 0.0, math.pi, 0.0])

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from ..errors import InputError, RunError, WriteError
-from ..model import Model
+from ..core.errors import InputError, RunError, WriteError
+from ..core.model import Model
 from . import export as python
 from .native import export as native
 from .native import platforms as targets

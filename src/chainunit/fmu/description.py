@@ -11,11 +11,11 @@ from importlib import metadata
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
-from ..engines import casadi_
-from ..errors import InputError
-from ..model import About, Model
-from ..quantities import DISPLAY_UNITS, TYPES, Type, Variable, base_units, written
-from ..trace import trace
+from ..core.engines import casadi_
+from ..core.errors import InputError
+from ..core.model import About, Model
+from ..core.quantities import DISPLAY_UNITS, TYPES, Type, Variable, base_units, written
+from ..core.symbolic_trace import trace
 from .recipe import Experiment, script_of
 from .script import Script
 

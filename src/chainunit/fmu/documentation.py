@@ -6,8 +6,8 @@ import inspect
 from dataclasses import fields
 from html import escape
 
-from ..model import About, Sketch
-from ..quantities import written
+from ..core.model import About, Sketch
+from ..core.quantities import written
 from .description import Interface, Signal
 from .pictures import drawing
 

@@ -20,10 +20,10 @@ from xml.etree.ElementTree import Element, tostring
 # imported here and not later: a Python FMU that runs in this process brings its own pythonfmu, without binaries
 from pythonfmu import FmuBuilder
 
-from ..ending import scratch
-from ..errors import InputError
-from ..files import folder, whole
-from ..model import Model
+from ..core.errors import InputError
+from ..core.files import folder, whole
+from ..core.model import Model
+from ..core.temporary_folders import scratch
 from .accompany import companion_files
 from .description import Interface, model_description
 from .pack import interface_of, pack

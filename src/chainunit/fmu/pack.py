@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from xml.etree.ElementTree import Element, indent, tostring
 
-from ..errors import InputError
-from ..model import Model
-from ..quantities import complaint
+from ..core.errors import InputError
+from ..core.model import Model
+from ..core.quantities import complaint
 from .description import Interface
 from .script import Script
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from xml.sax.saxutils import escape
 
-from ..model import Place, Sketch
+from ..core.model import Place, Sketch
 
 _DARK, _DRIVEN = "#1b1b1b", "#b5541c"
 _SIZE = 200

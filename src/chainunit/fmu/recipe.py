@@ -12,8 +12,8 @@ from functools import cache
 from importlib import resources
 from pathlib import Path
 
-from ..model import Model, Sketch
-from ..ports import LOAD
+from ..core.model import Model, Sketch
+from ..core.ports import LOAD
 from . import pictures
 from .script import Script
 

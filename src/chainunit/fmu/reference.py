@@ -17,9 +17,9 @@ from xml.etree.ElementTree import Element, SubElement, register_namespace
 
 import numpy as np
 
-from ..engines import MATH
-from ..ports import FLANGE, LOAD
-from ..quantities import Quantity, Type, written
+from ..core.engines import MATH
+from ..core.ports import FLANGE, LOAD
+from ..core.quantities import Quantity, Type, written
 from .description import Interface
 from .pack import xml_bytes
 

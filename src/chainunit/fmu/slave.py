@@ -25,11 +25,11 @@ from xml.etree.ElementTree import Element
 from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
 
-from .. import refusals
-from ..engines import MATH
-from ..errors import InputError
-from ..integrate import ADDED_UP, MAX_STEPS, ROUNDED, SAME_TIME, BudgetError, controlled, rk4
-from ..quantities import complaint
+from ..core import messages
+from ..core.engines import MATH
+from ..core.errors import InputError
+from ..core.integrators import ADDED_UP, MAX_STEPS, ROUNDED, SAME_TIME, BudgetError, controlled, rk4
+from ..core.quantities import complaint
 from .script import Script
 
 _NAN = float("nan")
@@ -155,10 +155,10 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
             return True
         except BudgetError as reason:
             over = {"size": step_size, "time": current_time, "name": MAX_STEPS, "most": reason.most}
-            self._tell(refusals.OVER_BUDGET.format(**over))
+            self._tell(messages.OVER_BUDGET.format(**over))
             return False
         except ArithmeticError:
-            self._tell(refusals.ASTRAY.format(time=current_time))
+            self._tell(messages.ASTRAY.format(time=current_time))
             return False
         except BaseException as reason:
             self._tell(f"step from t = {current_time:g} s failed: {reason!r}")
@@ -166,11 +166,11 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
 
     def _bad_step(self, time: float, size: float) -> str:
         if not (math.isfinite(time) and 0.0 <= size < math.inf and time + size < math.inf):
-            return refusals.STEP_SIZE.format(size=size, time=time)
+            return messages.STEP_SIZE.format(size=size, time=time)
         if abs(time - self._time) > SAME_TIME * size + ROUNDED * abs(self._time):
-            return refusals.STEP_BEGIN.format(time=time, now=self._time)
+            return messages.STEP_BEGIN.format(time=time, now=self._time)
         if not time + size <= self._stop:
-            return refusals.STEP_END.format(size=size, time=time, stop=self._stop)
+            return messages.STEP_END.format(size=size, time=time, stop=self._stop)
         return ""
 
     def _integrate(self, time: float, step: float) -> bool:
@@ -187,7 +187,7 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
         else:
             x = rk4(rates, self._x, step, longest, p.solver.max_steps)
         if not all(map(math.isfinite, x)):
-            self._tell(refusals.ASTRAY.format(time=time))
+            self._tell(messages.ASTRAY.format(time=time))
             return False
         self._x = x
         for at, rate, half in run:
@@ -223,7 +223,7 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
                 self._tell_no(kind, vr)
                 continue
             if vr >= self._first:
-                self._tell(refusals.OUTPUT_SET.format(reference=vr))
+                self._tell(messages.OUTPUT_SET.format(reference=vr))
                 continue
             quantity, value = self._variables[vr].quantity, float(bool(value) if kind == "Boolean" else value)
             if quantity.admits(value):
@@ -255,7 +255,7 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
     def _tune(self, vr: int, value: float) -> None:
         variable = self._variables[vr]
         if not variable.quantity.tunable:
-            self._tell(refusals.FIXED.format(name=variable.name) + "; not changed")
+            self._tell(messages.FIXED.format(name=variable.name) + "; not changed")
         elif not variable.quantity.admits(value):
             self._tell(complaint(variable, value) + "; not changed")
         else:
@@ -268,7 +268,7 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
 
     def _tell_no(self, kind: str, vr: int) -> None:
         """Log that there is no variable of that type with that reference."""
-        line = refusals.OTHER_TYPE if vr in self._types else refusals.NO_REFERENCE
+        line = messages.OTHER_TYPE if vr in self._types else messages.NO_REFERENCE
         self._tell(line.format(reference=vr, type=kind))
 
     def _read(self, kind: str, vrs: list[int]) -> list[Any]:
@@ -319,7 +319,7 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
                     self._shared = self.model.shared(MATH, p, u, x)
                 values = part.layout.values(part.equations(MATH, p, u, x, self._shared))
                 if not all(map(math.isfinite, values)):
-                    values, bad = None, refusals.NO_OUTPUT.format(model=self.model.name, time=self._time)
+                    values, bad = None, messages.NO_OUTPUT.format(model=self.model.name, time=self._time)
             except BaseException as reason:
                 bad = f"outputs cannot be evaluated: {reason!r}"
         if values is None:
@@ -369,9 +369,9 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
 
     def _bad_experiment(self) -> str:
         if not math.isfinite(self._time):
-            return refusals.TIME.format(which="start time", time=self._time)
+            return messages.TIME.format(which="start time", time=self._time)
         if not self._time <= self._stop:
-            return refusals.STOP.format(stop=self._stop, start=self._time)
+            return messages.STOP.format(stop=self._stop, start=self._time)
         return ""
 
     def _inputs(self, run: list[tuple[int, float, float]] | None = None, since: float = 0.0) -> Any:
@@ -427,7 +427,7 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
         except (KeyError, TypeError, ValueError, AttributeError):
             why = "it is not a saved state of this model"
         self._touch()
-        self._unrestored = refusals.STATE.format(why=f"{why}; not restored") if why else ""
+        self._unrestored = messages.STATE.format(why=f"{why}; not restored") if why else ""
         if why:
             self._tell(self._unrestored)
             return
@@ -445,7 +445,7 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
         if "damaged" in state:
             return str(state["damaged"])
         if state["of"] != _IDENTITY:
-            return refusals.STATE_OF_ANOTHER
+            return messages.STATE_OF_ANOTHER
         values, x = state["set"], state["x"]
         flags = [state[name] for name in ("initialized", "started", "closed")]
         numbers = {type(v) for v in (*values, *x, state["time"], state["stop"], state["pace"])} <= {
@@ -472,7 +472,7 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
     def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
         checksum, text = state[:4], state[4:]
         if checksum != binascii.crc32(text).to_bytes(4, "big"):
-            return {"damaged": refusals.STATE_DAMAGED}
+            return {"damaged": messages.STATE_DAMAGED}
         try:
             saved = json.loads(text)
         except ValueError:

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from ..planar import ZERO, Link, Motion, Vec2
+from ..core.planar import ZERO, Link, Motion, Vec2
 
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from ..planar import ZERO, Motion, Vec2
+from ..core.planar import ZERO, Motion, Vec2
 
 
 class Rods:

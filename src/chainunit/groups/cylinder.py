@@ -15,7 +15,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ..planar import ZERO, Link, Motion, Vec2
+from ..core.planar import ZERO, Link, Motion, Vec2
 from .body import Bar, Load
 from .driver import Driver, SolvedDriver
 from .group import GuideForce, Joint, Placed, Slide, Third

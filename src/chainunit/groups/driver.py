@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ..planar import ZERO, Link, Motion, Vec2
+from ..core.planar import ZERO, Link, Motion, Vec2
 from .body import Bar, Load, Mass
 from .group import Group, GuideForce, Placed, Rail, Slide, SolvedGroup, Third
 

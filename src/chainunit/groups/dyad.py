@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ..planar import Link, Motion, Vec2
+from ..core.planar import Link, Motion, Vec2
 from .body import Bar, Load
 from .group import Group, Placed, SolvedGroup, Third
 
@@ -76,7 +76,7 @@ class SolvedDyad(SolvedGroup):
         """
         Parameters
         ----------
-        xp : engine (see `chainunit.engines`)
+        xp : engine (see `chainunit.core.engines`)
         p, q : motion of the outer pins
         a, b : lengths P-B and Q-B [m]
         side : +1 where B lies to the left of the ray from P to Q, -1 where to the right

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
-from ..planar import ZERO, Link, Motion, Vec2
+from ..core.planar import ZERO, Link, Motion, Vec2
 from .body import Bar, Load
 
 Third = tuple[Vec2, Any]

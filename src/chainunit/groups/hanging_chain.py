@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from ..planar import ZERO, Link, Motion, Vec2
+from ..core.planar import ZERO, Link, Motion, Vec2
 from .chain import Chain, Rods, close_with_jolt, pins
 from .loads import Effect, Moving, Resistance, wrench_at
 

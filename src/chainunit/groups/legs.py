@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, ClassVar
 
-from ..planar import ZERO, Link, Motion, Vec2, coriolis, coriolis_third, rod_rates
+from ..core.planar import ZERO, Link, Motion, Vec2, coriolis, coriolis_third, rod_rates
 from .body import Bar, Load
 from .group import GuideForce, Joint, Placed, Rail, Slide, Third
 

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple, Protocol
 
-from ..planar import ZERO, Link, Motion, Vec2
+from ..core.planar import ZERO, Link, Motion, Vec2
 from .body import Body
 from .group import GuideForce, Joint, Slide
 

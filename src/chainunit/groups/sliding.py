@@ -16,7 +16,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ..planar import Link, Motion, Vec2, coriolis, coriolis_third, rod_rates
+from ..core.planar import Link, Motion, Vec2, coriolis, coriolis_third, rod_rates
 from .body import Bar, Load
 from .group import Group, GuideForce, Placed, Rail, Slide, SolvedGroup, Third
 

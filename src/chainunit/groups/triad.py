@@ -29,8 +29,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
-from ..model import Requirement
-from ..planar import Link, Motion, Vec2
+from ..core.model import Requirement
+from ..core.planar import Link, Motion, Vec2
 from .body import Bar, Load, Mass
 from .group import Group, Joint, Placed, Rail, Slide, SolvedGroup, Third
 from .legs import Leg, LegAt, PlacedLeg, RodLeg, rods_at
@@ -293,7 +293,7 @@ class SolvedTriad(SolvedGroup):
         """
         Parameters
         ----------
-        xp : engine (see `chainunit.engines`)
+        xp : engine (see `chainunit.core.engines`)
         placed : the three legs, see `Leg.placed`
         pose : pose of the ternary link, see `correct_pose`
         """
@@ -362,7 +362,7 @@ def assembly_modes(pins: tuple[Vec2, ...], lengths: tuple[float, ...], arms: tup
     """
     import numpy as np
 
-    from ..engines import MATH
+    from ..core.engines import MATH
 
     legs = rods_at([Motion(p) for p in pins], lengths, arms)
     (p1, p2, p3), (l1, l2, l3) = pins, lengths

@@ -9,15 +9,15 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import Any
 
+from ..core.planar import ZERO
+from ..core.ports import PortValues
+from ..core.quantities import Value, declaration, group, quantity
 from ..groups.body import Bar
 from ..groups.driver import Crank
 from ..groups.loads import Brake, PinLosses, Weight
 from ..mechanism.linkage import Linkage
 from ..mechanism.machine import MachineState
 from ..mechanism.models import CrankMotion, InverseMachine
-from ..planar import ZERO
-from ..ports import PortValues
-from ..quantities import Value, declaration, group, quantity
 from .parts import Force, Pin, Rod, force
 
 

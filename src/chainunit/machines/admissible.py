@@ -6,9 +6,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from ..errors import InputError
+from ..core.errors import InputError
+from ..core.messages import unit_behind
 from ..mechanism.models import MachineModel
-from ..refusals import unit_behind
 
 _ROUNDS = 24
 _GROWTH = 1.25

@@ -10,11 +10,11 @@ from typing import Any, Self
 
 import numpy as np
 
-from ..engines import MATH, numpy_
-from ..errors import GeometryError
+from ..core.engines import MATH, numpy_
+from ..core.errors import GeometryError
+from ..core.ports import PortSlopes
+from ..core.quantities import Quantity, Variable
 from ..mechanism.models import InverseMachine
-from ..ports import PortSlopes
-from ..quantities import Quantity, Variable
 from . import chain_unit
 from .chain_unit import (
     RODS,

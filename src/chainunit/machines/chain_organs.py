@@ -12,17 +12,17 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Any
 
+from ..core.integrators import Solver
+from ..core.planar import Vec2
+from ..core.quantities import Layout, Value, declaration, declared_class, group, quantity
 from ..groups import hanging_chain
 from ..groups.chain import Rods
 from ..groups.hanging_chain import HangingChain, HeldChain, State
 from ..groups.loads import Resistance
-from ..integrate import Solver
 from ..mechanism.chains import ChainedState
 from ..mechanism.linkage import Linkage
 from ..mechanism.machine import Mechanism
 from ..mechanism.models import running
-from ..planar import Vec2
-from ..quantities import Layout, Value, declaration, declared_class, group, quantity
 from . import chain_unit
 from .chain_unit import NAMES, SIDES, ChamberForces, Rocker, on_drive, on_side, rocker_load, rocker_motion
 

@@ -16,6 +16,10 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar, Literal, NamedTuple, TypeAlias
 
+from ..core.model import Requirement
+from ..core.planar import ZERO, Link, Vec2
+from ..core.ports import PortValues
+from ..core.quantities import Value, declaration, group, quantity
 from ..groups.body import Bar, Mass
 from ..groups.driver import Crank
 from ..groups.dyad import Dyad
@@ -23,10 +27,6 @@ from ..groups.loads import Block, PinLosses, Resistance, Weight
 from ..mechanism.linkage import Linkage
 from ..mechanism.machine import MachineState, Mechanism
 from ..mechanism.models import CrankMotion, InverseMachine
-from ..model import Requirement
-from ..planar import ZERO, Link, Vec2
-from ..ports import PortValues
-from ..quantities import Value, declaration, group, quantity
 from .crank_rocker import TURNS, half_width_range, longest_crank, pressure_angle, rocker_extremes
 from .parts import Force, Pin, Processing, Rod, Stop, force
 

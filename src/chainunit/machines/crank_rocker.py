@@ -16,9 +16,9 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from ..engines import MATH
-from ..errors import GeometryError
-from ..model import Requirement
+from ..core.engines import MATH
+from ..core.errors import GeometryError
+from ..core.model import Requirement
 
 
 def longest_crank(xp: Any, l: Any, h: Any, b: Any) -> Any:

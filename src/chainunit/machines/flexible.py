@@ -21,13 +21,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, ClassVar
 
-from ..errors import InputError
+from ..core.errors import InputError
+from ..core.model import Requirement
+from ..core.ports import PortSlopes
+from ..core.quantities import Layout, declared_class, group
 from ..mechanism.chains import ChainedState
 from ..mechanism.linkage import Linkage
 from ..mechanism.models import DirectMachine, InverseMachine, LinkageModel, acceleration
-from ..model import Requirement
-from ..ports import PortSlopes
-from ..quantities import Layout, declared_class, group
 from .chain_organs import MOST, Organs, Parameters, both
 from .chain_unit import SIDES, ChamberForces, Inputs, Outputs, drive
 

@@ -25,7 +25,7 @@ import numpy as np
 from scipy.linalg import eigh, null_space
 from scipy.optimize import minimize
 
-from ..errors import GeometryError
+from ..core.errors import GeometryError
 
 _POLISH = 30
 

@@ -12,7 +12,10 @@ import dataclasses
 from collections.abc import Iterator
 from typing import Any
 
-from ..engines import MATH
+from ..core.engines import MATH
+from ..core.planar import Vec2
+from ..core.ports import PortValues
+from ..core.quantities import Value, declaration, group, quantity
 from ..groups import triad
 from ..groups.body import Bar, Mass
 from ..groups.driver import Crank
@@ -23,9 +26,6 @@ from ..groups.triad import Pose, Triad
 from ..mechanism.linkage import Linkage
 from ..mechanism.machine import MachineState, Mechanism
 from ..mechanism.models import CrankMotion, InverseMachine
-from ..planar import Vec2
-from ..ports import PortValues
-from ..quantities import Value, declaration, group, quantity
 from .crank_rocker import TURNS, longest_crank
 from .parts import Force, Pin, Rod, force
 

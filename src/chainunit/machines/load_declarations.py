@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..core.integrators import Solver
+from ..core.quantities import Value, declaration, declared_class, group, quantity
 from ..drives.motor import Rotor
-from ..integrate import Solver
-from ..quantities import Value, declaration, declared_class, group, quantity
 from . import chain_unit
 from .load_filter import TRIANGLE, UNKNOWNS
 

@@ -26,10 +26,10 @@ import math
 from collections.abc import Iterator
 from typing import Any, ClassVar, NamedTuple
 
-from ..engines import Dual, dual, slope
+from ..core.engines import Dual, dual, slope
+from ..core.model import Model, Part
+from ..core.ports import measured_terminal
 from ..mechanism.machine import MachineState, Mechanism
-from ..model import Model, Part
-from ..ports import measured_terminal
 from . import chain_unit
 from .chain_unit import ChamberForces, SideLoads
 from .load_declarations import (

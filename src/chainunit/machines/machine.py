@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from ..engines import numpy_
-from ..errors import InputError
+from ..core.engines import numpy_
+from ..core.errors import InputError
+from ..core.quantities import Variable, complaint
 from ..mechanism.machine import MachineState, Mechanism
 from ..mechanism.models import InverseMachine
-from ..quantities import Variable, complaint
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ..planar import Vec2
-from ..quantities import Value, declaration, quantity
+from ..core.planar import Vec2
+from ..core.quantities import Value, declaration, quantity
 
 
 @declaration

@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from ..errors import InputError
+from ..core.errors import InputError
 
 GROUND = "ground"
 REVOLUTE, PRISMATIC = "revolute", "prismatic"

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..engines import Dual, dual, slope
+from ..core.engines import Dual, dual, slope
 from ..groups.hanging_chain import HangingChain, HeldChain
 from .machine import MachineState, Mechanism
 

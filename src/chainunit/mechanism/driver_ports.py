@@ -10,10 +10,10 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
-from ..integrate import Solver
-from ..model import Requirement, Terminal
-from ..ports import PortSlopes, PortValues, ShaftMotion, Start, flanges, load_terminal, way_terminals
-from ..quantities import Value, declaration, group, quantity
+from ..core.integrators import Solver
+from ..core.model import Requirement, Terminal
+from ..core.ports import PortSlopes, PortValues, ShaftMotion, Start, flanges, load_terminal, way_terminals
+from ..core.quantities import Value, declaration, group, quantity
 
 
 class DriverWords(NamedTuple):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from ..quantities import Value, declaration, quantity
+from ..core.quantities import Value, declaration, quantity
 from .curves import ROUNDED, positive, positive_integral, step
 
 CONTACT = 1e-4

@@ -13,8 +13,8 @@ from functools import cache
 from itertools import pairwise
 from typing import Any, NamedTuple
 
-from ..engines import MATH
-from ..errors import InputError, meant, shown
+from ..core.engines import MATH
+from ..core.errors import InputError, meant, shown
 from .curves import TableCurve, positive, ramp, step
 
 Evaluation = Callable[[Any, Mapping[str, Any]], Any]

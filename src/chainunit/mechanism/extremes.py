@@ -31,7 +31,7 @@ def extreme(
 
     Parameters
     ----------
-    xp : engine (see `chainunit.engines`), but no dual one
+    xp : engine (see `chainunit.core.engines`), but no dual one
     places : evenly spaced, close enough that at most one extreme lies near each
     ends : whether the coordinate ends at the first and the last place; else the places are a whole turn
     """

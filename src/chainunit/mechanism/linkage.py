@@ -11,9 +11,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
+from ..core.planar import Vec2
 from ..groups.driver import Driver
 from ..groups.group import Group, Joint
-from ..planar import Vec2
 from .extremes import MotionExtreme
 
 

@@ -17,12 +17,12 @@ import functools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
-from ..engines import Dual, dual, slope
+from ..core.engines import Dual, dual, slope
+from ..core.planar import ZERO, Link, Motion, Vec2, growth
 from ..groups.body import NO_LOAD, Body, Load, body_on, reflected_inertia
 from ..groups.driver import PushedRam, SolvedDriver, TurnedCrank
 from ..groups.group import GuideForce, Joint, Slide, SolvedGroup, Third, rail_third
 from ..groups.loads import Effect, Moving, Wrench
-from ..planar import ZERO, Link, Motion, Vec2, growth
 from .linkage import Connections, Linkage, Topology
 
 
@@ -39,7 +39,7 @@ class Mechanism:
         """
         Parameters
         ----------
-        xp : engine (see `chainunit.engines`)
+        xp : engine (see `chainunit.core.engines`)
         derived : numbers that the groups derive from the lengths, see `derived_numbers`
         topology : the topology of the linkage, if it is known
         """
@@ -278,7 +278,7 @@ class MachineState:
         """
         Parameters
         ----------
-        xp : engine (see `chainunit.engines`)
+        xp : engine (see `chainunit.core.engines`)
         w : speed of the crank [rad/s]
         loads : loads in place of those of the linkage
         """

@@ -13,11 +13,10 @@ from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Any, ClassVar
 
-from ..engines import MATH
-from ..groups.group import Joint
-from ..model import Model, Part, Sketch, keep
-from ..ports import PortSlopes, ShaftMotion
-from ..quantities import (
+from ..core.engines import MATH
+from ..core.model import Model, Part, Sketch, keep
+from ..core.ports import PortSlopes, ShaftMotion
+from ..core.quantities import (
     Fields,
     Layout,
     Quantity,
@@ -29,6 +28,7 @@ from ..quantities import (
     group,
     quantity,
 )
+from ..groups.group import Joint
 from .driver_ports import ROTATING, DriverPort, TurningStates
 from .end_stops import EndStops, StopAction, stop_action
 from .linkage import Linkage, Topology
@@ -127,7 +127,7 @@ class InverseMachine(LinkageModel, MachineModel):
     """Name of the direct model; by default ``<name>Direct``."""
     direct_description: ClassVar[str] = ""
     by_differences: ClassVar[frozenset[str]] = frozenset()
-    """Outputs whose derivatives are taken by differences, see `chainunit.model.Part`."""
+    """Outputs whose derivatives are taken by differences, see `chainunit.core.model.Part`."""
 
     span: ClassVar[tuple[float, float]] = (0.0, 2.0 * math.pi)
     """Places of the driver from which to which it goes: a whole turn [rad], or a way [m]."""
@@ -189,7 +189,7 @@ class InverseMachine(LinkageModel, MachineModel):
 
     @classmethod
     def sketch(cls, start: Mapping[str, float] | None = None) -> Sketch:
-        """See `chainunit.model.Model.sketch`; the driver is at a sixth of its `span`."""
+        """See `chainunit.core.model.Model.sketch`; the driver is at a sixth of its `span`."""
         from .sketch import sketch_of  # here, as FMUs do without it
 
         low, high = cls.span

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..model import Sketch
+from ..core.model import Sketch
 from .linkage import Linkage
 from .machine import Mechanism
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..engines import numpy_
+from ..core.engines import numpy_
 from ..machines.crank_rocker import longest_crank, parallel_frame, pressure_angle_extremes, swing
 from ..report.figure import Axis, Between, Curve, Field, Figure, Item, Label, Mark, Panel
 from ..report.print_figures import contours

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from types import ModuleType
 
 from .. import __version__
+from ..reading.text import DEFAULT_UNITS
 from ..report.blocks import Column, Report, Section, Table, TableRow, Text
 from ..report.markdown import block_lines
-from ..text import DEFAULT_UNITS
 from . import PAPERS
 from .figures import FIGURES
 from .table import PaperNumber

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..engines import MATH
+from ..core.engines import MATH
 from ..machines.api import EMPTY, ChainUnitMachine
 from ..machines.chain_unit import Feed
 from ..machines.crank_rocker import half_width_range

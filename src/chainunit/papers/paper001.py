@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..engines import MATH, numpy_
+from ..core.engines import MATH, numpy_
 from ..machines.crank_rocker import (
     longest_crank,
     parallel_frame,

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..engines import MATH
+from ..core.engines import MATH
 from ..groups.triad import LEGS
 from ..machines.knife_drive import KnifeDrive
 from ..mechanism.machine import MachineState, add_wrenches

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..reading import packaged, toml
+from ..reading.tables import packaged, toml
 
 PICK: dict[str, Callable[[Any], Any]] = {"least": np.min, "largest": np.max, "mean": np.mean}
 """By the word in the table, the function that takes one number of many."""

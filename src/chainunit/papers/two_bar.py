@@ -16,14 +16,14 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..errors import GeometryError
+from ..core.errors import GeometryError
 from ..machines import hanging
-from ..progress import Progress
+from ..reading.text import array_entry
 from ..report.blocks import Column, Report, Section, Table, TableRow, Text
 from ..report.figure import Axis, Curve, Field, Figure, Item, Panel
 from ..report.print_figures import contours
 from ..study.arrays import stretches
-from ..text import array_entry
+from ..work.progress import Progress
 
 NAME, PICTURE = "two_bar_error", "two_bar_error.png"
 MU = tuple(np.round(np.arange(0.30, 0.801, 0.05), 2))

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from ..machines.machine import Machine
+from ..reading.text import number
 from ..study.arrays import stretches
 from ..study.blade import BladeFindings, Cutting
 from ..study.record import StudyRecord
-from ..text import number
 from . import blocks as b
 from . import figure as fig
 from . import linkage

@@ -11,8 +11,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias
 
-from ..quantities import Layout
-from ..text import DEFAULT_UNITS, Units
+from ..core.quantities import Layout
+from ..reading.text import DEFAULT_UNITS, Units
 from .figure import Figure
 from .lines import Aside, Line, Number, Piece, Words, line, pieces
 from .motion import Animation

@@ -16,12 +16,12 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
-from ..engines import MATH
+from ..core.engines import MATH
+from ..core.quantities import Layout
 from ..groups.driver import Crank
 from ..machines.machine import Machine
 from ..mechanism.machine import Mechanism
-from ..quantities import Layout
-from ..text import number
+from ..reading.text import number
 from . import linkage
 from .motion import DrawnLink
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from ..core.planar import Link
 from ..mechanism.machine import MachineState
-from ..planar import Link
 from ..study.record import StudyRecord
 from .supplement import Details, Supplement
 

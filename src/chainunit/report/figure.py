@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
 
-from ..text import Units, plain, scales, unit_text
+from ..reading.text import Units, plain, scales, unit_text
 from .lines import Line
 
 

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from ..engines import numpy_
+from ..core.engines import numpy_
+from ..reading.text import forms, number
 from ..study.bearings import hardest_run
 from ..study.cycle import Cycle
 from ..study.drive import Drive
 from ..study.record import StudyRecord
-from ..text import forms, number
 from . import blocks as b
 from . import figure as fig
 from . import linkage_loads, load_figures, run_names

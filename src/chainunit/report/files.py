@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
-from ..files import whole
+from ..core.files import whole
 from . import html, print_figures
 from .blocks import Report
 from .markdown import markdown

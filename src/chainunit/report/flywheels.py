@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ..quantities import Layout
+from ..core.quantities import Layout
+from ..reading.text import number
 from ..study.flywheels import FlywheelFindings
 from ..study.record import StudyRecord
 from ..study.wheel import FlywheelAnswers, Wheel
-from ..text import number
 from . import blocks as b
 from . import figure as fig
 from .lines import Line, line

@@ -20,8 +20,8 @@ from plotly.io.json import to_json_plotly  # type: ignore[import-untyped]
 from plotly.offline import get_plotlyjs  # type: ignore[import-untyped]
 
 from .. import __version__
-from ..files import PAGE, whole
-from ..text import Units, forms
+from ..core.files import PAGE, whole
+from ..reading.text import Units, forms
 from . import blocks as b
 from . import motion, page_figures
 from .figure import Figure

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from ..files import clear, whole
+from ..core.files import clear, whole
+from ..reading.text import shown_in
 from ..study.config import Config
 from ..study.identification.identification import IdentifiedMachine
 from ..study.identification.measurands import MEASURANDS
 from ..study.identification.result import as_dict, identified_notes, identified_tables, sentences
 from ..study.study_file import toml_text
-from ..text import shown_in
 from . import blocks as b
 from . import figure as fig
 from . import files

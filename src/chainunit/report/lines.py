@@ -1,5 +1,5 @@
 """Lines of text with numbers in them. A number has its declared unit and kind and its place in the result;
-`chainunit.text` alone decides how a number looks."""
+`chainunit.reading.text` alone decides how a number looks."""
 
 from __future__ import annotations
 

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..engines import MATH
+from ..core.engines import MATH
+from ..core.quantities import Layout
 from ..mechanism.assur import PRISMATIC
 from ..mechanism.machine import MachineState
-from ..quantities import Layout
+from ..reading.text import array_entry
 from ..study.linkage_turn import GroupTurn, JointTurn, LinkageFindings
-from ..text import array_entry
 from . import blocks as b
 from . import figure as fig
 from . import linkage, linkage_loads

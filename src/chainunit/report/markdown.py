@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterable, Iterator
 
-from ..text import Units
+from ..reading.text import Units
 from .blocks import Block, Cards, Drawing, Given, Judgement, Report, Table, Tables, Text, of_form
 from .figure import Figure
 from .lines import Line, capital

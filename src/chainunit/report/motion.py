@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..text import Units, scales, unit_text
+from ..reading.text import Units, scales, unit_text
 from .lines import Line
 
 

@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from ..files import clear, whole
+from ..core.files import clear, whole
 from ..fmu.backends import Backend
-from ..progress import Report as Progress
-from ..reading import in_file
+from ..reading.tables import in_file
 from ..study.config import Config
 from ..study.optimum.best import Best, find_best
 from ..study.optimum.result import as_dict, best_tables, units_of
 from ..study.optimum.table import wishes_of
 from ..study.optimum.wishes import Wishes
 from ..study.study_file import toml_text
+from ..work.progress import Report as Progress
 from . import blocks as b
 from . import figure as fig
 from . import files

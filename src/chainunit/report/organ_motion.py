@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..engines import numpy_
+from ..core.engines import numpy_
+from ..core.planar import Vec2
 from ..groups.chain import pins
 from ..groups.loads import Resistance
 from ..machines.chain_unit import NAMES, ON_SIDE, OrganNames, SideName
 from ..mechanism.machine import MachineState
-from ..planar import Vec2
 from ..study.record import StudyRecord
 from .motion import Arrow
 from .supplement import Details, Supplement

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ..core.quantities import Layout
 from ..machines.chain_unit import SIDES
-from ..quantities import Layout
 from ..study.organs import Limits, OverloadFactors
 from ..study.record import StudyRecord
 from ..study.verdict import CRANK_GOOD, ROCKER_GOOD_EMPTY

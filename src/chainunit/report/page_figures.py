@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go  # type: ignore[import-untyped]
 
-from ..text import Units
+from ..reading.text import Units
 from .figure import (
     Axis,
     Bars,

@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.ticker import FuncFormatter
 
-from ..text import Units
+from ..reading.text import Units
 from .figure import (
     Axis,
     Bars,

@@ -7,12 +7,12 @@ import dataclasses
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from ..errors import InputError, near_name
+from ..core.errors import InputError, near_name
+from ..core.messages import unit_behind
+from ..core.model import Model
+from ..core.quantities import written
 from ..fmu.description import Interface
-from ..model import Model
 from ..models import MODELS
-from ..quantities import written
-from ..refusals import unit_behind
 from ..study.keys import Key, KeyTable, catalogue_columns, key_tables
 from .blocks import Block, Report, Section, Table, TableRow, Text, heads
 

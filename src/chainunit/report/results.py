@@ -6,16 +6,16 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
-from ..files import clear
+from ..core.files import clear
 from ..fmu.backends import Backend
 from ..models import MODELS
-from ..progress import Report as Progress
-from ..reading import in_file
+from ..reading.tables import in_file
 from ..study.choice import check_files
 from ..study.config import Config
 from ..study.monte_carlo import check_workers
 from ..study.record import LOAD_CYCLE, StudyRecord
 from ..study.run import run_study
+from ..work.progress import Report as Progress
 from . import files, series
 from . import study as contents
 from .blocks import Report

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from ..quantities import Layout
+from ..core.quantities import Layout
 from ..study.bearings import hardest_run
 from ..study.measures import MEASURES, Answers, measures_of
 from ..study.monte_carlo import Sample

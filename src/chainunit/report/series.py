@@ -16,9 +16,9 @@ from pathlib import Path
 import xarray as xr
 
 from .. import __version__
-from ..files import netcdf, whole
-from ..interrupts import stoppable
+from ..core.files import netcdf, whole
 from ..study.record import LOAD_CYCLE, StudyRecord
+from ..work.interrupts import stoppable
 from .run_names import title
 
 SERIES = "result.nc"

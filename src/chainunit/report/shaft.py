@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from ..quantities import Layout
+from ..core.quantities import Layout
 from ..study.record import StudyRecord
 from ..study.shaft import CLASSES, RIGID, ShaftAnswers, Torsion
 from ..study.verdict import START, STEADY

@@ -8,11 +8,11 @@ from dataclasses import replace
 from importlib import metadata
 from typing import Any
 
+from ..reading.text import shown_in
 from ..study.given import GivenSection, description, given_sections
 from ..study.record import StudyRecord
 from ..study.result import as_dict
 from ..study.rig import DIFFERENCE
-from ..text import shown_in
 from . import answer, chains, figures, run_names, runs, shaft, sizing, wording
 from . import blocks as b
 from .analyses import ANALYSES, Contents

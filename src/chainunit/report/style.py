@@ -11,7 +11,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
-from ..files import whole
+from ..core.files import whole
 
 STYLE: dict[str, Any] = {
     "font.size": 10,

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from ..files import clear
-from ..progress import Report as Progress
+from ..core.files import clear
+from ..reading.text import shown_in
 from ..study.config import Config
 from ..study.sweep import run_sweep
 from ..study.sweep_summary import SweepSummary
-from ..text import shown_in
+from ..work.progress import Report as Progress
 from . import blocks as b
 from . import files, sweep_figures
 from .lines import Line, Name, Number, capital, join, line

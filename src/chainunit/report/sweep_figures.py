@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from ..quantities import Variable
+from ..core.quantities import Variable
+from ..reading.text import number
 from ..study.sweep import plain_name
 from ..study.sweep_summary import SweepSummary
-from ..text import number
 from . import figure as fig
 from .style import WIDE
 

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..drives.cardan import ORDERS
+from ..reading.text import number
 from ..study.record import StudyRecord
 from ..study.torsion import LineAnalysis
-from ..text import number
 from . import blocks as b
 from . import figure as fig
 from .lines import Line, line

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..quantities import Layout
+from ..core.quantities import Layout
+from ..reading.text import number
 from ..study.record import StudyRecord
 from ..study.turn import Reaction, Turn, TurnFindings
-from ..text import number
 from . import blocks as b
 from . import figure as fig
 

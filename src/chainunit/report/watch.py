@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ..files import clear
+from ..core.files import clear
+from ..reading.text import shown_in
 from ..study.identification.residuals import LOUD
 from ..study.identification.watch import WatchedRecording
 from ..study.identification.watch_result import as_dict
-from ..text import shown_in
 from . import blocks as b
 from . import figure as fig
 from . import files

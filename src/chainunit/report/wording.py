@@ -6,7 +6,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-from ..text import turning
+from ..reading.text import turning
 from .blocks import GivenValue, Section
 from .figure import Figure
 from .lines import Number, Words

@@ -11,7 +11,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from ..progress import Report
+from ..work.progress import Report
 
 if TYPE_CHECKING:
     from .config import Config

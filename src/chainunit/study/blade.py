@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..core.errors import InputError
+from ..core.quantities import Value, declaration, quantity
 from ..machines.knife_drive import Stack
-from ..progress import Report
-from ..quantities import Value, declaration, quantity
-from ..text import array_entry, entries, number
+from ..reading.text import array_entry, entries, number
+from ..work.progress import Report
 from .analysis import Analysis, Findings
 from .config import Config
 from .cycle import Cycle, cycle

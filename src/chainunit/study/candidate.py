@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
+from ..core.quantities import Value, declaration, quantity
 from ..drives.catalogue import CatalogueMotor
 from ..drives.disc import Disc, steel_disc
 from ..drives.gear_ratios import GearUnit
-from ..quantities import Value, declaration, quantity
-from ..text import entries, number
+from ..reading.text import entries, number
 from .drive import Drive
 from .limits import Check
 from .torques import DutyPeak

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from ..core.engines import numpy_
 from ..drives.catalogue import CatalogueMotor
 from ..drives.gear_ratios import typical_efficiency
 from ..drives.gearing import Transmission, motor_side
 from ..drives.induction_motor import Inverter
 from ..drives.nameplate import Nameplate
-from ..engines import numpy_
 from .config import Config
 from .drive import Drive
 from .sections import Starter

@@ -20,14 +20,14 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InterruptedRunError, RunError
-from ..interrupts import stoppable
+from ..core.errors import InterruptedRunError, RunError
+from ..core.quantities import Layout, Value, declaration, quantity
 from ..machines.api import ChainUnitMachine
 from ..machines.chain_unit import SIDES, Feed
-from ..progress import Progress, Report
-from ..quantities import Layout, Value, declaration, quantity
+from ..reading.text import entries, entry, number
 from ..system.instance import Fmu, Instance
-from ..text import entries, entry, number
+from ..work.interrupts import stoppable
+from ..work.progress import Progress, Report
 from .arrays import peak
 from .config import Config
 from .cycle import Cycle, cycle

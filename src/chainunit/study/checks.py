@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from ..errors import InputError
-from ..quantities import Layout
-from ..refusals import unit_behind
+from ..core.errors import InputError
+from ..core.messages import unit_behind
+from ..core.quantities import Layout
 
 _ORDER = (
     ("sizing.poles_least", ">=", "sizing.poles_most"),

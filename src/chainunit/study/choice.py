@@ -9,16 +9,16 @@ from pathlib import Path
 
 import numpy as np
 
+from ..core.errors import InputError, refusal_prefix
+from ..core.quantities import Layout
 from ..drives.catalogue import check_own
 from ..drives.driveline import CardanDriveline
 from ..drives.motor import Motor
 from ..drives.speed_control import Tuning
 from ..drives.torsion import with_damping_ratio
-from ..errors import InputError, refusal_prefix
 from ..fmu.backends import Backend
-from ..progress import Report
-from ..quantities import Layout
 from ..system import foreign_component
+from ..work.progress import Report
 from .catalogue_drive import catalogue_drive, gear_with
 from .config import Config
 from .cycle import cycle

@@ -6,10 +6,10 @@ import re
 from collections.abc import Iterable, Iterator
 from itertools import groupby
 
+from ..core.messages import unit_behind
 from ..drives.motors import MOTORS
-from ..places import Statement, statements
-from ..reading import toml
-from ..refusals import unit_behind
+from ..reading.tables import toml
+from ..reading.toml_lines import Statement, statements
 from .keys import ENTRIES, Key, KeyTable, key_tables
 from .schema import FILE
 

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from .. import __version__
-from ..errors import InputError, printable
-from ..quantities import variables
-from ..text import entry
+from ..core.errors import InputError, printable
+from ..core.quantities import variables
+from ..reading.text import entry
 from .measures import Answers
 from .monte_carlo import Sample
 from .sections import CHOICES, SECTIONS

@@ -8,20 +8,20 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from ..core.errors import Faults, GeometryError, InputError, each_refusal, refusal_prefix
+from ..core.quantities import Layout
 from ..drives.cardan import check
 from ..drives.catalogue import CatalogueMotor
 from ..drives.gearing import Transmission
 from ..drives.motor import Motor
-from ..errors import Faults, GeometryError, InputError, each_refusal, refusal_prefix
 from ..machines.admissible import causes
 from ..machines.api import machine_of, ratios
 from ..machines.chain_unit import SideName
 from ..machines.machine import Machine
 from ..mechanism.models import MachineModel
-from ..places import lines_of
-from ..quantities import Layout
-from ..reading import Slip, filled, given_values, read, read_table, slips, toml
-from ..text import DEFAULT_UNITS, Units, chosen_units
+from ..reading.tables import Slip, filled, given_values, read, read_table, slips, toml
+from ..reading.text import DEFAULT_UNITS, Units, chosen_units
+from ..reading.toml_lines import lines_of
 from .checks import check_order
 from .event import Event
 from .event_table import RandomEvent, read_events, read_random_event

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ..quantities import variables
-from ..text import number
+from ..core.quantities import variables
+from ..reading.text import number
 from .event import Role
 from .event_torques import effects, peaks_in_events, running_peak, running_words
 from .judgement import wrong_runs

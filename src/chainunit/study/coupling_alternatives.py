@@ -10,12 +10,12 @@ from collections.abc import Callable, Iterator, Mapping
 import numpy as np
 import xarray as xr
 
+from ..core.errors import InterruptedRunError, RunError
 from ..drives.induction_motor import SoftStart
 from ..drives.slip_clutch import SlipClutch
-from ..errors import InterruptedRunError, RunError
-from ..progress import Report
 from ..system import ModelComponent, monolithic
 from ..system.graph import in_line
+from ..work.progress import Report
 from .arrays import peak
 from .catalogue_drive import with_starter
 from .cycle import cycle

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ..core.quantities import Layout
 from ..machines.machine import Machine
-from ..quantities import Layout
 
 
 @dataclass(frozen=True)

@@ -23,10 +23,10 @@ import numpy as np
 
 from ..batch.equations import columns_of
 from ..batch.reductions import REDUCTIONS
-from ..errors import InputError, near_name, shown
+from ..core.errors import InputError, near_name, shown
+from ..core.model import Model
+from ..core.quantities import Value, declaration, quantity
 from ..machines.machine import Machine
-from ..model import Model
-from ..quantities import Value, declaration, quantity
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -71,7 +71,7 @@ class CycleQuantity:
     integrands: tuple[Integrand, ...]
     combine: Callable[[Sequence[Any], Any, CycleBasis], Any]
     kind: str = ""
-    """how people show it, see `chainunit.text`"""
+    """how people show it, see `chainunit.reading.text`"""
 
 
 def _installed_power(values: Sequence[Any], w: Any, basis: CycleBasis) -> Any:

@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from ..core.errors import InputError
+from ..core.quantities import Layout
 from ..drives.driveline import CardanDriveline
 from ..drives.gear import Gear
 from ..drives.motor import Motor
-from ..errors import InputError
 from ..fmu.backends import Backend, Origin
 from ..fmu.backends import export as export_fmu
 from ..machines.api import ChainUnitMachine, machine_of
@@ -24,7 +25,6 @@ from ..machines.flexible import flexible
 from ..machines.hanging import split
 from ..machines.machine import Machine
 from ..mechanism.models import DirectMachine, InverseMachine
-from ..quantities import Layout
 from ..system import (
     Bond,
     Component,

@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from ..core.quantities import Value, declaration, quantity
 from ..drives.motor import Motor
 from ..fmu.backends import Backend
 from ..machines.chain_unit import SIDES, SideName
-from ..quantities import Value, declaration, quantity
+from ..reading.text import entries
 from ..system.instance import Fmu
-from ..text import entries
 from .chain import HIGH
 from .chain import duty as chain_duty
 from .config import Config

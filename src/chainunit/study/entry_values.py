@@ -10,8 +10,8 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field
 from pydantic_core import PydanticCustomError
 
-from ..quantities import variables
-from ..reading import to_number
+from ..core.quantities import variables
+from ..reading.tables import to_number
 
 
 def _admitted(given: Any) -> Any:

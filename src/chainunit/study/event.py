@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, ClassVar, Literal, TypeAlias
 
+from ..core.quantities import Value, declaration, quantity
 from ..machines.chain_unit import SIDES, SideName, other
-from ..quantities import Value, declaration, quantity
 from ..system.signals import Profile, corners
 
 OverTime: TypeAlias = float | Profile

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import xarray as xr
 
-from ..errors import InterruptedRunError, RunError
+from ..core.errors import InterruptedRunError, RunError
 from .event import Event
 from .rig import Rig
 

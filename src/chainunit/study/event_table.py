@@ -22,11 +22,11 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel
 
-from ..errors import Faults, InputError, each_refusal, near_name, shown
+from ..core.errors import Faults, InputError, each_refusal, near_name, shown
+from ..core.quantities import Layout, Variable, variables
 from ..machines.chain_unit import SIDES
 from ..mechanism.models import MachineModel
-from ..quantities import Layout, Variable, variables
-from ..reading import given_values, instance, read_table, schema, to_number
+from ..reading.tables import given_values, instance, read_table, schema, to_number
 from .event import TYPES, AnySide, Event, on_side
 from .events import Jam
 

@@ -9,10 +9,10 @@ from dataclasses import replace
 from functools import cache
 from typing import Any, ClassVar
 
+from ..core.quantities import Value, declaration, quantity
 from ..machines.chain_unit import other
-from ..quantities import Value, declaration, quantity
+from ..reading.text import number
 from ..system.signals import Profile
-from ..text import number
 from .event import AnySide, Event, EventType, Role, Signals, Timing, Values, on_side
 
 

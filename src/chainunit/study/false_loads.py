@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..engines import casadi_
-from ..errors import InputError
+from ..core.engines import casadi_
+from ..core.errors import InputError
 from ..machines.load_declarations import Inputs
 from ..machines.load_filter import UNKNOWNS
 from ..machines.load_observer import LoadObserver, balance

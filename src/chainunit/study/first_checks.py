@@ -7,12 +7,12 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..core.errors import Faults, InputError, refusal_prefix, shown
 from ..drives.catalogue import CatalogueMotor, catalogue, motor_of_catalogue
 from ..drives.motors import MOTORS
-from ..errors import Faults, InputError, refusal_prefix, shown
 from ..models import MACHINES
-from ..reading import read_table
-from ..text import chosen_units
+from ..reading.tables import read_table
+from ..reading.text import chosen_units
 from .checks import LOWER_LIMITS
 from .event_table import read_events, read_random_event
 from .parts import Parts, beside, is_designation, named_table, parts_of

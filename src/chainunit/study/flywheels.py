@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..progress import Report
-from ..quantities import Layout
-from ..text import entries, entry, number
+from ..core.quantities import Layout
+from ..reading.text import entries, entry, number
+from ..work.progress import Report
 from .analysis import Analysis, Findings
 from .choice import tune
 from .config import Config

@@ -13,9 +13,9 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import BaseModel
 
+from ..core.quantities import Layout, Value, base_units, declared_class, group, quantity
 from ..machines.machine import Machine
 from ..mechanism.models import MachineModel
-from ..quantities import Layout, Value, base_units, declared_class, group, quantity
 from ..system import Connector, CoSimulation, FmuComponent, System, foreign_component
 
 _GEAR = Connector("ratio", "parameter", "1", {}, 1.0, "gear ratio, motor turns per crank turn", 1e-4, 1e4)

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ..progress import Report
-from ..quantities import Value, declaration, quantity
-from ..text import entries, number
+from ..core.quantities import Value, declaration, quantity
+from ..reading.text import entries, number
+from ..work.progress import Report
 from .analysis import Analysis, Findings
 from .config import Config
 from .drive import Drive

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from ..core.quantities import variables
 from ..drives.line_table import Damping
-from ..quantities import variables
-from ..text import entries, entry
+from ..reading.text import entries, entry
 from .analyses import ANALYSES
 from .config import Config
 from .record import StudyRecord

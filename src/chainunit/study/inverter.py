@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterator
 
-from ..text import number
+from ..reading.text import number
 from .candidate import Candidate
 from .config import Config
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from ..text import entry, number, turning
+from ..reading.text import entry, number, turning
 from . import verdict
 from .chain import HIGH
 from .limits import Check, given_motor, reaches

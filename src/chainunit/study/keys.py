@@ -12,6 +12,8 @@ from typing import Any
 
 from pydantic.fields import FieldInfo
 
+from ..core.quantities import Layout, Variable, variables, written
+from ..core.units import shortest_text
 from ..drives.catalogue import LAYOUT as CATALOGUE
 from ..drives.catalogue import TEXTS
 from ..drives.line_table import CORNER, SHAFTS, Damping
@@ -19,9 +21,7 @@ from ..drives.motors import MOTORS
 from ..drives.shafts import SECTIONS as PROFILES
 from ..drives.shafts import Shaft
 from ..models import MACHINES
-from ..quantities import Layout, Variable, variables, written
-from ..text import CHOICES as UNITS
-from ..units import shortest_text
+from ..reading.text import CHOICES as UNITS
 from .config import Config, parse
 from .event import TYPES, Event
 from .identification.table import RUN_KEYS, SENSOR_KEYS, ParameterEntry, RunTable, SensorTable

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..drives.nameplate import Nameplate
-from ..text import entry, number
+from ..reading.text import entry, number
 from .config import Config
 from .drive import Drive
 from .window import BURNT

@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from ..engines import numpy_
+from ..core.engines import numpy_
+from ..core.quantities import Value, declaration, quantity
 from ..machines.linkages.model import LinkageDescription
 from ..machines.linkages.structure import CYLINDER
 from ..machines.machine import Machine
 from ..mechanism.assur import PRISMATIC
 from ..mechanism.courses import largest, means, roots
-from ..quantities import Value, declaration, quantity
 
 PLACES = 361
 _LOSSLESS = 1e-9

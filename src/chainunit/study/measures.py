@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..quantities import Layout, Value, Variable, declaration, quantity
+from ..core.quantities import Layout, Value, Variable, declaration, quantity
 from .arrays import peak
 from .drive import AbsentError
 from .limits import reaches

@@ -1,4 +1,4 @@
-"""Overloads at random sides, crank angles, times and sizes, in batches of runs (see `chainunit.runner`).
+"""Overloads at random sides, crank angles, times and sizes, in batches of runs (see `chainunit.work.runner`).
 
 Each run branches from the same steady state and is determined by the study and its own number alone. The runs
 are a Zarr store, ``monte_carlo_<study>.zarr``, where <study> is a digest of everything on which they depend. A
@@ -19,16 +19,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import __version__
-from ..ending import remove_folder, temporary_folder
-from ..errors import InputError, printable
-from ..job import Job, ResultVariable, texts
+from ..core.errors import InputError, printable
+from ..core.native.compilers import compiler
+from ..core.quantities import Layout, Value, declaration, quantity, variables
+from ..core.temporary_folders import remove_folder, temporary_folder
 from ..machines.chain_unit import SIDES, SideName
-from ..native.compilers import compiler
-from ..progress import Report
-from ..quantities import Layout, Value, declaration, quantity, variables
-from ..runner import check_scheduler
-from ..runner import run as run_job
-from ..text import entry
+from ..reading.text import entry
+from ..work.job import Job, ResultVariable, texts
+from ..work.progress import Report
+from ..work.runner import check_scheduler
+from ..work.runner import run as run_job
 from .config import Config
 from .drive import Drive
 from .event import AnySide, Event
@@ -368,7 +368,7 @@ def check_workers(config: Config, scheduler: str) -> None:
     Raises
     ------
     InputError
-        see `chainunit.runner.check_scheduler`.
+        see `chainunit.work.runner.check_scheduler`.
     """
     if not config.monte_carlo.runs:
         raise InputError(
@@ -399,7 +399,7 @@ def run(
     task: Task, folder: Path, report: Report, workers: int | None = None, scheduler: str | None = None
 ) -> MonteCarloResult:
     """Make the missing runs of the task and write them to the store in `folder`; the other arguments and the errors
-    are those of `chainunit.runner.run`."""
+    are those of `chainunit.work.runner.run`."""
     job = job_of(task)
     if workers is None and scheduler is None and task.is_compiled and job.points <= _IN_PROCESS * BATCH:
         workers = 1

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from ..core.quantities import Value, declaration, quantity
 from ..machines.chain_unit import SIDES
-from ..progress import Report
-from ..quantities import Value, declaration, quantity
-from ..text import entries, entry
+from ..reading.text import entries, entry
+from ..work.progress import Report
 from .analysis import Analysis, Findings
 from .arrays import peak
 from .config import Config

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..quantities import Value, declaration, quantity
+from ..core.quantities import Value, declaration, quantity
 
 
 @declaration

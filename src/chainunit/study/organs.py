@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from ..core.quantities import Value, declaration, quantity
 from ..machines.api import ChainUnitMachine
 from ..machines.chain_unit import SIDES, Feed, SideName, other
-from ..progress import Report
-from ..quantities import Value, declaration, quantity
-from ..text import array_entry, entries, entry
+from ..reading.text import array_entry, entries, entry
+from ..work.progress import Report
 from .analysis import Analysis, Findings
 from .arrays import peak
 from .config import Config

@@ -6,10 +6,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from ..core.errors import InputError, RunError, printable
+from ..core.model import About, Model
+from ..core.quantities import Layout
+from ..core.temporary_folders import scratch
 from ..drives.driveline import CardanDriveline
 from ..drives.motor import Motor
-from ..ending import scratch
-from ..errors import InputError, RunError, printable
 from ..fmu.backends import Backend
 from ..machines.chain_organs import LEAST, MOST
 from ..machines.chain_unit import ChamberForces
@@ -17,10 +19,8 @@ from ..machines.flexible import ChainedModel, flexible
 from ..machines.hanging import split
 from ..machines.machine import Machine
 from ..mechanism.models import DirectMachine
-from ..model import About, Model
 from ..models import model_named
-from ..quantities import Layout
-from ..reading import file_text, toml
+from ..reading.tables import file_text, toml
 from ..system import ModelComponent, System, compiled
 from ..system.compiled import input_starts
 from ..system.ssp import export

@@ -12,14 +12,14 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
+from ..core.errors import Faults, InputError, near_name, refusal_prefix, shown
 from ..drives.line_table import SHAFTS
 from ..drives.motor import Motor
 from ..drives.motors import MOTORS
-from ..errors import Faults, InputError, near_name, refusal_prefix, shown
 from ..machines.linkages.file import read_linkage
 from ..mechanism.models import MachineModel
 from ..models import MACHINES
-from ..reading import Title, file_form, given_values, merged, packaged, read_table, toml
+from ..reading.tables import Title, file_form, given_values, merged, packaged, read_table, toml
 from .foreign_machine import foreign_model
 from .sections import CHOICES, FileSection, SystemTable, sections_of
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
-from ..text import number
+from ..reading.text import number
 from .candidate import TOLERANCES, Candidate, Criterion, Standing
 
 ALIKE = 0.05

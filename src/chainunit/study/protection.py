@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..quantities import Value, declaration, quantity, variables
+from ..core.quantities import Value, declaration, quantity, variables
 
 MARGIN = 1.25
 """Ratio of the setting of a safety coupling to the largest torque of normal duty."""

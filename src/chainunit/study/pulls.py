@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
+from ..core.quantities import Layout
 from ..machines.chain_unit import RODS, SIDES, RodName, SideLoads
-from ..quantities import Layout
 from .drive import Drive
 
 

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ..text import entry
+from ..reading.text import entry
 
 LESS_ALIKE = 0.9
 """Confidence that the values of one run are no more alike than assumed."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..batch_store import made_anew
+from ..work.store import made_anew
 from .limits import limit_reached
 from .record import StudyRecord
 

@@ -8,11 +8,11 @@ from typing import Any, Literal, TypeAlias
 
 import xarray as xr
 
+from ..core.errors import RunError
 from ..drives.speed_control import Tuning
-from ..errors import RunError
 from ..fmu.backends import Origin
 from ..machines.chain_unit import RodName
-from ..text import entry, number
+from ..reading.text import entry, number
 from . import verdict
 from .chain import ChainResult
 from .config import Config

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..core.engines import numpy_
 from ..drives.cardan import two_joints
-from ..engines import numpy_
-from ..text import number
+from ..reading.text import number
 from .coupling import remark_on_coupling, remark_on_rams
 from .event_torques import peaks_in_events
 from .events import Jam

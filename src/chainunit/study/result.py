@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from .. import __version__
+from ..core.quantities import variables
 from ..drives.catalogue import CatalogueMotor
-from ..quantities import variables
-from ..text import entries, entry, shown_in, turning
+from ..reading.text import entries, entry, shown_in, turning
 from .coupling import coupling_sentence, way_words, why_none
 from .event_torques import running_peak, running_words
 from .given import given_sections

@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..errors import refusal_prefix
-from ..progress import Progress
+from ..core.errors import refusal_prefix
 from ..system import (
     CompiledSimulation,
     CoSimulation,
@@ -28,6 +27,7 @@ from ..system import (
     rigid,
     without,
 )
+from ..work.progress import Progress
 from .config import Config
 from .cycle import no_feed
 from .drive import Drive

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
+from ..core.errors import InputError, shown
 from ..drives.motors import MOTORS
-from ..errors import InputError, shown
 from ..machines.api import ratios
 from ..models import MACHINES
-from ..reading import filled
+from ..reading.tables import filled
 from .conditions import (
     Condition,
     Schema,

@@ -12,11 +12,11 @@ from pathlib import Path
 
 import xarray as xr
 
-from ..errors import InputError, InterruptedRunError, RunError
+from ..core.errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
-from ..progress import Progress, Report
+from ..reading.text import number, shown_in
 from ..system import Simulation
-from ..text import number, shown_in
+from ..work.progress import Progress, Report
 from . import verdict
 from .analyses import ANALYSES
 from .bearings import pin_loads

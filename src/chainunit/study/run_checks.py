@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from ..core.errors import InputError, near_name
+from ..core.messages import unit_behind
+from ..core.quantities import Layout
 from ..drives.motors import MOTORS
-from ..errors import InputError, near_name
 from ..machines.chain_unit import SideLoads
-from ..quantities import Layout
-from ..refusals import unit_behind
 from ..system.signals import Profile
 from .event_table import inputs_of
 

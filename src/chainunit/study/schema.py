@@ -11,10 +11,10 @@ import math
 from collections.abc import Iterable
 from typing import Any
 
+from ..core.quantities import Variable
 from ..drives.catalogue import catalogue
-from ..quantities import Variable
-from ..reading import may_be_share
-from ..unit_patterns import pattern, zero
+from ..reading.tables import may_be_share
+from ..reading.unit_patterns import pattern, zero
 from .event import TYPES
 from .event_table import LONGEST_NAME, PLACED, RESERVED
 from .identification.measurands import MEASURANDS

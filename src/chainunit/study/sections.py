@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, create_model
 
+from ..core.quantities import Value, declaration, group, quantity
 from ..drives.driveline import Mounted
 from ..drives.gearing import KINDS, Transmission
 from ..drives.induction_motor import InverterControl, SoftStart
@@ -17,8 +18,7 @@ from ..drives.line_table import Damping, form, line_values
 from ..drives.motor import Motor
 from ..machines.chain_organs import LEAST, MOST, OrganLaw
 from ..mechanism.models import MachineModel
-from ..quantities import Value, declaration, group, quantity
-from ..reading import given_values, schema
+from ..reading.tables import given_values, schema
 from ..system import NAMES
 from .entry_values import numbers
 from .identification import table as identify_table

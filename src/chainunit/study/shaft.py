@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from ..core.engines import MATH
+from ..core.quantities import Value, declaration, quantity, variables
 from ..drives.cardan import Cardan, ShaftLine, frozen_frequency
 from ..drives.torsion import largest_frequency
-from ..engines import MATH
-from ..quantities import Value, declaration, quantity, variables
-from ..text import number
+from ..reading.text import number
 from .arrays import peak
 from .drive import Drive
 

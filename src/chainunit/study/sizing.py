@@ -16,13 +16,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from ..core.errors import InputError, InterruptedRunError, RunError
+from ..core.native.compilers import compiler
 from ..drives.catalogue import CatalogueMotor, catalogue
 from ..drives.gear_ratios import UNITS, gear_unit, next_ratio, ratio_on_offer
-from ..errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
-from ..native.compilers import compiler
-from ..progress import Report
-from ..text import entries, number
+from ..reading.text import entries, number
+from ..work.progress import Report
 from .candidate import Candidate, Standing
 from .catalogue_drive import catalogue_drive
 from .chain import HIGH

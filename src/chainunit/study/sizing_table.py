@@ -7,9 +7,9 @@ from typing import Any, Literal
 
 from pydantic import Field
 
+from ..core.quantities import Value, declaration, quantity
 from ..drives.gear_ratios import UNITS
 from ..drives.gearing import Transmission
-from ..quantities import Value, declaration, quantity
 from .entry_values import numbers
 
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..quantities import Value, declaration, quantity
+from ..core.quantities import Value, declaration, quantity
 from .arrays import peak
 from .config import Config
 from .event import Event

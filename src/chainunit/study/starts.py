@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from ..progress import Report
-from ..text import entries, entry, number
+from ..reading.text import entries, entry, number
+from ..work.progress import Report
 from .analysis import Analysis, Findings
 from .config import Config
 from .drive import Drive

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from ..core.errors import InputError
 from ..drives.speed_control import Loop
-from ..errors import InputError
 from .config import Config
 from .cycle import Cycle, cycle, no_feed
 from .drive import Drive

@@ -1,4 +1,4 @@
-"""Runs a sweep: its points as batches of the runner (see `chainunit.runner`), and its results as a dataset."""
+"""Runs a sweep: its points as batches of the runner (see `chainunit.work.runner`), and its results as a dataset."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import __version__
-from ..composition import reference
-from ..errors import InputError
-from ..job import Job, ResultVariable
+from ..core.composition import reference
+from ..core.errors import InputError
+from ..core.quantities import Layout
 from ..machines.machine import Machine
-from ..progress import Report
-from ..quantities import Layout
-from ..runner import Outcome, check_scheduler
-from ..runner import run as run_job
+from ..work.job import Job, ResultVariable
+from ..work.progress import Report
+from ..work.runner import Outcome, check_scheduler
+from ..work.runner import run as run_job
 from .choice import choose
 from .config import Config
 from .cycle_quantities import CycleQuantity, cycle_quantity, evaluate
@@ -285,7 +285,7 @@ def run_sweep(
     config: Config, folder: Path, report: Report, workers: int | None = None, scheduler: str | None = None
 ) -> SweepFindings:
     """Make the points of the sweep of a study that its store in `folder` does not have; the other arguments and the
-    errors are those of `task_of` and `chainunit.runner.run`."""
+    errors are those of `task_of` and `chainunit.work.runner.run`."""
     task = task_of(config)
     if scheduler is not None:
         # before there is a store, which a refusal would leave behind

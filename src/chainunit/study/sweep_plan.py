@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..quantities import Variable
+from ..core.quantities import Variable
 
 MOST_OF_HYPERCUBE = 1_000_000
 """Largest number of points of a Latin hypercube: each of its points depends on all others, so that all are made."""

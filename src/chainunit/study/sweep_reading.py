@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import Faults, InputError, near_name, refusal_prefix, shown
+from ..core.errors import Faults, InputError, near_name, refusal_prefix, shown
+from ..core.messages import unit_behind
+from ..core.quantities import Quantity, Variable, named_values, variables
 from ..mechanism.models import MachineModel
-from ..quantities import Quantity, Variable, named_values, variables
-from ..reading import given_values, read_table, to_number
-from ..refusals import unit_behind
+from ..reading.tables import given_values, read_table, to_number
 from .cycle_quantities import CycleBasis, cycle_quantity
 from .event import Event
 from .sweep_plan import MOST_OF_HYPERCUBE, SweepPlan, SweptParameter

@@ -17,9 +17,9 @@ import numpy as np
 import xarray as xr
 
 from ..batch.transients import Runs, Transients, signal_table
-from ..errors import Faults, InputError
-from ..native.compilers import compiler
-from ..quantities import Layout
+from ..core.errors import Faults, InputError
+from ..core.native.compilers import compiler
+from ..core.quantities import Layout
 from ..system import Profile
 from ..system.compiled_simulation import LONGEST, CompiledSystem
 from .cycle import no_feed

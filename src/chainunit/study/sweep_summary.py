@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import __version__
-from ..batch_store import made_anew
-from ..quantities import Layout, Quantity, Variable
-from ..text import entry, shown_in
+from ..core.quantities import Layout, Quantity, Variable
+from ..reading.text import entry, shown_in
+from ..work.store import made_anew
 from .limits import limit_reached
 from .measures import Answers
 from .organ_limits import limits_of_organs

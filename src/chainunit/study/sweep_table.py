@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
-from ..quantities import Value, declaration, quantity
+from ..core.quantities import Value, declaration, quantity
 from .cycle_quantities import CycleBasis
 from .entry_values import Entered
 

@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 from scipy.signal import find_peaks
 
+from ..core.engines import numpy_
+from ..core.quantities import Value, declaration, quantity
 from ..drives.cardan import (
     ORDERS,
     Cardan,
@@ -34,9 +36,7 @@ from ..drives.torsion import (
     steady,
     with_damping_ratio,
 )
-from ..engines import numpy_
-from ..progress import Progress, Report
-from ..quantities import Value, declaration, quantity
+from ..work.progress import Progress, Report
 from .arrays import stretches
 from .sections import TorsionTable
 

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from ..core.errors import InputError
 from ..drives.cardan import ORDERS, frequency_band
 from ..drives.torsion import SteadyMotion
-from ..errors import InputError
-from ..progress import Report
-from ..text import array_entry, entries
+from ..reading.text import array_entry, entries
+from ..work.progress import Report
 from .analysis import Analysis, Findings
 from .config import Config
 from .drive import Drive

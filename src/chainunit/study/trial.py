@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from ..core.engines import MATH
 from ..drives.catalogue import CatalogueMotor
 from ..drives.induction_motor import volts_per_hertz
 from ..drives.motor import T_RATED
-from ..engines import MATH
 from ..machines.chain_unit import SideName
 from ..system import Simulation
 from .arrays import peak

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ..progress import Report
-from ..quantities import Value, declaration, quantity
-from ..text import array_entry, entries
+from ..core.quantities import Value, declaration, quantity
+from ..reading.text import array_entry, entries
+from ..work.progress import Report
 from .analysis import Analysis, Findings
 from .arrays import peak
 from .cycle import Cycle, cycle, energy_swing, no_feed

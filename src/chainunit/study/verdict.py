@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from ..machines.chain_unit import RodName
-from ..text import entry, number
+from ..reading.text import entry, number
 from .pulls import LeastPull
 
 ROCKER_GOOD, ROCKER_GOOD_EMPTY, CRANK_GOOD = 0.4, 0.2, 0.6

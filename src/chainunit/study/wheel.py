@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import xarray as xr
 
-from ..quantities import Value, declaration, quantity
+from ..core.quantities import Value, declaration, quantity
 from .limits import Check
 from .measures import same_measure
 from .window import closes

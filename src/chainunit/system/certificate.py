@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 from scipy.integrate import cumulative_simpson
 
-from ..errors import InputError
+from ..core.errors import InputError
 from .graph import Bond, System
 
 Feed = Mapping[str, Callable[[xr.Dataset], Any]]

@@ -16,16 +16,16 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from ..composite import composed
-from ..composition import RESERVED, SOLVER, reference
-from ..engines import casadi_
-from ..errors import InputError, printable, shown
+from ..core.composite import composed
+from ..core.composition import RESERVED, SOLVER, reference
+from ..core.engines import casadi_
+from ..core.errors import InputError, printable, shown
+from ..core.integrators import MAX_STEPS
+from ..core.model import About, Model, Terminal
+from ..core.ports import MEASURED
 from ..fmu.backends import Backend, Origin
 from ..fmu.backends import export as export_fmu
 from ..fmu.description import Interface
-from ..integrate import MAX_STEPS
-from ..model import About, Model, Terminal
-from ..ports import MEASURED
 from .graph import Component, Connection, ModelComponent, System, hold_loads, order
 
 
@@ -122,7 +122,7 @@ def input_starts(system: System, model: type[Model]) -> dict[str, float]:
 
 
 def _description(system: System, models: Mapping[str, type[Model]], name: str, title: str) -> dict[str, Any]:
-    """See `chainunit.composition.Composition`."""
+    """See `chainunit.core.composition.Composition`."""
     exact = hold_loads(system).connections
     influences = {each: _influences(model) for each, model in models.items()}
     free = _free_terminals(system)

@@ -10,10 +10,10 @@ import numpy as np
 import xarray as xr
 
 from ..batch.transients import Transients, signal_table
-from ..engines import MATH
-from ..errors import InputError, InterruptedRunError
-from ..progress import Progress
-from ..quantities import Variable
+from ..core.engines import MATH
+from ..core.errors import InputError, InterruptedRunError
+from ..core.quantities import Variable
+from ..work.progress import Progress
 from .compiled import compiled, input_starts
 from .graph import System
 from .rows import selected

@@ -3,7 +3,7 @@
 A *flange* has the angle `phi` [rad], the speed `w` [rad/s], the acceleration `a` [rad/s2] and the torque `tau` [N.m]
 of a shaft. A motor gives the motion and takes a *load*; a machine takes the motion and gives a load. The load is the
 torque at constant speed `tau_bias` and the inertia `J` at the angle `phi0` and speed `w0`, with their slopes
-(`chainunit.ports`). An FMU may omit all members of the load except `tau_bias` and `J`; without the slopes the load is
+(`chainunit.core.ports`). An FMU may omit all members of the load except `tau_bias` and `J`; without the slopes the load is
 held constant over a step.
 
 Terminals come from terminalsAndIcons.xml of the FMU, if it has this file, else from the names of its variables:
@@ -20,10 +20,10 @@ from pathlib import Path
 from typing import Any, Literal
 from xml.etree import ElementTree
 
-from ..errors import InputError, printable
-from ..model import Terminal
-from ..ports import FLANGE, LOAD, LoadPort, flange, load_terminal
-from ..quantities import Layout, base_units
+from ..core.errors import InputError, printable
+from ..core.model import Terminal
+from ..core.ports import FLANGE, LOAD, LoadPort, flange, load_terminal
+from ..core.quantities import Layout, base_units
 from .graph import Connector, FmuComponent
 from .instance import NUMBERS, Fmu, Kind
 

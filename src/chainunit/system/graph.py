@@ -16,10 +16,10 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError, shown
-from ..model import Model, Terminal
-from ..ports import FLANGE, LOAD, PortSlopes
-from ..quantities import Layout, Type, base_units
+from ..core.errors import InputError, shown
+from ..core.model import Model, Terminal
+from ..core.ports import FLANGE, LOAD, PortSlopes
+from ..core.quantities import Layout, Type, base_units
 
 Connection = tuple[str, str]
 """Source and target by full name, such as ``("motor.phi", "machine.phi")``."""

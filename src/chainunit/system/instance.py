@@ -13,8 +13,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
-from ..ending import remove_folder, temporary_folder
-from ..errors import InputError, RunError, printable, shown
+from ..core.errors import InputError, RunError, printable, shown
+from ..core.temporary_folders import remove_folder, temporary_folder
 
 log = logging.getLogger("chainunit.fmu")
 _WARNING, _DISCARD, _FATAL = 1, 2, 4  # of fmi2Status

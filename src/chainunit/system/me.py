@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import scipy.integrate
 
-from ..errors import InputError, RunError
+from ..core.errors import InputError, RunError
 from .graph import System
 from .instance import DiscardError, ExchangeInstance
 from .signals import at_time, corners

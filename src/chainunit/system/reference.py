@@ -15,8 +15,8 @@ import numpy as np
 import xarray as xr
 from scipy.integrate import solve_ivp
 
-from ..engines import MATH, casadi_
-from ..errors import RunError
+from ..core.engines import MATH, casadi_
+from ..core.errors import RunError
 from .compiled import compiled
 from .graph import System
 from .signals import at_time, corners

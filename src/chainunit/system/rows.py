@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..errors import InputError
-from ..files import netcdf
+from ..core.errors import InputError
+from ..core.files import netcdf
 from .instance import Instance
 
 Recorder = tuple[Instance, Any, list[str]]

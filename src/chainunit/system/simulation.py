@@ -17,10 +17,10 @@ from typing import Any, ClassVar, Self
 import numpy as np
 import xarray as xr
 
-from ..errors import InputError, InterruptedRunError, RunError
-from ..files import whole
-from ..interrupts import stoppable
-from ..progress import Progress
+from ..core.errors import InputError, InterruptedRunError, RunError
+from ..core.files import whole
+from ..work.interrupts import stoppable
+from ..work.progress import Progress
 from . import rows
 from .graph import FmuComponent, System, direct_inputs, order
 from .instance import Fmu, Instance, Kind

@@ -16,14 +16,14 @@ from importlib import metadata
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
-from ..ending import scratch
-from ..errors import InputError, refusal_prefix
-from ..files import folder, whole
+from ..core.errors import InputError, refusal_prefix
+from ..core.files import folder, whole
+from ..core.model import Model
+from ..core.quantities import written
+from ..core.temporary_folders import scratch
 from ..fmu.backends import Backend
 from ..fmu.backends import export as export_fmu
 from ..fmu.pack import interface_of, pack, xml_bytes
-from ..model import Model
-from ..quantities import written
 from .graph import Connector, FmuComponent, System
 
 PARAMETER_SET = "start"

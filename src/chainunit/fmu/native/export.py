@@ -13,8 +13,8 @@ from importlib import metadata
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
-from ...files import folder, whole
-from ...model import Model
+from ...core.files import folder, whole
+from ...core.model import Model
 from ..accompany import companion_files
 from ..description import model_description, model_description_3
 from ..pack import interface_of, pack, xml_bytes

@@ -11,11 +11,11 @@ from collections.abc import Iterator
 from string import Formatter
 from typing import Any
 
-from ... import integrate, refusals
-from ...engines import casadi_
-from ...integrate import MAX_STEPS
-from ...native.code import Program, constant, number
-from ...quantities import Variable
+from ...core import integrators, messages
+from ...core.engines import casadi_
+from ...core.integrators import MAX_STEPS
+from ...core.native.code import Program, constant, number
+from ...core.quantities import Variable
 from .. import recipe
 from ..description import Interface
 
@@ -129,7 +129,7 @@ def _text(s: str) -> str:
 
 
 def _unit(unit: str) -> str:
-    return _text(refusals.unit_behind(unit))
+    return _text(messages.unit_behind(unit))
 
 
 def _array(kind: str, name: str, items: list[str]) -> str:
@@ -139,10 +139,10 @@ def _array(kind: str, name: str, items: list[str]) -> str:
 
 
 def rules() -> str:
-    """``rules.h``: the texts of `chainunit.refusals` as formats of printf, and the numbers of `chainunit.integrate`,
+    """``rules.h``: the texts of `chainunit.core.messages` as formats of printf, and the numbers of `chainunit.core.integrators`,
     which native code and Python have in common."""
     lines = ["/* Words and numbers of an FMU, generated from those of its Python code. */"]
-    for name, value in (*_capitals(refusals), *_capitals(integrate)):
+    for name, value in (*_capitals(refusals), *_capitals(integrators)):
         if isinstance(value, str):
             lines.append(f"#define {name} {_text(_printf(value))}")
         else:

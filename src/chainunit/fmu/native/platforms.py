@@ -9,8 +9,8 @@ import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from ...errors import InputError, RunError
-from ...native.compilers import Compiler, compile_code, compiler, host, zig_compiler
+from ...core.errors import InputError, RunError
+from ...core.native.compilers import Compiler, compile_code, compiler, host, zig_compiler
 
 _FLAGS = ("-std=c99", "-O2", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off")
 _SHARED = ("-shared", "-s")

@@ -9,7 +9,7 @@ import unicodedata
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
-from ...errors import InputError
+from ...core.errors import InputError
 from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE, FreeLinksError
 from ...mechanism.expressions import CONSTANTS, WORDS
 from .loads import MOTION

@@ -7,8 +7,8 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from ...engines import MATH
-from ...errors import InputError
+from ...core.engines import MATH
+from ...core.errors import InputError
 from ...groups.dyad import Dyad
 from ...groups.sliding import RRP
 from ...mechanism.linkage import Linkage

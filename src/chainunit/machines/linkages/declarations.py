@@ -6,10 +6,10 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
+from ...core.ports import LoadInput, PortSlopes, PortValues, ShaftMotion, Start
+from ...core.quantities import Layout, Value, declaration, declared_class, fields_of, group, quantity
 from ...mechanism.driver_ports import AddedInertia
 from ...mechanism.models import names_of
-from ...ports import LoadInput, PortSlopes, PortValues, ShaftMotion, Start
-from ...quantities import Layout, Value, declaration, declared_class, fields_of, group, quantity
 from ..parts import Force, GuideLaw, Pin
 
 

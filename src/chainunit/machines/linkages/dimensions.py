@@ -5,9 +5,9 @@ from __future__ import annotations
 import ast
 from collections.abc import Mapping
 
-from ...errors import InputError, shown
+from ...core.errors import InputError, shown
+from ...core.quantities import base_units
 from ...mechanism.expressions import CONSTANTS, EXTREMES
-from ...quantities import base_units
 
 Dimension = tuple[tuple[str, float], ...]
 """Exponents of the base units, angles apart; None stands for a number that takes any dimension."""

@@ -10,11 +10,11 @@ from contextlib import contextmanager
 from dataclasses import fields
 from typing import Any
 
-from ... import units
-from ...errors import Faults, InputError, meant, near_name, printable, refusal_prefix, shown
+from ...core import units
+from ...core.errors import Faults, InputError, meant, near_name, printable, refusal_prefix, shown
+from ...core.model import About
+from ...core.quantities import Layout, base_units
 from ...mechanism.expressions import CONSTANTS, WORDS, Expression, expression
-from ...model import About
-from ...quantities import Layout, base_units
 from .checks import name_fault, words
 from .declarations import CommonParameters
 from .dimensions import checked_dimension

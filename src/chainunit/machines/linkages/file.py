@@ -11,13 +11,13 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from ... import places
-from ...engines import MATH
-from ...errors import InputError, each_refusal, meant, near_name, printable, shown
+from ...core.engines import MATH
+from ...core.errors import InputError, each_refusal, meant, near_name, printable, shown
 from ...mechanism.assur import DYADS, GROUND, PRISMATIC, REVOLUTE
 from ...mechanism.expressions import expression
 from ...mechanism.models import InverseMachine
-from ...reading import file_text, in_file, toml
+from ...reading import toml_lines
+from ...reading.tables import file_text, in_file, toml
 from .checks import (
     POINT_NAMES,
     alike_points,
@@ -57,7 +57,7 @@ def read_linkage(file: Path) -> type[InverseMachine]:
         with a line for each fault, which names file, line and key.
     """
     text = file_text(file)
-    with in_file(str(file), lambda: places.lines_of(text)):
+    with in_file(str(file), lambda: toml_lines.lines_of(text)):
         description = description_of(toml(text), file.stem, file.parent)
         # what is wrong of a group is told at its first link
         with each_refusal(lambda fault: InputError(f"{fault.key or 'links'}: {fault}", fault.key or "links")):

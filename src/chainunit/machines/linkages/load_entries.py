@@ -11,11 +11,11 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from ... import units
-from ...errors import InputError, meant, near_name, shown
+from ...core import units
+from ...core.errors import InputError, meant, near_name, shown
 from ...mechanism.assur import GROUND
 from ...mechanism.expressions import Expression
-from ...reading import file_text
+from ...reading.tables import file_text
 from .checks import name_fault
 from .entries import EntryReader, Known, is_given
 from .loads import place_of

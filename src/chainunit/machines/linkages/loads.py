@@ -8,12 +8,12 @@ import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from ...errors import InputError
+from ...core.errors import InputError
+from ...core.model import Requirement
+from ...core.planar import ZERO, Vec2
 from ...groups.loads import Effect, Moving, Wrench
 from ...mechanism.curves import TableCurve
 from ...mechanism.expressions import Width, expression, value_of
-from ...model import Requirement
-from ...planar import ZERO, Vec2
 
 Entry = float | str
 OF_POINT = ("x", "y", "vx", "vy")

@@ -15,8 +15,12 @@ from dataclasses import replace
 from functools import cache, cached_property
 from typing import Any, cast
 
-from ...engines import MATH
-from ...errors import GeometryError, InputError
+from ...core.engines import MATH
+from ...core.errors import GeometryError, InputError
+from ...core.messages import unit_behind
+from ...core.model import About, Requirement, keep
+from ...core.planar import ZERO
+from ...core.quantities import Value, declared_class, group, quantity
 from ...groups.loads import GuideLosses, PinLosses, Weight
 from ...groups.triad import MOST_MISFIT
 from ...mechanism.assur import GROUND, PRISMATIC
@@ -28,10 +32,6 @@ from ...mechanism.extremes import MotionExtreme
 from ...mechanism.linkage import Linkage
 from ...mechanism.machine import MachineState, Mechanism, derived_numbers
 from ...mechanism.models import InverseMachine
-from ...model import About, Requirement, keep
-from ...planar import ZERO
-from ...quantities import Value, declared_class, group, quantity
-from ...refusals import unit_behind
 from .closing import dead_group, gap_hint, open_group
 from .declarations import LinkageMotion, LinkBody, common_parameters, field_of
 from .loads import (
@@ -473,5 +473,5 @@ class LinkageDescription(LinkageOutputs):
 
     @property
     def notes(self) -> str:
-        """See `chainunit.model.Model.notes`."""
+        """See `chainunit.core.model.Model.notes`."""
         return notes_on(self.structure.driver, self.span, self.angle_counts)

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any
 
-from ...engines import MATH
-from ...errors import InputError
+from ...core.engines import MATH
+from ...core.errors import InputError
 from ...groups.triad import MOST_MISFIT, Triad
 from ...mechanism.extremes import lowest
 from ...mechanism.linkage import Linkage

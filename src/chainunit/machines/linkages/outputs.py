@@ -9,21 +9,14 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from ...core.planar import Vec2
+from ...core.quantities import declared_class, group
 from ...mechanism.assur import PRISMATIC
 from ...mechanism.driver_ports import DriverPort
 from ...mechanism.linkage import Linkage
 from ...mechanism.machine import MachineState
-from ...planar import Vec2
-from ...quantities import declared_class, group
 from ..parts import Force, force
-from .declarations import (
-    RESERVED,
-    GuideReaction,
-    LinkTurning,
-    PointMotion,
-    Running,
-    WayRunning,
-)
+from .declarations import RESERVED, GuideReaction, LinkTurning, PointMotion, Running, WayRunning
 from .loads import name_of_load
 from .parts import LinkageParts
 from .probes import guide_reaction, own_axis, point_motion

@@ -11,7 +11,8 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from ...errors import InputError
+from ...core.errors import InputError
+from ...core.planar import ZERO, Vec2
 from ...groups.body import Bar, Mass
 from ...groups.cylinder import Cylinder
 from ...groups.driver import Crank, Driver, Ram
@@ -23,7 +24,6 @@ from ...groups.triad import Pose, Triad
 from ...groups.yokes import PRP, RPP
 from ...mechanism.assur import GROUND, REVOLUTE, AssurGroup
 from ...mechanism.expressions import value_of
-from ...planar import ZERO, Vec2
 from .structure import CYLINDER, Entry, JointEntry, LinkEntry, Structure
 
 ALONG_X = Vec2(1.0, 0.0)

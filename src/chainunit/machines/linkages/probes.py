@@ -6,10 +6,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypeVar
 
+from ...core.planar import Motion, Vec2
 from ...groups.group import GuideForce
 from ...mechanism.assur import GROUND, PRISMATIC
 from ...mechanism.machine import Mechanism
-from ...planar import Motion, Vec2
 from .declarations import GuideReaction, PointMotion
 from .parts import LinkageParts, LinkFrame
 from .structure import DriverEntry, JointEntry, LinkEntry, Structure

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from ...errors import InputError
+from ...core.errors import InputError
 from ...mechanism.assur import GROUND, PRISMATIC
 from .structure import JointEntry
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError
+from ...core.errors import InputError
 from .measurands import COUNTS
 from .problem import crank_speed, mark_times
 from .recording import Recording

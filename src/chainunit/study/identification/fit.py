@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import RunError
+from ...core.errors import RunError
 from .problem import OUTLIER, Comparison, Problem, SimulatedRun
 
 MOST_ROUNDS = 60

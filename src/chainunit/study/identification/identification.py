@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from ...core.errors import Faults, InputError, printable
+from ...core.temporary_folders import scratch
 from ...drives.induction_motor import InductionMotor
-from ...ending import scratch
-from ...errors import Faults, InputError, printable
-from ...progress import Report
 from ...system import Profile
+from ...work.progress import Report
 from ..arrays import rms
 from ..choice import choose
 from ..config import Config

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError
-from ...refusals import unit_behind
-from ...units import scale
+from ...core.errors import InputError
+from ...core.messages import unit_behind
+from ...core.units import scale
 from ..arrays import rms, stretches
 from .measurands import COUNTS, MEASURANDS
 from .plant import MOVING

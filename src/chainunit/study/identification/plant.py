@@ -13,8 +13,8 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from ...core.errors import InputError
 from ...drives.free_rotor import FreeRotor
-from ...errors import InputError
 from ...machines.machine import Machine
 from ...system.compiled_simulation import CompiledSystem
 from ..drive import Drive

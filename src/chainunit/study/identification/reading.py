@@ -9,11 +9,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ...errors import Faults, InputError, near_name, shown
-from ...quantities import Layout, Quantity, Variable, named_values
-from ...reading import given_values, instance, read_table, to_number
-from ...refusals import unit_behind
-from ...units import split
+from ...core.errors import Faults, InputError, near_name, shown
+from ...core.messages import unit_behind
+from ...core.quantities import Layout, Quantity, Variable, named_values
+from ...core.units import split
+from ...reading.tables import given_values, instance, read_table, to_number
 from .measurands import MEASURANDS
 from .table import (
     RUN_KEYS,

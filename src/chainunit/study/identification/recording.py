@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import Faults, InputError, meant, near_name, printable
-from ...files import whole
-from ...reading import decoded, file_bytes
-from ...units import must_be, of_other_kind, scale
+from ...core.errors import Faults, InputError, meant, near_name, printable
+from ...core.files import whole
+from ...core.units import must_be, of_other_kind, scale
+from ...reading.tables import decoded, file_bytes
 from .measurands import MEASURANDS, Measurand
 
 FEWEST = 100

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from ... import __version__
-from ...quantities import Layout
-from ...refusals import unit_behind
-from ...text import array_entry, entry, shown_in
+from ...core.messages import unit_behind
+from ...core.quantities import Layout
+from ...reading.text import array_entry, entry, shown_in
 from ..observation import false_imbalance, usual_loads
 from ..study_file import changed_tables
 from .fit import Normal

@@ -23,8 +23,8 @@ import numpy as np
 import xarray as xr
 
 from ...batch.evaluate import evaluate
+from ...core.errors import InputError, RunError
 from ...drives.free_rotor import FreeRotor
-from ...errors import InputError, RunError
 from ...machines.machine import Machine
 from ..drive import Drive
 from .measurands import COUNTS

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import RunError
-from ...refusals import unit_behind
+from ...core.errors import RunError
+from ...core.messages import unit_behind
 from .fit import Normal, normal_of
 from .problem import Comparison, Problem
 from .unknown import Unknown

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from ...batch.transients import Transients, signal_table
-from ...errors import InputError
+from ...core.errors import InputError
 from ...system.compiled_simulation import LONGEST, CompiledSystem
 from ...system.reference import monolithic
 from ...system.signals import at_time

@@ -7,8 +7,8 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
-from ...quantities import Value, declaration, quantity
-from ...reading import schema
+from ...core.quantities import Value, declaration, quantity
+from ...reading.tables import schema
 from ..entry_values import Entered
 
 FEEDS = ("same", "none")

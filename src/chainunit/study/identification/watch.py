@@ -12,15 +12,15 @@ from typing import Any
 
 import numpy as np
 
+from ...core.errors import Faults, InputError
+from ...core.quantities import Layout
+from ...core.temporary_folders import scratch
 from ...drives.terminal_signals import terminal_signals
-from ...ending import scratch
-from ...errors import Faults, InputError
 from ...fmu.backends import export
 from ...machines.load_observer import LoadObserver
-from ...progress import Report
-from ...quantities import Layout
-from ...reading import instance
+from ...reading.tables import instance
 from ...system.instance import Fmu, Instance
+from ...work.progress import Report
 from ..arrays import rms, stretches
 from ..config import Config
 from ..drive import Drive

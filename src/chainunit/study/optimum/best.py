@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from ...ending import scratch
+from ...core.temporary_folders import scratch
 from ...fmu.backends import Backend
 from ...machines.machine import Machine
-from ...progress import Report
+from ...work.progress import Report
 from ..cycle import cycle
 from ..cycle_quantities import CycleQuantity
 from .checks import FmuValue, Neighbours, by_fmu, neighbours

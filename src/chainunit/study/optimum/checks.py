@@ -12,9 +12,9 @@ import numpy as np
 import xarray as xr
 
 from ...fmu.backends import Backend, export
-from ...interrupts import stoppable
 from ...machines.machine import Machine
 from ...system.instance import Fmu, Instance
+from ...work.interrupts import stoppable
 from ..cycle_quantities import CycleQuantity, evaluate
 from .extremes import grid
 from .search import FINE, Search

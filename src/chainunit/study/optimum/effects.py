@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...errors import InputError
+from ...core.errors import InputError
 from .extremes import grid
 from .program import COARSE
 from .search import Search

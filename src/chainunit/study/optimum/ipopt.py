@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...interrupts import stoppable
+from ...work.interrupts import stoppable
 from .program import AngleProgram
 
 _DONE = ("Solve_Succeeded", "Solved_To_Acceptable_Level")

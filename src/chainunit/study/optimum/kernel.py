@@ -17,11 +17,11 @@ import numpy as np
 from ...batch.arrays import by_numpy
 from ...batch.equations import Equations, Result, columns_of
 from ...batch.native import Reductions, aligned, native_kernel
-from ...engines import casadi_
-from ...errors import RunError
+from ...core.engines import casadi_
+from ...core.errors import RunError
+from ...core.native.operations import Operations
+from ...core.symbolic_trace import trace
 from ...machines.machine import Machine
-from ...native.operations import Operations
-from ...trace import trace
 
 _P, _U, _K, _LANE, _WEIGHT, _SEED = range(6)
 """The arguments of the compiled code: parameters, inputs, derived numbers, (angle, speed), weights, direction."""

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from ...engines import casadi_
+from ...core.engines import casadi_
+from ...core.symbolic_trace import trace
 from ...machines.machine import Machine
-from ...trace import trace
 
 
 class Requirements:

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from ... import __version__
-from ...quantities import finite
-from ...text import Units, array_entry, entry, shown_in
+from ...core.quantities import finite
+from ...reading.text import Units, array_entry, entry, shown_in
 from ..config import Config
 from ..organ_limits import limits_of_organs
 from ..study_file import changed_tables

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from ...errors import InputError
+from ...core.errors import InputError
 from ...machines.machine import Machine
 from ..cycle_quantities import CycleBasis, CycleQuantity
 from .extremes import Sense

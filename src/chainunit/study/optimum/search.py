@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, RunError
+from ...core.errors import InputError, RunError
 from ..cycle_quantities import CycleQuantity
 from .extremes import MOST_ANGLES, TurnValues, grid, peaks_of, stationary
 from .ipopt import Solution, solve

@@ -7,12 +7,12 @@ from typing import Any
 
 from pydantic import Field
 
-from ...errors import Faults, InputError, meant, near_name, refusal_prefix, shown
+from ...core.errors import Faults, InputError, meant, near_name, refusal_prefix, shown
+from ...core.messages import unit_behind
+from ...core.quantities import Quantity, Value, Variable, declaration, quantity
 from ...machines.machine import Machine
 from ...mechanism.models import MachineModel
-from ...quantities import Quantity, Value, Variable, declaration, quantity
-from ...reading import to_number
-from ...refusals import unit_behind
+from ...reading.tables import to_number
 from ..cycle_quantities import CycleBasis, CycleQuantity, cycle_quantity
 from .wishes import SLACK, TurnLimit, Wishes
 

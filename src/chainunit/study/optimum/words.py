@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from ...text import number
+from ...reading.text import number
 from .best import Best
 from .effects import no_effect
 from .wishes import SLACK, TURNS, TurnLimit

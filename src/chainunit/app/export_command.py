@@ -8,9 +8,9 @@ from typing import Annotated, Any
 import typer
 import typer.core
 
+from ..core.errors import InputError
 from .command_options import BackendOption
 from .console import study_file, terminal_console
-from .errors import InputError
 
 
 class ExportCommand(typer.core.TyperCommand):
@@ -19,7 +19,7 @@ class ExportCommand(typer.core.TyperCommand):
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Show the help with the names of all models."""
         # a module of `machines` adds its own machine: the names are known once all modules are imported
-        from .models import MODELS
+        from ..models import MODELS
 
         (name,) = (each for each in self.params if each.name == "name")
         name.help = f"A study file or a linkage file (.toml), or one of {', '.join(MODELS)}."  # type: ignore[attr-defined]
@@ -56,8 +56,8 @@ def export(
     ] = False,
 ) -> None:
     """Write a model as an FMU; of a study file its whole system, from control to machine, as one FMU."""
-    from .fmu.backends import export as write
-    from .study.package import is_study_file, left_out, model_and_start
+    from ..fmu.backends import export as write
+    from ..study.package import is_study_file, left_out, model_and_start
 
     file = output
     if file and file.suffix != ".fmu":
@@ -98,7 +98,7 @@ def export_ssp(
     backend: BackendOption = None,
 ) -> None:
     """Write motor and machine, connected, with their parameter sets, as an SSP 1.0 package of FMUs 2.0."""
-    from .study.package import export_study, left_out
+    from ..study.package import export_study, left_out
 
     if output.suffix != ".ssp":
         raise InputError(f"-o {output}: must be a file name that ends in .ssp")
@@ -111,7 +111,7 @@ def export_ssp(
 
 
 def _platforms(choice: str | None, fmi: int) -> list[str]:
-    from .fmu.native.platforms import PLATFORMS
+    from ..fmu.native.platforms import PLATFORMS
 
     if choice == "all":
         return [name for name, platform in PLATFORMS.items() if fmi in platform.folders]

@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from .quantities import base_units
+from ..core.quantities import base_units
 
 Work: TypeAlias = Callable[[Any, int, int], Mapping[str, Any]]
 """``work(task, begin, end)``: the results of the points from `begin` to `end` - 1, by the names of the result
@@ -40,7 +40,7 @@ class ResultVariable:
     Parameters
     ----------
     name : a name as in Python; it is that of the variable in the store
-    unit : as in `chainunit.quantities`
+    unit : as in `chainunit.core.quantities`
     dtype : a NumPy type of numbers: ``float64``, ``float32``, or an integer type
     dims : names of the coordinates beside the points, in order
     flags : words for the integers 0, 1, ... of a variable that is a choice (CF: flag_values, flag_meanings)

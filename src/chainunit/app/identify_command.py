@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
+from ..core.files import claim
 from .console import leave, progress_bar, study_file, terminal_console
-from .files import claim
 
 
 def identify(
@@ -22,9 +22,9 @@ def identify(
     recordings.
     """
     loaded = study_file(config)
-    from .report import identification as contents
-    from .study.identification.identification import identify as identified
-    from .study.identification.result import outlook
+    from ..report import identification as contents
+    from ..study.identification.identification import identify as identified
+    from ..study.identification.result import outlook
 
     console = terminal_console(stderr=True)
     with claim(output, "identify", contents.FILE):

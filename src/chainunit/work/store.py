@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import __version__
-from .errors import RunError
-from .files import regular_bytes, whole, writing
+from .. import __version__
+from ..core.errors import RunError
+from ..core.files import regular_bytes, whole, writing
 from .job import BATCH, CHECKS, Job, ResultVariable, text_array
 
 if TYPE_CHECKING:

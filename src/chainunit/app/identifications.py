@@ -7,15 +7,15 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .progress import Report as Progress
-from .report import identification as contents
-from .report import watch as watching
-from .report.blocks import Report
-from .reported import WrittenResult
-from .study.config import Config
-from .study.identification.identification import IdentifiedMachine, identify
-from .study.identification.watch import Alarm, WatchedRecording
-from .study.identification.watch import watch as watched_by
+from ..report import identification as contents
+from ..report import watch as watching
+from ..report.blocks import Report
+from ..study.config import Config
+from ..study.identification.identification import IdentifiedMachine, identify
+from ..study.identification.watch import Alarm, WatchedRecording
+from ..study.identification.watch import watch as watched_by
+from ..work.progress import Report as Progress
+from .results import WrittenResult
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-from . import refusals
+from . import messages
 from .engines import MATH
 from .errors import GeometryError, InputError
 from .quantities import Layout, Variable, violations, within_bounds
@@ -37,20 +37,20 @@ class Requirement:
 
     def refusal(self, value: float, low: float, high: float, values: Mapping[str, float]) -> str:
         """The line that refuses `value`."""
-        unit = refusals.unit_behind(self.unit)
-        formats = (refusals.FIRST_PARAMETER, *[refusals.NEXT_PARAMETER] * len(self.context))
+        unit = messages.unit_behind(self.unit)
+        formats = (messages.FIRST_PARAMETER, *[messages.NEXT_PARAMETER] * len(self.context))
         those = "".join(
             f.format(name=n, value=values[n]) for f, n in zip(formats, self.context, strict=False)
         )
         sides = math.isfinite(low), math.isfinite(high)
-        limits = {(True, False): refusals.ABOVE, (False, True): refusals.BELOW}.get(sides, refusals.BETWEEN)
-        return refusals.REQUIREMENT.format(
+        limits = {(True, False): messages.ABOVE, (False, True): messages.BELOW}.get(sides, messages.BETWEEN)
+        return messages.REQUIREMENT.format(
             subject=self.subject,
             value=value,
             unit=unit,
             why=self.why,
             parameters=those,
-            limits=(limits if low < high else refusals.NO_VALUE).format(
+            limits=(limits if low < high else messages.NO_VALUE).format(
                 low=low, high=high, unit=unit, remedy=self.remedy
             ),
         )

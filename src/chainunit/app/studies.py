@@ -14,34 +14,34 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from .ending import in_temporary_folder
-from .errors import InputError, RemarkWarning, RunError, WriteError, near_name, shown
-from .files import claim, clear, whole, write_all
-from .fmu.backends import Backend
+from ..core.errors import InputError, RemarkWarning, RunError, WriteError, near_name, shown
+from ..core.files import claim, clear, whole, write_all
+from ..core.quantities import Layout
+from ..core.temporary_folders import in_temporary_folder
+from ..fmu.backends import Backend
+from ..machines.machine import Machine
+from ..reading.tables import in_file
+from ..reading.text import number, shown_in
+from ..reading.toml_lines import lines_of
+from ..report import files, html, optimum, results, series, terminal
+from ..report import study as contents
+from ..report.blocks import Report
+from ..report.drawing import drawing
+from ..study import config as study_files
+from ..study.config import Config
+from ..study.foreign_machine import ForeignMachine
+from ..study.measures import Answers, measures_of
+from ..study.optimum.best import Best
+from ..study.optimum.result import best_tables
+from ..study.optimum.words import conflict_sentences
+from ..study.parts import over_example, parts_of
+from ..study.record import INSUFFICIENT, StudyRecord
+from ..study.result import as_dict
+from ..study.window import Phase
+from ..work.progress import Report as Progress
 from .identifications import IdentificationResult, WatchResult, make_identification, make_watch
-from .machines.machine import Machine
-from .places import lines_of
-from .progress import Report as Progress
-from .quantities import Layout
-from .reading import in_file
-from .report import files, html, optimum, results, series, terminal
-from .report import study as contents
-from .report.blocks import Report
-from .report.drawing import drawing
-from .reported import WrittenResult
-from .study import config as study_files
-from .study.config import Config
-from .study.foreign_machine import ForeignMachine
-from .study.measures import Answers, measures_of
-from .study.optimum.best import Best
-from .study.optimum.result import best_tables
-from .study.optimum.words import conflict_sentences
-from .study.parts import over_example, parts_of
-from .study.record import INSUFFICIENT, StudyRecord
-from .study.result import as_dict
-from .study.window import Phase
+from .results import WrittenResult
 from .sweeps import SweepResult, make_sweep
-from .text import number, shown_in
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -24,8 +24,8 @@ from contextvars import ContextVar
 from types import MappingProxyType
 from typing import Any, TypeAlias
 
-from .errors import Faults, InputError, near_name, printable, shown
-from .quantities import DISPLAY_UNITS, Layout, finite
+from ..core.errors import Faults, InputError, near_name, printable, shown
+from ..core.quantities import DISPLAY_UNITS, Layout, finite
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _THIN = "\u202f"  # between thousands

@@ -10,8 +10,8 @@ from __future__ import annotations
 import re
 from functools import cache
 
-from . import units
-from .quantities import Quantity
+from ..core import units
+from ..core.quantities import Quantity
 
 _POWER = r"[eE][+−-]?\d{1,3}|\s?[x×*]\s?10(?:\^[+−-]?\d{1,3}|[⁺⁻]?[⁰¹²³⁴⁵⁶⁷⁸⁹]{1,3})"
 _DIGITS = rf"(?:\d{{1,3}}(?:[\s']\d{{3}})+(?:\.\d*)?|\d+\.?\d*|\.\d+)(?:{_POWER})?"

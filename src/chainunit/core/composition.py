@@ -1,7 +1,7 @@
 """A system of models as one: declarations side by side, and equations in the order of their dependencies.
 
 The description of a system is a text in JSON, from which another process, or an FMU, makes the same model
-(`chainunit.composite.composed`); `chainunit.system.compiled` writes it. Each component is a group: the names are the
+(`chainunit.core.composite.composed`); `chainunit.system.compiled` writes it. Each component is a group: the names are the
 full names of the system, such as ``motor.armature.R``. Standard library only: FMUs carry this file.
 """
 
@@ -14,7 +14,7 @@ from operator import attrgetter
 from typing import Any
 
 from .errors import InputError
-from .integrate import MAX_STEPS, Solver
+from .integrators import MAX_STEPS, Solver
 from .model import Model, Requirement, Terminal
 from .quantities import Layout, Value, declaration, declared_class, group, pruned, quantity
 

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any, Literal, TypeAlias, TypeVar, dataclass_transform
 
-from . import refusals
+from . import messages
 
 T = TypeVar("T")
 
@@ -191,7 +191,7 @@ class Quantity:
     """One scalar: its unit, its description, its bounds (with `open_low` the bound `low` itself is not
     allowed), its start value (None for outputs), its `nominal` size, whether it may change in a run
     (`tunable`), the range of its `usual` sizes (a value outside it is probably a slip of the unit, and is not
-    refused), its `kind`, which says how it is shown (see `chainunit.text`), and its `type`."""
+    refused), its `kind`, which says how it is shown (see `chainunit.reading.text`), and its `type`."""
 
     unit: str
     description: str
@@ -215,7 +215,7 @@ class Quantity:
         """The allowed range in words, e.g. ``> 0 m``."""
         if self.type == "Boolean":
             return "true or false"
-        unit = refusals.unit_behind(self.unit)
+        unit = messages.unit_behind(self.unit)
         low = f"{'>' if self.open_low else '>='} {self.low:g}{unit}" if math.isfinite(self.low) else ""
         high = f"<= {self.high:g}{unit}" if math.isfinite(self.high) else ""
         limits = " and ".join(x for x in (low, high) if x)
@@ -260,7 +260,7 @@ def quantity(
     """A field that declares one scalar. `default` is its start value (outputs have none); `above` is a lower
     bound that is not allowed itself. Without `max`, a quantity with a lower bound has the upper bound of
     `MOST`; without `usual`, its usual sizes are those of `USUAL`. `kind` says how it is shown (see
-    `chainunit.text`). A `type` "Boolean" has the bounds 0 and 1."""
+    `chainunit.reading.text`). A `type` "Boolean" has the bounds 0 and 1."""
     base_units(unit)
     if type == "Boolean":
         min, max = 0.0, 1.0
@@ -486,9 +486,9 @@ def complaint(variable: Variable, x: Any) -> str:
     """The line that says what is wrong with the value `x` of `variable`."""
     q = variable.quantity
     free = math.isinf(q.low) and math.isinf(q.high)
-    finite = refusals.NUMBER if free else refusals.FINITE.format(allowed=q.allowed_range)
+    finite = messages.NUMBER if free else messages.FINITE.format(allowed=q.allowed_range)
     allowed_text = q.allowed_range if math.isfinite(x) else finite
-    line = refusals.VALUE.format(
-        name=variable.name, value=x, unit=refusals.unit_behind(q.unit), allowed=allowed_text
+    line = messages.VALUE.format(
+        name=variable.name, value=x, unit=messages.unit_behind(q.unit), allowed=allowed_text
     )
     return f"{line} ({variable.description})"

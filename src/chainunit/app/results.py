@@ -7,10 +7,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import ClassVar, Self
 
-from .errors import WriteError
-from .files import claim, write_all
-from .report import files, html, terminal
-from .report.blocks import Report
+from ..core.errors import WriteError
+from ..core.files import claim, write_all
+from ..report import files, html, terminal
+from ..report.blocks import Report
 
 
 class ReportedResult:

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from .errors import RemarkWarning, WriteError, printable
-from .files import write_all
+from ..core.errors import RemarkWarning, WriteError, printable
+from ..core.files import write_all
 
 if TYPE_CHECKING:
-    from .report.blocks import Report
+    from ..report.blocks import Report
 
 
 def terminal_console(**options: Any) -> Console:
@@ -32,7 +32,7 @@ def leave(
     no room for; the other files are written all the same. Without `remarks` the report is shown without its
     remarks, which the terminal then has already.
     """
-    from .report import terminal
+    from ..report import terminal
 
     written, unwritten = write_all(writers)
     console = terminal_console()
@@ -43,7 +43,7 @@ def leave(
 
 def finish(report: Report, output: Path, name: str) -> None:
     """Write and show a report whose run is complete."""
-    from .report import files
+    from ..report import files
 
     if (unwritten := leave(report, files.writers(report, output, name))) is not None:
         raise unwritten
@@ -90,7 +90,7 @@ def show_remark(sentence: str) -> None:
 
 def study_file(file: Path | None) -> Any:
     """The study of a file; a value that looks like a slip of a unit is named before any run."""
-    from .study import config as configuration
+    from ..study import config as configuration
 
     loaded = configuration.load(file)
     for slip in loaded.slips:

@@ -28,11 +28,12 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails
 
-from . import places, units
-from .errors import InputError, near_name, printable, shown
-from .quantities import Layout, Quantity, Variable, complaint, variables
-from .refusals import unit_behind
-from .syntax import syntax_faults
+from ..core import units
+from ..core.errors import InputError, near_name, printable, shown
+from ..core.messages import unit_behind
+from ..core.quantities import Layout, Quantity, Variable, complaint, variables
+from . import toml_lines
+from .toml_faults import syntax_faults
 
 T = TypeVar("T")
 
@@ -281,7 +282,9 @@ def _elsewhere(key: str, file: type[BaseModel]) -> str:
     """Words on the tables of a file that have the key, to follow a refusal."""
     places = ["before all tables"] if key in file.model_fields else _holders(key, file)
     return (
-        f"; it stands {'in ' if key not in file.model_fields else ''}{' or '.join(places)}" if places else ""
+        f"; it stands {'in ' if key not in file.model_fields else ''}{' or '.join(toml_lines)}"
+        if places
+        else ""
     )
 
 
@@ -369,7 +372,7 @@ def read(file: Path | None, example: Callable[[], str], parse: Callable[[str, st
     """
     source = str(file) if file else "packaged example"
     text = file_text(file) if file else example()
-    with in_file(source, lambda: places.lines_of(text)):
+    with in_file(source, lambda: toml_lines.lines_of(text)):
         return parse(text, source)
 
 

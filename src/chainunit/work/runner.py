@@ -21,12 +21,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from . import __version__, ending
-from .batch_store import BatchStore
-from .errors import InputError, InterruptedRunError, RunError, printable
-from .files import claim
+from .. import __version__
+from ..core import temporary_folders
+from ..core.errors import InputError, InterruptedRunError, RunError, printable
+from ..core.files import claim
 from .job import Job
 from .progress import Report
+from .store import BatchStore
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -278,7 +279,7 @@ def _local(workers: int) -> Iterator[Any]:
                 scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},
                 memory_limit=0,
                 silence_logs=logging.CRITICAL + 1,
-                preload=[ending.__name__],
+                preload=[temporary_folders.__name__],
             )
         except (RuntimeError, OSError) as error:
             raise RunError(

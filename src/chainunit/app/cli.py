@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 import typer.core
 
-from . import interrupts
+from ..core.errors import InputError, InterruptedRunError, RunError, printable
+from ..core.files import claim, clear, full, written
+from ..work import interrupts
 from .command_options import BackendOption
 from .console import finish, leave, progress_bar, study_file, terminal_console
-from .errors import InputError, InterruptedRunError, RunError, printable
 from .export_command import ExportCommand, export, export_ssp
-from .files import claim, clear, full, written
 from .identify_command import identify
 from .sweep_command import sweep
 from .watch_command import watch
@@ -61,7 +61,7 @@ app = typer.Typer(
 
 def _version(choice: bool) -> None:
     if choice:
-        from . import __version__
+        from .. import __version__
 
         print(f"chainunit {__version__}")
         raise typer.Exit
@@ -77,7 +77,7 @@ def _root(
     ] = False,
 ) -> None:
     if no_cache:
-        from .native.cache import OFF, VARIABLE
+        from ..core.native.cache import OFF, VARIABLE
 
         os.environ[VARIABLE] = OFF
 
@@ -108,19 +108,19 @@ def study(
 
     Writes report.html, result.json, result.md, result.nc, plots and the FMUs into the output folder.
     """
-    from .study import parts
+    from ..study import parts
 
     if example:
-        from .study.commented import commented
-        from .study.schema import FILE
+        from ..study.commented import commented
+        from ..study.schema import FILE
 
         text = parts.example(example.value)
         print(commented(text) if example is Example.full else f"#:schema {FILE}\n{text}", end="")
         return
     loaded = study_file(config)
-    from .report import results
-    from .report import study as contents
-    from .study.record import INSUFFICIENT, SPEED_MISSED
+    from ..report import results
+    from ..report import study as contents
+    from ..study.record import INSUFFICIENT, SPEED_MISSED
 
     with claim(output, "study", *results.names(loaded)):
         errors = terminal_console(stderr=True)
@@ -159,9 +159,9 @@ def compare(
 
     Writes report.html, comparison.json and comparison.md into the output folder.
     """
-    from .report import comparison, files
-    from .study.comparison import compare as compared
-    from .study.comparison import read_result
+    from ..report import comparison, files
+    from ..study.comparison import compare as compared
+    from ..study.comparison import read_result
 
     results = read_result(first), read_result(second)
     with claim(output, "compare"):
@@ -180,7 +180,7 @@ def optimize(
 
     Writes best.toml, report.html, result.json, result.md and pictures into the output folder.
     """
-    from .report import optimum
+    from ..report import optimum
 
     loaded = study_file(config)
     with claim(output, "optimize", *optimum.FILES):
@@ -214,7 +214,7 @@ def keys(
     ] = None,
 ) -> None:
     """Show the keys of study files and catalogues: what each means, allows, and is where a file leaves it out."""
-    from .report import reference, terminal
+    from ..report import reference, terminal
 
     terminal.show(reference.keys_of(table) if table else reference.overview(), terminal_console())
 
@@ -226,8 +226,8 @@ def schema(
     ] = None,
 ) -> None:
     """Write the JSON Schema of study files, by which an editor completes keys and marks mistakes."""
-    from .files import whole
-    from .study.schema import FILE, json_schema
+    from ..core.files import whole
+    from ..study.schema import FILE, json_schema
 
     file = output or Path(FILE)
     with whole(file) as part:
@@ -246,9 +246,9 @@ def reproduce(
     Writes report.html, reproduction.json, reproduction.md and the figures into the output folder.
     """
     with claim(output, "reproduce"):
-        from .papers import reproduce as compute
-        from .papers.output import report
-        from .report import files
+        from ..papers import reproduce as compute
+        from ..papers.output import report
+        from ..report import files
 
         with terminal_console(stderr=True).status("computing"):
             contents = report(compute())
@@ -264,8 +264,8 @@ def two_bar_error(
 
     Writes report.html, two_bar_error.json, two_bar_error.md and two_bar_error.png into the output folder.
     """
-    from .papers import two_bar
-    from .report import files
+    from ..papers import two_bar
+    from ..report import files
 
     names = files.names(two_bar.NAME, (two_bar.PICTURE,))
     with claim(output, "two-bar-error", *names):
@@ -290,11 +290,11 @@ def linkage_command(
 
     Writes report.html, linkage.json, linkage.md and pictures into the output folder.
     """
-    from .machines.linkages.file import read_linkage
-    from .machines.machine import Machine
-    from .reading import option_value
-    from .report import files, linkage_report
-    from .study.linkage_turn import linkage_findings
+    from ..machines.linkages.file import read_linkage
+    from ..machines.machine import Machine
+    from ..reading.tables import option_value
+    from ..report import files, linkage_report
+    from ..study.linkage_turn import linkage_findings
 
     machine = Machine(read_linkage(file))
     turns = machine.model.turns

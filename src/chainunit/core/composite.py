@@ -1,4 +1,4 @@
-"""The model of a system of models: `composed` makes it from its description (`chainunit.composition`).
+"""The model of a system of models: `composed` makes it from its description (`chainunit.core.composition`).
 
 Standard library only: FMUs carry this file.
 """

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
+from ..core.files import claim
 from .console import leave, progress_bar, study_file, terminal_console
-from .files import claim
 
 
 def watch(
@@ -20,8 +20,8 @@ def watch(
     Writes report.html, result.json, result.md and pictures into the output folder.
     """
     loaded = study_file(config)
-    from .report import watch as contents
-    from .study.identification.watch import watch as watched
+    from ..report import watch as contents
+    from ..study.identification.watch import watch as watched
 
     with claim(output, "watch", *contents.PICTURES):
         with progress_bar(terminal_console(stderr=True)) as progress:

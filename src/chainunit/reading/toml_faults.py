@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 import tomllib
 
-from .errors import InputError, printable, shown
+from ..core.errors import InputError, printable, shown
 
 _PLACE = re.compile(r" \(at (?:line (\d+), column \d+|end of document)\)$")
 _NAMED = r"\s*([\w.\"' -]*?)\s*=\s*"

@@ -7,15 +7,15 @@ from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .ending import in_temporary_folder
-from .errors import InputError, WriteError, shown
-from .files import claim, write_all
-from .progress import Report as Progress
-from .report import sweep as contents
-from .report.blocks import Report
-from .reported import ReportedResult
-from .study.config import Config
-from .study.sweep_summary import SweepSummary
+from ..core.errors import InputError, WriteError, shown
+from ..core.files import claim, write_all
+from ..core.temporary_folders import in_temporary_folder
+from ..report import sweep as contents
+from ..report.blocks import Report
+from ..study.config import Config
+from ..study.sweep_summary import SweepSummary
+from ..work.progress import Report as Progress
+from .results import ReportedResult
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .integrate import Solver
+from .integrators import Solver
 from .model import Terminal
 from .quantities import Layout, Value, declaration, group, quantity
 

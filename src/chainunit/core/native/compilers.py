@@ -19,8 +19,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from ..ending import scratch
 from ..errors import RunError
+from ..temporary_folders import scratch
 from .cache import entry
 
 
@@ -81,7 +81,7 @@ def compile_code(
     compiler: Compiler, arguments: Sequence[str], files: Mapping[str, bytes], product: str
 ) -> bytes:
     """The file `product` that the compiler makes with `arguments` from these `files` (contents by name), or the
-    cached one, see `chainunit.native.cache`.
+    cached one, see `chainunit.core.native.cache`.
 
     Raises
     ------

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
+from ..core.files import claim
 from .console import leave, progress_bar, study_file, terminal_console
-from .files import claim
 
 
 def sweep(
@@ -34,7 +34,7 @@ def sweep(
     was killed goes on from its store.
     """
     loaded = study_file(config)
-    from .report import sweep as contents
+    from ..report import sweep as contents
 
     with claim(output, "sweep"):
         with progress_bar(terminal_console(stderr=True)) as progress:

@@ -1,0 +1,1 @@
+"""Tables, numbers and texts, as people write and read them."""

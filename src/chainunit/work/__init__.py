@@ -1,0 +1,1 @@
+"""Long work: jobs, their runner and store, progress and interrupts."""
