@@ -9,7 +9,7 @@ from pathlib import Path
 PACKAGE = Path(__file__).parents[1] / "src" / "chainunit"
 DRAWING = Path(__file__).with_name("architecture.svg")
 LAYERS = (
-    ("cli",),
+    ("app",),
     ("papers",),
     ("report",),
     ("study",),
@@ -17,25 +17,14 @@ LAYERS = (
     ("drives", "machines"),
     ("mechanism",),
     ("groups",),
+    ("work", "reading"),
     ("core",),
 )
 """From above to below; a package imports from its own row and from the rows below. `fmu` stands beside them on
 `core`, and serves `system` and all above."""
 HOMES = {
-    "__main__": "cli",
-    "cli": "cli",
-    "console": "cli",
-    "studies": "cli",
-    "identifications": "cli",
-    "identify_command": "cli",
-    "reported": "cli",
-    "command_options": "cli",
-    "export_command": "cli",
-    "sweep_command": "cli",
-    "watch_command": "cli",
-    "sweeps": "cli",
+    "__main__": "app",
     "models": "system",
-    "native": "core",
     "batch": "core",
 }
 """Layer of a module or folder whose name is not that of its layer; any other module beside the folders is `core`."""
@@ -95,7 +84,7 @@ def _is_module(base: list[str], name: str) -> bool:
 
 
 TEXTS = {
-    "cli": "the commands",
+    "app": "the commands, and studies from Python",
     "papers": "the four papers, row by row, and two bars against the catenary",
     "report": "tables, page, figures and files of a study",
     "study": "a file, events, runs, and measures read from the runs",
@@ -104,7 +93,9 @@ TEXTS = {
     "drives": "motors, gear, shafts, control",
     "mechanism": "any linkage from data: one forward pass, one force pass",
     "groups": "crank, dyad, triad, chain, bodies, friction",
-    "core": "quantities, model, engines, batches, vectors of the plane, load port, integrators, reading, errors",
+    "work": "jobs, runner, store, progress",
+    "reading": "tables, numbers and texts, as people write them",
+    "core": "quantities, model, engines, batches, vectors of the plane, load port, integrators, native code, files",
     "fmu": "any model as an FMU",
 }
 WAYS = {

@@ -40,7 +40,7 @@ def test_no_renderer_names_a_study_or_a_machine():
     )
     assert {f"report.{name}" for name in renderers} <= {a for a, _ in HOUSE.imports()} | {"report.lines"}
     results = {(a, b) for a, b in HOUSE.imports() if a.startswith("report.") and a.split(".")[1] in renderers}
-    assert {HOUSE.layer(b) for _, b in results} == {"core", "report"}
+    assert {HOUSE.layer(b) for _, b in results} == {"core", "reading", "report"}
     assert {b.split(".")[1] for _, b in results if HOUSE.layer(b) == "report"} <= set(renderers)
 
 
@@ -70,10 +70,10 @@ def test_no_two_classes_share_a_name():
 def test_the_scan_sees_every_way_of_importing(tmp_path, monkeypatch):
     """Relative and absolute, of a module and from one, inside a function, and from the package itself."""
     package = tmp_path / "chainunit"
-    for name in ("fmu", "groups"):
+    for name in ("fmu", "groups", "app"):
         (package / name).mkdir(parents=True)
         (package / name / "__init__.py").write_text("")
-    (package / "__init__.py").write_text("from .cli import app")
+    (package / "__init__.py").write_text("from .app.cli import app")
     (package / "errors.py").write_text("")
     (package / "fmu" / "export.py").write_text("")
     (package / "groups" / "chain.py").write_text(
@@ -82,18 +82,18 @@ def test_the_scan_sees_every_way_of_importing(tmp_path, monkeypatch):
         "def f():\n    from chainunit.fmu.export import export\n"
         "    from chainunit.fmu import export\n    import chainunit.app.cli\n"
     )
-    (package / "cli.py").write_text("from .groups import chain\n")
+    (package / "app" / "cli.py").write_text("from ..groups import chain\n")
     monkeypatch.setattr(HOUSE, "PACKAGE", package)
     assert HOUSE.imports() == {
         ("groups.chain", "errors"),
         ("groups.chain", "fmu.export"),
-        ("groups.chain", "cli"),
-        ("cli", "groups.chain"),
+        ("groups.chain", "app.cli"),
+        ("app.cli", "groups.chain"),
     }
-    assert [HOUSE.layer(m) for m in ("groups.chain", "errors", "fmu.export", "cli")] == [
-        "groups", "core", "fmu", "cli"
+    assert [HOUSE.layer(m) for m in ("groups.chain", "errors", "fmu.export", "app.cli")] == [
+        "groups", "core", "fmu", "app"
     ]  # fmt: skip
-    assert HOUSE.admitted("cli", "groups") and not HOUSE.admitted("groups", "cli")
+    assert HOUSE.admitted("app", "groups") and not HOUSE.admitted("groups", "app")
     assert HOUSE.admitted("system", "fmu") and not HOUSE.admitted("machines", "fmu")
     assert HOUSE.admitted("fmu", "core") and not HOUSE.admitted("fmu", "groups")
 

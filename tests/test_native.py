@@ -29,7 +29,7 @@ from test_fmu import Running
 from test_reference import POINTS, deviation
 
 from chainunit import ChainUnitMachine, GeometryError, InputError, RunError
-from chainunit.core import integrators
+from chainunit.core import integrators, messages
 from chainunit.core.engines import MATH
 from chainunit.core.native.cache import OFF, VARIABLE
 from chainunit.core.native.compilers import compile_code, compiler
@@ -477,7 +477,7 @@ def test_python_and_native_code_refuse_in_the_same_words(native, fmus):
 
 def test_every_word_of_python_is_in_native_code():
     text = rules()
-    for name, value in vars(refusals).items():
+    for name, value in vars(messages).items():
         if name.isupper():
             pieces = [piece for piece, *_ in Formatter().parse(value) if piece]
             (line,) = (x for x in text.splitlines() if x.startswith(f"#define {name} "))

@@ -37,19 +37,19 @@ else:
     # numpy and scipy take longer to import than a command takes to answer: import them when they are needed; a
     # signal during the import of anything ends with the words of Python
     _HOMES = {
-        "BestResult": ".studies",
+        "BestResult": ".app.studies",
         "EMPTY": ".machines.api",
         "ChainUnitMachine": ".machines.api",
         "ChamberForces": ".machines.chain_unit",
-        "GeometryError": ".errors",
-        "IdentificationResult": ".identifications",
-        "InputError": ".errors",
-        "RunError": ".errors",
+        "GeometryError": ".core.errors",
+        "IdentificationResult": ".app.identifications",
+        "InputError": ".core.errors",
+        "RunError": ".core.errors",
         "SideLoads": ".machines.chain_unit",
-        "Study": ".studies",
-        "StudyResult": ".studies",
-        "SweepResult": ".sweeps",
-        "WatchResult": ".identifications",
+        "Study": ".app.studies",
+        "StudyResult": ".app.studies",
+        "SweepResult": ".app.sweeps",
+        "WatchResult": ".app.identifications",
     }
 
     def __getattr__(name):

@@ -1,9 +1,9 @@
 """Transients of a model in blocks: many runs side by side, in one native loop without Python between the steps.
 
 Runs differ in parameters, states at the start, signals, and end. Each is integrated by the method of the model's FMU,
-with equal steps or with error control of its own (`chainunit.core.integrators`), and its signals are evaluated at every
-stage. Without constraints a step need not end at a row: the rows are interpolated (the dense output of Dormand and
-Prince, of fourth order, with scipy's coefficients).
+with equal steps or with error control of its own (`chainunit.core.integrators`), and its signals are evaluated at
+every stage. Without constraints a step need not end at a row: the rows are interpolated (the dense output of Dormand
+and Prince, of fourth order, with scipy's coefficients).
 
 A run may carry a direction in the space of parameters, inputs and states at the start. Then the exact derivative of
 the run in this direction is integrated beside it, under the same control of the error: as many runs with the same

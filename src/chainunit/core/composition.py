@@ -1,8 +1,8 @@
 """A system of models as one: declarations side by side, and equations in the order of their dependencies.
 
 The description of a system is a text in JSON, from which another process, or an FMU, makes the same model
-(`chainunit.core.composite.composed`); `chainunit.system.compiled` writes it. Each component is a group: the names are the
-full names of the system, such as ``motor.armature.R``. Standard library only: FMUs carry this file.
+(`chainunit.core.composite.composed`); `chainunit.system.compiled` writes it. Each component is a group: the names are
+the full names of the system, such as ``motor.armature.R``. Standard library only: FMUs carry this file.
 """
 
 from __future__ import annotations

@@ -9,9 +9,9 @@ and `L` armature resistance and inductance, `w` rotor speed, `T` winding tempera
 
 `tau_ff` is a feed-forward torque, such as the load at the machine's angle from a model in the controller.
 
-The load is the linearised load of the port (see `chainunit.core.ports`): the motor solves for the acceleration. The speed
-controller gives a current reference, limited to the current limit. The current controller gives a voltage, limited to
-that of the supply. Back-calculation keeps the integrators from winding up at a limit.
+The load is the linearised load of the port (see `chainunit.core.ports`): the motor solves for the acceleration. The
+speed controller gives a current reference, limited to the current limit. The current controller gives a voltage,
+limited to that of the supply. Back-calculation keeps the integrators from winding up at a limit.
 """
 
 from __future__ import annotations

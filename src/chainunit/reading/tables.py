@@ -282,9 +282,7 @@ def _elsewhere(key: str, file: type[BaseModel]) -> str:
     """Words on the tables of a file that have the key, to follow a refusal."""
     places = ["before all tables"] if key in file.model_fields else _holders(key, file)
     return (
-        f"; it stands {'in ' if key not in file.model_fields else ''}{' or '.join(toml_lines)}"
-        if places
-        else ""
+        f"; it stands {'in ' if key not in file.model_fields else ''}{' or '.join(places)}" if places else ""
     )
 
 

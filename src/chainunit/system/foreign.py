@@ -3,8 +3,8 @@
 A *flange* has the angle `phi` [rad], the speed `w` [rad/s], the acceleration `a` [rad/s2] and the torque `tau` [N.m]
 of a shaft. A motor gives the motion and takes a *load*; a machine takes the motion and gives a load. The load is the
 torque at constant speed `tau_bias` and the inertia `J` at the angle `phi0` and speed `w0`, with their slopes
-(`chainunit.core.ports`). An FMU may omit all members of the load except `tau_bias` and `J`; without the slopes the load is
-held constant over a step.
+(`chainunit.core.ports`). An FMU may omit all members of the load except `tau_bias` and `J`; without the slopes the
+load is held constant over a step.
 
 Terminals come from terminalsAndIcons.xml of the FMU, if it has this file, else from the names of its variables:
 `phi`, `w`, `a`, `tau`; `load.tau_bias` and so on for a motor, `tau_bias` and so on for a machine. A mapping gives the

@@ -139,10 +139,10 @@ def _array(kind: str, name: str, items: list[str]) -> str:
 
 
 def rules() -> str:
-    """``rules.h``: the texts of `chainunit.core.messages` as formats of printf, and the numbers of `chainunit.core.integrators`,
-    which native code and Python have in common."""
+    """``rules.h``: the texts of `chainunit.core.messages` as formats of printf, and the numbers of
+    `chainunit.core.integrators`, which native code and Python have in common."""
     lines = ["/* Words and numbers of an FMU, generated from those of its Python code. */"]
-    for name, value in (*_capitals(refusals), *_capitals(integrators)):
+    for name, value in (*_capitals(messages), *_capitals(integrators)):
         if isinstance(value, str):
             lines.append(f"#define {name} {_text(_printf(value))}")
         else:
