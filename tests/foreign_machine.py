@@ -17,7 +17,7 @@ class ForeignMachine(Fmi2Slave):
     def __init__(self, **kwargs):
         super().__init__(**kwargs)
         self.description = "An eccentric pump: one piston"
-        self.u = {"phi": 0.0, "w": 0.0, "a": 0.0, "back_pressure": 0.0}
+        self.u = {"phi": 0.0, "w": 0.0, "a": 0.0, "back_pressure": 0.0, "valves": 1}
         self.p = {"piston.mass": 40.0, "throw": 0.15, "cylinders": 1, "vented": False}
         for table, causality in ((self.u, Fmi2Causality.input), (self.p, Fmi2Causality.parameter)):
             for name in table:

@@ -182,6 +182,15 @@ def test_counts_and_switches_of_a_machine_reach_its_fmu(folder):
     np.testing.assert_allclose(turn.outputs.J * RATIO**2, 2.0 + moving * s * s, rtol=1e-12)
 
 
+def test_an_event_that_raises_a_count_is_refused(folder):
+    """It would pass through fractions, which the FMU does not take."""
+    text = (STUDY + MACHINE) + "[[event]]\ntype = 'surge'\ninput = 'valves'\n"
+    with pytest.raises(
+        InputError, match=r"valves is a whole number, and the event changes its input smoothly"
+    ):
+        parse(folder, text)
+
+
 def test_motor_and_machine_of_somebody_else(folder, burst):
     """Start-up, steady running and an event are those of both written as one ODE and integrated by scipy."""
     text = f"{STUDY}{MACHINE}motor = 'ForeignMotor.fmu'\n{OTHER_NAMES}[[event]]\ntype = 'burst'\n"
@@ -361,6 +370,7 @@ def test_a_package_holds_their_files_as_they_are(tool, folder, tmp_path):
     inputs = {e.name: e.parameterBindings[0].parameterValues[0].parameters for e in system.elements}
     given = {f"{name}.{p.name}": p.value for name, each in inputs.items() for p in each}
     assert given.pop("machine.vented") == "false" and int(given.pop("machine.cylinders")) == 1
+    assert int(given.pop("machine.valves")) == 1
     assert {name: float(value) for name, value in given.items()} == {
         "machine.piston.mass": MASS,
         "machine.throw": 0.15,

@@ -128,6 +128,43 @@ def test_means_are_those_of_sharp_loads():
     assert sizes == pytest.approx([bell / 3.0, corner / 3.0, (polynomial + 2.0 / 3.0) / 3.0, 0.0], rel=0.05)
 
 
+def test_a_mean_of_rounding_alone_ends():
+    """A torque that the loads balance is noise all the way: no part of it agrees with its halves, and the search must
+    not halve on. A load beside it keeps its accuracy."""
+    places = 0
+
+    def values(x):
+        nonlocal places
+        places += x.size
+        bell = np.exp(-(((x - 2.0) / 0.01) ** 2))
+        return np.array([np.cos(x) ** 2 + np.sin(x) ** 2 - 1.0, bell])
+
+    (noise, found), (size, _) = means(values, 0.0, 3.0)
+    assert abs(noise) <= size < 1e-15 and places < 500_000
+    assert found == pytest.approx(math.sqrt(math.pi) * 0.01 / 3.0, rel=1e-9)
+
+
+@pytest.mark.parametrize("middle", [1.0, 1.03, 2.7183])
+def test_a_mean_has_a_load_of_a_third_of_a_degree(middle):
+    width = math.radians(0.33)
+    (found,), _ = means(lambda x: np.array([np.abs(x - middle) < 0.5 * width]) * 1e3, 0.0, 2.0 * math.pi)
+    assert found == pytest.approx(1e3 * width / (2.0 * math.pi), rel=1e-3)
+
+
+def test_a_peak_at_the_begin_of_a_turn_hides_no_higher_one():
+    """The first and the last sample are one place, which takes one place among the candidates alone."""
+    q = np.linspace(0.0, 2.0 * math.pi, 361)
+
+    def values(x):
+        high = 1.0002 * np.exp(-(((x - 2.0 - 0.5 * q[1]) / q[1]) ** 2))
+        return np.array([np.cos(x) ** 200 * (np.cos(x) > 0.0) + high])
+
+    places, sizes = largest(values, q, around=True)
+    assert places[0] == pytest.approx(2.0 + 0.5 * q[1], abs=1e-6) and sizes[0] == pytest.approx(
+        1.0002, abs=1e-9
+    )
+
+
 def test_the_mean_power_of_a_press_is_that_of_its_work():
     """The press works over a few degrees of the crank: a place each degree misses 0.25 % of the work."""
     f = findings("slider_crank_press")

@@ -67,7 +67,7 @@ _SCALES: dict[str, dict[str, tuple[float, float]]] = {
 }
 """By kind, the units in which it may be shown, with factor and offset: shown = factor * value + offset."""
 _BY_SIZE: Mapping[str, tuple[float, float, str]] = {
-    "power": (0.0, 1.0, "W"),
+    "power": (0.0, 100.0, "W"),
     "torque": (1e4, math.inf, "kN.m"),
     "force": (1e4, math.inf, "kN"),
 }

@@ -191,7 +191,7 @@ def linkage_findings(machine: Machine, speed: float) -> LinkageFindings:
 
     (mean, *mean_squares), (size, *_) = means(squares, *description.span)
     # the mean of a torque without losses is rounding
-    mean = float(mean) if abs(mean) > _LOSSLESS * size else 0.0
+    mean = 0.0 if abs(mean) <= _LOSSLESS * size else float(mean)
     torque_rms, *forces_rms = map(math.sqrt, mean_squares)
     torque = np.broadcast_to(state.bias, q.shape)
     losses = sum(effect.dissipative for load, effect in state.effects.items() if load in ("pins", "guides"))

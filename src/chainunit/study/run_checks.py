@@ -59,7 +59,13 @@ def loads_beyond(config: Any) -> Iterator[InputError]:
                 else signal
             )
             v = inputs[name]
-            if not v.quantity.admits(most):
+            if v.quantity.type != "Real" and isinstance(signal, Profile) and signal.changes:
+                kind = "whole number" if v.quantity.type == "Integer" else "switch"
+                yield InputError(
+                    f"{where}: {name} is a {kind}, and the event changes its input smoothly; name another input",
+                    key=key,
+                )
+            elif not v.quantity.admits(most):
                 yield InputError(
                     f"{where}: {name} comes to {most:.9g}{unit_behind(v.unit)} with the feed: must be "
                     f"{v.quantity.allowed_range}",

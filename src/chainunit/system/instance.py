@@ -318,6 +318,14 @@ class ExchangeInstance(Instance):
         self._states = (ctypes.c_double * self.n_states)()
         self._rates = (ctypes.c_double * self.n_states)()
         self._indicators = (ctypes.c_double * self.n_indicators)()
+        self._is_continuous = False
+        """whether the FMU is in the Continuous-Time Mode"""
+
+    def write(self, handle: Handle, new: Sequence[float]) -> None:
+        """Set the values behind a handle. In the Continuous-Time Mode counts and switches keep theirs, as FMI allows
+        them to change at events alone; the event that their source makes sets them."""
+        if not self._is_continuous or handle.parts or handle.kind == "Real":
+            super().write(handle, new)
 
     def put(self, time: float, states: Sequence[float]) -> None:
         """Set the time [s] and the states, shape (states,)."""
@@ -367,6 +375,7 @@ class ExchangeInstance(Instance):
     def enter_event(self) -> None:
         """Enter the event mode."""
         self._call("an event", self._fmi.enterEventMode)
+        self._is_continuous = False
 
     def update(self) -> tuple[bool, float]:
         """Update the discrete states once, in event mode. Returns whether anything changed, so that all FMUs have to
@@ -379,3 +388,4 @@ class ExchangeInstance(Instance):
     def leave_event(self) -> None:
         """Return to continuous time."""
         self._call("an event", self._fmi.enterContinuousTimeMode)
+        self._is_continuous = True

@@ -163,7 +163,8 @@ class EntryReader:
                 if moving := {*width.of.names} & ({*self.inputs} | {*(motion or {})}) or {*width.of.tables}:
                     raise InputError(
                         f"is {shown(given)}; the width of {width.call} changes with {', '.join(sorted(moving))}; "
-                        "must be a number or an expression of parameters"
+                        "must be a number or an expression of parameters; a ramp that begins at such a value a is "
+                        "ramp(x - a, 0, width)"
                     )
             return given
         return 0.0
