@@ -24,8 +24,9 @@ from chainunit.report.sizing import _best
 from chainunit.study import config, sizing
 from chainunit.study.bearings import hardest_run, mean_load
 from chainunit.study.coupling import coupling_sentence, recommended_setting, way_words
-from chainunit.study.coupling_alternatives import _before_flywheel, on_motor_side, slip_run
+from chainunit.study.coupling_alternatives import _before_flywheel, _in_time, on_motor_side, slip_run
 from chainunit.study.drive import Drive
+from chainunit.study.event_torques import effects
 from chainunit.study.judgement import motor_verdict
 from chainunit.study.protection import CouplingEffect, Obstacle, Setting, Way, stall
 from chainunit.study.relay import CLASSES, MULTIPLE, relay_trip, start_class
@@ -149,14 +150,16 @@ def test_a_setting_carries_every_start():
 
 
 def test_a_coupling_that_saves_nothing_is_not_recommended():
-    """It is tried: with too little spared at the output of the gear, or more there than the gear may carry, it has no
-    setting; an overload that it spares is enough."""
+    """It is tried: with too little spared at the output of the gear it has no setting; an overload that it spares, or
+    brings below the limit of the gear, is enough, whatever the gear carries in another."""
     shocks = {"jam_left": 400.0, "blocked": 900.0}
     result = Setting(200.0, 0.0, 600.0, 1000.0, shocks)
     for without, with_coupling, obstacle in (
         (900.0, 300.0, None),
         (900.0, 880.0, Obstacle.RELEASE),
-        (4200.0, 1100.0, Obstacle.RELEASE),
+        (1010.0, 990.0, None),
+        (1010.0, 1005.0, Obstacle.RELEASE),
+        (4200.0, 1100.0, None),
     ):
         tried = {"jam_left": CouplingEffect(400.0, 400.0), "blocked": CouplingEffect(without, with_coupling)}
         setting = dataclasses.replace(result, effects=tried)
@@ -285,12 +288,12 @@ def test_a_recommendation_rests_on_right_runs_alone(on_line):
 
 
 def test_the_sentence_on_a_coupling_names_both_shafts_and_its_effect(on_line):
-    """It is withdrawn where it opens too late."""
+    """It is withdrawn where it saves nothing; where it leaves more than the gear may carry, it says how much more."""
     shocks, ratio = on_line.setting.overloads, on_line.drive.ratio
     own = Setting(280.0, 0.0, 3000.0, 900.0, shocks)
     spared, late = (
         dataclasses.replace(own, effects={"blocked": CouplingEffect(1324.0, peak)})
-        for peak in (700.0, 1100.0)
+        for peak in (700.0, 1300.0)
     )
     words = coupling_sentence(dataclasses.replace(on_line, setting=spared))
     assert f"350 N m at the crank, {350.0 / ratio:.2f} N m at the motor's shaft" in words
@@ -299,10 +302,25 @@ def test_the_sentence_on_a_coupling_names_both_shafts_and_its_effect(on_line):
         in words
     )
     study = dataclasses.replace(on_line, setting=late)
-    assert "opens too late" in coupling_sentence(
-        study
-    ) and "The gear may carry 900 N m." in coupling_sentence(study)
+    assert "opens too late" in coupling_sentence(study) and "That saves nothing." in coupling_sentence(study)
     assert as_dict(study)["sizing"]["protection"]["why_none"] == "it opens too late"
+    over = dataclasses.replace(own, effects={"blocked": CouplingEffect(1324.0, 1100.0, 900.0, 0.002)})
+    words = coupling_sentence(dataclasses.replace(on_line, setting=over, alternatives=()))
+    assert words.startswith("Recommended safety coupling")
+    assert (
+        "too late to keep below the 900 N m" in words
+        and "the rocker is blocked (by 200 N m, 22.2 %)" in words
+    )
+    assert "a gear that may carry 1100 N m" in words
+    release, gear = _in_time(on_line, over)
+    assert release.numbers.release_time == 0.002 and gear.numbers.gear == 1100.0
+    # as long as its release time the gear carries what it may
+    limit = dataclasses.replace(on_line.config.gear, torque_limit=900.0)
+    study = dataclasses.replace(on_line, config=dataclasses.replace(on_line.config, gear=limit))
+    effect = effects(study, over.least)["blocked"]
+    assert effect.without > effect.goal == 900.0 and effect.release > 0.0
+    assert effects(study, over.least, release=effect.release)["blocked"].with_coupling <= 900.0
+    assert effects(study, over.least, release=effect.release + 0.004)["blocked"].with_coupling > 900.0
 
 
 def test_a_coupling_before_the_flywheel_carries_each_start_and_one_sided_feed(on_line):

@@ -108,7 +108,7 @@ _OBSTACLES = {
     "{gear}.",
     Obstacle.OVERLOADS: "No safety coupling is recommended: it has to open above {above}, and {bound}.",
     Obstacle.RELEASE: "No safety coupling is recommended: one that opens at {setting}, opens too late. The largest "
-    "torques until no torque passes it, {release} after its trip: {effects}. {why}.",
+    "torques until no torque passes it, {release} after its trip: {effects}. That saves nothing.",
     Obstacle.ENERGY: "No safety coupling is recommended: the energy balance is not kept in {wrong}, so that no "
     "setting follows from its numbers.",
 }
@@ -152,7 +152,6 @@ def coupling_sentence(study: StudyRecord) -> str:
             setting=_at_both(study, setting.least),
             release=number(Coupling().release_time, "s"),
             effects=_effects(study, setting.effects),
-            why=f"The gear may carry {_torque(setting.gear)}" if setting.passed else "That saves nothing",
             wrong=", ".join(map(study.title_of, setting.wrong)),
             start_torque=_torque(hardest.torque),
             least=_torque(setting.least),
@@ -170,6 +169,7 @@ def coupling_sentence(study: StudyRecord) -> str:
         f"{_effects(study, setting.effects)}"
     )
     text += f"; it stays shut where {_list_of(study, shut)}." if shut else "."
+    text += _too_late(study, setting)
     if setting.wrong:
         names = ", ".join(map(study.title_of, setting.wrong))
         text += f" Left out, as the energy balance is not kept: {names}."
@@ -204,7 +204,32 @@ def _bound(setting: Setting) -> str:
     return f"the jams, lumps and blocks of this study put {most} on it at most"
 
 
+def _too_late(study: StudyRecord, setting: Setting) -> str:
+    """A sentence on the overloads in which the gear carries more than it may, though the coupling opens, and on the
+    cures; empty where there are none."""
+    if not setting.passed:
+        return ""
+    over = ", ".join(
+        f"{study.title_of(name)} (by {_torque(effect.with_coupling - setting.gear)}, "
+        f"{number(effect.with_coupling / setting.gear - 1.0, '1', 'percent')})"
+        for name, effect in setting.passed.items()
+    )
+    cures = []
+    for each in study.alternatives:
+        if each.way is Way.RELEASE:
+            declared = number(Coupling().release_time, "s")
+            cures.append(f"a release time of {number(each.numbers.release_time, 's')} in place of {declared}")
+    cures.append(f"a gear that may carry {_torque(max(e.with_coupling for e in setting.passed.values()))}")
+    cures.append("a device at the machine, nearer to the overload")
+    return (
+        f" It opens too late to keep below the {_torque(setting.gear)} that the gear may carry where {over}; the "
+        f"cure is {', or '.join(cures)}."
+    )
+
+
 _WAYS = {
+    Way.RELEASE: "With a release time of {release_time}: {set}.",
+    Way.GEAR: "With a gear that may carry {gear}: {set}.",
     Way.SOFT_STARTER: 'With a soft starter (start = "soft"; starter.soft_start: voltage = "{voltage}", '
     'time = "{ramp}") a start puts at most {start} on it and takes {start_time}: {set}.',
     Way.INVERTER: 'With an inverter (start = "inverter"; run.ramp = "{ramp}") a start puts at most {start} on it, '
@@ -253,7 +278,7 @@ def _set(study: StudyRecord, each: Alternative) -> str:
     if not each.opens:
         return text + "in no overload of this study and protects nothing"
     text += f"where {_effects(study, each.effects) if each.effects else _list_of(study, each.opens)}"
-    if each.effects and not spares(each.effects):
+    if each.effects and not spares(each.effects, gear):
         text += ", too late to save anything"
     assert study.setting is not None
     if shut := {n: p for n, p in study.setting.overloads.items() if n not in each.opens}:
