@@ -231,7 +231,29 @@ def test_a_drive_whose_start_is_harder_than_its_shocks_has_no_coupling(on_line):
     plate, gear = on_line.sizing.best.motor.nameplate, as_dict(on_line)["sizing"]["gear"]
     start = on_line.findings["starts"].worst.gear_torque
     assert gear["rated_torque"]["value"] == pytest.approx(max(gear["running"]["value"], start / 2.0))
-    assert f"gear with a rated output torque of at least {start / 2.0:.0f} N m" in said
+    assert (
+        f"gear with a rated output torque of at least {start / 2.0:.0f} N m (decided by a start, in which"
+        in said
+    )
+    # without a coupling the gear carries the whole overload, with one what passes it; a gear for it is ordered
+    block = float(np.max(np.abs(on_line.drive.crank_torque(on_line.runs["blocked"]))))
+    assert gear["overload"]["value"] == pytest.approx(block, rel=1e-3)
+    quick = dataclasses.replace(on_line.config.gear, start_factor=1.0)
+    given = on_line.config.given | {"gear.start_factor"}
+    light = dataclasses.replace(on_line.findings["starts"].worst, gear_torque=1.0)
+    gentle = dataclasses.replace(on_line.findings["starts"], starts=(light,))
+    own = dataclasses.replace(
+        on_line,
+        config=dataclasses.replace(on_line.config, gear=quick, given=given),
+        findings={"starts": gentle},
+    )
+    ordered = as_dict(own)["sizing"]["gear"]
+    assert ordered["rated_torque"]["value"] == pytest.approx(block, rel=1e-3)
+    assert ordered["decided_by"].startswith("an overload (the rocker is blocked)")
+    spared = {"blocked": CouplingEffect(block, 500.0), "jam_left": CouplingEffect(420.0, 410.0)}
+    own.setting = Setting(280.0, 0.0, 3000.0, 900.0, setting.overloads, effects=spared)
+    ordered = as_dict(own)["sizing"]["gear"]
+    assert ordered["overload"]["value"] < 0.6 * block
     assert f"{plate.torque:.2f} N m" in said and "no safety coupling (a start puts 1" in said
     assert "running (all feed on the right) puts" in said
 
