@@ -21,13 +21,23 @@ from chainunit.machines.chain_unit import SIDES
 from chainunit.reading.text import entry
 from chainunit.report import blocks, terminal
 from chainunit.report.sizing import _best
-from chainunit.study import config, sizing
+from chainunit.study import config, run, sizing
+from chainunit.study.analyses import ANALYSES
+from chainunit.study.analysis import Analysis
 from chainunit.study.bearings import hardest_run, mean_load
 from chainunit.study.coupling import coupling_sentence, recommended_setting, way_words
-from chainunit.study.coupling_alternatives import _before_flywheel, _in_time, on_motor_side, slip_run
+from chainunit.study.coupling_alternatives import (
+    _before_flywheel,
+    _in_time,
+    _rocker_until,
+    on_motor_side,
+    slip_run,
+)
 from chainunit.study.drive import Drive
 from chainunit.study.event_torques import effects
+from chainunit.study.gear_loss import GearAnalysis
 from chainunit.study.judgement import motor_verdict
+from chainunit.study.measures import read_answers
 from chainunit.study.protection import CouplingEffect, Obstacle, Setting, Way, stall
 from chainunit.study.relay import CLASSES, MULTIPLE, relay_trip, start_class
 from chainunit.study.result import as_dict
@@ -35,6 +45,7 @@ from chainunit.study.rig import Rig
 from chainunit.study.run import _with_class_of_all_starts, run_study
 from chainunit.study.sections import Coupling
 from chainunit.study.start_runs import from_angle
+from chainunit.study.starts import StartAnalysis
 from chainunit.study.window import Phase
 from chainunit.system import ModelComponent, System, monolithic
 
@@ -64,7 +75,7 @@ def test_a_relay_trips_within_the_times_of_its_class(trip_class):
     assert start_class(hold, np.full(101, 36.0), 5.0) == max(seconds, 10)
 
 
-def test_the_relay_that_is_ordered_is_simulated(on_line):
+def test_the_relay_that_is_ordered_is_simulated(on_line, monkeypatch):
     """A start from another angle takes a heavier class: then its trips in the events are those of that class."""
     study = dataclasses.replace(on_line, answers=dict(on_line.answers), findings=dict(on_line.findings))
     light = {name: study.answers[name].thermal_trip_time for name in study.overloads}
@@ -82,8 +93,60 @@ def test_the_relay_that_is_ordered_is_simulated(on_line):
         by_hand = relay_trip(since, current, study.drive.rated_current, before, lasts, 30)
         later = study.answers[name].thermal_trip_time
         assert later == by_hand and (later is None or later > light[name])
+    # an analysis that reads the trips comes after the class is known, so that a report has one time
+    order = [analysis.name for analysis in ANALYSES]
+    assert order.index("starts") < order.index("observer")
+    seen = []
+
+    class Reader(Analysis):
+        name, needs_runs = "reader", True
+
+        @staticmethod
+        def find(study, rig, report):
+            seen.append((study.relay_class, {n: study.answers[n].thermal_trip_time for n in light}))
+
+    class Starts(StartAnalysis):
+        @staticmethod
+        def find(study, rig, report):
+            return study.findings["starts"]
+
+    later = {name: study.answers[name].thermal_trip_time for name in light}
+    study.relay_class, study.answers = 10, dict(on_line.answers)
+    monkeypatch.setattr(run, "ANALYSES", (Starts, Reader))
+    run._analyse(study, Rig(study.config, study.drive, {}), None, needs_runs=True)
+    assert seen == [(30, later)]
     protection = as_dict(study)["sizing"]["protection"]
     assert protection["relay_class"]["value"] == "class 30"
+
+
+def test_a_motor_is_not_judged_by_turns_that_are_not_steady(on_line):
+    """Turns that begin in the start take up energy: no mean of them stands for running that lasts. A motor that does
+    not start from another angle is not told as one that keeps the speed."""
+    assert motor_verdict(on_line)["text"].startswith("The motor keeps the crank at")
+    found = on_line.findings["starts"]
+    stuck = dataclasses.replace(found.starts[3], start_time=None)
+    study = dataclasses.replace(
+        on_line, findings={"starts": dataclasses.replace(found, starts=(found.starts[0], stuck))}
+    )
+    verdict = motor_verdict(study)
+    assert (
+        verdict["holds"] == "false"
+        and "does NOT bring the crank to its speed from 135 deg" in verdict["text"]
+    )
+    early = dataclasses.replace(
+        on_line, steady_from=0.0, answers=dict(on_line.answers), findings={}, remarks=[]
+    )
+    window = early.window(Phase.STEADY, on_line.runs["start_up"].sel(time=slice(0.05, on_line.config.turn)))
+    assert not window.lasts and on_line.window(Phase.STEADY, on_line.steady).lasts
+    early.runs = {**on_line.runs, "start_up": window.run}
+    early.answers["steady"] = read_answers(window)
+    refused = early.answers["steady"]
+    assert refused.power_mean is refused.supply_power_mean is refused.winding_temperature is None
+    verdict = motor_verdict(early)
+    assert verdict["holds"] == "false" and verdict["text"].startswith(
+        "The motor is not judged: the crank turns at"
+    )
+    assert "its turns are not steady" in verdict["text"] and GearAnalysis.find(early, None, None) is None
 
 
 def test_a_stall_is_the_time_from_which_it_stands():
@@ -232,7 +295,7 @@ def test_a_drive_whose_start_is_harder_than_its_shocks_has_no_coupling(on_line):
     start = on_line.findings["starts"].worst.gear_torque
     assert gear["rated_torque"]["value"] == pytest.approx(max(gear["running"]["value"], start / 2.0))
     assert (
-        f"gear with a rated output torque of at least {start / 2.0:.0f} N m (decided by a start, in which"
+        f"gear with a rated output torque of at least {start / 2.0:.0f} N m, decided by a start, in which"
         in said
     )
     # without a coupling the gear carries the whole overload, with one what passes it; a gear for it is ordered
@@ -301,6 +364,9 @@ def test_a_recommendation_rests_on_right_runs_alone(on_line):
         return dataclasses.replace(on_line, certificate={**on_line.certificate, **bad})
 
     kept = recommended_setting(without("blocked"))
+    # a jam that counts as wrong does not decide the torque of the rocker either
+    right = recommended_setting(without("jam_left", "jam_right"))
+    assert _rocker_until(on_line, right) < _rocker_until(on_line, kept)
     assert set(kept.overloads) == set(on_line.setting.overloads) - {"blocked"} and kept.wrong == ["blocked"]
     for name in ("start_up", "feed_right"):
         study = without(name)

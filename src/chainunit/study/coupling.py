@@ -20,7 +20,7 @@ from .sections import Coupling
 from .starts import StartAnalysis
 from .torques import at_gear, on_coupling
 from .verdict import START, STEADY
-from .window import BURNT
+from .window import Phase
 
 
 def recommended_setting(study: StudyRecord) -> Setting | None:
@@ -82,7 +82,7 @@ def hardest_start(study: StudyRecord) -> StartPeak:
 
 def pull_out(study: StudyRecord) -> float:
     """Largest torque of the warm motor at the crank in steady running [N m]."""
-    return study.drive.pull_out(study.steady, min(BURNT, study.answers["steady"].winding_temperature))
+    return study.drive.pull_out(study.steady, study.window(Phase.STEADY, study.steady).warm)
 
 
 def overloads_at_gear(study: StudyRecord) -> dict[str, float]:
@@ -347,10 +347,10 @@ def remark_on_coupling(study: StudyRecord, trip: float) -> None:
 
 
 _RAM = (
-    "A coupling that opens at {trip} does not limit the force on the link {ram} near its dead centre, at a crank "
-    "angle of {dead}: the setting stands for {fastest} where the link is fastest, for {thirty} at 30 deg and {ten} "
-    "at 10 deg before the dead centre; at the dead centre the force has no limit. In running the pin pushes with "
-    "{working} at most; "
+    "A coupling {set_for}that opens at {trip} does not limit the force on the link {ram} near its dead centre, at a "
+    "crank angle of {dead}: the setting stands for {fastest} where the link is fastest, for {thirty} at 30 deg and "
+    "{ten} at 10 deg before the dead centre; at the dead centre the force has no limit. In running the pin "
+    "pushes with {working} at most; "
 )
 _RAM_WITHIN, _RAM_ALWAYS = "within {angle}, the last {way}, ", "at every angle "
 _RAM_END = (
@@ -362,9 +362,12 @@ _RAM_END = (
 def remark_on_rams(study: StudyRecord) -> None:
     """Note for each ram of a linkage what the setting of the coupling means at it."""
     if study.config.coupling is not None:
-        torque = study.config.coupling.trip_torque
+        torque, set_for = study.config.coupling.trip_torque, ""
+    elif study.setting is not None and study.setting.obstacle in (None, Obstacle.RELEASE):
+        # this is the setting that the answer names, recommended or not
+        torque, set_for = study.setting.least, ""
     elif study.setting is not None:
-        torque = study.setting.torque or study.setting.least_in_running
+        torque, set_for = study.setting.least_in_running, "set for running alone "
     else:
         return
     for ram in rams(study):
@@ -376,6 +379,7 @@ def remark_on_rams(study: StudyRecord) -> None:
             "coupling at ram",
             _RAM + (_RAM_WITHIN if quantities else _RAM_ALWAYS) + _RAM_END,
             trip=(torque, "N.m"),
+            set_for=set_for,
             ram=ram.ram,
             dead=(ram.dead, "rad"),
             fastest=(ram.least(torque), "N"),

@@ -21,7 +21,7 @@ from .catalogue_drive import with_starter
 from .cycle import cycle
 from .drive import Drive
 from .event import Role
-from .event_torques import effects, peaks_in_events
+from .event_torques import effects
 from .limits import starting
 from .measures import STARTED
 from .protection import MARGIN, Alternative, Setting, Way, WayNumbers
@@ -323,20 +323,20 @@ def _higher(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative:
         setting=setting.least if setting.least < setting.gear else None,
         running=setting.running,
         start=setting.start,
-        rocker=_rocker_until(study, setting.least),
+        rocker=_rocker_until(study, setting),
     )
     return _tried(study, Way.HIGHER, numbers, setting.overloads)
 
 
-def _rocker_until(study: StudyRecord, setting: float) -> float | None:
+def _rocker_until(study: StudyRecord, setting: Setting) -> float | None:
     """The largest torque of the rocker in the overloads [N m], each up to the instant at which the coupling carries
-    its setting; None for a machine without a rocker."""
+    its least setting; None for a machine without a rocker."""
     peaks = []
-    for name in peaks_in_events(study, Role.SHOCK):
+    for name in setting.overloads:
         run = study.runs[name].sel(time=slice(study.event[name], None))
         if "machine.rocker.tau" not in run:
             return None
-        passed = np.flatnonzero(np.abs(run["motor.tau"].values) * study.drive.ratio > setting)
+        passed = np.flatnonzero(np.abs(run["motor.tau"].values) * study.drive.ratio > setting.least)
         end = int(passed[0]) + 1 if passed.size else None
         peaks.append(peak(run["machine.rocker.tau"].values[:end]))
     return max(peaks, default=None)
