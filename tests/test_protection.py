@@ -366,11 +366,14 @@ def test_a_recommendation_rests_on_right_runs_alone(on_line):
     kept = recommended_setting(without("blocked"))
     # a jam that counts as wrong does not decide the torque of the rocker either
     right = recommended_setting(without("jam_left", "jam_right"))
+    ordered = as_dict(without("blocked"))["sizing"]["gear"]["decided_by"]
+    assert ordered.endswith("; left out, as the energy balance is not kept: the rocker is blocked")
     assert _rocker_until(on_line, right) < _rocker_until(on_line, kept)
     assert set(kept.overloads) == set(on_line.setting.overloads) - {"blocked"} and kept.wrong == ["blocked"]
     for name in ("start_up", "feed_right"):
         study = without(name)
         study.setting = recommended_setting(study)
+        assert "left out" not in as_dict(study)["sizing"]["gear"]["decided_by"]
         assert study.setting.obstacle is Obstacle.ENERGY and not study.setting.overloads
         assert "the energy balance is not kept in" in coupling_sentence(study)
 

@@ -10,9 +10,10 @@ from ..core.quantities import variables
 from ..drives.catalogue import CatalogueMotor
 from ..reading.text import entries, entry, shown_in, turning
 from .coupling import coupling_sentence, overloads_at_gear, way_words, why_none
-from .event_torques import running_peak, running_words
+from .event import Role
+from .event_torques import peaks_in_events, running_peak, running_words
 from .given import given_sections
-from .judgement import motor_verdict
+from .judgement import motor_verdict, wrong_runs
 from .measures import measures_of
 from .protection import CouplingEffect
 from .record import StudyRecord
@@ -204,6 +205,11 @@ def _gear(study: StudyRecord) -> dict[str, Any]:
         key=lambda each: each[0],
     )
     reason = by if times == 1.0 else f"{by}, in which it may carry {times:g} times that"
+    if left_out := [
+        n for n in wrong_runs(study) if n in peaks_in_events(study, Role.SHOCK, Role.DISTURBANCE)
+    ]:
+        names = ", ".join(map(study.title_of, left_out))
+        reason += f"; left out, as the energy balance is not kept: {names}"
     title = f"gear, rated output torque at least; decided by {reason}"
     return {
         "rated_torque": entry(least, "N.m") | {"title": title},
