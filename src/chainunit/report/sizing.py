@@ -92,7 +92,8 @@ def _data(s: b.Source) -> Iterator[Line]:
 def _gear_torque(s: b.Source) -> Iterator[Line]:
     """The rated torque of the gear to be ordered."""
     if s.result["sizing"].get("gear"):
-        yield s.line("gear with a rated output torque of at least {sizing.gear.rated_torque}")
+        order = s.line("gear with a rated output torque of at least {sizing.gear.rated_torque}")
+        yield line(order, ", decided by ", s.words("sizing.gear.decided_by"))
 
 
 def _protection(s: b.Source) -> Iterator[Line]:

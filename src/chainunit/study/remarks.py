@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from ..reading.text import number
 from .coupling import remark_on_coupling, remark_on_rams
 from .event_torques import peaks_in_events
 from .events import Jam
-from .judgement import model_verdict, motor_limits, no_reserve
+from .judgement import lasts, model_verdict, motor_limits, no_reserve
 from .measures import STARTED, Answers
 from .random_remarks import remark_on_random_overloads
 from .record import LOAD_CYCLE, Amount, StudyRecord
@@ -56,7 +57,7 @@ def conclude(study: StudyRecord) -> None:
             what=" and ".join(left_out),
         )
     if study.answers:
-        study.verdict = model_verdict(study)
+        study.verdict = replace(model_verdict(study), step=config.run.step)
         for line in study.verdict.details(study.titles):
             study.warn("model", "{line}", line=line)
     if config.chain is not None:
@@ -217,16 +218,18 @@ def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
         warn(
             "no whole turn",
             "steady running: the crank does not make a whole turn; means are over the whole run, and there is no "
-            f"{LOAD_CYCLE}.",
+            f"{LOAD_CYCLE}.{{refused}}",
             STEADY,
+            refused="" if lasts(study) else _REFUSED,
         )
     elif steady.cycle_gap > CLOSED:
         warn(
             "turns do not close",
             "steady running: the turns do not close, their ends differ by {cycle_gap} in speed or torque: {repeats}; "
-            "raise run.settle_turns or run.turns.",
+            "raise run.settle_turns or run.turns.{refused}",
             STEADY,
             cycle_gap=(steady.cycle_gap, "1", "percent"),
+            refused="" if lasts(study) else _REFUSED,
             repeats="chains do not repeat a turn" if study.config.chain else "the machine has not settled",
         )
     elif abs(steady.speed_drift) > DRIFT and not study.config.chain:
@@ -243,11 +246,12 @@ def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
         warn(
             "energy taken up",
             "steady running: the moving masses {take}, over the evaluated turns {energy_gap} of the energy that "
-            "passes the motor's shaft. Mean powers are told without it; peaks, RMS and ripple are not those of "
+            "passes the motor's shaft. {means} peaks, RMS and ripple are not those of "
             "steady running: raise run.settle_turns.",
             STEADY,
             take="still take up energy" if steady.energy_gap > 0.0 else "still give energy",
             energy_gap=(abs(steady.energy_gap), "1", "percent"),
+            means="Mean powers are told without it;" if lasts(study) else f"{_REFUSED.strip()} The",
         )
     if steady.winding_temperature is not None and not math.isfinite(steady.winding_temperature):
         warn(
@@ -263,6 +267,12 @@ def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
             without=(study.ripple_without, "1", "percent"),
             speed_ripple=(steady.speed_ripple, "1", "percent"),
         )
+
+
+_REFUSED = (
+    " Mean power, electric power and the temperature of the winding have no value: no mean of these turns stands for "
+    "running that lasts."
+)
 
 
 _HAPPENINGS = {
