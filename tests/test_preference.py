@@ -21,6 +21,7 @@ from chainunit.drives.gear_ratios import (
     ratio_on_offer,
     typical_efficiency,
 )
+from chainunit.drives.gearing import START_FACTOR, ordered_torque
 from chainunit.reading.text import number
 from chainunit.study import sizing
 from chainunit.study.candidate import Candidate, Criterion, Standing
@@ -324,25 +325,39 @@ def test_a_heavy_start_and_a_second_gear_are_named():
 # -- the mill and the pump
 
 
-def sized(name, tmp_path, monkeypatch, *designations, **demands):
-    """The result of sizing for an example, with these motors alone."""
+def sized(name, tmp_path, monkeypatch, *designations, more="", **demands):
+    """The result of sizing for an example, with `more` lines, and with these motors alone."""
     motors = [m for m in catalogue() if m.designation in designations]
     monkeypatch.setattr(sizing, "catalogue", lambda extra: motors)
-    config = parse((EXAMPLES / f"{name}.toml").read_text("utf-8"), str(EXAMPLES / f"{name}.toml"))
+    text = (EXAMPLES / f"{name}.toml").read_text("utf-8")
+    config = parse(f"{text}\n{more}", str(EXAMPLES / f"{name}.toml"))
     config = dataclasses.replace(config, sizing=dataclasses.replace(config.sizing, **demands))
     return sizing.size(config, tmp_path, lambda *said: None)
 
 
+def check_order(first, name, tmp_path, monkeypatch, *motors):
+    """A study with the gear that is ordered chooses the same motor, ratio and flywheel, and so it does with a gear
+    that the start takes nearly wholly."""
+    best = first.chosen_candidate
+    start = max(each.gear_torque for each in starts_from_all(Rig(first.config, best.drive, None), 3.0))
+    order = ordered_torque(best.duty.torque, start, START_FACTOR, 0.1)
+    for torque in (order, 0.92 * order):
+        more = f"[gear]\ntorque_limit = {torque}\n"
+        result = sized(name, tmp_path, monkeypatch, *motors, more=more, candidates=float(len(motors)))
+        again = result.chosen_candidate
+        assert again is not None and again.keeps_margin
+        assert (again.motor, again.drive.ratio) == (best.motor, best.drive.ratio)
+        assert again.drive.flywheel == best.drive.flywheel == 0.0
+        used = again.sizes["gear_start"]
+        assert used == pytest.approx(start / START_FACTOR / torque, rel=1e-3)
+    assert used > 0.95
+
+
 def test_the_heavy_mill_gets_the_motor_without_a_flywheel(tmp_path, monkeypatch):
-    """It got 0.55 kW with 2 poles, a ratio of 199, a flywheel of 200 rotors, and a start of 7.3 s."""
-    result = sized(
-        "heavy_mill",
-        tmp_path,
-        monkeypatch,
-        "IE3 2-pole 0.55 kW, 71M",
-        "IE3 4-pole 0.75 kW, 80M",
-        candidates=2.0,
-    )
+    """It got 0.55 kW with 2 poles, a ratio of 199, a flywheel of 200 rotors, and a start of 7.3 s; with the gear that
+    was ordered for 0.75 kW it got that again."""
+    motors = "IE3 2-pole 0.55 kW, 71M", "IE3 4-pole 0.75 kW, 80M"
+    result = sized("heavy_mill", tmp_path, monkeypatch, *motors, candidates=2.0)
     best, small = result.candidates
     assert result.chosen_candidate is best and best.motor.designation == "IE3 4-pole 0.75 kW, 80M"
     assert best.drive.flywheel == 0.0 and best.checks["start"].value < 0.2
@@ -359,10 +374,11 @@ def test_the_heavy_mill_gets_the_motor_without_a_flywheel(tmp_path, monkeypatch)
     numbers = result.as_dict()["candidates"][1]["flywheel"]
     mass, diameter = numbers["mass"]["value"], numbers["diameter"]["value"]
     assert mass * diameter**2 / 8.0 == pytest.approx(numbers["J"]["value"])
+    check_order(result, "heavy_mill", tmp_path, monkeypatch, *motors)
 
 
 def test_the_beam_pump_gets_four_poles_and_one_gear(tmp_path, monkeypatch):
-    """It got 2 poles and a ratio of 369."""
+    """It got 2 poles and a ratio of 369, and again with the gear that was ordered."""
     motors = "IE3 2-pole 11 kW, 160M", "IE3 4-pole 11 kW, 160M", "IE3 6-pole 11 kW, 160L"
     result = sized("beam_pump", tmp_path, monkeypatch, *motors, candidates=3.0)
     assert [c.motor.nameplate.poles for c in result.candidates] == [4.0, 6.0, 2.0]
@@ -377,6 +393,29 @@ def test_the_beam_pump_gets_four_poles_and_one_gear(tmp_path, monkeypatch):
     assert best.worst_start and not six.worst_start
     assert best.checks["start"].value == pytest.approx(slowest, rel=0.02)
     assert best.start_class == max(start.start_class for start in starts)
+    check_order(result, "beam_pump", tmp_path, monkeypatch, *motors)
+
+
+def test_a_gear_that_the_start_alone_breaks_asks_for_a_soft_start(tmp_path, monkeypatch):
+    """The nearest is the same motor, and the result of its soft start is told. It was the motor of 2 poles, whose
+    start is the softest, with two gear units; where that fits, a note names the better one."""
+    motors = "IE3 2-pole 11 kW, 160M", "IE3 4-pole 11 kW, 160M"
+    gear = "[gear]\ntorque_limit = {}\n"
+    result = sized("beam_pump", tmp_path, monkeypatch, *motors, more=gear.format(20e3))
+    best = result.best
+    assert result.chosen_candidate is None and best.motor.designation == motors[1] and best.breaks_gear
+    assert best.violation > result.candidates[1].violation > 1.0
+    # the soft start, computed by itself
+    text = (EXAMPLES / "beam_pump.toml").read_text("utf-8")
+    config = parse(f'start = "soft"\n{text}', str(EXAMPLES / "beam_pump.toml"))
+    drive = sizing.proposal(config, best.motor, result.duty).drive
+    hardest = max(each.gear_torque for each in starts_from_all(Rig(config, drive, None), 3.0))
+    words = f'with start = "soft" it fits, and puts {number(hardest, "N.m")} on the gear in a start'
+    assert words in result.answer
+    result = sized("beam_pump", tmp_path, monkeypatch, *motors, more=gear.format(25e3))
+    assert result.chosen_candidate.motor.designation == motors[0]
+    (note,) = (each for each in result.notes if "would be preferred" in each)
+    assert note.startswith(motors[1]) and words in note
 
 
 def test_an_inverter_takes_the_next_ratio_before_a_larger_motor(tmp_path, monkeypatch):

@@ -227,8 +227,9 @@ def test_a_drive_whose_start_is_harder_than_its_shocks_has_no_coupling(on_line):
     # what has to be ordered, with the reason where nothing is
     plate, gear = on_line.sizing.best.motor.nameplate, as_dict(on_line)["sizing"]["gear"]
     start = on_line.findings["starts"].worst.gear_torque
-    assert gear["rated_torque"]["value"] == pytest.approx(max(gear["running"]["value"], start / 2.0))
-    assert f"gear with a rated output torque of at least {start / 2.0:.0f} N m" in said
+    assert gear["rated_torque"]["value"] == pytest.approx(start / 2.0 / 0.9, rel=0.01)
+    assert gear["rated_torque"]["value"] >= max(gear["running"]["value"], start / 2.0) / 0.9
+    assert f"gear with a rated output torque of at least {gear['rated_torque']['value']:.0f} N m" in said
     assert f"{plate.torque:.2f} N m" in said and "no safety coupling (a start puts 1" in said
     assert "running (all feed on the right) puts" in said
 

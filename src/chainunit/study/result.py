@@ -8,7 +8,8 @@ from typing import Any
 from .. import __version__
 from ..core.quantities import variables
 from ..drives.catalogue import CatalogueMotor
-from ..reading.text import entries, entry, shown_in, turning
+from ..drives.gearing import ordered_torque
+from ..reading.text import entries, entry, number, shown_in, turning
 from .coupling import coupling_sentence, way_words, why_none
 from .event_torques import running_peak, running_words
 from .given import given_sections
@@ -17,7 +18,7 @@ from .measures import measures_of
 from .protection import CouplingEffect
 from .record import StudyRecord
 from .relay import class_words
-from .starts import LARGE, StartAnalysis
+from .starts import StartAnalysis
 from .torques import at_gear
 from .verdict import STEADY
 from .window import Phase
@@ -183,20 +184,26 @@ def _parts(study: StudyRecord) -> dict[str, Any]:
 
 
 def _gear(study: StudyRecord) -> dict[str, Any]:
-    """The torques by which the gear of the drive that sizing chose is ordered; empty without steady running, and for
-    an insufficient motor."""
+    """The torques by which the gear of the drive that sizing chose is ordered, such that a study with that gear keeps
+    its margin; empty without steady running, and for an insufficient motor."""
+    assert study.config.sizing is not None
     if study.insufficient or STEADY not in study.answers:
         return {}
     running, starts = running_peak(study, at_gear), study.findings.get(StartAnalysis.name)
-    given = "gear.start_factor" in study.config.given
-    factor = study.config.gear.start_factor if given else LARGE
+    factor, margin = study.config.gear.start_factor, study.config.sizing.margin
     start = starts.worst.gear_torque if starts else 0.0
     titles = {
-        "rated_torque": f"gear, rated output torque at least, with {factor:g} times that in a start",
+        "rated_torque": (
+            f"gear, rated output torque at least, with {factor:g} times that in a start and the margin of "
+            f"{number(margin, '1', 'percent', full=False)}"
+        ),
         "running": f"largest torque of {running_words(study, running.run)} on the output of the gear",
         "start": "largest torque of a start on the output of the gear",
     }
-    torques = {"rated_torque": max(running.torque, start / factor), "running": running.torque}
+    torques = {
+        "rated_torque": ordered_torque(running.torque, start, factor, margin),
+        "running": running.torque,
+    }
     torques |= {"start": start} if starts else {}
     return {name: entry(torque, "N.m") | {"title": titles[name]} for name, torque in torques.items()}
 

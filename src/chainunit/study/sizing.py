@@ -32,6 +32,7 @@ from .inverter import inverter_needs, least_boost, misses_by_a_hair
 from .limits import SPEED_DEVIATION
 from .preference import ORDER, choice, poles_rank, rank
 from .relay import HEAVIEST, LIGHT, class_words
+from .sections import SOFTER
 from .sizing_table import SIZING_KEYS
 from .trial import try_motor
 
@@ -174,6 +175,11 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
         )
         strong = [m for m in motors if m.nameplate.power == motors[-1].nameplate.power]
     candidates = _search(config, strong, duty, folder, report, backend)
+    notes += [
+        f"{c.motor.designation} would be preferred, but for its start: {c.reason}."
+        for c in candidates[1:]
+        if c.remedy
+    ]
     notes += _needs(candidates[0], config)
     return SizingResult(config, duty, candidates, notes, len(motors), len(motors) - len(strong))
 
@@ -216,7 +222,28 @@ def _search(
         if (larger := _without_flywheel(config, motors, candidates, duty, files)) is not None:
             candidates.append(larger)
             _from_all_angles(config, candidates, duty, files)
+    hard = [c for c in candidates if c.breaks_gear]
+    best, _ = choice([candidates[0], *hard], limits.larger) if hard else (candidates[0], {})
+    if best.breaks_gear:
+        report("a softer start", 0.0, 1.0)
+        best.remedy = _remedy(config, best, duty, files)
+        rank(candidates, limits.larger)
     return candidates
+
+
+def _remedy(config: Config, c: Candidate, duty: Duty, files: Mapping[str, Path] | None) -> str:
+    """What makes a candidate fit whose start alone is too hard for the gear: on the line it is tried with a soft
+    starter."""
+    if config.start != "direct":
+        return SOFTER[config.start]
+    config = dataclasses.replace(config, start="soft")
+    soft = proposal(config, c.motor, duty, c.drive.ratio)
+    soft.drive = dataclasses.replace(soft.drive, flywheel=c.drive.flywheel)
+    judge(config, soft, duty, files, worst_start=True)
+    if not soft.fits:
+        return SOFTER["direct"]
+    start = soft.checks["gear_start"]
+    return f'with start = "soft" it fits, and puts {number(start.value, start.unit)} on the gear in a start'
 
 
 def _tried(config: Config, bare: Candidate, duty: Duty, files: Mapping[str, Path] | None) -> Candidate:
