@@ -15,6 +15,7 @@ from chainunit.drives.catalogue import catalogue
 from chainunit.drives.disc import DENSITY, steel_disc
 from chainunit.drives.gear_ratios import (
     SERIES,
+    UNITS,
     gear_unit,
     next_ratio,
     preferred_ratio,
@@ -95,6 +96,21 @@ def test_the_efficiency_is_that_of_the_stages(kind, ratio, efficiency):
     assert typical_efficiency(kind, ratio) == pytest.approx(efficiency)
 
 
+@pytest.mark.parametrize("kind", UNITS)
+def test_a_drive_of_two_units_has_the_efficiency_of_both(kind):
+    """A belt of 8 and a helical gear of 300 take two, unless such a unit is given; they had the efficiency of one."""
+    last = UNITS[kind][-1]
+    for ratio in np.geomspace(1.0, 10.0 * last.made, 50):
+        for is_given in (False, True):
+            is_one = gear_unit(kind, ratio, is_given) is not None
+            assert (typical_efficiency(kind, ratio, is_given) >= last.efficiency - 1e-12) is is_one
+    between = 0.5 * (last.largest + last.made)
+    two = last.efficiency * UNITS[kind][0].efficiency
+    if last.made > last.largest:
+        assert typical_efficiency(kind, between) == pytest.approx(two)
+        assert typical_efficiency(kind, between, is_given=True) == pytest.approx(last.efficiency)
+
+
 def test_the_next_ratio_is_of_the_finest_series_or_of_the_list():
     assert [next_ratio(ratio, []) for ratio in (180.0, 185.0, 98.0, 9.75, 0.95)] == [
         185.0,
@@ -103,6 +119,8 @@ def test_the_next_ratio_is_of_the_finest_series_or_of_the_list():
         10.0,
         0.975,
     ]
+    # a hair below the end of a decade the one above it is meant
+    assert [next_ratio(ratio, ()) for ratio in (99.99995, 9.999999, 100.0)] == [103.0, 10.3, 103.0]
     assert next_ratio(97.3, [86.5, 97.3, 110.2]) == 110.2 and next_ratio(110.2, [97.3, 110.2]) is None
 
 
@@ -585,7 +603,26 @@ def test_the_next_motor_without_a_flywheel_is_found_below_a_gear_that_the_larges
         c.checks = {"rms_torque": load, "gear_start": hard}
 
     monkeypatch.setattr(sizing, "proposal", bare)
+    monkeypatch.setattr(sizing, "least_boost", lambda config, c, judged: judged(c))
     monkeypatch.setattr(sizing, "judge", judge)
     small = made("small", 550.0, flywheel=0.5)
     found = sizing._without_flywheel(config, motors, [small], SimpleNamespace(), None)
     assert found.power == 2200.0 and len(tried) <= 4
+
+
+def test_the_next_motor_without_a_flywheel_gets_its_boost(monkeypatch):
+    """A larger motor that starts with a boost of 10 % alone counted as one that does not start."""
+    config, small = proposed("[sizing]\nlarger = 1\n", start="inverter")
+    small.checks = {"start": Check("time to start", 1.0, 2.0, "s")}
+    small.drive = dataclasses.replace(small.drive, flywheel=0.5)
+    motors = [m for m in catalogue() if m.nameplate.poles == small.motor.nameplate.poles][:6]
+
+    def judge(config, c, duty, files):
+        starts = c.drive.parameters.inverter.boost >= 0.1
+        c.checks = {"start": Check("time to start", 1.0 if starts else None, 2.0, "s")}
+
+    monkeypatch.setattr(sizing, "judge", judge)
+    duty = SimpleNamespace(normal=SimpleNamespace(crank_torque=np.full(10, 60.0)))
+    found = sizing._without_flywheel(config, motors, [small], duty, None)
+    larger = [m for m in motors if m.nameplate.power > small.power]
+    assert found.motor is larger[0] and found.drive.parameters.inverter.boost == 0.1

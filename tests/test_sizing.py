@@ -25,6 +25,7 @@ from chainunit.fmu.backends import export
 from chainunit.machines.chain_unit import Feed, SideLoads
 from chainunit.study import sizing
 from chainunit.study.candidate import Criterion, Standing
+from chainunit.study.catalogue_drive import check_ratios
 from chainunit.study.config import parse
 from chainunit.study.cycle import cycle, energy_swing, needed_inertia
 from chainunit.study.drive import Drive
@@ -380,6 +381,19 @@ def test_poles_that_no_motor_has_are_refused(tmp_path):
         sizing.size(one_candidate("", poles_least=8.0, poles_most=12.0), tmp_path, lambda *said: None)
 
 
+def test_ratios_with_which_no_motor_keeps_the_speed_are_refused_before_any_run(tmp_path):
+    """All motors were simulated with 5 and 7, where about 50 is needed; an inverter takes any ratio."""
+    slow = f"{HEAVY}ratios = [5, 7]\n"
+
+    def report(*said):
+        raise AssertionError(said)
+
+    with pytest.raises(InputError, match=r"about 50 \(4 poles\) is needed, the nearest on offer is 7;"):
+        sizing.size(parse(slow), tmp_path, report)
+    for more in ('start = "inverter"\n' + slow, slow + "[gear]\nratio = 62\n", slow.replace("7]", "52]")):
+        check_ratios(parse(more), catalogue())
+
+
 def test_without_a_fit_the_study_goes_on_with_the_nearest(tmp_path, monkeypatch):
     """All that was asked is run, marked as insufficient, and the command ends with 1."""
     from chainunit.app import cli
@@ -391,7 +405,7 @@ def test_without_a_fit_the_study_goes_on_with_the_nearest(tmp_path, monkeypatch)
     message = CliRunner().invoke(cli.app, ["study", str(tmp_path / "weak.toml"), "-o", str(tmp_path / "out")])
     assert message.exit_code == 1, message.output
     assert "No motor of the catalogue fits (2 of 2 were tried)" in message.output
-    assert "the motor is insufficient" in message.output
+    assert "the motor is insufficient" in message.output and "Order: " not in message.output
     numbers = json.loads((tmp_path / "out" / "result.json").read_text())
     assert set(numbers["answers"]) == {"steady", "feed_right"} and numbers["status"] == "complete"
     nearest = numbers["sizing"]["candidates"][numbers["sizing"]["nearest"]]

@@ -59,8 +59,8 @@ KINDS: Mapping[str, Transmission] = MappingProxyType(
 
 
 def ordered_torque(running: float, start: float, factor: float, margin: float) -> float:
-    """Rated output torque [N m] with which a gear is ordered, rounded up to three digits, as it is printed: it leaves
-    the `margin` free above the torque of `running` [N m], and `factor` times it does above that of a `start` [N m]."""
+    """Rated output torque [N m] with which a gear is ordered, rounded up to three digits, as it is printed. It leaves
+    the `margin` free above the torque of `running` [N m], and `factor` times it does so above that of a `start`."""
     torque = max(running, start / factor) / (1.0 - margin)
     step = 10.0 ** (math.floor(math.log10(torque)) - 2) if torque > 0.0 else 1.0
     return float(f"{math.ceil(torque / step * (1.0 - 1e-9)) * step:.6g}")

@@ -197,7 +197,9 @@ def _best(s: b.Source, path: str, word: str) -> Iterator[b.Block]:
     doubt = s.line(" ({verdict.model.caveat})") if model is not None and model["caveat"] else ()
     begin = "Chosen: " if word == "Motor" else "Insufficient: "
     yield b.Text(line(sentence, doubt, "."), form="short")
-    if order := [line("motor of ", each) for each in _data(s)] + [*_gear_torque(s)]:
+    # a motor that does not suffice is not ordered
+    order = [line("motor of ", each) for each in _data(s)] + [*_gear_torque(s)]
+    if order and word == "Motor":
         yield b.Text(line("Order: ", join(order, "; "), "."), form="short")
     yield b.Text(line(begin, s.words(f"{path}.reason"), doubt, "."))
 

@@ -24,7 +24,7 @@ from ..fmu.backends import Backend
 from ..reading.text import entries, number
 from ..work.progress import Report
 from .candidate import Candidate, Standing
-from .catalogue_drive import catalogue_drive
+from .catalogue_drive import catalogue_drive, check_ratios, is_of_a_gear
 from .chain import HIGH
 from .config import Config
 from .duty import CycleNumbers, Duty, duty_of
@@ -144,6 +144,16 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
     """
     limits = config.sizing
     assert limits is not None
+    motors = [
+        m for m in catalogue(config.catalogue) if limits.poles_least <= m.nameplate.poles <= limits.poles_most
+    ]
+    motors.sort(key=lambda m: (m.nameplate.power, poles_rank(m.nameplate.poles)))
+    if not motors:
+        raise InputError(
+            f"sizing.poles_least = {limits.poles_least:g}, sizing.poles_most = {limits.poles_most:g}: the catalogue "
+            "has no motor with so many poles"
+        )
+    check_ratios(config, motors)
     report("the machine at constant speed", 0.0, 1.0)
     duty = duty_of(config, folder, backend)
     numbers = duty.numbers
@@ -156,17 +166,8 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
             f"Peaks of the cycle and the flywheel are those of single turns, {100 * HIGH:g} % quantile over all "
             "turns of all starts of the chains."
         )
-    motors = [
-        m for m in catalogue(config.catalogue) if limits.poles_least <= m.nameplate.poles <= limits.poles_most
-    ]
     # a flywheel evens the torque of a cycle, but gives no mean power
     power = numbers.power_mean / (1.0 - limits.margin)
-    motors.sort(key=lambda m: (m.nameplate.power, poles_rank(m.nameplate.poles)))
-    if not motors:
-        raise InputError(
-            f"sizing.poles_least = {limits.poles_least:g}, sizing.poles_most = {limits.poles_most:g}: the catalogue "
-            "has no motor with so many poles"
-        )
     strong = [m for m in motors if m.nameplate.power >= power]
     if not strong:
         notes.append(
@@ -289,10 +290,9 @@ def _needs(best: Candidate, config: Config) -> Iterator[str]:
         yield from inverter_needs(best, config)
     if best.unit is None:
         largest = UNITS[config.choices["sizing.gear_kind"]][-1]
-        is_given = "gear.ratio" in config.given or config.choices["sizing.ratios"]
         end = (
             f"even of makers with large ratios ends at about {largest.made:g}"
-            if is_given
+            if is_of_a_gear(config)
             else (f"ends at about {largest.largest:g}")
         )
         yield f"A ratio of {best.drive.ratio:g} takes two gear units: a {largest.title} {end}."
@@ -331,16 +331,15 @@ def _without_flywheel(
         if m.nameplate.poles == poles and m.nameplate.power > best.power and m.designation not in tried
     ]
 
-    def bare(motor: CatalogueMotor) -> Candidate:
-        candidate = proposal(config, motor, duty)
-        judge(config, candidate, duty, files)
-        return candidate
+    def judged(c: Candidate) -> Candidate:
+        judge(config, c, duty, files)
+        return c
 
     # a larger motor runs more evenly, but puts more on the gear in its start: the largest may not fit
     least = None
     while rest:
         middle = len(rest) // 2
-        candidate = bare(rest[middle])
+        candidate = least_boost(config, proposal(config, rest[middle], duty), judged)
         if candidate.keeps_margin:
             least = candidate
         too_weak = any(candidate.exceeds(name) for name in candidate.checks if name not in _WORSE_WITH_POWER)
@@ -462,7 +461,7 @@ def proposal(config: Config, motor: CatalogueMotor, duty: Duty, chosen: float | 
     elif "gear.ratio" not in config.given:
         ratio, series = ratio_on_offer(drive.ratio, config.choices["sizing.ratio_series"], ratios, _TOLERANCE)
         drive = catalogue_drive(config, motor, torque, limits.ambient, ratio)
-    unit = gear_unit(kind, drive.ratio, is_given=bool("gear.ratio" in config.given or ratios))
+    unit = gear_unit(kind, drive.ratio, is_given=is_of_a_gear(config))
     return Candidate(motor, drive, {}, limits.margin, unit, series)
 
 
