@@ -288,7 +288,10 @@ def test_without_a_candidate_that_keeps_the_margin_the_nearest_is_taken():
 def test_the_page_states_the_order():
     text = (DOCS / "drives.md").read_text("utf-8")
     assert list(ORDER) == [*Criterion]
-    places = [text.index(f"{i}. {words}") for i, words in enumerate(ORDER.values(), 1)]
+    places = [
+        text.index(f"{i}. {words}")
+        for i, words in enumerate((each.format(larger="2") for each in ORDER.values()), 1)
+    ]
     assert places == sorted(places)
 
 
@@ -573,6 +576,8 @@ def test_a_motor_that_stalls_without_a_flywheel_is_told_so(tmp_path, monkeypatch
     sizing.judge(parse(PRESS, str(EXAMPLES / "linkages" / "press.toml")), bare, result.duty, None)
     rank(alone := [bare], 2.0)
     assert "without a flywheel it stalls at 2" in alone[0].reason and "deg" in alone[0].reason
+    assert c.reason.endswith("and no flywheel that sizing.inertia_ratio = 2 permits carries it through")
+    assert "at most 2 times (sizing.larger)" in result.as_dict()["order"][1]
     assert "hot" not in alone[0].reason and bare.checks["starts"].value is None
     # the ram meets the workpiece 10 mm above its lower dead centre, on the way down
     turn = result.duty.normal

@@ -99,6 +99,8 @@ class Candidate:
     """crank angle at which the load stalls the motor [rad]; None for a motor that starts"""
     heaviest: float = 0.0
     """the heaviest flywheel that was tried with the motor [kg m2]"""
+    bound: float | None = None
+    """the value of `sizing.inertia_ratio`, where it ended the trials of flywheels"""
     worst_start: bool = False
     """whether time, class and heat of its start are those of the worst crank angle, not of the angle 0 alone"""
     verdict: Standing | None = None

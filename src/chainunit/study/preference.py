@@ -16,7 +16,7 @@ STEP = 1.5
 
 ORDER: Mapping[Criterion, str] = {
     Criterion.MARGIN: "each limit is kept with the margin",
-    Criterion.LARGER: "the power is at most sizing.larger times that of the smallest motor that fits so",
+    Criterion.LARGER: "the power is at most {larger} times (sizing.larger) that of the smallest motor that fits so",
     Criterion.GEAR: "one gear unit has the ratio",
     Criterion.START: "the start takes a relay of a lower trip class",
     Criterion.FLYWHEEL: "there is no flywheel",
@@ -25,7 +25,7 @@ ORDER: Mapping[Criterion, str] = {
     Criterion.COST: "the price is lower, or without prices the mass of motor and flywheel",
     Criterion.USE: "the most used limit is used less",
 }
-"""The criteria in their order, in words."""
+"""The criteria in their order, in words; `larger` stands for the number of that key."""
 
 
 def poles_rank(poles: float) -> float:
@@ -159,7 +159,9 @@ def _unstarted(c: Candidate) -> str:
     if c.stall_angle is None:
         return "it does not bring the machine up to speed"
     reason = f"without a flywheel it stalls at {number(c.stall_angle, 'rad')} of the crank"
-    if c.heaviest:
+    if c.bound:
+        reason += f", and no flywheel that sizing.inertia_ratio = {c.bound:g} permits carries it through"
+    elif c.heaviest:
         reason += f", and no flywheel of up to {number(c.heaviest, 'kg.m2')} carries it through"
     return reason
 

@@ -15,7 +15,7 @@ from .event_torques import running_peak, running_words
 from .given import given_sections
 from .judgement import motor_verdict
 from .measures import measures_of
-from .protection import CouplingEffect
+from .protection import CouplingEffect, Obstacle
 from .record import StudyRecord
 from .relay import class_words
 from .starts import StartAnalysis
@@ -42,6 +42,9 @@ def _rating(motor: CatalogueMotor | None) -> dict[str, Any]:
         "rated_speed": entry(plate.speed, "rad/s", "speed"),
         "rated_torque": entry(plate.torque, "N.m"),
         "rated_current": entry(plate.rated_current, "A"),
+        "rated_voltage": entry(plate.voltage, "V"),
+        "rated_frequency": entry(plate.frequency, "Hz"),
+        "poles": entry(plate.poles, "1"),
     }
 
 
@@ -208,6 +211,9 @@ def _gear(study: StudyRecord) -> dict[str, Any]:
     return {name: entry(torque, "N.m") | {"title": titles[name]} for name, torque in torques.items()}
 
 
+_UNTRIED = "not judged: this study has no overload; add [[event]]"
+
+
 def _protection(study: StudyRecord) -> dict[str, Any]:
     """Settings of the protection of the drive that sizing chose; empty where the motor is insufficient."""
     assert study.sizing is not None
@@ -231,7 +237,9 @@ def _protection(study: StudyRecord) -> dict[str, Any]:
         **relay,
         "coupling": coupling_sentence(study),
         "obstacle": setting.obstacle,
-        "why_none": why_none(study),
+        "why_none": why_none(study)
+        if setting.overloads or setting.obstacle is not Obstacle.OVERLOADS
+        else _UNTRIED,
         "normal_torque": torque(
             setting.normal, "largest torque of normal duty on the coupling, at the crank"
         ),

@@ -112,7 +112,7 @@ class SizingResult:
             "motors": {"value": self.motors, "unit": "1"},
             "weak": {"value": self.weak, "unit": "1"},
             "candidates": [c.as_dict() for c in self.candidates],
-            "order": list(ORDER.values()),
+            "order": [words.format(larger=f"{self.config.sizing.larger:g}") for words in ORDER.values()],
             "trade": None if self.trade is None else [self.candidates.index(c) for c in self.trade],
             "chosen": self.candidates.index(self.chosen_candidate) if self.chosen_candidate else None,
             "nearest": None if self.chosen_candidate else self.candidates.index(best),
@@ -404,6 +404,7 @@ def _nearest(trials: list[Candidate]) -> Candidate:
     """The trial that comes nearest to all limits; where none starts, the one without a flywheel."""
     best = min(trials, key=lambda c: c.violation)
     best.heaviest = max(c.drive.flywheel for c in trials)
+    best.bound = next((c.checks["inertia"].limit for c in trials if c.exceeds("inertia")), None)
     return best
 
 
