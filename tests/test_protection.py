@@ -293,11 +293,10 @@ def test_a_drive_whose_start_is_harder_than_its_shocks_has_no_coupling(on_line):
     # what has to be ordered, with the reason where nothing is
     plate, gear = on_line.sizing.best.motor.nameplate, as_dict(on_line)["sizing"]["gear"]
     start = on_line.findings["starts"].worst.gear_torque
-    assert gear["rated_torque"]["value"] == pytest.approx(max(gear["running"]["value"], start / 2.0))
-    assert (
-        f"gear with a rated output torque of at least {start / 2.0:.0f} N m, decided by a start, in which"
-        in said
-    )
+    assert gear["rated_torque"]["value"] == pytest.approx(start / 2.0 / 0.9, rel=0.01)
+    assert gear["rated_torque"]["value"] >= max(gear["running"]["value"], start / 2.0) / 0.9
+    ordered = f"gear with a rated output torque of at least {gear['rated_torque']['value']:.0f} N m"
+    assert f"{ordered}, decided by a start, in which" in said
     # without a coupling the gear carries the whole overload, with one what passes it; a gear for it is ordered
     block = float(np.max(np.abs(on_line.drive.crank_torque(on_line.runs["blocked"]))))
     assert gear["overload"]["value"] == pytest.approx(block, rel=1e-3)
@@ -311,7 +310,7 @@ def test_a_drive_whose_start_is_harder_than_its_shocks_has_no_coupling(on_line):
         findings={"starts": gentle},
     )
     ordered = as_dict(own)["sizing"]["gear"]
-    assert ordered["rated_torque"]["value"] == pytest.approx(block, rel=1e-3)
+    assert ordered["rated_torque"]["value"] == pytest.approx(block / 0.9, rel=0.01)
     assert ordered["decided_by"].startswith("an overload (the rocker is blocked)")
     spared = {"blocked": CouplingEffect(block, 500.0), "jam_left": CouplingEffect(420.0, 410.0)}
     own.setting = Setting(280.0, 0.0, 3000.0, 900.0, setting.overloads, effects=spared)

@@ -85,8 +85,9 @@ def _disc(s: b.Source, flywheel: str = "sizing.flywheel") -> Iterator[Line]:
 def _data(s: b.Source) -> Iterator[Line]:
     """The data of the motor of all runs."""
     if "rated_power" in s.result.get("motor", {}):
-        names = ("rated_power", "rated_speed", "rated_torque", "rated_current")
-        yield join((s.number(f"motor.{name}") for name in names), ", ")
+        names = ("rated_speed", "rated_torque", "rated_current")
+        parts = "{=motor.rated_power}, {=motor.poles} poles, {=motor.rated_voltage}, {=motor.rated_frequency}"
+        yield join((s.line(parts), *(s.number(f"motor.{name}") for name in names)), ", ")
 
 
 def _gear_torque(s: b.Source) -> Iterator[Line]:
@@ -198,7 +199,9 @@ def _best(s: b.Source, path: str, word: str) -> Iterator[b.Block]:
     doubt = s.line(" ({verdict.model.caveat})") if model is not None and model["caveat"] else ()
     begin = "Chosen: " if word == "Motor" else "Insufficient: "
     yield b.Text(line(sentence, doubt, "."), form="short")
-    if order := [line("motor of ", each) for each in _data(s)] + [*_gear_torque(s)]:
+    # a motor that does not suffice is not ordered
+    order = [line("motor ", s.words(f"{path}.motor"), " of ", each) for each in _data(s)] + [*_gear_torque(s)]
+    if order and word == "Motor":
         yield b.Text(line("Order: ", join(order, "; "), "."), form="short")
     yield b.Text(line(begin, s.words(f"{path}.reason"), doubt, "."))
 

@@ -18,6 +18,10 @@ from .torques import DutyPeak
 
 TOLERANCES = ("crank_speed",)
 """Checks of a tolerance, which a drive may use wholly: the gear's ratio takes it, and no load does."""
+_HARD = ("gear_start",)
+"""Checks of a limit that leaves room by itself, which a drive may use wholly, too: a gear permits a multiple of its
+rated torque in a start. A margin on top would prefer two gear units, or a flywheel, to a shock of 91 % of it."""
+_WHOLLY = (*TOLERANCES, *_HARD)
 
 
 @declaration
@@ -95,6 +99,8 @@ class Candidate:
     """crank angle at which the load stalls the motor [rad]; None for a motor that starts"""
     heaviest: float = 0.0
     """the heaviest flywheel that was tried with the motor [kg m2]"""
+    bound: float | None = None
+    """the value of `sizing.inertia_ratio`, where it ended the trials of flywheels"""
     worst_start: bool = False
     """whether time, class and heat of its start are those of the worst crank angle, not of the angle 0 alone"""
     verdict: Standing | None = None
@@ -102,6 +108,8 @@ class Candidate:
     criterion: Criterion | None = None
     """the criterion by which a candidate that fits stands behind the chosen one"""
     reason: str = ""
+    remedy: str = ""
+    """what makes a candidate fit that only fails in the torque of the gear in its start, in words"""
 
     @property
     def sizes(self) -> dict[str, float]:
@@ -120,23 +128,35 @@ class Candidate:
 
     @property
     def use(self) -> float:
-        """Largest utilisation of the checks without the tolerances."""
-        return max((x for name, x in self.sizes.items() if name not in TOLERANCES), default=math.inf)
+        """Largest utilisation of the checks that have to leave the margin free."""
+        return max((x for name, x in self.sizes.items() if name not in _WHOLLY), default=math.inf)
 
     @property
     def fits(self) -> bool:
         """Whether every check is within its limit."""
         return self.violation <= 1.0
 
+    @property
+    def breaks_gear(self) -> bool:
+        """Whether its start puts too much on the gear, and nothing else exceeds a limit."""
+        over = {name for name, size in self.sizes.items() if size > 1.0}
+        return bool(over) and over <= set(_HARD)
+
     def exceeds(self, name: str) -> bool:
         """Whether a check takes more of its limit than the margin leaves; False for a check that there is not."""
-        permitted = 1.0 if name in TOLERANCES else 1.0 - self.margin
+        permitted = 1.0 if name in _WHOLLY else 1.0 - self.margin
         return self.sizes.get(name, 0.0) > permitted
 
     @property
     def keeps_margin(self) -> bool:
         """Whether the candidate fits with the margin."""
-        return self.fits and not any(map(self.exceeds, self.checks))
+        return self.fits and self.leaves_margin
+
+    @property
+    def leaves_margin(self) -> bool:
+        """Whether the candidate leaves the margin free of each limit that has one, whatever its start puts on the
+        gear."""
+        return not any(self.exceeds(name) for name in self.checks if name not in _HARD)
 
     @property
     def power(self) -> float:

@@ -239,6 +239,13 @@ SIMULATIONS = ("cs", "me")
 
 STARTS = ("direct", "soft", "inverter")
 
+SOFTER: Mapping[str, str] = {
+    "direct": 'start softer (start = "soft" or "inverter")',
+    "soft": "lower the voltage or lengthen the ramp of the soft starter",
+    "inverter": "lengthen run.ramp",
+}
+"""Remedies for a start that is too hard, by the start of the study."""
+
 CHOICES: Mapping[str, Any] = {
     "feed_forward": (
         StrictBool,

@@ -93,7 +93,7 @@ SIZING_KEYS: Mapping[str, Any] = {
         ),
     ),
     "ratios": (
-        numbers(Transmission, "ratio", "sizing.ratios", 500),
+        numbers(Transmission, "ratio", "sizing.ratios", 500, is_empty_allowed=False),
         Field([], description="gear ratios on offer, of a catalogue of gears, in place of the series"),
     ),
 }
