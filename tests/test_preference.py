@@ -424,6 +424,20 @@ def test_the_least_boost_with_which_it_starts_is_taken():
     for needed, taken in ((0.0, 0.05), (0.08, 0.10), (0.12, 0.15), (0.3, 0.05)):
         best = least_boost(config, c, judged(needed))
         assert best.drive.parameters.inverter.boost == taken and best.starts is (needed < 0.2)
+    # a run that fails with a higher boost hides neither the first trial nor the boost behind it
+
+    def failing(needed):
+        def judge(each):
+            each = judged(needed)(each)
+            if each.drive.parameters.inverter.boost == 0.10:
+                each.checks, each.reason = {}, "its run failed: no step"
+            return each
+
+        return judge
+
+    assert least_boost(config, c, failing(0.12)).drive.parameters.inverter.boost == 0.15
+    first = least_boost(config, c, failing(0.3))
+    assert first.drive.parameters.inverter.boost == 0.05 and first.checks
     (boost, _) = inverter_needs(least_boost(config, c, judged(0.12)), config)
     assert boost.startswith("The inverter needs a voltage boost of 15 % ") and "with less" in boost
     given, c = proposed("[starter.inverter]\nboost = 0.08\n[sizing]\n", start="inverter")

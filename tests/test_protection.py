@@ -21,7 +21,7 @@ from chainunit.machines.chain_unit import SIDES
 from chainunit.reading.text import entry
 from chainunit.report import blocks, terminal
 from chainunit.report.sizing import _best
-from chainunit.study import config, sizing
+from chainunit.study import config, coupling_alternatives, sizing
 from chainunit.study.bearings import hardest_run, mean_load
 from chainunit.study.coupling import coupling_sentence, recommended_setting, way_words
 from chainunit.study.coupling_alternatives import _before_flywheel, on_motor_side, slip_run
@@ -247,6 +247,7 @@ def test_a_starter_that_is_recommended_holds_in_a_study_of_its_own(on_line, way,
     text = start.format(heavy(*SIX).partition("[sizing]")[0])
     if way is Way.INVERTER:
         text = text.replace("[run]\n", f"[run]\nramp = {numbers.ramp}\n")
+        text += f"[starter.inverter]\nboost = {numbers.boost}\n"
     text += f'[system]\nmotor = "{MOTOR}"\n[gear]\nratio = {on_line.drive.ratio!r}\n'
     trial = run_study(config.parse(text + f"[coupling]\ntrip_torque = {numbers.setting}\n"), tmp_path)
     assert trial.failure is None
@@ -265,6 +266,27 @@ def test_a_starter_that_is_recommended_holds_in_a_study_of_its_own(on_line, way,
     assert opened == set(each.opens) and opened
     assert largest(trial, "start_up") <= 1.001 * max(numbers.start, numbers.running) < numbers.setting
     assert not [warning for warning in trial.warnings if warning.kind == "coupling opens in start"]
+
+
+def test_an_inverter_as_a_way_is_tried_with_more_boost(on_line, monkeypatch):
+    """The mill with 0.75 kW started with 15 % only, and was said to start with none."""
+    tried = []
+
+    def gentlest(trials, study, goal, limit):
+        rigs = list(trials)
+        tried.append(({rig.drive.parameters.inverter.boost for rig, *_ in rigs}, len(rigs)))
+        rig, _, numbers = rigs[0]
+        return (rig, on_line.findings["starts"].starts, numbers) if numbers["boost"] == 0.15 else None
+
+    monkeypatch.setattr(coupling_alternatives, "_gentlest", gentlest)
+    monkeypatch.setattr(coupling_alternatives, "_runs", lambda study, rig, of: (1.0, {}))
+    rig = Rig(on_line.config, on_line.drive, None)
+    found = coupling_alternatives._inverter(on_line, rig, on_line.setting)
+    assert tried == [({0.05}, 5), ({0.10}, 5), ({0.15}, 5)] and found.numbers.boost == 0.15
+    given = dataclasses.replace(on_line.config, given=on_line.config.given | {"starter.inverter.boost"})
+    tried.clear()
+    none = coupling_alternatives._inverter(dataclasses.replace(on_line, config=given), rig, on_line.setting)
+    assert tried == [({0.05}, 5)] and none.numbers.start is None
 
 
 def test_a_recommendation_rests_on_right_runs_alone(on_line):

@@ -18,10 +18,9 @@ _RELIEVED = ("rms_torque", "peak_torque", "temperature", "inverter_current")
 """Checks that a larger ratio improves: the motor turns faster and gives less torque."""
 
 
-def _boosts(config: Config, c: Candidate) -> list[float]:
-    """The boosts to try, that of the candidate first; it alone where the file gives it, or on the line."""
-    own = float(c.drive.parameters.inverter.boost)
-    if not c.drive.follows or "starter.inverter.boost" in config.given:
+def boosts(config: Config, own: float) -> list[float]:
+    """The boosts to try, the `own` one first; it alone where the file gives it."""
+    if "starter.inverter.boost" in config.given:
         return [own]
     return [own, *(boost for boost in BOOSTS if boost > own)]
 
@@ -34,13 +33,13 @@ def _with_boost(c: Candidate, boost: float) -> Candidate:
 
 def least_boost(config: Config, c: Candidate, judged: Callable[[Candidate], Candidate]) -> Candidate:
     """The candidate, as `judged`, with the least boost with which it starts; where it starts with none, with the
-    first."""
-    trials = []
-    for boost in _boosts(config, c):
-        trials.append(judged(_with_boost(c, boost)))
-        if trials[-1].starts or not trials[-1].checks:
-            return trials[-1]
-    return trials[0]
+    first. A boost with which the run fails is none with which it starts."""
+    own = float(c.drive.parameters.inverter.boost)
+    first = judged(_with_boost(c, own))
+    if first.starts or not c.drive.follows:
+        return first
+    others = (judged(_with_boost(c, boost)) for boost in boosts(config, own)[1:])
+    return next((each for each in others if each.starts), first)
 
 
 def misses_by_a_hair(c: Candidate) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 from ..core.engines import numpy_
 from ..drives.cardan import two_joints
 from ..reading.text import number
+from .catalogue_drive import SLIP
 from .coupling import remark_on_coupling, remark_on_rams
 from .event_torques import peaks_in_events
 from .events import Jam
@@ -333,6 +334,16 @@ def _on_inverter(study: StudyRecord) -> None:
     rated_current = study.drive.rated_current
     if rated_current is None or study.config.start != "inverter":
         return
+    if SLIP not in study.config.given:
+        slip = study.drive.parameters.inverter.slip
+        without = (
+            "The inverter does not compensate the slip of the motor (starter.inverter.slip): it would raise "
+            "its frequency in each peak of the load, where the flywheel has to slow down to give its energy."
+        )
+        compensated = (
+            "The inverter compensates the rated slip of the motor by {slip} (starter.inverter.slip)."
+        )
+        study.note("slip compensation", compensated if slip else without, slip=(slip, "Hz/(N.m)"))
     limit = study.config.starter.overload
     runs = {name: a.current_peak for name, a in (("start_up", study.start), *study.answers.items()) if a}
     high = {name: peak for name, peak in runs.items() if peak is not None and peak > limit * rated_current}

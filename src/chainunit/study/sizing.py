@@ -24,7 +24,7 @@ from ..fmu.backends import Backend
 from ..reading.text import entries, number
 from ..work.progress import Report
 from .candidate import Candidate, Standing
-from .catalogue_drive import catalogue_drive
+from .catalogue_drive import catalogue_drive, with_wheel
 from .chain import HIGH
 from .config import Config
 from .duty import CycleNumbers, Duty, duty_of
@@ -338,7 +338,7 @@ def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[st
     trials: list[Candidate] = []
 
     def trial_with(flywheel: float) -> Candidate:
-        candidate = dataclasses.replace(bare, drive=dataclasses.replace(bare.drive, flywheel=flywheel))
+        candidate = dataclasses.replace(bare, drive=with_wheel(config, bare.drive, flywheel))
         judge(config, candidate, duty, files)
         trials.append(candidate)
         return candidate
