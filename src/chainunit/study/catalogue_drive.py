@@ -99,7 +99,7 @@ def with_wheel(config: Config, drive: Drive, flywheel: float) -> Drive:
     """The drive with that flywheel [kg m2]. Slip compensation raises the frequency in each peak of the load, where a
     flywheel has to slow down to give its energy: with a flywheel there is none, unless the file gives it."""
     drive = dataclasses.replace(drive, flywheel=flywheel)
-    if not flywheel or not drive.follows or not config.of_catalogue or SLIP in config.given:
+    if not flywheel or config.start != "inverter" or not config.of_catalogue or SLIP in config.given:
         return drive
     inverter = dataclasses.replace(drive.parameters.inverter, slip=0.0)
     return dataclasses.replace(drive, parameters=dataclasses.replace(drive.parameters, inverter=inverter))

@@ -14,7 +14,7 @@ BOOSTS = (0.05, 0.10, 0.15)
 HAIR = 1.1
 """Factor by which a candidate may exceed the share of a limit that the margin leaves, so that it is tried with the
 ratio above: a step of the finest series is 3 %, and the heat of a winding changes with the square of the torque."""
-_RELIEVED = ("rms_torque", "peak_torque", "temperature", "inverter_current")
+_RELIEVED = ("rms_torque", "peak_torque", "temperature")
 """Checks that a larger ratio improves: the motor turns faster and gives less torque."""
 
 
@@ -64,10 +64,16 @@ def inverter_needs(best: Candidate, config: Config) -> Iterator[str]:
             yield f"{text}: one with the rated current of the motor suffices, also for the start."
         else:
             yield (
-                f"{text}, and the start takes {number(best.start_current, 'A')}, {best.start_current / rated:.2g} "
-                f"times the rated current of the motor: order one of at least {number(best.inverter_current, 'A')}, "
-                "or lengthen run.ramp."
+                f"{text}. The start takes up to {number(best.start_current, 'A')}, "
+                f"{best.start_current / rated:.2g} times the rated current of the motor, and more than this current "
+                f"for {number(best.overload_time, 's')}: order one of at least {number(best.inverter_current, 'A')}."
             )
+    if best.weakened:
+        yield (
+            f"The motor runs at {number(best.frequency, 'Hz')}, above its rated "
+            f"{number(best.motor.nameplate.frequency, 'Hz')}: in field weakening, where its breakdown torque falls "
+            "with the square of the frequency; gear.ratio or sizing.ratios lead there."
+        )
     yield (
         "The electronic motor protection of the inverter stands in place of a thermal relay: set it to the rated "
         "current of the motor. No trip class is to be chosen for it."

@@ -34,7 +34,7 @@ _FOLLOWS = {
     "gear.efficiency": "98 % a stage of a helical gear, 70 % of a worm gear, 95 % of a V-belt; see sizing.gear_kind",
     "starter.inverter.boost": "5 %; with [sizing] the least of 5, 10 and 15 % with which the machine starts",
     "starter.inverter.slip": "that of the rated slip of the motor; none with a flywheel, against which it works",
-    "sizing.inertia_ratio": '10 with start = "inverter", else none',
+    "sizing.inertia_ratio": "none",
     "chain.sweep_highest": "twice run.crank_speed, or 1.2 times the lowest mode of an organ if that is more",
     "motor.speed_control.kp": "tuned",
     "motor.speed_control.ki": "tuned",

@@ -345,19 +345,26 @@ def _on_inverter(study: StudyRecord) -> None:
         )
         study.note("slip compensation", compensated if slip else without, slip=(slip, "Hz/(N.m)"))
     limit = study.config.starter.overload
+    ordered = study.sizing.best.inverter_current if study.sizing else None
+    rated_current, whose = (
+        (ordered, "to be ordered") if ordered else (rated_current, "with the rated current of the motor")
+    )
     runs = {name: a.current_peak for name, a in (("start_up", study.start), *study.answers.items()) if a}
-    high = {name: peak for name, peak in runs.items() if peak is not None and peak > limit * rated_current}
+    high = {
+        name: peak for name, peak in runs.items() if peak is not None and peak > 1.001 * limit * rated_current
+    }
     if high:
         where = (
             f"{study.title_of(name)} ({number(peak / rated_current, '1')})" for name, peak in high.items()
         )
         study.note(
             "inverter current",
-            "The inverter's own current limit is not in the model, and one of the rated current of the motor gives "
-            "{limit} times that for up to 60 s (starter.overload). Take one for the peak current, or the motor gives "
+            "The inverter's own current limit is not in the model, and the one {whose} gives {limit} times its rated "
+            "current for up to 60 s (starter.overload). Take one for the peak current, or the motor gives "
             "less torque than here. Times the rated {rated}: {where}.",
             *high,
             limit=f"{limit:g}",
+            whose=whose,
             rated=(rated_current, "A"),
             where="; ".join(where),
             **{f"{name}.current_peak": (peak, "A") for name, peak in high.items()},

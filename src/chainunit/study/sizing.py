@@ -279,7 +279,11 @@ def _is_settled(candidates: list[Candidate], following: CatalogueMotor, larger: 
         return False
     best, _ = choice(keeping, larger)
     is_light = best.unit is not None and (best.start_class or 0) <= LIGHT and not best.drive.flywheel
-    if is_light and poles_rank(best.motor.nameplate.poles) <= poles_rank(following.nameplate.poles):
+    if (
+        is_light
+        and not best.weakened
+        and poles_rank(best.motor.nameplate.poles) <= poles_rank(following.nameplate.poles)
+    ):
         return best.power < following.nameplate.power
     return following.nameplate.power > larger * min(c.power for c in keeping)
 
@@ -459,3 +463,6 @@ def judge(
     c.checks, c.fluctuation = trial.checks(), trial.fluctuation
     c.duty, c.stall_angle = trial.duty, trial.stall_angle
     c.start_class, c.start_current = trial.start_class, trial.start_current
+    c.inverter_current, c.overload_time = trial.inverter_current, trial.overload_time
+    if trial.start_time is not None:
+        c.speed, c.frequency = trial.speed, trial.frequency
