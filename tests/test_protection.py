@@ -20,7 +20,7 @@ from chainunit.drives.slip_clutch import SlipClutch
 from chainunit.machines.chain_unit import SIDES
 from chainunit.reading.text import entry
 from chainunit.report import blocks, terminal
-from chainunit.report.sizing import _best
+from chainunit.report.sizing import _best, _starter
 from chainunit.study import config, coupling_alternatives, sizing
 from chainunit.study.bearings import hardest_run, mean_load
 from chainunit.study.coupling import coupling_sentence, recommended_setting, way_words
@@ -532,6 +532,39 @@ def test_the_protection_of_a_chosen_motor_is_told_once(protection, ending):
     )
     sentence = next(each for each in _best(source, "sizing.candidates.0", "Motor") if each.form == "short")
     assert terminal.plain_line(sentence.line).endswith(ending)
+
+
+def test_the_order_names_the_starter():
+    """The least rated current of an inverter stood in a note only, and a soft starter nowhere."""
+    starter = {
+        "inverter.boost": entry(0.05, "1", "percent"),
+        "soft_start.voltage": entry(0.5, "1", "percent"),
+        "soft_start.time": entry(1.0, "s"),
+    }
+    numbers = {
+        "inverter_current": entry(45.4, "A"),
+        "frequency": entry(50.3, "Hz"),
+        "speed": entry(156.8, "rad/s", "speed"),
+    }
+    result = {
+        "run": {"ramp": entry(2.0, "s")},
+        "starter": starter,
+        "sizing": {"candidates": [{"numbers": numbers}]},
+    }
+
+    def said(start):
+        lines = _starter(blocks.Source(result | {"start": start}), "sizing.candidates.0")
+        return "; ".join(map(terminal.plain_line, lines))
+
+    assert said("soft") == "soft starter, 50 % voltage, 1 s"
+    inverter = (
+        "inverter of at least 45.4 A, boost 5 %, ramp 2 s; in running 50.3 Hz, 157 rad/s (1497 rev/min)"
+    )
+    assert said("inverter") == inverter
+    numbers["inverter_current"] = entry(None, "A")
+    assert said("inverter") == "inverter, boost 5 %, ramp 2 s"
+    del result["starter"]
+    assert said("direct") == ""
 
 
 def test_an_insufficient_motor_gets_no_advice(tmp_path, monkeypatch):

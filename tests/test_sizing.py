@@ -28,11 +28,11 @@ from chainunit.study.candidate import Criterion, Standing
 from chainunit.study.config import parse
 from chainunit.study.cycle import cycle, energy_swing, needed_inertia
 from chainunit.study.drive import Drive
-from chainunit.study.duty import rms
+from chainunit.study.duty import duty_of, rms
 from chainunit.study.limits import Check
 from chainunit.study.measures import time_to_start
 from chainunit.study.rig import Rig
-from chainunit.study.trial import Trial, permitted_starts
+from chainunit.study.trial import Trial, permitted_starts, try_motor
 from chainunit.system import CompiledSimulation, CoSimulation, Profile, System
 
 ANGLE = np.linspace(0.0, 2.0 * math.pi, 7200, endpoint=False)
@@ -465,6 +465,21 @@ def test_above_the_corner_an_inverter_has_less_torque(tmp_path, monkeypatch):
     (light,) = sizing.size(config, tmp_path, lambda *said: None).candidates
     assert light.verdict is Standing.INSUFFICIENT and "peak torque" in light.reason
     assert light.drive.flywheel < 0.1 * c.drive.flywheel
+
+
+def test_the_peak_torque_is_that_of_the_feed_that_moves_too(tmp_path, monkeypatch):
+    """A motor that breaks down while the feed moves to one side stalls there."""
+    config = one_candidate("", fluctuation=0.9)
+    duty = duty_of(config, tmp_path, None)
+    c = sizing.proposal(config, small(1)[0], duty)
+    trial = try_motor(config, c.motor, c.drive, duty, None)
+    assert len(trial.shifts) >= 2
+    longest = max(trial.shifts, key=lambda shift: np.max(np.abs(shift[1]["motor.air_gap_tau"].values)))[1]
+    moved = longest.assign({"motor.air_gap_tau": 3.0 * longest["motor.air_gap_tau"]})
+    most = float(np.max(np.abs(moved["motor.air_gap_tau"].values)))
+    harder = dataclasses.replace(trial, shifts=(("all feed on the left", moved),))
+    assert harder.checks()["peak_torque"].value == pytest.approx(most)
+    assert harder.checks()["rms_torque"].value == trial.checks()["rms_torque"].value
 
 
 def test_the_shift_of_the_feed_keeps_its_mass():

@@ -99,10 +99,10 @@ def _starter(s: b.Source, path: str) -> Iterator[Line]:
     """The soft starter or inverter to be ordered, with its settings; nothing for a start direct on line."""
     start = s.result["start"] if "starter" in s.result else "direct"
     if start == "soft":
-        yield s.line("soft starter, {starter.soft_start.voltage} voltage, {starter.soft_start.time}")
+        yield s.line("soft starter, {=starter.soft_start.voltage} voltage, {=starter.soft_start.time}")
     elif start == "inverter":
         current = s.line(f" of at least {{{path}.numbers.inverter_current}}") if _starts(s, path) else ()
-        yield line("inverter", current, s.line(", boost {starter.inverter.boost}, ramp {=run.ramp}"))
+        yield line("inverter", current, s.line(", boost {=starter.inverter.boost}, ramp {=run.ramp}"))
         if _starts(s, path):
             yield s.line(f"in running {{{path}.numbers.frequency}}, {{{path}.numbers.speed}}")
 
