@@ -20,8 +20,8 @@ from chainunit.drives.slip_clutch import SlipClutch
 from chainunit.machines.chain_unit import SIDES
 from chainunit.reading.text import entry
 from chainunit.report import blocks, terminal
-from chainunit.report.sizing import _best
-from chainunit.study import config, run, sizing
+from chainunit.report.sizing import _best, _starter
+from chainunit.study import config, coupling_alternatives, run, sizing
 from chainunit.study.analyses import ANALYSES
 from chainunit.study.analysis import Analysis
 from chainunit.study.bearings import hardest_run, mean_load
@@ -334,6 +334,7 @@ def test_a_starter_that_is_recommended_holds_in_a_study_of_its_own(on_line, way,
     text = start.format(heavy(*SIX).partition("[sizing]")[0])
     if way is Way.INVERTER:
         text = text.replace("[run]\n", f"[run]\nramp = {numbers.ramp}\n")
+        text += f"[starter.inverter]\nboost = {numbers.boost}\n"
     text += f'[system]\nmotor = "{MOTOR}"\n[gear]\nratio = {on_line.drive.ratio!r}\n'
     trial = run_study(config.parse(text + f"[coupling]\ntrip_torque = {numbers.setting}\n"), tmp_path)
     assert trial.failure is None
@@ -352,6 +353,27 @@ def test_a_starter_that_is_recommended_holds_in_a_study_of_its_own(on_line, way,
     assert opened == set(each.opens) and opened
     assert largest(trial, "start_up") <= 1.001 * max(numbers.start, numbers.running) < numbers.setting
     assert not [warning for warning in trial.warnings if warning.kind == "coupling opens in start"]
+
+
+def test_an_inverter_as_a_way_is_tried_with_more_boost(on_line, monkeypatch):
+    """The mill with 0.75 kW started with 15 % only, and was said to start with none."""
+    tried = []
+
+    def gentlest(trials, study, goal, limit):
+        rigs = list(trials)
+        tried.append(({rig.drive.parameters.inverter.boost for rig, *_ in rigs}, len(rigs)))
+        rig, _, numbers = rigs[0]
+        return (rig, on_line.findings["starts"].starts, numbers) if numbers["boost"] == 0.15 else None
+
+    monkeypatch.setattr(coupling_alternatives, "_gentlest", gentlest)
+    monkeypatch.setattr(coupling_alternatives, "_runs", lambda study, rig, of: (1.0, {}))
+    rig = Rig(on_line.config, on_line.drive, None)
+    found = coupling_alternatives._inverter(on_line, rig, on_line.setting)
+    assert tried == [({0.05}, 5), ({0.10}, 5), ({0.15}, 5)] and found.numbers.boost == 0.15
+    given = dataclasses.replace(on_line.config, given=on_line.config.given | {"starter.inverter.boost"})
+    tried.clear()
+    none = coupling_alternatives._inverter(dataclasses.replace(on_line, config=given), rig, on_line.setting)
+    assert tried == [({0.05}, 5)] and none.numbers.start is None
 
 
 def test_a_recommendation_rests_on_right_runs_alone(on_line):
@@ -618,6 +640,39 @@ def test_the_protection_of_a_chosen_motor_is_told_once(protection, ending):
     )
     sentence = next(each for each in _best(source, "sizing.candidates.0", "Motor") if each.form == "short")
     assert terminal.plain_line(sentence.line).endswith(ending)
+
+
+def test_the_order_names_the_starter():
+    """The least rated current of an inverter stood in a note only, and a soft starter nowhere."""
+    starter = {
+        "inverter.boost": entry(0.05, "1", "percent"),
+        "soft_start.voltage": entry(0.5, "1", "percent"),
+        "soft_start.time": entry(1.0, "s"),
+    }
+    numbers = {
+        "inverter_current": entry(45.4, "A"),
+        "frequency": entry(50.3, "Hz"),
+        "speed": entry(156.8, "rad/s", "speed"),
+    }
+    result = {
+        "run": {"ramp": entry(2.0, "s")},
+        "starter": starter,
+        "sizing": {"candidates": [{"numbers": numbers}]},
+    }
+
+    def said(start):
+        lines = _starter(blocks.Source(result | {"start": start}), "sizing.candidates.0")
+        return "; ".join(map(terminal.plain_line, lines))
+
+    assert said("soft") == "soft starter, 50 % voltage, 1 s"
+    inverter = (
+        "inverter of at least 45.4 A, boost 5 %, ramp 2 s; in running 50.3 Hz, 157 rad/s (1497 rev/min)"
+    )
+    assert said("inverter") == inverter
+    numbers["inverter_current"] = entry(None, "A")
+    assert said("inverter") == "inverter, boost 5 %, ramp 2 s"
+    del result["starter"]
+    assert said("direct") == ""
 
 
 def test_an_insufficient_motor_gets_no_advice(tmp_path, monkeypatch):

@@ -29,11 +29,11 @@ from chainunit.study.catalogue_drive import check_ratios
 from chainunit.study.config import parse
 from chainunit.study.cycle import cycle, energy_swing, needed_inertia
 from chainunit.study.drive import Drive
-from chainunit.study.duty import rms
+from chainunit.study.duty import duty_of, rms
 from chainunit.study.limits import Check
 from chainunit.study.measures import time_to_start
 from chainunit.study.rig import Rig
-from chainunit.study.trial import Trial, permitted_starts
+from chainunit.study.trial import Trial, permitted_starts, try_motor
 from chainunit.system import CompiledSimulation, CoSimulation, Profile, System
 
 ANGLE = np.linspace(0.0, 2.0 * math.pi, 7200, endpoint=False)
@@ -173,7 +173,7 @@ def wheel_of(monkeypatch, wanted, inertia, sizes):
     numbers.torque_peak_one_sided = None
     plate = SimpleNamespace(torque=10.0, synchronous=105.0, speed=100.0)
     bare = sizing.Candidate(SimpleNamespace(nameplate=plate), Wheeled(), {})
-    config = SimpleNamespace(run=SimpleNamespace(crank_speed=2.0))
+    config = SimpleNamespace(run=SimpleNamespace(crank_speed=2.0), start="direct")
     return sizing.with_flywheel(config, bare, SimpleNamespace(numbers=numbers), {}), trials
 
 
@@ -365,7 +365,7 @@ def test_sizing_climbs_until_one_fits(tmp_path, monkeypatch):
     assert all(c.motor.nameplate.power < result.chosen_candidate.motor.nameplate.power for c in others)
 
 
-def test_a_limit_of_the_inertia_ratio_is_for_inverters_or_who_asks_for_it(tmp_path, monkeypatch):
+def test_a_limit_of_the_inertia_ratio_is_for_who_asks_for_it(tmp_path, monkeypatch):
     monkeypatch.setattr(sizing, "catalogue", lambda extra: small(1, 1))
 
     def found(more):
@@ -375,8 +375,8 @@ def test_a_limit_of_the_inertia_ratio_is_for_inverters_or_who_asks_for_it(tmp_pa
     assert found("").as_dict()["asked"]["inertia_ratio"]["value"] is None
     asked = found("inertia_ratio = 5\n").best
     assert asked.checks["inertia"].limit == 5.0
-    inverter = parse('start = "inverter"\n' + HEAVY)
-    assert inverter.sizing.inertia_ratio == 10.0
+    # nor for an inverter: the limit is a rule for servo drives
+    assert parse('start = "inverter"\n' + HEAVY).sizing.inertia_ratio == math.inf
 
 
 def test_poles_that_no_motor_has_are_refused(tmp_path):
@@ -492,6 +492,21 @@ def test_above_the_corner_an_inverter_has_less_torque(tmp_path, monkeypatch):
     (light,) = sizing.size(config, tmp_path, lambda *said: None).candidates
     assert light.verdict is Standing.INSUFFICIENT and "peak torque" in light.reason
     assert light.drive.flywheel < 0.1 * c.drive.flywheel
+
+
+def test_the_peak_torque_is_that_of_the_feed_that_moves_too(tmp_path, monkeypatch):
+    """A motor that breaks down while the feed moves to one side stalls there."""
+    config = one_candidate("", fluctuation=0.9)
+    duty = duty_of(config, tmp_path, None)
+    c = sizing.proposal(config, small(1)[0], duty)
+    trial = try_motor(config, c.motor, c.drive, duty, None)
+    assert len(trial.shifts) >= 2
+    longest = max(trial.shifts, key=lambda shift: np.max(np.abs(shift[1]["motor.air_gap_tau"].values)))[1]
+    moved = longest.assign({"motor.air_gap_tau": 3.0 * longest["motor.air_gap_tau"]})
+    most = float(np.max(np.abs(moved["motor.air_gap_tau"].values)))
+    harder = dataclasses.replace(trial, shifts=(("all feed on the left", moved),))
+    assert harder.checks()["peak_torque"].value == pytest.approx(most)
+    assert harder.checks()["rms_torque"].value == trial.checks()["rms_torque"].value
 
 
 def test_the_shift_of_the_feed_keeps_its_mass():

@@ -29,7 +29,7 @@ def answer(s: b.Source) -> Iterator[b.Block]:
     also = {"flywheel": _disc, "protection": _protection}
     gear = (*_gear(s, path), *_gear_torque(s))
     cards = [
-        b.Card("Motor", ((motor, str(b.at(s.result, f"{path}.verdict"))),), tuple(_data(s))),
+        b.Card("Motor", ((motor, str(b.at(s.result, f"{path}.verdict"))),), (*_data(s), *_starter(s, path))),
         b.Card("Gear ratio", ((ratio, "motor turns per crank turn"),), gear),
         *(
             b.Card(capital(name), ((size or "none", title),), tuple(also[name](s)))
@@ -95,6 +95,22 @@ def _gear_torque(s: b.Source) -> Iterator[Line]:
     if s.result["sizing"].get("gear"):
         order = s.line("gear with a rated output torque of at least {sizing.gear.rated_torque}")
         yield line(order, ", decided by ", s.words("sizing.gear.decided_by"))
+
+
+def _starter(s: b.Source, path: str) -> Iterator[Line]:
+    """The soft starter or inverter to be ordered, with its settings; nothing for a start direct on line."""
+    start = s.result["start"] if "starter" in s.result else "direct"
+    if start == "soft":
+        yield s.line("soft starter, {=starter.soft_start.voltage} voltage, {=starter.soft_start.time}")
+    elif start == "inverter":
+        current = s.line(f" of at least {{{path}.numbers.inverter_current}}") if _starts(s, path) else ()
+        yield line("inverter", current, s.line(", boost {=starter.inverter.boost}, ramp {=run.ramp}"))
+        if _starts(s, path):
+            yield s.line(f"in running {{{path}.numbers.frequency}}, {{{path}.numbers.speed}}")
+
+
+def _starts(s: b.Source, path: str) -> bool:
+    return s.value(f"{path}.numbers.inverter_current") is not None
 
 
 def _protection(s: b.Source) -> Iterator[Line]:
@@ -200,7 +216,8 @@ def _best(s: b.Source, path: str, word: str) -> Iterator[b.Block]:
     begin = "Chosen: " if word == "Motor" else "Insufficient: "
     yield b.Text(line(sentence, doubt, "."), form="short")
     # a motor that does not suffice is not ordered
-    order = [line("motor ", s.words(f"{path}.motor"), " of ", each) for each in _data(s)] + [*_gear_torque(s)]
+    motor = [line("motor ", s.words(f"{path}.motor"), " of ", each) for each in _data(s)]
+    order: list[Line] = [*motor, *_gear_torque(s), *_starter(s, path)]
     if order and word == "Motor":
         yield b.Text(line("Order: ", join(order, "; "), "."), form="short")
     yield b.Text(line(begin, s.words(f"{path}.reason"), doubt, "."))
@@ -276,7 +293,9 @@ def _trade(s: b.Source) -> Iterator[b.Block]:
         )
     if rows:
         title = "A flywheel, or a larger motor. Mass: of motor and flywheel."
-        yield b.Table(tuple(rows), b.heads("motor", "flywheel", "start", "mass", "verdict"), title=title)
+        yield b.Table(
+            tuple(rows), b.heads("motor", "flywheel", "start, worst angle", "mass", "verdict"), title=title
+        )
 
 
 def _flywheel(s: b.Source, candidate: str) -> Line:

@@ -24,6 +24,10 @@ rated torque in a start. A margin on top would prefer two gear units, or a flywh
 _WHOLLY = (*TOLERANCES, *_HARD)
 
 
+FIELD_WEAKENING = 1.1
+"""Frequency of running, in parts of the rated one, above which a motor counts as one in field weakening."""
+
+
 @declaration
 class Flywheel:
     """The flywheel of a drive, and the disc of steel that has its inertia; None without a flywheel."""
@@ -44,6 +48,8 @@ class DriveNumbers:
         "1", "trip class of the overload relay that holds in the start; 40: none up to class 30"
     )
     inverter_current: Value = quantity("A", "least rated current of the inverter")
+    frequency: Value = quantity("Hz", "frequency of the supply in steady running")
+    speed: Value = quantity("rad/s", "speed of the motor in steady running", kind="speed")
     mass: Value = quantity("kg", "mass of motor and flywheel, the relative cost")
     price: Value = quantity("1", "price of the motor, as the catalogue has it")
 
@@ -65,6 +71,7 @@ class Criterion(StrEnum):
 
     MARGIN = "margin"
     LARGER = "larger"
+    FIELD = "field"
     GEAR = "gear"
     START = "start"
     FLYWHEEL = "flywheel"
@@ -91,6 +98,14 @@ class Candidate:
     """see `chainunit.study.relay`; None for an inverter, or where there is no start"""
     start_current: float | None = None
     """largest current of the motor in a start [A]; None without a start"""
+    overload_time: float | None = None
+    """longest time of a start above the rated current of the motor [s]; None without a start"""
+    inverter_current: float | None = None
+    """least rated current of an inverter [A] that carries running and starts, see `Trial.inverter_current`; None on
+    the line, or without a start"""
+    speed: float | None = None
+    frequency: float | None = None
+    """mean speed of the motor in steady running [rad/s], and frequency of its supply [Hz]; None without a start"""
     duty: DutyPeak | None = None
     """the largest torque at the crank in steady running, and while all feed moves to either side and stays there;
     None where the run failed"""
@@ -164,15 +179,10 @@ class Candidate:
         return float(self.motor.nameplate.power)
 
     @property
-    def inverter_current(self) -> float | None:
-        """Least rated current of an inverter [A] that carries the duty and the peak of the starts for a short time;
-        None on the line, or without a start."""
-        if self.start_current is None or "inverter_current" not in self.checks:
-            return None
-        rated = float(self.motor.nameplate.rated_current)
-        running = self.checks["inverter_current"]
-        overload = running.limit / rated
-        return max(rated, max(self.start_current, running.value or 0.0) / overload)
+    def weakened(self) -> bool:
+        """Whether an inverter runs the motor well above its rated frequency, where it has less torque."""
+        rated = float(self.motor.nameplate.frequency)
+        return self.frequency is not None and self.frequency > FIELD_WEAKENING * rated
 
     @property
     def disc(self) -> Disc | None:
@@ -210,6 +220,8 @@ class Candidate:
         numbers = DriveNumbers(
             start_class=self.start_class,
             inverter_current=self.inverter_current,
+            frequency=self.frequency,
+            speed=self.speed,
             mass=self.mass,
             price=self.motor.nameplate.price or None,
         )

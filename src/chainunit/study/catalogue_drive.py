@@ -21,7 +21,9 @@ from ..reading.text import number
 from .config import Config
 from .drive import Drive
 from .limits import SPEED_DEVIATION
-from .sections import Starter
+
+SLIP = "starter.inverter.slip"
+"""Key of the slip compensation."""
 
 
 def catalogue_drive(
@@ -56,12 +58,12 @@ def catalogue_drive(
     for _ in range(3):
         shaft = motor_side(numpy_(), gear_with(config, ratio), crank_torque, speed)
         mean = float(np.mean(shaft))
-        # the slip is proportional to the torque; an inverter compensates it
+        # the slip is proportional to the torque; the reference of an inverter has the speed of the crank
         speed = rated_speed if follows else synchronous - (synchronous - rated_speed) * mean / rated_torque
         if gear_ratio is None:
             ratio = speed / w
         drag = (mean - float(np.mean(crank_torque)) / ratio) / speed
-    p = with_starter(p, plate, config.start, config.starter)
+    p = with_starter(p, plate, config)
     if ambient is not None:
         p = dataclasses.replace(p, ambient=dataclasses.replace(p.ambient, T=ambient))
     machine = config.machine.replace({"ratio": ratio})
@@ -119,12 +121,23 @@ def gear_with(config: Config, ratio: float) -> Transmission:
     return dataclasses.replace(config.gear, ratio=ratio, efficiency=efficiency)
 
 
-def with_starter(p: Any, plate: Nameplate, start: str, starter: Starter) -> Any:
-    """The parameters `p` of a motor that starts on line, with its starter: `start` is one of `sections.STARTS`."""
-    control = dataclasses.asdict(starter.inverter)
-    follows = start == "inverter"
-    if follows:
+def with_starter(p: Any, plate: Nameplate, config: Config) -> Any:
+    """The parameters `p` of a motor that starts on line, with the starter of the study. An inverter compensates the
+    rated slip of the motor, unless the file gives its compensation."""
+    control = dataclasses.asdict(config.starter.inverter)
+    follows = config.start == "inverter"
+    if follows and SLIP not in config.given:
         slip_hz = (plate.synchronous - plate.speed) * plate.poles / (4.0 * math.pi)
-        control["slip"] = control["slip"] or slip_hz / plate.torque
-    soft = starter.soft_start if start == "soft" else p.soft_start
+        control["slip"] = slip_hz / plate.torque
+    soft = config.starter.soft_start if config.start == "soft" else p.soft_start
     return dataclasses.replace(p, soft_start=soft, inverter=Inverter(on=float(follows), **control))
+
+
+def with_wheel(config: Config, drive: Drive, flywheel: float) -> Drive:
+    """The drive with that flywheel [kg m2]. Slip compensation raises the frequency in each peak of the load, where a
+    flywheel has to slow down to give its energy: with a flywheel there is none, unless the file gives it."""
+    drive = dataclasses.replace(drive, flywheel=flywheel)
+    if not flywheel or config.start != "inverter" or not config.of_catalogue or SLIP in config.given:
+        return drive
+    inverter = dataclasses.replace(drive.parameters.inverter, slip=0.0)
+    return dataclasses.replace(drive, parameters=dataclasses.replace(drive.parameters, inverter=inverter))

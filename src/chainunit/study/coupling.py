@@ -242,8 +242,8 @@ _WAYS = {
     Way.GEAR: "With a gear that may carry {gear}: {set}.",
     Way.SOFT_STARTER: 'With a soft starter (start = "soft"; starter.soft_start: voltage = "{voltage}", '
     'time = "{ramp}") a start puts at most {start} on it and takes {start_time}: {set}.',
-    Way.INVERTER: 'With an inverter (start = "inverter"; run.ramp = "{ramp}") a start puts at most {start} on it, '
-    "running {running}: {set}.",
+    Way.INVERTER: 'With an inverter (start = "inverter"; run.ramp = "{ramp}", starter.inverter.boost = "{boost}") a '
+    "start puts at most {start} on it, running {running}: {set}.",
     Way.SLIP_CLUTCH: "With a slip clutch, set to {setting}, the motor starts on line, and the clutch slips for "
     "{slip_time} in each start, which makes {slip_energy} of heat. It slips, too, where {opens}: a switch has to "
     "stop the motor then, as the slip makes {slip_power} of heat.",
@@ -257,8 +257,8 @@ _WAYS = {
 _FAILURES = {
     Way.SOFT_STARTER: "No soft starter that was tried brings the crank to its speed from every angle within the "
     "locked-rotor time of the motor.",
-    Way.INVERTER: "An inverter with the boost of this study (starter.inverter.boost) does not bring the crank to its "
-    "speed from every angle with any ramp that was tried.",
+    Way.INVERTER: "An inverter does not bring the crank to its speed from every angle with any ramp and boost "
+    "(starter.inverter.boost) that were tried.",
     Way.SLIP_CLUTCH: "A slip clutch that running alone permits slips on in the start and does not bring the machine "
     "to its speed.",
 }
@@ -270,7 +270,7 @@ def way_words(study: StudyRecord, each: Alternative) -> str:
     if each.numbers.start is None:
         return _FAILURES[each.way]
     numbers = {
-        v.name: number(value, v.unit, v.kind, full=v.name not in ("voltage", "ramp"))
+        v.name: number(value, v.unit, v.kind, full=v.name not in ("voltage", "ramp", "boost"))
         for v in variables(WayNumbers)
         if (value := getattr(each.numbers, v.name)) is not None
     }

@@ -17,11 +17,12 @@ from ..system import ModelComponent, monolithic
 from ..system.graph import in_line
 from ..work.progress import Report
 from .arrays import peak
-from .catalogue_drive import with_starter
+from .catalogue_drive import with_starter, with_wheel
 from .cycle import cycle
 from .drive import Drive
 from .event import Role
 from .event_torques import effects
+from .inverter import boosts
 from .limits import starting
 from .measures import STARTED
 from .protection import MARGIN, Alternative, Setting, Way, WayNumbers
@@ -164,10 +165,11 @@ def _soft_starter(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative
     def rigs() -> Iterator[_Trial]:
         for voltage, time in SOFT_STARTERS:
             starter = dataclasses.replace(config.starter, soft_start=SoftStart(voltage=voltage, time=time))
-            p = with_starter(rig.drive.parameters, plate, "soft", starter)
+            own = dataclasses.replace(config, start="soft", starter=starter)
+            p = with_starter(rig.drive.parameters, plate, own)
             soft = dataclasses.replace(
                 rig,
-                config=dataclasses.replace(config, start="soft", starter=starter),
+                config=own,
                 drive=dataclasses.replace(rig.drive, parameters=p),
             )
             yield soft, usual + time, {"voltage": voltage, "ramp": time}
@@ -207,17 +209,23 @@ def _inverter(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative:
     config = study.config
     assert study.sizing is not None
     plate = study.sizing.best.motor.nameplate
-    p = with_starter(rig.drive.parameters, plate, "inverter", config.starter)
-    drive = dataclasses.replace(rig.drive, parameters=p, follows=True, observer=None, observed={})
 
-    def rigs() -> Iterator[_Trial]:
+    def rigs(boost: float) -> Iterator[_Trial]:
+        inverter = dataclasses.replace(config.starter.inverter, boost=boost)
+        starter = dataclasses.replace(config.starter, inverter=inverter)
         for ramp in RAMPS:
             run = dataclasses.replace(config.run, ramp=ramp)
-            own = dataclasses.replace(config, start="inverter", run=run)
-            yield dataclasses.replace(rig, config=own, drive=drive), 1.5 * ramp + 1.0, {"ramp": ramp}
+            own = dataclasses.replace(config, start="inverter", run=run, starter=starter)
+            p = with_starter(rig.drive.parameters, plate, own)
+            drive = dataclasses.replace(rig.drive, parameters=p, follows=True, observer=None, observed={})
+            fed = dataclasses.replace(rig, config=own, drive=with_wheel(own, drive, drive.flywheel))
+            yield fed, 1.5 * ramp + 1.0, {"ramp": ramp, "boost": boost}
 
-    best = _gentlest(rigs(), study, setting.running, math.inf)
-    if best is None:
+    for boost in boosts(config, config.starter.inverter.boost):
+        best = _gentlest(rigs(boost), study, setting.running, math.inf)
+        if best is not None:
+            break
+    else:
         return Alternative(Way.INVERTER, WayNumbers.of(), {})
     fed, starts, numbers = best
     fed = dataclasses.replace(fed, fed_from=None)

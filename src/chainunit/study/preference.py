@@ -17,6 +17,7 @@ STEP = 1.5
 ORDER: Mapping[Criterion, str] = {
     Criterion.MARGIN: "each limit is kept with the margin",
     Criterion.LARGER: "the power is at most {larger} times (sizing.larger) that of the smallest motor that fits so",
+    Criterion.FIELD: "an inverter runs the motor at no more than 1.1 times its rated frequency",
     Criterion.GEAR: "one gear unit has the ratio",
     Criterion.START: "the start takes a relay of a lower trip class",
     Criterion.FLYWHEEL: "there is no flywheel",
@@ -86,6 +87,7 @@ def _steps(larger: float) -> Sequence[tuple[Criterion, Callable[[list[Candidate]
     return (
         (Criterion.MARGIN, _with_margin),
         (Criterion.LARGER, partial(_powerful, most=larger)),
+        (Criterion.FIELD, partial(_least, value=lambda c: float(c.weakened))),
         (Criterion.GEAR, partial(_least, value=lambda c: float(c.unit is None))),
         (Criterion.START, partial(_least, value=lambda c: c.start_class or 0)),
         (Criterion.FLYWHEEL, partial(_least, value=lambda c: float(c.drive.flywheel > 0.0))),
@@ -180,6 +182,8 @@ def _chosen(best: Candidate, ranking: Sequence[Candidate]) -> str:
     # the one of the smallest that comes farthest in the order of preference
     rival = max((c for c in smaller if c.power == least), key=lambda c: [*Criterion].index(c.criterion))
     name = f"{rival.motor.designation}, the smallest that fits,"
+    if rival.criterion is Criterion.FIELD:
+        return f"runs at {number(best.frequency, 'Hz')}, where {name} {_weakened(rival)}"
     if rival.criterion is Criterion.GEAR:
         return f"takes one gear unit, where {name} takes two"
     if rival.criterion is Criterion.START:
@@ -200,11 +204,17 @@ def _behind(c: Candidate, best: Candidate) -> str:
     poles = (each.motor.nameplate.poles for each in (c, best))
     return {
         Criterion.MARGIN: f"leaves less than the margin of {_margin(c)}",
+        Criterion.FIELD: f"{_weakened(c)}",
         Criterion.GEAR: "its ratio takes two gear units",
         Criterion.START: f"its start is of {_class(c)}, that of the chosen one of {_class(best)}",
         Criterion.FLYWHEEL: "needs a flywheel, the chosen one none",
         Criterion.POLES: "{:g} poles, where {:g} are to be had".format(*poles),
     }.get(c.criterion or Criterion.POWER, "larger than needed")
+
+
+def _weakened(c: Candidate) -> str:
+    rated = number(c.motor.nameplate.frequency, "Hz")
+    return f"runs at {number(c.frequency, 'Hz')} in field weakening, with less torque than at its {rated}"
 
 
 def _margin(c: Candidate) -> str:

@@ -190,6 +190,9 @@ class WayNumbers:
     start_time: Value = quantity("s", "longest start-up")
     voltage: Value = quantity("1", "share of the voltage at the start", kind="percent")
     ramp: Value = quantity("s", "ramp of the voltage or of the speed")
+    boost: Value = quantity(
+        "1", "boost of the inverter: share of the voltage at frequency zero", kind="percent"
+    )
     slip_time: Value = quantity("s", "time for which the clutch slips in a start")
     slip_energy: Value = quantity("J", "heat of the slip in a start")
     slip_power: Value = quantity("W", "heat of the slip while the machine is blocked and the motor runs on")

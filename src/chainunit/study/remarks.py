@@ -11,6 +11,7 @@ import numpy as np
 from ..core.engines import numpy_
 from ..drives.cardan import two_joints
 from ..reading.text import number
+from .catalogue_drive import SLIP
 from .coupling import remark_on_coupling, remark_on_rams
 from .event_torques import peaks_in_events
 from .events import Jam
@@ -343,20 +344,37 @@ def _on_inverter(study: StudyRecord) -> None:
     rated_current = study.drive.rated_current
     if rated_current is None or study.config.start != "inverter":
         return
+    if SLIP not in study.config.given:
+        slip = study.drive.parameters.inverter.slip
+        without = (
+            "The inverter does not compensate the slip of the motor (starter.inverter.slip): it would raise "
+            "its frequency in each peak of the load, where the flywheel has to slow down to give its energy."
+        )
+        compensated = (
+            "The inverter compensates the rated slip of the motor by {slip} (starter.inverter.slip)."
+        )
+        study.note("slip compensation", compensated if slip else without, slip=(slip, "Hz/(N.m)"))
     limit = study.config.starter.overload
+    ordered = study.sizing.best.inverter_current if study.sizing else None
+    rated_current, whose = (
+        (ordered, "to be ordered") if ordered else (rated_current, "with the rated current of the motor")
+    )
     runs = {name: a.current_peak for name, a in (("start_up", study.start), *study.answers.items()) if a}
-    high = {name: peak for name, peak in runs.items() if peak is not None and peak > limit * rated_current}
+    high = {
+        name: peak for name, peak in runs.items() if peak is not None and peak > 1.001 * limit * rated_current
+    }
     if high:
         where = (
             f"{study.title_of(name)} ({number(peak / rated_current, '1')})" for name, peak in high.items()
         )
         study.note(
             "inverter current",
-            "The inverter's own current limit is not in the model, and one of the rated current of the motor gives "
-            "{limit} times that for up to 60 s (starter.overload). Take one for the peak current, or the motor gives "
+            "The inverter's own current limit is not in the model, and the one {whose} gives {limit} times its rated "
+            "current for up to 60 s (starter.overload). Take one for the peak current, or the motor gives "
             "less torque than here. Times the rated {rated}: {where}.",
             *high,
             limit=f"{limit:g}",
+            whose=whose,
             rated=(rated_current, "A"),
             where="; ".join(where),
             **{f"{name}.current_peak": (peak, "A") for name, peak in high.items()},

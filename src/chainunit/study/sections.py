@@ -136,7 +136,7 @@ class Starter:
     inverter: InverterControl = group(InverterControl, "inverter", default=InverterControl())
     overload: Value = quantity(
         "1",
-        "largest current of an inverter, for up to 60 s, over the rated current of the motor",
+        "largest current of an inverter, for up to 60 s, over its rated current",
         default=1.5,
         min=1.0,
         max=5.0,

@@ -24,7 +24,7 @@ from ..fmu.backends import Backend
 from ..reading.text import entries, number
 from ..work.progress import Report
 from .candidate import Candidate, Standing
-from .catalogue_drive import catalogue_drive, check_ratios, is_of_a_gear
+from .catalogue_drive import catalogue_drive, check_ratios, is_of_a_gear, with_wheel
 from .chain import HIGH
 from .config import Config
 from .duty import CycleNumbers, Duty, duty_of
@@ -306,7 +306,11 @@ def _is_settled(candidates: list[Candidate], following: CatalogueMotor, larger: 
         return False
     best, _ = choice(keeping, larger)
     is_light = best.unit is not None and (best.start_class or 0) <= LIGHT and not best.drive.flywheel
-    if is_light and poles_rank(best.motor.nameplate.poles) <= poles_rank(following.nameplate.poles):
+    if (
+        is_light
+        and not best.weakened
+        and poles_rank(best.motor.nameplate.poles) <= poles_rank(following.nameplate.poles)
+    ):
         return best.power < following.nameplate.power
     return following.nameplate.power > larger * min(c.power for c in keeping)
 
@@ -364,7 +368,7 @@ def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[st
     trials: list[Candidate] = []
 
     def trial_with(flywheel: float) -> Candidate:
-        candidate = dataclasses.replace(bare, drive=dataclasses.replace(bare.drive, flywheel=flywheel))
+        candidate = dataclasses.replace(bare, drive=with_wheel(config, bare.drive, flywheel))
         judge(config, candidate, duty, files)
         trials.append(candidate)
         return candidate
@@ -486,3 +490,6 @@ def judge(
     c.checks, c.fluctuation = trial.checks(), trial.fluctuation
     c.duty, c.stall_angle = trial.duty, trial.stall_angle
     c.start_class, c.start_current = trial.start_class, trial.start_current
+    c.inverter_current, c.overload_time = trial.inverter_current, trial.overload_time
+    if trial.start_time is not None:
+        c.speed, c.frequency = trial.speed, trial.frequency
