@@ -26,7 +26,7 @@ motor = "IE3 4-pole 0.75 kW, 80M"
 [gear]
 ratio = 50
 [starter]
-inverter = { ramp = "30 Hz/s" }
+inverter = { ramp = "30 Hz/s", slip = 0.41495086610881765 }  # with a flywheel only where the file gives it
 [flywheel]
 J = 0.002
 compare = [0.1]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import json
+import math
 
 import pytest
 from test_foreign_machine import MACHINE, SCRIPT
@@ -16,7 +17,8 @@ from chainunit.core.quantities import Layout
 from chainunit.report import blocks
 from chainunit.report.study import report
 from chainunit.study import remarks
-from chainunit.study.choice import choose
+from chainunit.study.catalogue_drive import with_wheel
+from chainunit.study.choice import as_chosen, choose
 from chainunit.study.config import load, parse
 from chainunit.study.given import given_sections
 from chainunit.study.measures import Answers
@@ -62,7 +64,7 @@ def test_values_of_a_motor_of_the_catalogue_are_the_catalogues(tmp_path):
     soft = soft.replace("[gear]\n", "[gear]\nratio = 25\n")
     origin = study_of(parse(soft), tmp_path).origin
     assert origin("machine.ratio") == origin("motor.inverter.on") == "file"
-    assert origin("motor.inverter.slip") == "catalogue"
+    assert origin("motor.inverter.slip") == origin("starter.inverter.slip") == "catalogue"
     # the supply is what `start` says, and no other key
     with pytest.raises(InputError, match=r"starter\.inverter\.on"):
         parse(soft.replace("ramp = 2", "ramp = 2\non = 0"))
@@ -70,6 +72,34 @@ def test_values_of_a_motor_of_the_catalogue_are_the_catalogues(tmp_path):
     origin = study_of(parse("[system]\nmachine = 'KnifeDrive'\n[run]\ncrank_speed = 4"), tmp_path).origin
     assert origin("motor.rotor.J") == "catalogue"
     assert origin("machine.r") == origin("flywheel.J") == "example" and origin("run.crank_speed") == "file"
+
+
+def test_the_slip_compensation_that_is_used_is_shown(tmp_path):
+    """That of the rated slip; none with a flywheel, against which it works. The file may give either: 0 as well."""
+    bare = KNIFE[: KNIFE.index("[flywheel]")] + KNIFE[KNIFE.index("[run]") :]
+    plate = parse(KNIFE).plate.nameplate
+    rated = (plate.synchronous - plate.speed) * plate.poles / (4.0 * math.pi) / plate.torque
+    for text, given, used in (
+        (KNIFE, None, 0.0),
+        (bare, None, rated),
+        (KNIFE, "0.3 Hz/(N m)", 0.3),
+        (bare, "0 Hz/(N m)", 0.0),
+    ):
+        more = f'[starter.inverter]\nslip = "{given}"\n' if given else ""
+        config = parse(f'start = "inverter"\n{text}\n{more}')
+        drive = drive_of(config, tmp_path)
+        study = dataclasses.replace(study_of(config, tmp_path), config=as_chosen(config, drive))
+        result = as_dict(study)
+        assert drive.parameters.inverter.slip == pytest.approx(used, rel=1e-12)
+        assert result["motor"]["inverter.slip"]["value"] == drive.parameters.inverter.slip
+        assert result["starter"]["inverter.slip"]["value"] == drive.parameters.inverter.slip
+        assert study.origin("starter.inverter.slip") == ("file" if given else "catalogue")
+        # a flywheel that a comparison adds has the setting of a drive with one
+        wheel = with_wheel(config, drive, 0.1)
+        assert wheel.flywheel == 0.1 and wheel.parameters.inverter.slip == (used if given else 0.0)
+        (note,) = [remark.text for remark in study.remarks if remark.kind == "slip compensation"] or [""]
+        assert ("rated slip" in note) == (not given and used > 0.0)
+        assert ("flywheel has to slow down" in note) == (not given and used == 0.0)
 
 
 def test_the_ratio_is_shown_that_is_used(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -109,6 +110,11 @@ def test_the_speed_is_the_one_that_the_crank_has():
 def test_each_reason_has_its_own_remedy():
     stiff = bars(residuals=KEPT | {"jam_left": 2e-3})
     assert stiff.text.endswith("the energy balance is not kept, in overloads; shorten run.step.")
+    # the value of the key that would do, where it is known: the residual falls with the square of the step at least
+    for residual, step in ((1.55 * RESIDUAL, "0.5"), (5.0 * RESIDUAL, "0.25")):
+        named = replace(rigid_links(6.0, {"surge": residual}), step=1e-3)
+        assert named.text.endswith(f'in overloads; shorten run.step: run.step = "{step} ms".')
+    assert replace(rigid_links(6.0, {"surge": 1.0}), step=1e-3).text.endswith("; shorten run.step.")
     both = bars(3.0, residuals=KEPT | {"jam_left": 2e-3})
     assert both.text.endswith('; take organ = "chain"; shorten run.step.')
     assert of_chains(independent=71.0).text.endswith("; raise chain.starts.")

@@ -73,15 +73,13 @@ def gear_unit(kind: str, ratio: float, is_given: bool = False) -> GearUnit | Non
     return next(usual, last if is_given and ratio <= last.made else None)
 
 
-def typical_efficiency(kind: str, ratio: float) -> float:
+def typical_efficiency(kind: str, ratio: float, is_given: bool = False) -> float:
     """Typical efficiency of the unit of that `kind` and `ratio`, or of as many units one behind the other as it
-    takes. A stage of helical wheels has `STAGE`, a V-belt 0.95. That of a worm gear falls from 0.9 at a ratio of 5 to
-    0.65 at 80; the number is that of 50."""
+    takes; for `is_given` see `gear_unit`. A stage of helical wheels has `STAGE`, a V-belt 0.95. That of a worm gear
+    falls from 0.9 at a ratio of 5 to 0.65 at 80; the number is that of 50."""
     efficiency, last = 1.0, UNITS[kind][-1]
-    while ratio > last.made:
+    while (unit := gear_unit(kind, ratio, is_given)) is None:
         efficiency, ratio = efficiency * last.efficiency, ratio / last.largest
-    unit = gear_unit(kind, ratio, is_given=True)
-    assert unit is not None
     return float(efficiency * unit.efficiency)
 
 
@@ -91,7 +89,8 @@ def next_ratio(ratio: float, ratios: Sequence[float]) -> float | None:
     if ratios:
         return min((each for each in ratios if each > ratio), default=None)
     decade = 10.0 ** math.floor(math.log10(ratio))
-    above = (decade * each for each in (*SERIES["R80"], 10.0) if decade * each > ratio * (1.0 + 1e-6))
+    decades = (decade * each * numeral for each in (1.0, 10.0) for numeral in SERIES["R80"])
+    above = (each for each in decades if each > ratio * (1.0 + 1e-6))
     return float(f"{next(above):.4g}")
 
 

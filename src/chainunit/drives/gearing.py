@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
@@ -10,6 +11,10 @@ from ..core.quantities import Value, declaration, quantity
 
 W_REST = 1e-3
 """Speed of the motor [rad/s] below which friction in the transmission fades out: at rest it has no direction."""
+
+START_FACTOR = 2.0
+"""Permitted torque of a gear in a start, over its rated torque, where nobody gives it: catalogues of gears commonly
+permit about twice the rated torque in starts and momentary peaks."""
 
 
 @declaration
@@ -29,8 +34,9 @@ class Transmission:
     torque_limit: Value = quantity("N.m", "permitted torque of the output", default=1e6, above=0.0)
     start_factor: Value = quantity(
         "1",
-        "permitted torque of the output in a start, over torque_limit; gears of catalogues commonly permit about 2",
-        default=1.0,
+        "permitted torque of the output in a start, over torque_limit; catalogues of gears commonly permit about "
+        "twice the rated torque in starts and momentary peaks",
+        default=START_FACTOR,
         min=1.0,
         max=10.0,
     )
@@ -50,6 +56,15 @@ KINDS: Mapping[str, Transmission] = MappingProxyType(
     }
 )
 """Typical start values by kind: a coupling, a two-stage helical gear, a V-belt, a worm gear."""
+
+
+def ordered_torque(running: float, momentary: float, factor: float, margin: float) -> float:
+    """Rated output torque [N m] with which a gear is ordered, rounded up to three digits, as it is printed. It leaves
+    the `margin` free above the torque of `running` [N m], and `factor` times it does so above the largest `momentary`
+    torque of a start or an overload [N m]."""
+    torque = max(running, momentary / factor) / (1.0 - margin)
+    step = 10.0 ** (math.floor(math.log10(torque)) - 2) if torque > 0.0 else 1.0
+    return float(f"{math.ceil(torque / step * (1.0 - 1e-9)) * step:.6g}")
 
 
 def motor_side(xp: Any, t: Transmission, torque: Any, w: Any) -> Any:

@@ -88,7 +88,9 @@ class Cage:
 class SoftStart:
     """A ramp of the voltage from switching on; with `voltage` = 1 the motor starts direct on line."""
 
-    voltage: Value = quantity("1", "share of the voltage at the start", default=1.0, above=0.0, max=1.0)
+    voltage: Value = quantity(
+        "1", "share of the voltage at the start", default=1.0, above=0.0, max=1.0, kind="percent"
+    )
     time: Value = quantity("s", "time in which the voltage rises to its full value", default=1.0, above=0.0)
 
 
@@ -99,7 +101,13 @@ class InverterControl:
     ramp: Value = quantity("Hz/s", "fastest change of frequency", default=50.0, above=0.0, tunable=True)
     lag: Value = quantity("s", "lag of the frequency behind its reference", default=0.02, above=0.0)
     boost: Value = quantity(
-        "1", "share of the voltage at frequency zero", default=0.05, min=0.0, max=0.5, tunable=True
+        "1",
+        "share of the voltage at frequency zero",
+        default=0.05,
+        min=0.0,
+        max=0.5,
+        tunable=True,
+        kind="percent",
     )
     slip: Value = quantity(
         "Hz/(N.m)", "slip compensation: frequency added per air-gap torque", default=0.0, min=0.0, tunable=True,

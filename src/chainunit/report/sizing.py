@@ -29,7 +29,7 @@ def answer(s: b.Source) -> Iterator[b.Block]:
     also = {"flywheel": _disc, "protection": _protection}
     gear = (*_gear(s, path), *_gear_torque(s))
     cards = [
-        b.Card("Motor", ((motor, str(b.at(s.result, f"{path}.verdict"))),), tuple(_data(s))),
+        b.Card("Motor", ((motor, str(b.at(s.result, f"{path}.verdict"))),), (*_data(s), *_starter(s, path))),
         b.Card("Gear ratio", ((ratio, "motor turns per crank turn"),), gear),
         *(
             b.Card(capital(name), ((size or "none", title),), tuple(also[name](s)))
@@ -85,14 +85,32 @@ def _disc(s: b.Source, flywheel: str = "sizing.flywheel") -> Iterator[Line]:
 def _data(s: b.Source) -> Iterator[Line]:
     """The data of the motor of all runs."""
     if "rated_power" in s.result.get("motor", {}):
-        names = ("rated_power", "rated_speed", "rated_torque", "rated_current")
-        yield join((s.number(f"motor.{name}") for name in names), ", ")
+        names = ("rated_speed", "rated_torque", "rated_current")
+        parts = "{=motor.rated_power}, {=motor.poles} poles, {=motor.rated_voltage}, {=motor.rated_frequency}"
+        yield join((s.line(parts), *(s.number(f"motor.{name}") for name in names)), ", ")
 
 
 def _gear_torque(s: b.Source) -> Iterator[Line]:
     """The rated torque of the gear to be ordered."""
     if s.result["sizing"].get("gear"):
-        yield s.line("gear with a rated output torque of at least {sizing.gear.rated_torque}")
+        order = s.line("gear with a rated output torque of at least {sizing.gear.rated_torque}")
+        yield line(order, ", decided by ", s.words("sizing.gear.decided_by"))
+
+
+def _starter(s: b.Source, path: str) -> Iterator[Line]:
+    """The soft starter or inverter to be ordered, with its settings; nothing for a start direct on line."""
+    start = s.result["start"] if "starter" in s.result else "direct"
+    if start == "soft":
+        yield s.line("soft starter, {=starter.soft_start.voltage} voltage, {=starter.soft_start.time}")
+    elif start == "inverter":
+        current = s.line(f" of at least {{{path}.numbers.inverter_current}}") if _starts(s, path) else ()
+        yield line("inverter", current, s.line(", boost {=starter.inverter.boost}, ramp {=run.ramp}"))
+        if _starts(s, path):
+            yield s.line(f"in running {{{path}.numbers.frequency}}, {{{path}.numbers.speed}}")
+
+
+def _starts(s: b.Source, path: str) -> bool:
+    return s.value(f"{path}.numbers.inverter_current") is not None
 
 
 def _protection(s: b.Source) -> Iterator[Line]:
@@ -197,7 +215,10 @@ def _best(s: b.Source, path: str, word: str) -> Iterator[b.Block]:
     doubt = s.line(" ({verdict.model.caveat})") if model is not None and model["caveat"] else ()
     begin = "Chosen: " if word == "Motor" else "Insufficient: "
     yield b.Text(line(sentence, doubt, "."), form="short")
-    if order := [line("motor of ", each) for each in _data(s)] + [*_gear_torque(s)]:
+    # a motor that does not suffice is not ordered
+    motor = [line("motor ", s.words(f"{path}.motor"), " of ", each) for each in _data(s)]
+    order: list[Line] = [*motor, *_gear_torque(s), *_starter(s, path)]
+    if order and word == "Motor":
         yield b.Text(line("Order: ", join(order, "; "), "."), form="short")
     yield b.Text(line(begin, s.words(f"{path}.reason"), doubt, "."))
 
@@ -272,7 +293,9 @@ def _trade(s: b.Source) -> Iterator[b.Block]:
         )
     if rows:
         title = "A flywheel, or a larger motor. Mass: of motor and flywheel."
-        yield b.Table(tuple(rows), b.heads("motor", "flywheel", "start", "mass", "verdict"), title=title)
+        yield b.Table(
+            tuple(rows), b.heads("motor", "flywheel", "start, worst angle", "mass", "verdict"), title=title
+        )
 
 
 def _flywheel(s: b.Source, candidate: str) -> Line:

@@ -18,6 +18,14 @@ from .torques import DutyPeak
 
 TOLERANCES = ("crank_speed",)
 """Checks of a tolerance, which a drive may use wholly: the gear's ratio takes it, and no load does."""
+_HARD = ("gear_start",)
+"""Checks of a limit that leaves room by itself, which a drive may use wholly, too: a gear permits a multiple of its
+rated torque in a start. A margin on top would prefer two gear units, or a flywheel, to a shock of 91 % of it."""
+_WHOLLY = (*TOLERANCES, *_HARD)
+
+
+FIELD_WEAKENING = 1.1
+"""Frequency of running, in parts of the rated one, above which a motor counts as one in field weakening."""
 
 
 @declaration
@@ -40,6 +48,8 @@ class DriveNumbers:
         "1", "trip class of the overload relay that holds in the start; 40: none up to class 30"
     )
     inverter_current: Value = quantity("A", "least rated current of the inverter")
+    frequency: Value = quantity("Hz", "frequency of the supply in steady running")
+    speed: Value = quantity("rad/s", "speed of the motor in steady running", kind="speed")
     mass: Value = quantity("kg", "mass of motor and flywheel, the relative cost")
     price: Value = quantity("1", "price of the motor, as the catalogue has it")
 
@@ -61,6 +71,7 @@ class Criterion(StrEnum):
 
     MARGIN = "margin"
     LARGER = "larger"
+    FIELD = "field"
     GEAR = "gear"
     START = "start"
     FLYWHEEL = "flywheel"
@@ -87,6 +98,14 @@ class Candidate:
     """see `chainunit.study.relay`; None for an inverter, or where there is no start"""
     start_current: float | None = None
     """largest current of the motor in a start [A]; None without a start"""
+    overload_time: float | None = None
+    """longest time of a start above the rated current of the motor [s]; None without a start"""
+    inverter_current: float | None = None
+    """least rated current of an inverter [A] that carries running and starts, see `Trial.inverter_current`; None on
+    the line, or without a start"""
+    speed: float | None = None
+    frequency: float | None = None
+    """mean speed of the motor in steady running [rad/s], and frequency of its supply [Hz]; None without a start"""
     duty: DutyPeak | None = None
     """the largest torque at the crank in steady running, and while all feed moves to either side and stays there;
     None where the run failed"""
@@ -95,6 +114,8 @@ class Candidate:
     """crank angle at which the load stalls the motor [rad]; None for a motor that starts"""
     heaviest: float = 0.0
     """the heaviest flywheel that was tried with the motor [kg m2]"""
+    bound: float | None = None
+    """the value of `sizing.inertia_ratio`, where it ended the trials of flywheels"""
     worst_start: bool = False
     """whether time, class and heat of its start are those of the worst crank angle, not of the angle 0 alone"""
     verdict: Standing | None = None
@@ -102,6 +123,8 @@ class Candidate:
     criterion: Criterion | None = None
     """the criterion by which a candidate that fits stands behind the chosen one"""
     reason: str = ""
+    remedy: str = ""
+    """what makes a candidate fit that only fails in the torque of the gear in its start, in words"""
 
     @property
     def sizes(self) -> dict[str, float]:
@@ -120,23 +143,35 @@ class Candidate:
 
     @property
     def use(self) -> float:
-        """Largest utilisation of the checks without the tolerances."""
-        return max((x for name, x in self.sizes.items() if name not in TOLERANCES), default=math.inf)
+        """Largest utilisation of the checks that have to leave the margin free."""
+        return max((x for name, x in self.sizes.items() if name not in _WHOLLY), default=math.inf)
 
     @property
     def fits(self) -> bool:
         """Whether every check is within its limit."""
         return self.violation <= 1.0
 
+    @property
+    def breaks_gear(self) -> bool:
+        """Whether its start puts too much on the gear, and nothing else exceeds a limit."""
+        over = {name for name, size in self.sizes.items() if size > 1.0}
+        return bool(over) and over <= set(_HARD)
+
     def exceeds(self, name: str) -> bool:
         """Whether a check takes more of its limit than the margin leaves; False for a check that there is not."""
-        permitted = 1.0 if name in TOLERANCES else 1.0 - self.margin
+        permitted = 1.0 if name in _WHOLLY else 1.0 - self.margin
         return self.sizes.get(name, 0.0) > permitted
 
     @property
     def keeps_margin(self) -> bool:
         """Whether the candidate fits with the margin."""
-        return self.fits and not any(map(self.exceeds, self.checks))
+        return self.fits and self.leaves_margin
+
+    @property
+    def leaves_margin(self) -> bool:
+        """Whether the candidate leaves the margin free of each limit that has one, whatever its start puts on the
+        gear."""
+        return not any(self.exceeds(name) for name in self.checks if name not in _HARD)
 
     @property
     def power(self) -> float:
@@ -144,15 +179,10 @@ class Candidate:
         return float(self.motor.nameplate.power)
 
     @property
-    def inverter_current(self) -> float | None:
-        """Least rated current of an inverter [A] that carries the duty and the peak of the starts for a short time;
-        None on the line, or without a start."""
-        if self.start_current is None or "inverter_current" not in self.checks:
-            return None
-        rated = float(self.motor.nameplate.rated_current)
-        running = self.checks["inverter_current"]
-        overload = running.limit / rated
-        return max(rated, max(self.start_current, running.value or 0.0) / overload)
+    def weakened(self) -> bool:
+        """Whether an inverter runs the motor well above its rated frequency, where it has less torque."""
+        rated = float(self.motor.nameplate.frequency)
+        return self.frequency is not None and self.frequency > FIELD_WEAKENING * rated
 
     @property
     def disc(self) -> Disc | None:
@@ -190,6 +220,8 @@ class Candidate:
         numbers = DriveNumbers(
             start_class=self.start_class,
             inverter_current=self.inverter_current,
+            frequency=self.frequency,
+            speed=self.speed,
             mass=self.mass,
             price=self.motor.nameplate.price or None,
         )

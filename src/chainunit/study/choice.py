@@ -19,7 +19,7 @@ from ..drives.torsion import with_damping_ratio
 from ..fmu.backends import Backend
 from ..system import foreign_component
 from ..work.progress import Report
-from .catalogue_drive import catalogue_drive, gear_with
+from .catalogue_drive import catalogue_drive, gear_with, with_wheel
 from .config import Config
 from .cycle import cycle
 from .drive import Drive
@@ -57,16 +57,18 @@ def _drive_of_file(config: Config) -> Drive:
         motor, p = config.motor_type, config.motor
         drive = Drive(motor, p, config.machine, motor.follows(p), chain=config.chain)
     flywheel = 0.0 if config.flywheel is None else config.flywheel.J
-    return replace(drive, feed_forward=config.feed_forward, flywheel=flywheel)
+    return with_wheel(config, replace(drive, feed_forward=config.feed_forward), flywheel)
 
 
 def as_chosen(config: Config, drive: Drive) -> Config:
     """The study with the values that follow from the drive with a motor of the catalogue: the efficiency of the gear
-    by its stages, and the boost of the inverter."""
+    by its stages, and boost and slip compensation of the inverter."""
     if not config.of_catalogue:
         return config
-    boost = drive.parameters.inverter.boost
-    inverter = replace(config.starter.inverter, boost=boost) if drive.follows else config.starter.inverter
+    inverter = config.starter.inverter
+    if drive.follows:
+        used = drive.parameters.inverter
+        inverter = replace(inverter, boost=used.boost, slip=used.slip)
     efficiency = gear_with(config, drive.ratio).efficiency
     return replace(
         config,

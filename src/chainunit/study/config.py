@@ -300,8 +300,8 @@ def _config(
     of_study |= {
         name: values[name] if name in data else None for name, each in sections.items() if each.optional
     }
-    if "sizing" in data and checked.start != "inverter" and "inertia_ratio" not in tables["sizing"]:
-        # for motors on the line only where the file gives it
+    if "sizing" in data and "inertia_ratio" not in tables["sizing"]:
+        # a rule for servo drives: time, current and heat of its start limit the inertia of an induction motor
         of_study["sizing"] = dataclasses.replace(of_study["sizing"], inertia_ratio=math.inf)
     chain, own_motors = values["chain"] if checked.organ == "chain" else None, None
     with faults.collected(), refusal_prefix("catalogue = ", "catalogue"):

@@ -18,9 +18,9 @@ from .ram_force import TIMES, rams
 from .record import StudyRecord
 from .sections import Coupling
 from .starts import StartAnalysis
-from .torques import on_coupling
+from .torques import at_gear, on_coupling
 from .verdict import START, STEADY
-from .window import BURNT
+from .window import Phase
 
 
 def recommended_setting(study: StudyRecord) -> Setting | None:
@@ -82,7 +82,17 @@ def hardest_start(study: StudyRecord) -> StartPeak:
 
 def pull_out(study: StudyRecord) -> float:
     """Largest torque of the warm motor at the crank in steady running [N m]."""
-    return study.drive.pull_out(study.steady, min(BURNT, study.answers["steady"].winding_temperature))
+    return study.drive.pull_out(study.steady, study.window(Phase.STEADY, study.steady).warm)
+
+
+def overloads_at_gear(study: StudyRecord) -> dict[str, float]:
+    """Peak torque at the output of the gear in each shock and disturbance [N m], by name: that which passes the
+    coupling where one is recommended. Runs whose energy balance is not kept are left out."""
+    peaks = peaks_in_events(study, Role.SHOCK, Role.DISTURBANCE, of=at_gear)
+    if study.setting is not None and study.setting.torque is not None:
+        peaks |= {name: effect.with_coupling for name, effect in study.setting.effects.items()}
+    wrong = wrong_runs(study)
+    return {name: peak for name, peak in peaks.items() if name not in wrong}
 
 
 def _torque(value: float) -> str:
@@ -108,7 +118,7 @@ _OBSTACLES = {
     "{gear}.",
     Obstacle.OVERLOADS: "No safety coupling is recommended: it has to open above {above}, and {bound}.",
     Obstacle.RELEASE: "No safety coupling is recommended: one that opens at {setting}, opens too late. The largest "
-    "torques until no torque passes it, {release} after its trip: {effects}. {why}.",
+    "torques until no torque passes it, {release} after its trip: {effects}. That saves nothing.",
     Obstacle.ENERGY: "No safety coupling is recommended: the energy balance is not kept in {wrong}, so that no "
     "setting follows from its numbers.",
 }
@@ -152,7 +162,6 @@ def coupling_sentence(study: StudyRecord) -> str:
             setting=_at_both(study, setting.least),
             release=number(Coupling().release_time, "s"),
             effects=_effects(study, setting.effects),
-            why=f"The gear may carry {_torque(setting.gear)}" if setting.passed else "That saves nothing",
             wrong=", ".join(map(study.title_of, setting.wrong)),
             start_torque=_torque(hardest.torque),
             least=_torque(setting.least),
@@ -170,6 +179,7 @@ def coupling_sentence(study: StudyRecord) -> str:
         f"{_effects(study, setting.effects)}"
     )
     text += f"; it stays shut where {_list_of(study, shut)}." if shut else "."
+    text += _too_late(study, setting)
     if setting.wrong:
         names = ", ".join(map(study.title_of, setting.wrong))
         text += f" Left out, as the energy balance is not kept: {names}."
@@ -204,11 +214,36 @@ def _bound(setting: Setting) -> str:
     return f"the jams, lumps and blocks of this study put {most} on it at most"
 
 
+def _too_late(study: StudyRecord, setting: Setting) -> str:
+    """A sentence on the overloads in which the gear carries more than it may, though the coupling opens, and on the
+    cures; empty where there are none."""
+    if not setting.passed:
+        return ""
+    over = ", ".join(
+        f"{study.title_of(name)} (by {_torque(effect.with_coupling - setting.gear)}, "
+        f"{number(effect.with_coupling / setting.gear - 1.0, '1', 'percent')})"
+        for name, effect in setting.passed.items()
+    )
+    cures = []
+    for each in study.alternatives:
+        if each.way is Way.RELEASE:
+            declared = number(Coupling().release_time, "s")
+            cures.append(f"a release time of {number(each.numbers.release_time, 's')} in place of {declared}")
+    cures.append(f"a gear that may carry {_torque(max(e.with_coupling for e in setting.passed.values()))}")
+    cures.append("a device at the machine, nearer to the overload")
+    return (
+        f" It opens too late to keep below the {_torque(setting.gear)} that the gear may carry where {over}; the "
+        f"cure is {', or '.join(cures)}."
+    )
+
+
 _WAYS = {
+    Way.RELEASE: "With a release time of {release_time}: {set}.",
+    Way.GEAR: "With a gear that may carry {gear}: {set}.",
     Way.SOFT_STARTER: 'With a soft starter (start = "soft"; starter.soft_start: voltage = "{voltage}", '
     'time = "{ramp}") a start puts at most {start} on it and takes {start_time}: {set}.',
-    Way.INVERTER: 'With an inverter (start = "inverter"; run.ramp = "{ramp}") a start puts at most {start} on it, '
-    "running {running}: {set}.",
+    Way.INVERTER: 'With an inverter (start = "inverter"; run.ramp = "{ramp}", starter.inverter.boost = "{boost}") a '
+    "start puts at most {start} on it, running {running}: {set}.",
     Way.SLIP_CLUTCH: "With a slip clutch, set to {setting}, the motor starts on line, and the clutch slips for "
     "{slip_time} in each start, which makes {slip_energy} of heat. It slips, too, where {opens}: a switch has to "
     "stop the motor then, as the slip makes {slip_power} of heat.",
@@ -222,8 +257,8 @@ _WAYS = {
 _FAILURES = {
     Way.SOFT_STARTER: "No soft starter that was tried brings the crank to its speed from every angle within the "
     "locked-rotor time of the motor.",
-    Way.INVERTER: "An inverter with the boost of this study (starter.inverter.boost) does not bring the crank to its "
-    "speed from every angle with any ramp that was tried.",
+    Way.INVERTER: "An inverter does not bring the crank to its speed from every angle with any ramp and boost "
+    "(starter.inverter.boost) that were tried.",
     Way.SLIP_CLUTCH: "A slip clutch that running alone permits slips on in the start and does not bring the machine "
     "to its speed.",
 }
@@ -235,7 +270,7 @@ def way_words(study: StudyRecord, each: Alternative) -> str:
     if each.numbers.start is None:
         return _FAILURES[each.way]
     numbers = {
-        v.name: number(value, v.unit, v.kind, full=v.name not in ("voltage", "ramp"))
+        v.name: number(value, v.unit, v.kind, full=v.name not in ("voltage", "ramp", "boost"))
         for v in variables(WayNumbers)
         if (value := getattr(each.numbers, v.name)) is not None
     }
@@ -253,7 +288,7 @@ def _set(study: StudyRecord, each: Alternative) -> str:
     if not each.opens:
         return text + "in no overload of this study and protects nothing"
     text += f"where {_effects(study, each.effects) if each.effects else _list_of(study, each.opens)}"
-    if each.effects and not spares(each.effects):
+    if each.effects and not spares(each.effects, gear):
         text += ", too late to save anything"
     assert study.setting is not None
     if shut := {n: p for n, p in study.setting.overloads.items() if n not in each.opens}:
@@ -312,10 +347,10 @@ def remark_on_coupling(study: StudyRecord, trip: float) -> None:
 
 
 _RAM = (
-    "A coupling that opens at {trip} does not limit the force on the link {ram} near its dead centre, at a crank "
-    "angle of {dead}: the setting stands for {fastest} where the link is fastest, for {thirty} at 30 deg and {ten} "
-    "at 10 deg before the dead centre; at the dead centre the force has no limit. In running the pin pushes with "
-    "{working} at most; "
+    "A coupling {set_for}that opens at {trip} does not limit the force on the link {ram} near its dead centre, at a "
+    "crank angle of {dead}: the setting stands for {fastest} where the link is fastest, for {thirty} at 30 deg and "
+    "{ten} at 10 deg before the dead centre; at the dead centre the force has no limit. In running the pin "
+    "pushes with {working} at most; "
 )
 _RAM_WITHIN, _RAM_ALWAYS = "within {angle}, the last {way}, ", "at every angle "
 _RAM_END = (
@@ -327,9 +362,12 @@ _RAM_END = (
 def remark_on_rams(study: StudyRecord) -> None:
     """Note for each ram of a linkage what the setting of the coupling means at it."""
     if study.config.coupling is not None:
-        torque = study.config.coupling.trip_torque
+        torque, set_for = study.config.coupling.trip_torque, ""
+    elif study.setting is not None and study.setting.obstacle in (None, Obstacle.RELEASE):
+        # this is the setting that the answer names, recommended or not
+        torque, set_for = study.setting.least, ""
     elif study.setting is not None:
-        torque = study.setting.torque or study.setting.least_in_running
+        torque, set_for = study.setting.least_in_running, "set for running alone "
     else:
         return
     for ram in rams(study):
@@ -341,6 +379,7 @@ def remark_on_rams(study: StudyRecord) -> None:
             "coupling at ram",
             _RAM + (_RAM_WITHIN if quantities else _RAM_ALWAYS) + _RAM_END,
             trip=(torque, "N.m"),
+            set_for=set_for,
             ram=ram.ram,
             dead=(ram.dead, "rad"),
             fastest=(ram.least(torque), "N"),

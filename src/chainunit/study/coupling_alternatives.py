@@ -17,11 +17,12 @@ from ..system import ModelComponent, monolithic
 from ..system.graph import in_line
 from ..work.progress import Report
 from .arrays import peak
-from .catalogue_drive import with_starter
+from .catalogue_drive import with_starter, with_wheel
 from .cycle import cycle
 from .drive import Drive
 from .event import Role
-from .event_torques import effects, peaks_in_events
+from .event_torques import effects
+from .inverter import boosts
 from .limits import starting
 from .measures import STARTED
 from .protection import MARGIN, Alternative, Setting, Way, WayNumbers
@@ -36,6 +37,8 @@ SOFT_STARTERS = ((0.5, 1.0), (0.5, 3.0), (0.4, 2.0), (0.4, 5.0), (0.3, 5.0), (0.
 """Share of the voltage and ramp [s] of the soft starters that are tried, in this order."""
 RAMPS = (1.0, 2.0, 5.0, 10.0, 20.0)
 """Ramps of the inverter that are tried [s], in this order."""
+_FASTEST_RELEASE = 1e-4
+"""Release time below which a coupling is not bought [s]."""
 _ROWS = 2e-4
 """Time between the rows of the run with a slip clutch [s]."""
 _SWING = 0.05
@@ -47,10 +50,34 @@ clutch counts as stuck: there it passes 98 % of its setting."""
 
 
 def alternatives(study: StudyRecord, rig: Rig, report: Report) -> tuple[Alternative, ...]:
+    """The ways to a coupling that saves what the least setting does not, and to one that a start does not open."""
+    if study.setting is None:
+        return ()
+    return *_in_time(study, study.setting), *_for_starts(study, study.setting, rig, report)
+
+
+def _in_time(study: StudyRecord, setting: Setting) -> Iterator[Alternative]:
+    """A shorter release time and a stronger gear, where the gear carries more than it may though the coupling opens;
+    a shorter release time that spares a part in one overload, where the declared one spares nothing."""
+    late = setting.passed or ({} if setting.spares else setting.effects)
+    if not late:
+        return
+    times = [effect.release for effect in late.values()]
+    release = min(times) if setting.passed else max(times)
+    basis = {"setting": setting.least, "running": setting.running, "start": setting.start}
+    if release > _FASTEST_RELEASE:
+        tried = effects(study, setting.least, release=release)
+        numbers = WayNumbers.of(**basis, release_time=release)
+        yield Alternative(Way.RELEASE, numbers, setting.opens, {name: tried[name] for name in setting.opens})
+    if setting.passed:
+        gear = max(effect.with_coupling for effect in setting.passed.values())
+        yield Alternative(Way.GEAR, WayNumbers.of(**basis, gear=gear), setting.opens, setting.effects)
+
+
+def _for_starts(study: StudyRecord, setting: Setting, rig: Rig, report: Report) -> tuple[Alternative, ...]:
     """The ways for a sized drive that starts direct on line, if the start decides its setting and an overload would
     open a coupling that running alone allows. A way whose run fails is left out."""
-    setting, config = study.setting, study.config
-    if setting is None or config.start != "direct" or not setting.start_decides:
+    if study.config.start != "direct" or not setting.start_decides:
         return ()
     if not setting.opened_by(setting.least_in_running) or StartAnalysis.name not in study.findings:
         return ()
@@ -138,10 +165,11 @@ def _soft_starter(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative
     def rigs() -> Iterator[_Trial]:
         for voltage, time in SOFT_STARTERS:
             starter = dataclasses.replace(config.starter, soft_start=SoftStart(voltage=voltage, time=time))
-            p = with_starter(rig.drive.parameters, plate, "soft", starter)
+            own = dataclasses.replace(config, start="soft", starter=starter)
+            p = with_starter(rig.drive.parameters, plate, own)
             soft = dataclasses.replace(
                 rig,
-                config=dataclasses.replace(config, start="soft", starter=starter),
+                config=own,
                 drive=dataclasses.replace(rig.drive, parameters=p),
             )
             yield soft, usual + time, {"voltage": voltage, "ramp": time}
@@ -181,17 +209,23 @@ def _inverter(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative:
     config = study.config
     assert study.sizing is not None
     plate = study.sizing.best.motor.nameplate
-    p = with_starter(rig.drive.parameters, plate, "inverter", config.starter)
-    drive = dataclasses.replace(rig.drive, parameters=p, follows=True, observer=None, observed={})
 
-    def rigs() -> Iterator[_Trial]:
+    def rigs(boost: float) -> Iterator[_Trial]:
+        inverter = dataclasses.replace(config.starter.inverter, boost=boost)
+        starter = dataclasses.replace(config.starter, inverter=inverter)
         for ramp in RAMPS:
             run = dataclasses.replace(config.run, ramp=ramp)
-            own = dataclasses.replace(config, start="inverter", run=run)
-            yield dataclasses.replace(rig, config=own, drive=drive), 1.5 * ramp + 1.0, {"ramp": ramp}
+            own = dataclasses.replace(config, start="inverter", run=run, starter=starter)
+            p = with_starter(rig.drive.parameters, plate, own)
+            drive = dataclasses.replace(rig.drive, parameters=p, follows=True, observer=None, observed={})
+            fed = dataclasses.replace(rig, config=own, drive=with_wheel(own, drive, drive.flywheel))
+            yield fed, 1.5 * ramp + 1.0, {"ramp": ramp, "boost": boost}
 
-    best = _gentlest(rigs(), study, setting.running, math.inf)
-    if best is None:
+    for boost in boosts(config, config.starter.inverter.boost):
+        best = _gentlest(rigs(boost), study, setting.running, math.inf)
+        if best is not None:
+            break
+    else:
         return Alternative(Way.INVERTER, WayNumbers.of(), {})
     fed, starts, numbers = best
     fed = dataclasses.replace(fed, fed_from=None)
@@ -297,20 +331,20 @@ def _higher(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative:
         setting=setting.least if setting.least < setting.gear else None,
         running=setting.running,
         start=setting.start,
-        rocker=_rocker_until(study, setting.least),
+        rocker=_rocker_until(study, setting),
     )
     return _tried(study, Way.HIGHER, numbers, setting.overloads)
 
 
-def _rocker_until(study: StudyRecord, setting: float) -> float | None:
+def _rocker_until(study: StudyRecord, setting: Setting) -> float | None:
     """The largest torque of the rocker in the overloads [N m], each up to the instant at which the coupling carries
-    its setting; None for a machine without a rocker."""
+    its least setting; None for a machine without a rocker."""
     peaks = []
-    for name in peaks_in_events(study, Role.SHOCK):
+    for name in setting.overloads:
         run = study.runs[name].sel(time=slice(study.event[name], None))
         if "machine.rocker.tau" not in run:
             return None
-        passed = np.flatnonzero(np.abs(run["motor.tau"].values) * study.drive.ratio > setting)
+        passed = np.flatnonzero(np.abs(run["motor.tau"].values) * study.drive.ratio > setting.least)
         end = int(passed[0]) + 1 if passed.size else None
         peaks.append(peak(run["machine.rocker.tau"].values[:end]))
     return max(peaks, default=None)

@@ -26,10 +26,18 @@ Entered = Annotated[Any, BeforeValidator(_admitted)]
 """A number, or a text with a unit."""
 
 
-def numbers(declaration: type, quantity_name: str, name: str, most: int) -> Any:
-    """The type of a list of at most `most` values of a quantity of the `declaration`; a refusal calls the
-    list `name`."""
+def numbers(
+    declaration: type, quantity_name: str, name: str, most: int, is_empty_allowed: bool = True
+) -> Any:
+    """The type of a list of at most `most` values of a quantity of the `declaration`, and of at least one unless
+    `is_empty_allowed`; a refusal calls the list `name`."""
     variable = next(v for v in variables(declaration) if v.name == quantity_name)
     variable = dataclasses.replace(variable, name=name)
     value = Annotated[float, BeforeValidator(lambda entry: to_number(variable, entry))]
-    return Annotated[list[value], Field(max_length=most), variable]
+
+    def filled(entry: Any) -> Any:
+        if entry == [] and not is_empty_allowed:
+            raise PydanticCustomError("empty_list", "must have at least one value")
+        return entry
+
+    return Annotated[list[value], Field(max_length=most), BeforeValidator(filled), variable]

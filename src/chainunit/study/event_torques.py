@@ -8,10 +8,10 @@ import numpy as np
 import xarray as xr
 
 from .event import Role
-from .protection import CouplingEffect
+from .protection import CouplingEffect, goal
 from .record import StudyRecord
 from .sections import Coupling
-from .torques import DutyPeak, PeakOf, at_gear, duty_peak, on_coupling
+from .torques import DutyPeak, PeakOf, at_gear, duty_peak, gear_torque, on_coupling
 from .verdict import STEADY
 
 
@@ -47,12 +47,15 @@ def running_words(study: StudyRecord, run: str) -> str:
 
 
 def effects(
-    study: StudyRecord, setting: float, runs: Mapping[str, xr.Dataset] | None = None
+    study: StudyRecord,
+    setting: float,
+    runs: Mapping[str, xr.Dataset] | None = None,
+    release: float | None = None,
 ) -> dict[str, CouplingEffect]:
     """The effect of a coupling with this setting [N m at the crank] in each shock that opens it, by name; it passes
-    torque for the declared release time. `runs` are other runs of the shocks without a coupling, from their begin on;
-    by default those of the study."""
-    drive, release = study.drive, Coupling().release_time
+    torque for the `release` time [s], by default the declared one. `runs` are other runs of the shocks without a
+    coupling, from their begin on; by default those of the study."""
+    drive, release = study.drive, Coupling().release_time if release is None else release
     if runs is None:
         names = peaks_in_events(study, Role.SHOCK)
         runs = {name: study.runs[name].sel(time=slice(study.event[name], None)) for name in names}
@@ -64,10 +67,16 @@ def effects(
             continue
         k = int(passed[0])
         before = slice(max(k - 1, 0), k + 1)
-        end = float(np.interp(setting, torque[before], time[before])) + release
+        trip = float(np.interp(setting, torque[before], time[before]))
+        end = trip + release
         # up to the opening the run is the same as without the coupling
         until = run.sel(time=slice(None, end))
         rows = until.sizes["time"]
         last = run.isel(time=slice(rows - 1, rows + 1)).interp(time=[min(end, float(time[-1]))])
-        found[name] = CouplingEffect(at_gear(drive, run), max(at_gear(drive, until), at_gear(drive, last)))
+        without = at_gear(drive, run)
+        wanted = goal(without, study.config.gear.torque_limit)
+        above = int(np.argmax(np.abs(gear_torque(drive, run)) > wanted))
+        in_time = max(float(time[max(above - 1, 0)]) - trip, 0.0)
+        with_coupling = max(at_gear(drive, until), at_gear(drive, last))
+        found[name] = CouplingEffect(without, with_coupling, wanted, in_time)
     return found

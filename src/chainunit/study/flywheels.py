@@ -16,6 +16,7 @@ from ..core.quantities import Layout
 from ..reading.text import entries, entry, number
 from ..work.progress import Report
 from .analysis import Analysis, Findings
+from .catalogue_drive import with_wheel
 from .choice import tune
 from .config import Config
 from .cycle import needed_inertia
@@ -164,8 +165,9 @@ def _own(study: StudyRecord, findings: FlywheelFindings) -> Wheel:
 def _run(study: StudyRecord, rig: Rig, findings: FlywheelFindings, flywheel: float) -> Wheel:
     """The start-up and steady running of the study with another flywheel [kg m2], without its safety coupling."""
     config = study.config
-    drive, _ = tune(config, replace(study.drive, flywheel=flywheel, observer=None))
-    findings.is_retuned = findings.is_retuned or drive.parameters != study.drive.parameters
+    turned = with_wheel(config, replace(study.drive, observer=None), flywheel)
+    drive, _ = tune(config, turned)
+    findings.is_retuned = findings.is_retuned or drive.parameters != turned.parameters
     sides = drive.machine.loaded_sides(config.feed)
     rig = replace(rig, drive=drive, fed_from=None)
     with rig.from_rest() as simulation:

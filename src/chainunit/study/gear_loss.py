@@ -86,13 +86,16 @@ class GearAnalysis(Analysis):
 
     @staticmethod
     def find(study: StudyRecord, rig: Rig, report: Report) -> GearFindings | None:
-        """The loss in the steady turns; None without them."""
+        """The loss in the steady turns; None without them, and where no mean power of them stands for running
+        that lasts."""
         if STEADY not in study.answers:
             return None
         drive, gear = study.drive, study.config.gear
         window = study.window(Phase.STEADY, study.steady)
         squared = window.mean(lambda run: run[drive.motor_speed].values ** 2)
-        total, net = drive.gear_friction * squared, float(study.answers[STEADY].power_mean)
+        total, net = drive.gear_friction * squared, study.answers[STEADY].power_mean
+        if net is None:
+            return None
         without_load = min(total, gear.d * squared)
         return GearFindings(
             GearLoss(

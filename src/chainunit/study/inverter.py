@@ -14,14 +14,13 @@ BOOSTS = (0.05, 0.10, 0.15)
 HAIR = 1.1
 """Factor by which a candidate may exceed the share of a limit that the margin leaves, so that it is tried with the
 ratio above: a step of the finest series is 3 %, and the heat of a winding changes with the square of the torque."""
-_RELIEVED = ("rms_torque", "peak_torque", "temperature", "inverter_current")
+_RELIEVED = ("rms_torque", "peak_torque", "temperature")
 """Checks that a larger ratio improves: the motor turns faster and gives less torque."""
 
 
-def _boosts(config: Config, c: Candidate) -> list[float]:
-    """The boosts to try, that of the candidate first; it alone where the file gives it, or on the line."""
-    own = float(c.drive.parameters.inverter.boost)
-    if not c.drive.follows or "starter.inverter.boost" in config.given:
+def boosts(config: Config, own: float) -> list[float]:
+    """The boosts to try, the `own` one first; it alone where the file gives it."""
+    if "starter.inverter.boost" in config.given:
         return [own]
     return [own, *(boost for boost in BOOSTS if boost > own)]
 
@@ -34,13 +33,13 @@ def _with_boost(c: Candidate, boost: float) -> Candidate:
 
 def least_boost(config: Config, c: Candidate, judged: Callable[[Candidate], Candidate]) -> Candidate:
     """The candidate, as `judged`, with the least boost with which it starts; where it starts with none, with the
-    first."""
-    trials = []
-    for boost in _boosts(config, c):
-        trials.append(judged(_with_boost(c, boost)))
-        if trials[-1].starts or not trials[-1].checks:
-            return trials[-1]
-    return trials[0]
+    first. A boost with which the run fails is none with which it starts."""
+    own = float(c.drive.parameters.inverter.boost)
+    first = judged(_with_boost(c, own))
+    if first.starts or not c.drive.follows:
+        return first
+    others = (judged(_with_boost(c, boost)) for boost in boosts(config, own)[1:])
+    return next((each for each in others if each.starts), first)
 
 
 def misses_by_a_hair(c: Candidate) -> bool:
@@ -65,10 +64,16 @@ def inverter_needs(best: Candidate, config: Config) -> Iterator[str]:
             yield f"{text}: one with the rated current of the motor suffices, also for the start."
         else:
             yield (
-                f"{text}, and the start takes {number(best.start_current, 'A')}, {best.start_current / rated:.2g} "
-                f"times the rated current of the motor: order one of at least {number(best.inverter_current, 'A')}, "
-                "or lengthen run.ramp."
+                f"{text}. The start takes up to {number(best.start_current, 'A')}, "
+                f"{best.start_current / rated:.2g} times the rated current of the motor, and more than this current "
+                f"for {number(best.overload_time, 's')}: order one of at least {number(best.inverter_current, 'A')}."
             )
+    if best.weakened:
+        yield (
+            f"The motor runs at {number(best.frequency, 'Hz')}, above its rated "
+            f"{number(best.motor.nameplate.frequency, 'Hz')}: in field weakening, where its breakdown torque falls "
+            "with the square of the frequency; gear.ratio or sizing.ratios lead there."
+        )
     yield (
         "The electronic motor protection of the inverter stands in place of a thermal relay: set it to the rated "
         "current of the motor. No trip class is to be chosen for it."

@@ -17,6 +17,7 @@ from .rig import worst_residual
 from .start_runs import longest_of
 from .starts import StartAnalysis
 from .verdict import RESIDUAL, STEADY, Holds, Verdict, shown_speed
+from .window import Phase
 
 
 def model_verdict(study: StudyRecord) -> Verdict:
@@ -103,7 +104,33 @@ def no_reserve(run: str, reserve: float) -> str:
     0."""
     over = number(-reserve, "1", "percent") + (" or more" if reserve <= -1.0 else "")
     when = "in each turn" if run == STEADY else "for a moment"
-    return f"overloaded {when}: {over} above its largest steady torque"
+    return f"overloaded {when}: {over} above its breakdown torque"
+
+
+def lasts(study: StudyRecord) -> bool:
+    """Whether means of steady running stand for running that lasts, see `Window.lasts`."""
+    return study.window(Phase.STEADY, study.steady).lasts
+
+
+def _no_judgement(study: StudyRecord, speed: str) -> str:
+    """Words on a motor that is not told as one that keeps the speed, though the mean `speed` is near: it does not
+    start from another angle, or its turns are not steady; empty where neither is so."""
+    found = study.findings.get(StartAnalysis.name)
+    if found is not None and found.stuck:
+        where = " and ".join(number(each.angle, "rad") for each in found.stuck)
+        return (
+            f"The motor does NOT bring the crank to its speed from {where}, though it turns at {speed} here"
+        )
+    if lasts(study):
+        return ""
+    steady, why = study.answers[STEADY], "the crank does not make a whole turn"
+    if study.drive.whole_turns(study.steady) is not None:
+        gap, energy = (number(abs(x), "1", "percent") for x in (steady.cycle_gap, steady.energy_gap))
+        why = f"their ends differ by {gap}, and the moving masses take up or give {energy} of the energy that passes"
+    return (
+        f"The motor is not judged: the crank turns at {speed}, but its turns are not steady ({why}); raise "
+        "run.settle_turns or run.turns"
+    )
 
 
 def motor_verdict(study: StudyRecord) -> dict[str, Any] | None:
@@ -125,7 +152,10 @@ def motor_verdict(study: StudyRecord) -> dict[str, Any] | None:
     reserve = None if run is None else reserves[run]
     speed = number(shown_speed(steady.speed_mean, requested), "rad/s", "speed", beside=False)
     requested_text = number(requested, "rad/s", "speed", full=False, beside=False)
-    if keeps_speed:
+    unjudged = _no_judgement(study, speed) if keeps_speed else ""
+    if unjudged:
+        text, keeps_speed = unjudged, False
+    elif keeps_speed:
         text = f"The motor keeps the crank at {speed}"
         if speed != number(requested, "rad/s", "speed", beside=False):
             text += f", near enough to the {requested_text} asked for"

@@ -60,8 +60,13 @@ class Check:
         """Words on a limit that is exceeded."""
         if self.limit <= 0.0 and self.forbidden:
             return self.forbidden
-        value, limit = (number(x, self.unit, self.kind, full=False) for x in (self.value, self.limit))
         share = number(self.utilisation, "1", "used")
+        if share.startswith("100 %") and self.utilisation is not None:
+            # the numbers would read as if the limit were kept
+            value, limit = (number(x, self.unit, self.kind, 5, full=False) for x in (self.value, self.limit))
+            above = number(self.utilisation - 1.0, "1", "percent", 1, full=False)
+            return f"{self.title} {value}, {above} above the permitted {limit}"
+        value, limit = (number(x, self.unit, self.kind, full=False) for x in (self.value, self.limit))
         return f"{self.title} {value}, {share}{' of' if share.endswith('%') else ''} the permitted {limit}"
 
     def as_dict(self) -> dict[str, Any]:

@@ -185,7 +185,8 @@ class Answers:
       its speed, voltage and frequency: 0 at the limit, negative where a transient exceeds it, None in a start
     - `winding_temperature`: the final temperature of the winding if the steady turns go on for ever
     - `power_mean`, `supply_power_mean` of steady running: without the power that the moving masses take up, where the
-      turns have not settled
+      turns have not settled; None where the turns are so far from steady that no mean stands for running that lasts,
+      see `Window.lasts`, and so the `winding_temperature`
     - `energy_gap`: the energy that the moving masses take up over the steady turns, over the energy that passes the
       motor's shaft to and fro
     - `cycle_gap`: the difference between the ends of the steady turns, of speed or torque, over the largest value
@@ -215,14 +216,14 @@ class Answers:
     power_mean: Value = measure(
         "W",
         "mean",
-        lambda w: w.mean(w.drive.shaft_power) - w.taken_up[0],
+        lambda w: w.mean(w.drive.shaft_power) - w.taken_up[0] if w.lasts else None,
         of="shaft power",
         minor=True,
     )
     supply_power_mean: Value = measure(
         "W",
         "mean",
-        lambda w: w.mean("motor.supply_power") - w.taken_up[1],
+        lambda w: w.mean("motor.supply_power") - w.taken_up[1] if w.lasts else None,
         of="electric power",
         minor=True,
     )
@@ -240,7 +241,7 @@ class Answers:
     winding_temperature: Value = measure(
         "K",
         "thermal steady state",
-        lambda w: w.settled_temperature,
+        lambda w: w.settled_temperature if w.lasts else None,
         during=_STEADY,
         of="winding temperature",
         card=True,

@@ -16,7 +16,8 @@ STEP = 1.5
 
 ORDER: Mapping[Criterion, str] = {
     Criterion.MARGIN: "each limit is kept with the margin",
-    Criterion.LARGER: "the power is at most sizing.larger times that of the smallest motor that fits so",
+    Criterion.LARGER: "the power is at most {larger} times (sizing.larger) that of the smallest motor that fits so",
+    Criterion.FIELD: "an inverter runs the motor at no more than 1.1 times its rated frequency",
     Criterion.GEAR: "one gear unit has the ratio",
     Criterion.START: "the start takes a relay of a lower trip class",
     Criterion.FLYWHEEL: "there is no flywheel",
@@ -25,7 +26,7 @@ ORDER: Mapping[Criterion, str] = {
     Criterion.COST: "the price is lower, or without prices the mass of motor and flywheel",
     Criterion.USE: "the most used limit is used less",
 }
-"""The criteria in their order, in words."""
+"""The criteria in their order, in words; `larger` stands for the number of that key."""
 
 
 def poles_rank(poles: float) -> float:
@@ -35,21 +36,16 @@ def poles_rank(poles: float) -> float:
 
 def rank(candidates: list[Candidate], larger: float) -> None:
     """Order the candidates by rank and set their reasons. First come those that fit, by the order of preference,
-    then those that do not fit, by their largest utilisation; among those that do not start at all a larger
-    motor comes first. For `larger` see `chainunit.study.sizing_table`."""
+    then those whose start alone is too hard for the gear, by the same order, then the others, by their largest
+    utilisation; among those that do not start at all a larger motor comes first. For `larger` see
+    `chainunit.study.sizing_table`."""
     for c in candidates:
         _judge(c)
-    others = [c for c in candidates if not c.fits]
+    ranking, behind = _ranking([c for c in candidates if c.fits], larger)
+    hard, _ = _ranking([c for c in candidates if c.breaks_gear], larger)
+    others = [c for c in candidates if not c.fits and not c.breaks_gear]
     others.sort(key=lambda c: (not c.starts, c.violation, -c.power, c.motor.designation))
-    fitting = [c for c in candidates if c.fits]
-    ranking = []
-    behind: dict[int, Criterion] = {}
-    while fitting:
-        best, dropped = choice(fitting, larger)
-        behind = behind or dropped
-        ranking.append(best)
-        fitting.remove(best)
-    candidates[:] = ranking + others
+    candidates[:] = ranking + hard + others
     best = candidates[0]
     if not best.fits:
         best.verdict = Standing.INSUFFICIENT
@@ -59,6 +55,19 @@ def rank(candidates: list[Candidate], larger: float) -> None:
         c.criterion = behind[id(c)]
         c.reason = f"{_behind(c, best)}; {c.reason}"
     best.verdict, best.reason = Standing.CHOSEN, f"{_chosen(best, ranking)}; {best.reason}"
+
+
+def _ranking(left: list[Candidate], larger: float) -> tuple[list[Candidate], dict[int, Criterion]]:
+    """Candidates in the order of preference, and by the `id` of each but the first the criterion by which it was left
+    out."""
+    ranking = []
+    behind: dict[int, Criterion] = {}
+    while left:
+        best, dropped = choice(left, larger)
+        behind = behind or dropped
+        ranking.append(best)
+        left.remove(best)
+    return ranking, behind
 
 
 def choice(fitting: Sequence[Candidate], larger: float) -> tuple[Candidate, dict[int, Criterion]]:
@@ -78,6 +87,7 @@ def _steps(larger: float) -> Sequence[tuple[Criterion, Callable[[list[Candidate]
     return (
         (Criterion.MARGIN, _with_margin),
         (Criterion.LARGER, partial(_powerful, most=larger)),
+        (Criterion.FIELD, partial(_least, value=lambda c: float(c.weakened))),
         (Criterion.GEAR, partial(_least, value=lambda c: float(c.unit is None))),
         (Criterion.START, partial(_least, value=lambda c: c.start_class or 0)),
         (Criterion.FLYWHEEL, partial(_least, value=lambda c: float(c.drive.flywheel > 0.0))),
@@ -97,7 +107,7 @@ def _least(left: list[Candidate], value: Callable[[Candidate], float]) -> list[C
 
 def _with_margin(left: list[Candidate]) -> list[Candidate]:
     """Those that keep the margin; where none does, those that use least of their limits."""
-    return [c for c in left if c.keeps_margin] or _less_used(left)
+    return [c for c in left if c.leaves_margin] or _less_used(left)
 
 
 def _powerful(left: list[Candidate], most: float) -> list[Candidate]:
@@ -132,7 +142,7 @@ def _judge(c: Candidate) -> None:
         loads = [check for name, check in c.checks.items() if name not in TOLERANCES]
         most = max(loads, key=lambda check: check.utilisation or 0.0)
         c.verdict = Standing.FITS if c.keeps_margin else Standing.BARELY
-        c.reason = f"most used: {most.title}, {number(c.use, '1', 'used')}"
+        c.reason = f"most used: {most.title}, {number(most.utilisation, '1', 'used')}"
     elif not c.checks:
         # the run failed, and the reason is already set
         c.verdict = Standing.REJECTED
@@ -141,6 +151,7 @@ def _judge(c: Candidate) -> None:
     else:
         over = [check for name, check in c.checks.items() if c.sizes[name] > 1.0]
         c.verdict, c.reason = Standing.REJECTED, "; ".join(check.excess for check in over)
+        c.reason += f"; {c.remedy}" if c.remedy else ""
     if c.disc:
         c.reason += f", with a flywheel of {c.flywheel_words}"
 
@@ -150,7 +161,9 @@ def _unstarted(c: Candidate) -> str:
     if c.stall_angle is None:
         return "it does not bring the machine up to speed"
     reason = f"without a flywheel it stalls at {number(c.stall_angle, 'rad')} of the crank"
-    if c.heaviest:
+    if c.bound:
+        reason += f", and no flywheel that sizing.inertia_ratio = {c.bound:g} permits carries it through"
+    elif c.heaviest:
         reason += f", and no flywheel of up to {number(c.heaviest, 'kg.m2')} carries it through"
     return reason
 
@@ -169,6 +182,8 @@ def _chosen(best: Candidate, ranking: Sequence[Candidate]) -> str:
     # the one of the smallest that comes farthest in the order of preference
     rival = max((c for c in smaller if c.power == least), key=lambda c: [*Criterion].index(c.criterion))
     name = f"{rival.motor.designation}, the smallest that fits,"
+    if rival.criterion is Criterion.FIELD:
+        return f"runs at {number(best.frequency, 'Hz')}, where {name} {_weakened(rival)}"
     if rival.criterion is Criterion.GEAR:
         return f"takes one gear unit, where {name} takes two"
     if rival.criterion is Criterion.START:
@@ -189,11 +204,17 @@ def _behind(c: Candidate, best: Candidate) -> str:
     poles = (each.motor.nameplate.poles for each in (c, best))
     return {
         Criterion.MARGIN: f"leaves less than the margin of {_margin(c)}",
+        Criterion.FIELD: f"{_weakened(c)}",
         Criterion.GEAR: "its ratio takes two gear units",
         Criterion.START: f"its start is of {_class(c)}, that of the chosen one of {_class(best)}",
         Criterion.FLYWHEEL: "needs a flywheel, the chosen one none",
         Criterion.POLES: "{:g} poles, where {:g} are to be had".format(*poles),
     }.get(c.criterion or Criterion.POWER, "larger than needed")
+
+
+def _weakened(c: Candidate) -> str:
+    rated = number(c.motor.nameplate.frequency, "Hz")
+    return f"runs at {number(c.frequency, 'Hz')} in field weakening, with less torque than at its {rated}"
 
 
 def _margin(c: Candidate) -> str:

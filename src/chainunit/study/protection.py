@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -31,11 +32,13 @@ class Obstacle(StrEnum):
     OVERLOADS = "the overloads"
     """no overload reaches the torque of the setting"""
     RELEASE = "the release"
-    """until no torque passes the opening coupling, the gear carries as much as without it, or more than it may"""
+    """until no torque passes the opening coupling, the gear carries as much as without it in every overload"""
     ENERGY = "the energy balance"
     """the energy balance is not kept in the runs from which the setting follows"""
 
 
+MARKED = 0.2
+"""Share of the torque at the output of the gear that a coupling spares it in an overload if it opens in good time."""
 _SPARED = 0.05
 """Share of the torque at the output of the gear that a coupling has to spare it in an overload."""
 
@@ -43,15 +46,29 @@ _SPARED = 0.05
 @dataclass(frozen=True)
 class CouplingEffect:
     """The effect of a safety coupling in an overload: the largest torque at the output of the gear [N m] without it,
-    and with it until no torque passes it any more."""
+    and with it until no torque passes it any more; and the `release` time [s] up to which the gear carries no more
+    than `goal` [N m], 0 where it carries more before the trip."""
 
     without: float
     with_coupling: float
+    goal: float = math.inf
+    release: float = math.inf
 
 
-def spares(effects: Mapping[str, CouplingEffect]) -> bool:
-    """Whether a coupling spares the gear a part of its torque in one of the overloads."""
-    return any(effect.with_coupling < (1.0 - _SPARED) * effect.without for effect in effects.values())
+def goal(without: float, gear: float) -> float:
+    """The torque to which a coupling should bring down that `without` it at the output of the gear [N m]: the limit
+    of the `gear` where it is above that, else a marked part of itself."""
+    return gear if without > gear else (1.0 - MARKED) * without
+
+
+def spares(effects: Mapping[str, CouplingEffect], gear: float = math.inf) -> bool:
+    """Whether a coupling spares the gear a part of its torque in one of the overloads, or brings one below the limit
+    of the `gear` [N m]."""
+    return any(
+        effect.with_coupling < (1.0 - _SPARED) * effect.without
+        or effect.with_coupling <= gear < effect.without
+        for effect in effects.values()
+    )
 
 
 @dataclass(frozen=True)
@@ -125,8 +142,8 @@ class Setting:
 
     @property
     def spares(self) -> bool:
-        """Whether a coupling of the least setting spares the gear something, and enough; True until it was tried."""
-        return not self.effects or (spares(self.effects) and not self.passed)
+        """Whether a coupling of the least setting spares the gear something; True until it was tried."""
+        return not self.effects or spares(self.effects, self.gear)
 
     @property
     def torque(self) -> float | None:
@@ -150,8 +167,11 @@ class Setting:
 
 
 class Way(StrEnum):
-    """A way to a safety coupling that stays shut in a start which puts more on it than running does."""
+    """A way to a safety coupling that stays shut in a start which puts more on it than running does, or that saves
+    what one with the declared release time does not."""
 
+    RELEASE = "shorter release time"
+    GEAR = "stronger gear"
     SOFT_STARTER = "soft starter"
     INVERTER = "inverter"
     SLIP_CLUTCH = "slip clutch"
@@ -170,9 +190,14 @@ class WayNumbers:
     start_time: Value = quantity("s", "longest start-up")
     voltage: Value = quantity("1", "share of the voltage at the start", kind="percent")
     ramp: Value = quantity("s", "ramp of the voltage or of the speed")
+    boost: Value = quantity(
+        "1", "boost of the inverter: share of the voltage at frequency zero", kind="percent"
+    )
     slip_time: Value = quantity("s", "time for which the clutch slips in a start")
     slip_energy: Value = quantity("J", "heat of the slip in a start")
     slip_power: Value = quantity("W", "heat of the slip while the machine is blocked and the motor runs on")
+    release_time: Value = quantity("s", "time from the trip until no torque passes the coupling")
+    gear: Value = quantity("N.m", "torque that the gear has to carry")
     rocker: Value = quantity("N.m", "largest rocker torque in the overloads until the coupling opens")
 
     @classmethod

@@ -14,6 +14,7 @@ from ..fmu.backends import Origin
 from ..machines.chain_unit import RodName
 from ..reading.text import entry, number
 from . import verdict
+from .catalogue_drive import SLIP
 from .chain import ChainResult
 from .config import Config
 from .drive import Drive
@@ -45,7 +46,7 @@ Amount: TypeAlias = (
 """A number and its unit; optionally the kind by which it is shown, and the number of digits."""
 
 
-_CHOSEN = ("gear.efficiency", "starter.inverter.boost")
+_CHOSEN = ("gear.efficiency", "starter.inverter.boost", SLIP)
 """Values that sizing chooses where the file leaves them out, see `chainunit.study.choice.as_chosen`."""
 
 Origins: TypeAlias = Literal["file", "example", "declared", "tuned", "catalogue", "sizing"]
@@ -190,6 +191,8 @@ class StudyRecord:
         section, _, parameter = name.partition(".")
         if name in _CHOSEN and self.sizing is not None and self._of(name) == "declared":
             return "sizing"
+        if name == SLIP and self.config.start == "inverter" and self._of(name) == "declared":
+            return "catalogue"
         if section == "motor" and self.tuning is not None and parameter in self.tuning.parameters:
             return "file" if name in self.config.given else "tuned"
         if section == "machine" and parameter in LENGTHS and self.config.gives("ratios"):
@@ -217,7 +220,7 @@ class StudyRecord:
         group = parameter.partition(".")[0]
         if parameter == "inverter.on":
             return "start"
-        if parameter == "inverter.slip" and config.start == "inverter" and not config.starter.inverter.slip:
+        if parameter == "inverter.slip" and config.start == "inverter" and SLIP not in config.given:
             return ""
         if group in ("soft_start", "inverter"):
             return f"starter.{parameter}"

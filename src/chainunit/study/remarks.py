@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from ..core.engines import numpy_
 from ..drives.cardan import two_joints
 from ..reading.text import number
+from .catalogue_drive import SLIP
 from .coupling import remark_on_coupling, remark_on_rams
 from .event_torques import peaks_in_events
 from .events import Jam
-from .judgement import model_verdict, motor_limits, no_reserve
+from .judgement import lasts, model_verdict, motor_limits, no_reserve
 from .measures import STARTED, Answers
 from .random_remarks import remark_on_random_overloads
 from .record import LOAD_CYCLE, Amount, StudyRecord
@@ -56,7 +58,7 @@ def conclude(study: StudyRecord) -> None:
             what=" and ".join(left_out),
         )
     if study.answers:
-        study.verdict = model_verdict(study)
+        study.verdict = replace(model_verdict(study), step=config.run.step)
         for line in study.verdict.details(study.titles):
             study.warn("model", "{line}", line=line)
     if config.chain is not None:
@@ -217,16 +219,18 @@ def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
         warn(
             "no whole turn",
             "steady running: the crank does not make a whole turn; means are over the whole run, and there is no "
-            f"{LOAD_CYCLE}.",
+            f"{LOAD_CYCLE}.{{refused}}",
             STEADY,
+            refused="" if lasts(study) else _REFUSED,
         )
     elif steady.cycle_gap > CLOSED:
         warn(
             "turns do not close",
             "steady running: the turns do not close, their ends differ by {cycle_gap} in speed or torque: {repeats}; "
-            "raise run.settle_turns or run.turns.",
+            "raise run.settle_turns or run.turns.{refused}",
             STEADY,
             cycle_gap=(steady.cycle_gap, "1", "percent"),
+            refused="" if lasts(study) else _REFUSED,
             repeats="chains do not repeat a turn" if study.config.chain else "the machine has not settled",
         )
     elif abs(steady.speed_drift) > DRIFT and not study.config.chain:
@@ -243,11 +247,12 @@ def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
         warn(
             "energy taken up",
             "steady running: the moving masses {take}, over the evaluated turns {energy_gap} of the energy that "
-            "passes the motor's shaft. Mean powers are told without it; peaks, RMS and ripple are not those of "
+            "passes the motor's shaft. {means} peaks, RMS and ripple are not those of "
             "steady running: raise run.settle_turns.",
             STEADY,
             take="still take up energy" if steady.energy_gap > 0.0 else "still give energy",
             energy_gap=(abs(steady.energy_gap), "1", "percent"),
+            means="Mean powers are told without it;" if lasts(study) else f"{_REFUSED.strip()} The",
         )
     if steady.winding_temperature is not None and not math.isfinite(steady.winding_temperature):
         warn(
@@ -263,6 +268,12 @@ def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
             without=(study.ripple_without, "1", "percent"),
             speed_ripple=(steady.speed_ripple, "1", "percent"),
         )
+
+
+_REFUSED = (
+    " Mean power, electric power and the temperature of the winding have no value: no mean of these turns stands for "
+    "running that lasts."
+)
 
 
 _HAPPENINGS = {
@@ -333,20 +344,37 @@ def _on_inverter(study: StudyRecord) -> None:
     rated_current = study.drive.rated_current
     if rated_current is None or study.config.start != "inverter":
         return
+    if SLIP not in study.config.given:
+        slip = study.drive.parameters.inverter.slip
+        without = (
+            "The inverter does not compensate the slip of the motor (starter.inverter.slip): it would raise "
+            "its frequency in each peak of the load, where the flywheel has to slow down to give its energy."
+        )
+        compensated = (
+            "The inverter compensates the rated slip of the motor by {slip} (starter.inverter.slip)."
+        )
+        study.note("slip compensation", compensated if slip else without, slip=(slip, "Hz/(N.m)"))
     limit = study.config.starter.overload
+    ordered = study.sizing.best.inverter_current if study.sizing else None
+    rated_current, whose = (
+        (ordered, "to be ordered") if ordered else (rated_current, "with the rated current of the motor")
+    )
     runs = {name: a.current_peak for name, a in (("start_up", study.start), *study.answers.items()) if a}
-    high = {name: peak for name, peak in runs.items() if peak is not None and peak > limit * rated_current}
+    high = {
+        name: peak for name, peak in runs.items() if peak is not None and peak > 1.001 * limit * rated_current
+    }
     if high:
         where = (
             f"{study.title_of(name)} ({number(peak / rated_current, '1')})" for name, peak in high.items()
         )
         study.note(
             "inverter current",
-            "The inverter's own current limit is not in the model, and one of the rated current of the motor gives "
-            "{limit} times that for up to 60 s (starter.overload). Take one for the peak current, or the motor gives "
+            "The inverter's own current limit is not in the model, and the one {whose} gives {limit} times its rated "
+            "current for up to 60 s (starter.overload). Take one for the peak current, or the motor gives "
             "less torque than here. Times the rated {rated}: {where}.",
             *high,
             limit=f"{limit:g}",
+            whose=whose,
             rated=(rated_current, "A"),
             where="; ".join(where),
             **{f"{name}.current_peak": (peak, "A") for name, peak in high.items()},

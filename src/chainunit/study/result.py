@@ -8,16 +8,18 @@ from typing import Any
 from .. import __version__
 from ..core.quantities import variables
 from ..drives.catalogue import CatalogueMotor
-from ..reading.text import entries, entry, shown_in, turning
-from .coupling import coupling_sentence, way_words, why_none
-from .event_torques import running_peak, running_words
+from ..drives.gearing import ordered_torque
+from ..reading.text import entries, entry, number, shown_in, turning
+from .coupling import coupling_sentence, overloads_at_gear, way_words, why_none
+from .event import Role
+from .event_torques import peaks_in_events, running_peak, running_words
 from .given import given_sections
-from .judgement import motor_verdict
+from .judgement import motor_verdict, wrong_runs
 from .measures import measures_of
-from .protection import CouplingEffect
+from .protection import CouplingEffect, Obstacle
 from .record import StudyRecord
 from .relay import class_words
-from .starts import LARGE, StartAnalysis
+from .starts import StartAnalysis
 from .torques import at_gear
 from .verdict import STEADY
 from .window import Phase
@@ -41,6 +43,9 @@ def _rating(motor: CatalogueMotor | None) -> dict[str, Any]:
         "rated_speed": entry(plate.speed, "rad/s", "speed"),
         "rated_torque": entry(plate.torque, "N.m"),
         "rated_current": entry(plate.rated_current, "A"),
+        "rated_voltage": entry(plate.voltage, "V"),
+        "rated_frequency": entry(plate.frequency, "Hz"),
+        "poles": entry(plate.poles, "1"),
     }
 
 
@@ -183,22 +188,46 @@ def _parts(study: StudyRecord) -> dict[str, Any]:
 
 
 def _gear(study: StudyRecord) -> dict[str, Any]:
-    """The torques by which the gear of the drive that sizing chose is ordered; empty without steady running, and for
-    an insufficient motor."""
+    """The torques by which the gear of the drive that sizing chose is ordered, and the one that decides, such that a
+    study with that gear keeps its margin; empty without steady running, and for an insufficient motor."""
+    assert study.config.sizing is not None
     if study.insufficient or STEADY not in study.answers:
         return {}
     running, starts = running_peak(study, at_gear), study.findings.get(StartAnalysis.name)
-    given = "gear.start_factor" in study.config.given
-    factor = study.config.gear.start_factor if given else LARGE
-    start = starts.worst.gear_torque if starts else 0.0
-    titles = {
-        "rated_torque": f"gear, rated output torque at least, with {factor:g} times that in a start",
-        "running": f"largest torque of {running_words(study, running.run)} on the output of the gear",
-        "start": "largest torque of a start on the output of the gear",
+    factor, margin = study.config.gear.start_factor, study.config.sizing.margin
+    of_running = running_words(study, running.run)
+    torques = {"running": (running.torque, of_running, 1.0)}
+    if starts:
+        torques["start"] = (starts.worst.gear_torque, "a start", factor)
+    if overloads := overloads_at_gear(study):
+        name = max(overloads, key=lambda each: overloads[each])
+        with_coupling = study.setting is not None and name in study.setting.effects and study.setting.torque
+        words = f"an overload ({study.title_of(name)}{', with the coupling' if with_coupling else ''})"
+        torques["overload"] = (overloads[name], words, factor)
+    _, by, times = max(
+        ((torque / permitted, words, permitted) for torque, words, permitted in torques.values()),
+        key=lambda each: each[0],
+    )
+    momentary = max((torque for name, (torque, *_) in torques.items() if name != "running"), default=0.0)
+    reason = by if times == 1.0 else f"{by}, in which it may carry {times:g} times that"
+    if left_out := [
+        n for n in wrong_runs(study) if n in peaks_in_events(study, Role.SHOCK, Role.DISTURBANCE)
+    ]:
+        names = ", ".join(map(study.title_of, left_out))
+        reason += f"; left out, as the energy balance is not kept: {names}"
+    free = number(margin, "1", "percent", full=False)
+    return {
+        "rated_torque": entry(ordered_torque(running.torque, momentary, factor, margin), "N.m")
+        | {"title": f"gear, rated output torque at least, with the margin of {free}; decided by {reason}"},
+        **{
+            name: entry(torque, "N.m") | {"title": f"largest torque of {words} on the output of the gear"}
+            for name, (torque, words, _) in torques.items()
+        },
+        "decided_by": reason,
     }
-    torques = {"rated_torque": max(running.torque, start / factor), "running": running.torque}
-    torques |= {"start": start} if starts else {}
-    return {name: entry(torque, "N.m") | {"title": titles[name]} for name, torque in torques.items()}
+
+
+_UNTRIED = "not judged: this study has no overload; add [[event]]"
 
 
 def _protection(study: StudyRecord) -> dict[str, Any]:
@@ -224,7 +253,9 @@ def _protection(study: StudyRecord) -> dict[str, Any]:
         **relay,
         "coupling": coupling_sentence(study),
         "obstacle": setting.obstacle,
-        "why_none": why_none(study),
+        "why_none": why_none(study)
+        if setting.overloads or setting.obstacle is not Obstacle.OVERLOADS
+        else _UNTRIED,
         "normal_torque": torque(
             setting.normal, "largest torque of normal duty on the coupling, at the crank"
         ),

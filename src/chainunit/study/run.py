@@ -108,7 +108,6 @@ def _run_study(
             task = Task(config, replace(drive, observer=None), files, runner.stop, runner.rig.fed_from)
             study.monte_carlo = run_monte_carlo(task, folder, report, scheduler=scheduler)
         _analyse(study, runner.rig, report, needs_runs=True)
-        _with_class_of_all_starts(study)
         study.setting = recommended_setting(study)
         study.alternatives = alternatives(study, runner.rig, report)
     except RunError as error:
@@ -132,6 +131,9 @@ def _analyse(study: StudyRecord, rig: Rig, report: Report, *, needs_runs: bool) 
             findings = analysis.find(study, rig, report)
             if findings is not None:
                 study.findings[analysis.name] = findings
+            if analysis.name == StartAnalysis.name:
+                # before an analysis reads the answers that depend on it
+                _with_class_of_all_starts(study)
 
 
 def _with_class_of_all_starts(study: StudyRecord) -> None:

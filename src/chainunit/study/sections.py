@@ -136,7 +136,7 @@ class Starter:
     inverter: InverterControl = group(InverterControl, "inverter", default=InverterControl())
     overload: Value = quantity(
         "1",
-        "largest current of an inverter, for up to 60 s, over the rated current of the motor",
+        "largest current of an inverter, for up to 60 s, over its rated current",
         default=1.5,
         min=1.0,
         max=5.0,
@@ -238,6 +238,13 @@ SIMULATIONS = ("cs", "me")
 """The methods of simulation: as a co-simulation, or as one ODE of Model Exchange FMUs."""
 
 STARTS = ("direct", "soft", "inverter")
+
+SOFTER: Mapping[str, str] = {
+    "direct": 'start softer (start = "soft" or "inverter")',
+    "soft": "lower the voltage or lengthen the ramp of the soft starter",
+    "inverter": "lengthen run.ramp",
+}
+"""Remedies for a start that is too hard, by the start of the study."""
 
 CHOICES: Mapping[str, Any] = {
     "feed_forward": (

@@ -24,7 +24,7 @@ from ..fmu.backends import Backend
 from ..reading.text import entries, number
 from ..work.progress import Report
 from .candidate import Candidate, Standing
-from .catalogue_drive import catalogue_drive
+from .catalogue_drive import catalogue_drive, check_ratios, is_of_a_gear, with_wheel
 from .chain import HIGH
 from .config import Config
 from .duty import CycleNumbers, Duty, duty_of
@@ -32,6 +32,7 @@ from .inverter import inverter_needs, least_boost, misses_by_a_hair
 from .limits import SPEED_DEVIATION
 from .preference import ORDER, choice, poles_rank, rank
 from .relay import HEAVIEST, LIGHT, class_words
+from .sections import SOFTER
 from .sizing_table import SIZING_KEYS
 from .trial import try_motor
 
@@ -111,7 +112,7 @@ class SizingResult:
             "motors": {"value": self.motors, "unit": "1"},
             "weak": {"value": self.weak, "unit": "1"},
             "candidates": [c.as_dict() for c in self.candidates],
-            "order": list(ORDER.values()),
+            "order": [words.format(larger=f"{self.config.sizing.larger:g}") for words in ORDER.values()],
             "trade": None if self.trade is None else [self.candidates.index(c) for c in self.trade],
             "chosen": self.candidates.index(self.chosen_candidate) if self.chosen_candidate else None,
             "nearest": None if self.chosen_candidate else self.candidates.index(best),
@@ -143,6 +144,16 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
     """
     limits = config.sizing
     assert limits is not None
+    motors = [
+        m for m in catalogue(config.catalogue) if limits.poles_least <= m.nameplate.poles <= limits.poles_most
+    ]
+    motors.sort(key=lambda m: (m.nameplate.power, poles_rank(m.nameplate.poles)))
+    if not motors:
+        raise InputError(
+            f"sizing.poles_least = {limits.poles_least:g}, sizing.poles_most = {limits.poles_most:g}: the catalogue "
+            "has no motor with so many poles"
+        )
+    check_ratios(config, motors)
     report("the machine at constant speed", 0.0, 1.0)
     duty = duty_of(config, folder, backend)
     numbers = duty.numbers
@@ -155,17 +166,8 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
             f"Peaks of the cycle and the flywheel are those of single turns, {100 * HIGH:g} % quantile over all "
             "turns of all starts of the chains."
         )
-    motors = [
-        m for m in catalogue(config.catalogue) if limits.poles_least <= m.nameplate.poles <= limits.poles_most
-    ]
     # a flywheel evens the torque of a cycle, but gives no mean power
     power = numbers.power_mean / (1.0 - limits.margin)
-    motors.sort(key=lambda m: (m.nameplate.power, poles_rank(m.nameplate.poles)))
-    if not motors:
-        raise InputError(
-            f"sizing.poles_least = {limits.poles_least:g}, sizing.poles_most = {limits.poles_most:g}: the catalogue "
-            "has no motor with so many poles"
-        )
     strong = [m for m in motors if m.nameplate.power >= power]
     if not strong:
         notes.append(
@@ -174,6 +176,11 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
         )
         strong = [m for m in motors if m.nameplate.power == motors[-1].nameplate.power]
     candidates = _search(config, strong, duty, folder, report, backend)
+    notes += [
+        f"{c.motor.designation} would be preferred, but for its start: {c.reason}."
+        for c in candidates[1:]
+        if c.remedy
+    ]
     notes += _needs(candidates[0], config)
     return SizingResult(config, duty, candidates, notes, len(motors), len(motors) - len(strong))
 
@@ -216,7 +223,28 @@ def _search(
         if (larger := _without_flywheel(config, motors, candidates, duty, files)) is not None:
             candidates.append(larger)
             _from_all_angles(config, candidates, duty, files)
+    hard = [c for c in candidates if c.breaks_gear]
+    best, _ = choice([candidates[0], *hard], limits.larger) if hard else (candidates[0], {})
+    if best.breaks_gear:
+        report("a softer start", 0.0, 1.0)
+        best.remedy = _remedy(config, best, duty, files)
+        rank(candidates, limits.larger)
     return candidates
+
+
+def _remedy(config: Config, c: Candidate, duty: Duty, files: Mapping[str, Path] | None) -> str:
+    """What makes a candidate fit whose start alone is too hard for the gear: on the line it is tried with a soft
+    starter."""
+    if config.start != "direct":
+        return SOFTER[config.start]
+    config = dataclasses.replace(config, start="soft")
+    soft = proposal(config, c.motor, duty, c.drive.ratio)
+    soft.drive = dataclasses.replace(soft.drive, flywheel=c.drive.flywheel)
+    judge(config, soft, duty, files, worst_start=True)
+    if not soft.fits:
+        return SOFTER["direct"]
+    start = soft.checks["gear_start"]
+    return f'with start = "soft" it fits, and puts {number(start.value, start.unit)} on the gear in a start'
 
 
 def _tried(config: Config, bare: Candidate, duty: Duty, files: Mapping[str, Path] | None) -> Candidate:
@@ -262,10 +290,9 @@ def _needs(best: Candidate, config: Config) -> Iterator[str]:
         yield from inverter_needs(best, config)
     if best.unit is None:
         largest = UNITS[config.choices["sizing.gear_kind"]][-1]
-        is_given = "gear.ratio" in config.given or config.choices["sizing.ratios"]
         end = (
             f"even of makers with large ratios ends at about {largest.made:g}"
-            if is_given
+            if is_of_a_gear(config)
             else (f"ends at about {largest.largest:g}")
         )
         yield f"A ratio of {best.drive.ratio:g} takes two gear units: a {largest.title} {end}."
@@ -279,7 +306,11 @@ def _is_settled(candidates: list[Candidate], following: CatalogueMotor, larger: 
         return False
     best, _ = choice(keeping, larger)
     is_light = best.unit is not None and (best.start_class or 0) <= LIGHT and not best.drive.flywheel
-    if is_light and poles_rank(best.motor.nameplate.poles) <= poles_rank(following.nameplate.poles):
+    if (
+        is_light
+        and not best.weakened
+        and poles_rank(best.motor.nameplate.poles) <= poles_rank(following.nameplate.poles)
+    ):
         return best.power < following.nameplate.power
     return following.nameplate.power > larger * min(c.power for c in keeping)
 
@@ -304,16 +335,15 @@ def _without_flywheel(
         if m.nameplate.poles == poles and m.nameplate.power > best.power and m.designation not in tried
     ]
 
-    def bare(motor: CatalogueMotor) -> Candidate:
-        candidate = proposal(config, motor, duty)
-        judge(config, candidate, duty, files)
-        return candidate
+    def judged(c: Candidate) -> Candidate:
+        judge(config, c, duty, files)
+        return c
 
     # a larger motor runs more evenly, but puts more on the gear in its start: the largest may not fit
     least = None
     while rest:
         middle = len(rest) // 2
-        candidate = bare(rest[middle])
+        candidate = least_boost(config, proposal(config, rest[middle], duty), judged)
         if candidate.keeps_margin:
             least = candidate
         too_weak = any(candidate.exceeds(name) for name in candidate.checks if name not in _WORSE_WITH_POWER)
@@ -338,7 +368,7 @@ def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[st
     trials: list[Candidate] = []
 
     def trial_with(flywheel: float) -> Candidate:
-        candidate = dataclasses.replace(bare, drive=dataclasses.replace(bare.drive, flywheel=flywheel))
+        candidate = dataclasses.replace(bare, drive=with_wheel(config, bare.drive, flywheel))
         judge(config, candidate, duty, files)
         trials.append(candidate)
         return candidate
@@ -378,6 +408,7 @@ def _nearest(trials: list[Candidate]) -> Candidate:
     """The trial that comes nearest to all limits; where none starts, the one without a flywheel."""
     best = min(trials, key=lambda c: c.violation)
     best.heaviest = max(c.drive.flywheel for c in trials)
+    best.bound = next((c.checks["inertia"].limit for c in trials if c.exceeds("inertia")), None)
     return best
 
 
@@ -435,7 +466,7 @@ def proposal(config: Config, motor: CatalogueMotor, duty: Duty, chosen: float | 
     elif "gear.ratio" not in config.given:
         ratio, series = ratio_on_offer(drive.ratio, config.choices["sizing.ratio_series"], ratios, _TOLERANCE)
         drive = catalogue_drive(config, motor, torque, limits.ambient, ratio)
-    unit = gear_unit(kind, drive.ratio, is_given=bool("gear.ratio" in config.given or ratios))
+    unit = gear_unit(kind, drive.ratio, is_given=is_of_a_gear(config))
     return Candidate(motor, drive, {}, limits.margin, unit, series)
 
 
@@ -459,3 +490,6 @@ def judge(
     c.checks, c.fluctuation = trial.checks(), trial.fluctuation
     c.duty, c.stall_angle = trial.duty, trial.stall_angle
     c.start_class, c.start_current = trial.start_class, trial.start_current
+    c.inverter_current, c.overload_time = trial.inverter_current, trial.overload_time
+    if trial.start_time is not None:
+        c.speed, c.frequency = trial.speed, trial.frequency

@@ -47,8 +47,8 @@ class Sizing:
     )
     inertia_ratio: Value = quantity(
         "1",
-        "permitted ratio of all other inertia at the motor shaft, flywheel included, to that of the rotor; of motors "
-        "on the line only where it is given",
+        "permitted ratio of all other inertia at the motor shaft, flywheel included, to that of the rotor; checked "
+        "only where it is given",
         default=10.0,
         above=0.0,
         max=1000.0,
@@ -93,7 +93,7 @@ SIZING_KEYS: Mapping[str, Any] = {
         ),
     ),
     "ratios": (
-        numbers(Transmission, "ratio", "sizing.ratios", 500),
+        numbers(Transmission, "ratio", "sizing.ratios", 500, is_empty_allowed=False),
         Field([], description="gear ratios on offer, of a catalogue of gears, in place of the series"),
     ),
 }

@@ -22,6 +22,8 @@ START_ANGLES = 8
 """Number of crank angles, evenly over the turn, from which the machine is started."""
 _STEP = 1e-3
 """Longest step of a start [s]: the first swings have the frequency of the supply, and a coarser one misses peaks."""
+OVERLOADED = 60.0
+"""Time for which an inverter carries more than its rated current [s]."""
 _AFTER = 0.25
 """Time for which a start is followed once the crank has its speed [s]: the motor overshoots and settles."""
 
@@ -40,6 +42,8 @@ class StartNumbers:
         "1", "trip class of the overload relay that holds; 40: none up to class 30; none for an inverter"
     )
     current: Value = quantity("A", "largest current of the motor")
+    long_current: Value = quantity("A", "current that is exceeded for 60 s in all; 0 in a shorter start")
+    time_above: Value = quantity("s", "time above the rated current of the motor, as long as it is followed")
     heat: Value = quantity("J", "heat of the winding until shortly after the start")
     followed: Value = quantity("s", "time of that heat")
 
@@ -74,7 +78,7 @@ def start_from(
             time, speed = run["time"].values, run[name].values / ratio
             final = float(np.mean(speed[time >= time[-1] - rig.config.turn]))
             reached = time_to_start(time, speed, final, rig.config.run.crank_speed)
-    time, current = run["time"].values, run[f"motor.{rig.drive.motor.current}"].values
+    time, current = run["time"].values, np.abs(run[f"motor.{rig.drive.motor.current}"].values)
     relay, rated = None, rig.drive.rated_current
     if reached is not None and rated is not None and not rig.drive.follows:
         relay = start_class(time[time <= reached], current[time <= reached], rated)
@@ -85,9 +89,30 @@ def start_from(
         start_time=reached,
         start_class=relay,
         current=peak(current),
+        long_current=exceeded_for(time, current, OVERLOADED),
+        time_above=0.0 if rated is None else time_above(time, current, rated),
         heat=float(np.trapezoid(run["motor.heat"].values, time)),
         followed=float(time[-1]),
     )
+
+
+def exceeded_for(time: np.ndarray, current: np.ndarray, longest: float) -> float:
+    """The least current [A] that is exceeded for no longer than `longest` [s] in all; 0 for a shorter record.
+
+    Parameters
+    ----------
+    time, current : times [s] and sizes of the current [A] there, shape (rows,)
+    """
+    means, spans = 0.5 * (current[1:] + current[:-1]), np.diff(time)
+    order = np.argsort(means)[::-1]
+    above = np.cumsum(spans[order])
+    first = int(np.searchsorted(above, longest, side="right"))
+    return float(means[order[first]]) if first < len(order) else 0.0
+
+
+def time_above(time: np.ndarray, current: np.ndarray, level: float) -> float:
+    """The time [s] for which the current is above the `level` [A]; arguments as of `exceeded_for`."""
+    return float(np.sum(np.diff(time)[0.5 * (current[1:] + current[:-1]) > level]))
 
 
 def longest_start(config: Config, start_time: float) -> float:

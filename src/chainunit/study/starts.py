@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+from ..drives.gearing import START_FACTOR
 from ..reading.text import entries, entry, number
 from ..work.progress import Report
 from .analysis import Analysis, Findings
@@ -14,12 +15,9 @@ from .drive import Drive
 from .event_torques import running_peak, running_words
 from .record import StudyRecord
 from .rig import Rig
+from .sections import SOFTER
 from .start_runs import StartNumbers, longest_start, starts_from_all
 from .torques import at_gear
-
-LARGE = 2.0
-"""Ratio of the torque of a start to that of running from which on it is told where no limit of the gear is given:
-gears of catalogues commonly permit about twice their rated torque for the moment of a start."""
 
 
 @dataclass(frozen=True)
@@ -76,10 +74,10 @@ class StartFindings(Findings):
                 "start_up",
                 start=start,
                 limit=(self.limit, "N.m"),
-                remedy=_remedy(study.config.start),
+                remedy=SOFTER[study.config.start],
                 **numbers,
             )
-        elif math.isinf(self.limit) and worst.gear_torque > LARGE * self.running:
+        elif math.isinf(self.limit) and worst.gear_torque > START_FACTOR * self.running:
             study.warn(
                 "start at gear",
                 "{start} from a crank angle of {angle} puts {torque} on the output of the gear, {over} times the "
@@ -88,9 +86,9 @@ class StartFindings(Findings):
                 "{remedy}.",
                 "start_up",
                 start=start,
-                large=f"{LARGE:g}",
+                large=f"{START_FACTOR:g}",
                 running_in=running_words(study, self.running_in),
-                remedy=_remedy(study.config.start),
+                remedy=SOFTER[study.config.start],
                 **numbers,
             )
         if self.stuck:
@@ -108,15 +106,6 @@ _STARTERS = {
     "soft": "A start with the soft starter",
     "inverter": "A start by the inverter",
 }
-
-
-def _remedy(start: str) -> str:
-    """Words on the remedies for a start that is too hard."""
-    return {
-        "direct": 'start softer (start = "soft" or "inverter")',
-        "soft": "lower the voltage or lengthen the ramp of the soft starter",
-        "inverter": "lengthen run.ramp",
-    }[start]
 
 
 class StartAnalysis(Analysis):

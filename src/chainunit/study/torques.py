@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import xarray as xr
 
@@ -21,11 +22,16 @@ def on_coupling(drive: Drive, run: xr.Dataset) -> float:
     return peak(run["motor.tau"].values) * drive.ratio
 
 
-def at_gear(drive: Drive, run: xr.Dataset) -> float:
-    """Peak torque in a run at the output of the gear [N m]: in the shaft behind the gear where the driveline is
-    there, else at the crank."""
+def gear_torque(drive: Drive, run: xr.Dataset) -> Any:
+    """Torque in a run at the output of the gear [N m], shape (time,): in the shaft behind the gear where the
+    driveline is there, else at the crank."""
     behind_gear = drive.line is not None and drive.driven_machine.ratio == 1.0
-    return on_coupling(drive, run) if behind_gear else peak(drive.crank_torque(run))
+    return run["motor.tau"].values * drive.ratio if behind_gear else drive.crank_torque(run)
+
+
+def at_gear(drive: Drive, run: xr.Dataset) -> float:
+    """Peak torque in a run at the output of the gear [N m], see `gear_torque`."""
+    return peak(gear_torque(drive, run))
 
 
 @dataclass(frozen=True)

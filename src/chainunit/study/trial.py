@@ -27,7 +27,15 @@ from .limits import Check, heating, keeping_speed, starting
 from .measures import time_to_start
 from .relay import start_class
 from .rig import PATIENCE, Rig
-from .start_runs import StartNumbers, longest_of, longest_start, starts_from_all
+from .start_runs import (
+    OVERLOADED,
+    StartNumbers,
+    exceeded_for,
+    longest_of,
+    longest_start,
+    starts_from_all,
+    time_above,
+)
 from .torques import DutyPeak, all_feed_on, at_gear, duty_peak
 from .verdict import CREEPS, SETTLING, STEADY
 from .window import BURNT, is_settled
@@ -101,6 +109,34 @@ class Trial:
         return max([self._peak_current(self.start), *(start.current for start in self.starts)])
 
     @cached_property
+    def overload_time(self) -> float | None:
+        """Longest time of a start above the rated current of the motor [s]; None without a start."""
+        if self.start_time is None:
+            return None
+        first = time_above(*self._start_currents, self.motor.nameplate.rated_current)
+        return max([first, *(start.time_above for start in self.starts)])
+
+    @property
+    def _start_currents(self) -> tuple[np.ndarray, np.ndarray]:
+        """Times [s] and currents [A] of the start from the angle 0."""
+        current = self.start[f"motor.{self.drive.motor.current}"].values
+        return self.start["time"].values, np.abs(current)
+
+    @cached_property
+    def inverter_current(self) -> float | None:
+        """Least rated current of an inverter [A]: that of the motor, the RMS of the duty, the peak of running and
+        starts over the permitted overload, and the current that a start exceeds for as long as that overload is
+        permitted. None on the line, or without a start."""
+        if not self.drive.follows or self.start_current is None:
+            return None
+        name = f"motor.{self.drive.motor.current}"
+        highest = max(self.start_current, self._peak_current(*self._running))
+        lasting = [exceeded_for(*self._start_currents, OVERLOADED), *(s.long_current for s in self.starts)]
+        duty = rms(*((share, run[name].values) for share, run in self._cases))
+        rated = float(self.motor.nameplate.rated_current)
+        return max(rated, duty, highest / self.config.starter.overload, *lasting)
+
+    @cached_property
     def speed(self) -> float:
         """Mean speed of the motor [rad/s]."""
         return float(np.mean(self.steady["motor.w"]))
@@ -124,7 +160,7 @@ class Trial:
         plate = self.motor.nameplate
         if not self.drive.follows or self._first is None:
             return plate.frequency
-        return max(self.speed * plate.poles / (4.0 * math.pi), 1.0)
+        return max(float(np.mean(self.steady["motor.supply.frequency"])), 1.0)
 
     @cached_property
     def breakdown_torque(self) -> float:
@@ -187,6 +223,11 @@ class Trial:
         return steady, max(0.0, *extra)
 
     @property
+    def _running(self) -> tuple[xr.Dataset, ...]:
+        """The runs of running: steady, with all feed on each side, and those in which the feed comes or moves."""
+        return (self.steady, *(run for _, run in self.shifts), *self.one_sided.values())
+
+    @property
     def _cases(self) -> list[tuple[float, xr.Dataset]]:
         """The runs of the duty, each with its share of the time."""
         assert self.config.sizing is not None
@@ -227,7 +268,7 @@ class Trial:
             ),
             "peak_torque": check(
                 "peak torque",
-                max(peak(run[_GAP]) for run in (self.steady, *self.one_sided.values())),
+                max(peak(run[_GAP]) for run in self._running),
                 breakdown,
                 "N.m",
             ),
@@ -248,12 +289,6 @@ class Trial:
             inertia = float(np.max(self.drive.load_inertia(self.steady)))
             ratio = (inertia + p.rotor.J - plate.J) / plate.J
             checks["inertia"] = Check("inertia ratio", ratio, demands.inertia_ratio, "1")
-        if self.drive.follows:
-            most = self.config.starter.overload * plate.rated_current
-            current = self._peak_current(
-                self.steady, *(run for _, run in self.shifts), *self.one_sided.values()
-            )
-            checks["inverter_current"] = check("peak current of the inverter", current, most, "A")
         if "gear.torque_limit" in self.config.given:
             gear = self.config.gear
             checks["gear"] = Check("torque of the gear", self.duty.torque, gear.torque_limit, "N.m")

@@ -154,6 +154,8 @@ class Verdict:
     reasons: tuple[Reason, ...] = ()
     actual: float | None = None
     """crank speed in the runs [rad/s], if the model is judged at the requested speed instead; else None"""
+    step: float | None = None
+    """communication step of the runs [s]; None where it is not known"""
 
     @property
     def holds(self) -> Holds:
@@ -180,6 +182,16 @@ class Verdict:
     def _stalls(self) -> bool:
         """Whether the crank hardly turns."""
         return self.actual is not None and abs(self.actual) < CREEPS * self.speed
+
+    @property
+    def _shorter(self) -> str:
+        """The step of the runs with which the energy balance is kept, to follow the words on it; empty where it is
+        not known. The residual falls with the square of the step at least."""
+        worst = max((r.value for r in self.reasons if r.topic == "energy"), default=math.nan)
+        if self.step is None or not RESIDUAL <= worst < 4.0**_HALVINGS * RESIDUAL:
+            return ""
+        halvings = math.floor(math.log(worst / RESIDUAL, 4.0)) + 1
+        return f': run.step = "{1e3 * self.step / 2.0**halvings:.3g} ms"'
 
     @property
     def caveat(self) -> str:
@@ -209,6 +221,7 @@ class Verdict:
             if runs:
                 why.append(short + _where(runs))
                 # a crank that hardly turns moves no energy that a residual could be compared with
+                remedy += self._shorter if topic == "energy" else ""
                 remedies.append("" if topic == "energy" and self._stalls else remedy)
         # a remedy for several faults is named once
         return "; ".join((line, *why, *dict.fromkeys(filter(None, remedies)))) + "."
@@ -261,6 +274,8 @@ class Verdict:
         }
 
 
+_HALVINGS = 3
+"""Halvings of the step of the runs up to which the verdict names a shorter one."""
 CREEPS = 0.5
 """Share of the requested speed below which a machine counts as standing."""
 _STANDS = 1e-3

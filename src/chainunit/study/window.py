@@ -17,6 +17,7 @@ from .arrays import peak
 from .drive import Drive
 from .relay import LIGHT
 from .stored import energy_behind, energy_gap, energy_held
+from .verdict import CREEPS
 
 BURNT = 2000.0
 """Temperature that stands for a winding without a thermal steady state [K]."""
@@ -28,6 +29,8 @@ steady."""
 STORED = 0.002
 """Energy that the moving masses take up over the steady turns, relative to the energy that passes the motor's shaft,
 up to which the turns count as steady."""
+LASTING = 0.05
+"""The same, up to which means of the turns stand for running that lasts, once what is taken up is left out."""
 _EVEN = 1e-4
 """Relative change of the speed over the steady turns that counts as none."""
 
@@ -136,6 +139,16 @@ class Window:
     def mean(self, of: str | Callable[[xr.Dataset], Any]) -> float:
         """Mean over the time of whole turns, of a variable or of a value read from them."""
         return mean(self.turns, of(self.turns) if callable(of) else self.drive.series(self.turns, of))
+
+    @cached_property
+    def lasts(self) -> bool:
+        """Whether means of steady running stand for running that lasts. They do not where the moving masses take up
+        more than `LASTING`, or the crank turns and makes no whole turn. Chains never repeat a turn."""
+        if self.phase is not Phase.STEADY or self.drive.chain is not None:
+            return True
+        if self.drive.whole_turns(self.run) is None:
+            return bool(abs(self.speed_mean) < CREEPS * self.requested_speed)
+        return abs(energy_gap(self.drive, self.turns)) <= LASTING
 
     @cached_property
     def taken_up(self) -> tuple[float, float]:
