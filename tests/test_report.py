@@ -290,7 +290,7 @@ def test_nothing_that_renders_knows_a_study(name):
     own = {module for level, module in imported if level == 1}
     beyond = {module.split(".")[0] for level, module in imported if level == 2}
     assert own <= set(RENDERERS)
-    assert beyond <= {"text", "quantities", "files", "__version__", "mechanism"}
+    assert beyond <= {"core", "reading", "__version__", "mechanism"}
     assert ("mechanism" in beyond) == (name == "linkage")
 
 

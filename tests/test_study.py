@@ -254,7 +254,7 @@ def test_a_run_that_fails_keeps_what_it_computed(tmp_path, monkeypatch):
 # the command, which tells when it is in the middle of the start-up
 TELLING = """
 from pathlib import Path
-from chainunit import cli
+from chainunit.app import cli
 from chainunit.system.instance import Instance
 
 step = Instance.step

@@ -5,6 +5,9 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import Any
 
+from ..core.planar import Vec2
+from ..core.ports import PortValues
+from ..core.quantities import Value, declaration, group, quantity
 from ..groups.body import Bar, Mass
 from ..groups.driver import Crank
 from ..groups.dyad import Dyad
@@ -12,9 +15,6 @@ from ..groups.loads import PinLosses, Resistance, Weight
 from ..mechanism.linkage import Linkage
 from ..mechanism.machine import MachineState
 from ..mechanism.models import InverseMachine, ShaftMotion
-from ..planar import Vec2
-from ..ports import PortValues
-from ..quantities import Value, declaration, group, quantity
 from .parts import Force, Pin, Processing, Rod, force
 
 

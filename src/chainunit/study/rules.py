@@ -56,6 +56,7 @@ def refusals(data: Mapping[str, Any], parts: Parts) -> list[InputError]:
     """A refusal for each rule that a file breaks, whose machine and motor are `parts`."""
     names = {
         "machine": "an FMU" if issubclass(parts.machine, ForeignModel) else parts.machine.name,
+        "name": "machine" if issubclass(parts.machine, ForeignModel) else parts.machine.name,
         "motor": shown(parts.named_motor),
         "type": "" if parts.file else parts.motor.name,
     }
@@ -91,7 +92,6 @@ def _any(conditions: list[Condition]) -> Condition:
 
 
 MACHINE_FMU, MOTOR_FMU = ends_with("system.machine", FMU), ends_with("system.motor", FMU)
-DESIGNATION = given("system.motor") & ~(motor_is(*MOTORS) | MOTOR_FMU)
 CHAINS = is_one_of("organ", "chain")
 
 
@@ -101,16 +101,25 @@ def has_sides() -> Condition:
     return _any([machine_is(name) for name, model in MACHINES.items() if model.sides])
 
 
-@cache
+def is_designation() -> Condition:
+    """Whether the file names a motor by its designation in a catalogue."""
+    return given("system.motor") & ~(motor_is(*MOTORS) | MOTOR_FMU)
+
+
 def motor_of_catalogue() -> Condition:
     """Whether the motor is one of a catalogue, by its designation or that of the machine's example."""
     by_example = _any([machine_is(name) for name in MACHINES if _default(name).designation])
-    return DESIGNATION | (by_example & ~(given("system.motor") | given("motor") | given("sizing")))
+    return is_designation() | (by_example & ~(given("system.motor") | given("motor") | given("sizing")))
+
+
+def all_rules() -> tuple[Rule, ...]:
+    """The rules, in the order in which their refusals come."""
+    return _with_motors(tuple(MOTORS))
 
 
 @cache
-def all_rules() -> tuple[Rule, ...]:
-    """The rules, in the order in which their refusals come."""
+def _with_motors(names: tuple[str, ...]) -> tuple[Rule, ...]:
+    """The rules for the registered motors of these names."""
     return (*_of_parts(), *_of_sides(), *_of_motors(), *_of_sweeps(), *_of_tasks(), *_of_lines())
 
 
@@ -143,9 +152,7 @@ def _of_sides() -> Iterator[Rule]:
     for name in ("ratios", "chain", "organ"):
         words = "is of the chain unit, and the machine is {machine}; leave it out"
         yield Rule(name, ~has_sides(), words)
-    yield Rule(
-        "sizing.one_sided_share", ~has_sides(), "is of two sides, and the machine is {machine}; leave it out"
-    )
+    yield Rule("sizing.one_sided_share", ~has_sides(), "the {name} has no sides; leave it out")
     yield Rule(
         "chain", has_sides() & ~CHAINS, 'is of organs that are chains; add organ = "chain", or leave it out'
     )
@@ -164,7 +171,7 @@ def _of_sides() -> Iterator[Rule]:
 def _of_motors() -> Iterator[Rule]:
     """Rules of the motor and of the tables that choose one."""
     beside = "given beside system.motor = {motor}, which is the motor; leave out one of the two"
-    yield Rule("motor", DESIGNATION | MOTOR_FMU, beside)
+    yield Rule("motor", is_designation() | MOTOR_FMU, beside)
     yield Rule("sizing", given("system.motor"), beside)
     deaf = motor_is(*(name for name, motor in MOTORS.items() if "tau_ff" not in motor.input_layout.names))
     words = "a motor of the type {type} has no input for the torque; leave it out"
