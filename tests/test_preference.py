@@ -392,7 +392,7 @@ def check_order(first, name, tmp_path, monkeypatch, *motors):
     that the start takes nearly wholly."""
     best = first.chosen_candidate
     start = max(each.gear_torque for each in starts_from_all(Rig(first.config, best.drive, None), 3.0))
-    order = ordered_torque(best.duty.torque, start, START_FACTOR, 0.1)
+    order = ordered_torque(max(best.duty.torque, start / START_FACTOR), 0.1)
     for torque in (order, 0.92 * order):
         more = f"[gear]\ntorque_limit = {torque}\n"
         result = sized(name, tmp_path, monkeypatch, *motors, more=more, candidates=float(len(motors)))

@@ -58,11 +58,10 @@ KINDS: Mapping[str, Transmission] = MappingProxyType(
 """Typical start values by kind: a coupling, a two-stage helical gear, a V-belt, a worm gear."""
 
 
-def ordered_torque(running: float, momentary: float, factor: float, margin: float) -> float:
-    """Rated output torque [N m] with which a gear is ordered, rounded up to three digits, as it is printed. It leaves
-    the `margin` free above the torque of `running` [N m], and `factor` times it does so above the largest `momentary`
-    torque of a start or an overload [N m]."""
-    torque = max(running, momentary / factor) / (1.0 - margin)
+def ordered_torque(least: float, margin: float) -> float:
+    """Rated output torque [N m] with which a gear is ordered that needs at `least` such a one [N m]: it leaves the
+    `margin` free above it, and is rounded up to three digits, as it is printed."""
+    torque = least / (1.0 - margin)
     step = 10.0 ** (math.floor(math.log10(torque)) - 2) if torque > 0.0 else 1.0
     return float(f"{math.ceil(torque / step * (1.0 - 1e-9)) * step:.6g}")
 

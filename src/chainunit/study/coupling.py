@@ -18,7 +18,7 @@ from .ram_force import TIMES, rams
 from .record import StudyRecord
 from .sections import Coupling
 from .starts import StartAnalysis
-from .torques import at_gear, on_coupling
+from .torques import on_coupling
 from .verdict import START, STEADY
 from .window import Phase
 
@@ -83,16 +83,6 @@ def hardest_start(study: StudyRecord) -> StartPeak:
 def pull_out(study: StudyRecord) -> float:
     """Largest torque of the warm motor at the crank in steady running [N m]."""
     return study.drive.pull_out(study.steady, study.window(Phase.STEADY, study.steady).warm)
-
-
-def overloads_at_gear(study: StudyRecord) -> dict[str, float]:
-    """Peak torque at the output of the gear in each shock and disturbance [N m], by name: that which passes the
-    coupling where one is recommended. Runs whose energy balance is not kept are left out."""
-    peaks = peaks_in_events(study, Role.SHOCK, Role.DISTURBANCE, of=at_gear)
-    if study.setting is not None and study.setting.torque is not None:
-        peaks |= {name: effect.with_coupling for name, effect in study.setting.effects.items()}
-    wrong = wrong_runs(study)
-    return {name: peak for name, peak in peaks.items() if name not in wrong}
 
 
 def _torque(value: float) -> str:

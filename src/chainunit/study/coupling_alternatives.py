@@ -20,8 +20,8 @@ from .arrays import peak
 from .catalogue_drive import with_starter, with_wheel
 from .cycle import cycle
 from .drive import Drive
-from .event import Role
-from .event_torques import effects
+from .event import Event, Role
+from .event_torques import effects, from_event_on
 from .inverter import boosts
 from .limits import starting
 from .measures import STARTED
@@ -108,6 +108,11 @@ def _worst(study: StudyRecord) -> StartNumbers:
     return worst
 
 
+def _loaded_starts(study: StudyRecord) -> list[Event]:
+    """The starts under load that the study has run."""
+    return [each for each in study.config.events.values() if each.from_rest and each.name in study.answers]
+
+
 _Trial = tuple[Rig, float, dict[str, float]]
 """A rig with a starter, the time after which its start-up counts as failed [s], and the numbers of the starter."""
 
@@ -117,7 +122,7 @@ def _gentlest(
 ) -> tuple[Rig, list[StartNumbers], dict[str, float]] | None:
     """The first of the `trials` whose starts put at most `goal` [N m] on the coupling and take at most the time
     `limit` [s]; where none does, the one whose hardest start is the gentlest. None where none starts in time."""
-    events = [e for e in study.config.events.values() if e.from_rest and e.name in study.answers]
+    events = _loaded_starts(study)
     angle, full = _worst(study).angle, []
     probes: list[tuple[float, int, _Trial]] = []
     for trial in trials:
@@ -341,7 +346,7 @@ def _rocker_until(study: StudyRecord, setting: Setting) -> float | None:
     its least setting; None for a machine without a rocker."""
     peaks = []
     for name in setting.overloads:
-        run = study.runs[name].sel(time=slice(study.event[name], None))
+        run = from_event_on(study, name)
         if "machine.rocker.tau" not in run:
             return None
         passed = np.flatnonzero(np.abs(run["motor.tau"].values) * study.drive.ratio > setting.least)
@@ -362,7 +367,7 @@ def _before_flywheel(study: StudyRecord, rig: Rig, setting: Setting) -> Alternat
     """The coupling between motor and flywheel, where the drive has a flywheel; else None."""
     if not rig.drive.flywheel or study.start is None:
         return None
-    events = [e for e in study.config.events.values() if e.from_rest and e.name in study.answers]
+    events = _loaded_starts(study)
     starts = starts_from_all(rig, longest_start(study.config, study.start.start_time), events, on_motor_side)
     if any(start.start_time is None for start in starts):
         return None

@@ -15,12 +15,17 @@ from .torques import DutyPeak, PeakOf, at_gear, duty_peak, gear_torque, on_coupl
 from .verdict import STEADY
 
 
+def from_event_on(study: StudyRecord, name: str) -> xr.Dataset:
+    """The part of a run from the begin of its event on."""
+    return study.runs[name].sel(time=slice(study.event[name], None))
+
+
 def peaks_in_events(study: StudyRecord, *roles: Role, of: PeakOf = on_coupling) -> dict[str, float]:
     """Peak torque in each event with one of these `roles`, or in every event without `roles` [N m]."""
     events = study.config.events
     return {
-        name: of(study.drive, study.runs[name].sel(time=slice(begin, None)))
-        for name, begin in study.event.items()
+        name: of(study.drive, from_event_on(study, name))
+        for name in study.event
         if name in study.runs and (not roles or events[name].role in roles)
     }
 
@@ -30,8 +35,8 @@ def running_peak(study: StudyRecord, of: PeakOf = on_coupling) -> DutyPeak:
     runs of sizing with all feed on either side."""
     events = study.config.events
     lasting = [
-        (name, study.runs[name].sel(time=slice(begin, None)))
-        for name, begin in study.event.items()
+        (name, from_event_on(study, name))
+        for name in study.event
         if name in study.runs and events[name].role is Role.DUTY and not events[name].from_rest
     ]
     peaks = [duty_peak(study.drive, [(STEADY, study.steady), *lasting], of)]
@@ -58,7 +63,7 @@ def effects(
     drive, release = study.drive, Coupling().release_time if release is None else release
     if runs is None:
         names = peaks_in_events(study, Role.SHOCK)
-        runs = {name: study.runs[name].sel(time=slice(study.event[name], None)) for name in names}
+        runs = {name: from_event_on(study, name) for name in names}
     found = {}
     for name, run in runs.items():
         time, torque = run["time"].values, np.abs(run["motor.tau"].values) * drive.ratio

@@ -5,7 +5,7 @@ Extremes and means are those of the whole way, not those at the `PLACES` of the 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -181,18 +181,7 @@ def linkage_findings(machine: Machine, speed: float) -> LinkageFindings:
     at = {name: _folded(float(place), turns) for name, place in zip(names, places, strict=True)}
     top = dict(zip(names, map(float, values), strict=True))
 
-    def squares(q: Any) -> Any:
-        """The torque, and the squares of the torque and of the forces in the joints, of which the means count."""
-        state, at = way.state(q)
-        bias = np.broadcast_to(state.bias, q.shape)
-        return np.array(
-            [bias, bias**2, *(at[f"{joint}.fx"] ** 2 + at[f"{joint}.fy"] ** 2 for joint in joints.values())]
-        )
-
-    (mean, *mean_squares), (size, *_) = means(squares, *description.span)
-    # the mean of a torque without losses is rounding
-    mean = 0.0 if abs(mean) <= _LOSSLESS * size else float(mean)
-    torque_rms, *forces_rms = map(math.sqrt, mean_squares)
+    (mean, torque_rms), forces_rms = _means(way, joints.values(), description.span)
     torque = np.broadcast_to(state.bias, q.shape)
     losses = sum(effect.dissipative for load, effect in state.effects.items() if load in ("pins", "guides"))
     gap = np.abs(state.torque_by_reactions(0.0) + losses - torque)
@@ -231,6 +220,25 @@ def linkage_findings(machine: Machine, speed: float) -> LinkageFindings:
         },
         {name: (-top[f"-{name}"], top[name]) for name in moving},
     )
+
+
+def _means(
+    way: _Way, joints: Collection[str], span: tuple[float, float]
+) -> tuple[tuple[float, float], list[float]]:
+    """Mean and RMS of the torque [N m], and the RMS of the force in each of the `joints` [N], by the names of their
+    variables, over the way of the driver from the begin to the end of its `span`."""
+
+    def squares(q: Any) -> Any:
+        state, at = way.state(q)
+        bias = np.broadcast_to(state.bias, q.shape)
+        return np.array(
+            [bias, bias**2, *(at[f"{joint}.fx"] ** 2 + at[f"{joint}.fy"] ** 2 for joint in joints)]
+        )
+
+    (mean, *mean_squares), (size, *_) = means(squares, *span)
+    torque_rms, *forces_rms = map(math.sqrt, mean_squares)
+    # the mean of a torque without losses is rounding
+    return (0.0 if abs(mean) <= _LOSSLESS * size else float(mean), torque_rms), forces_rms
 
 
 def _motions(

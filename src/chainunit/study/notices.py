@@ -18,6 +18,7 @@ from .analysis import Analysis, Findings
 from .arrays import peak
 from .config import Config
 from .drive import Drive
+from .event_torques import from_event_on
 from .organ_limits import slack_and_mode
 from .record import StudyRecord
 from .rig import Rig
@@ -144,8 +145,8 @@ class ObserverAnalysis(Analysis):
         steady, begin = study.steady, study.steady_begin
         normal = peak(steady["machine.rocker.tau"].values)
         after = {
-            name: study.runs[name].sel(time=slice(start, None))
-            for name, start in study.event.items()
+            name: from_event_on(study, name)
+            for name in study.event
             if name in study.answers and not study.config.events[name].from_rest
         }
         start = study.runs["start_up"].sel(time=slice(None, begin))

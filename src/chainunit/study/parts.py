@@ -106,12 +106,12 @@ def _form(machine: type[MachineModel], motor: type[Motor]) -> type[BaseModel]:
     return file_form("Config", tables, **CHOICES, event=(list[Any], []))
 
 
-LINKAGE = ".toml"
-"""End of the name of a linkage file."""
+LINKAGE, FMU = ".toml", ".fmu"
+"""Ends of the names of a linkage file and of an FMU."""
 
 
 def _is_fmu(name: str) -> bool:
-    return name.lower().endswith(".fmu")
+    return name.lower().endswith(FMU)
 
 
 def is_designation(motor: str) -> bool:

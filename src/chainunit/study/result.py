@@ -8,20 +8,15 @@ from typing import Any
 from .. import __version__
 from ..core.quantities import variables
 from ..drives.catalogue import CatalogueMotor
-from ..drives.gearing import ordered_torque
 from ..reading.text import entries, entry, number, shown_in, turning
-from .coupling import coupling_sentence, overloads_at_gear, way_words, why_none
-from .event import Role
-from .event_torques import peaks_in_events, running_peak, running_words
+from .coupling import coupling_sentence, way_words, why_none
+from .gear_order import gear_order
 from .given import given_sections
-from .judgement import motor_verdict, wrong_runs
+from .judgement import motor_verdict
 from .measures import measures_of
 from .protection import CouplingEffect, Obstacle
 from .record import StudyRecord
 from .relay import class_words
-from .starts import StartAnalysis
-from .torques import at_gear
-from .verdict import STEADY
 from .window import Phase
 
 
@@ -188,40 +183,26 @@ def _parts(study: StudyRecord) -> dict[str, Any]:
 
 
 def _gear(study: StudyRecord) -> dict[str, Any]:
-    """The torques by which the gear of the drive that sizing chose is ordered, and the one that decides, such that a
-    study with that gear keeps its margin; empty without steady running, and for an insufficient motor."""
-    assert study.config.sizing is not None
-    if study.insufficient or STEADY not in study.answers:
+    """The gear to order, and the load that decides; empty where there is no drive to order."""
+    order = gear_order(study)
+    if order is None:
         return {}
-    running, starts = running_peak(study, at_gear), study.findings.get(StartAnalysis.name)
-    factor, margin = study.config.gear.start_factor, study.config.sizing.margin
-    of_running = running_words(study, running.run)
-    torques = {"running": (running.torque, of_running, 1.0)}
-    if starts:
-        torques["start"] = (starts.worst.gear_torque, "a start", factor)
-    if overloads := overloads_at_gear(study):
-        name = max(overloads, key=lambda each: overloads[each])
-        with_coupling = study.setting is not None and name in study.setting.effects and study.setting.torque
-        words = f"an overload ({study.title_of(name)}{', with the coupling' if with_coupling else ''})"
-        torques["overload"] = (overloads[name], words, factor)
-    _, by, times = max(
-        ((torque / permitted, words, permitted) for torque, words, permitted in torques.values()),
-        key=lambda each: each[0],
-    )
-    momentary = max((torque for name, (torque, *_) in torques.items() if name != "running"), default=0.0)
-    reason = by if times == 1.0 else f"{by}, in which it may carry {times:g} times that"
-    if left_out := [
-        n for n in wrong_runs(study) if n in peaks_in_events(study, Role.SHOCK, Role.DISTURBANCE)
-    ]:
-        names = ", ".join(map(study.title_of, left_out))
+    assert study.config.sizing is not None
+    decides, margin = order.decides, study.config.sizing.margin
+    reason = decides.words
+    if decides.times != 1.0:
+        reason += f", in which it may carry {decides.times:g} times that"
+    if order.left_out:
+        names = ", ".join(map(study.title_of, order.left_out))
         reason += f"; left out, as the energy balance is not kept: {names}"
     free = number(margin, "1", "percent", full=False)
     return {
-        "rated_torque": entry(ordered_torque(running.torque, momentary, factor, margin), "N.m")
+        "rated_torque": entry(order.rated, "N.m")
         | {"title": f"gear, rated output torque at least, with the margin of {free}; decided by {reason}"},
         **{
-            name: entry(torque, "N.m") | {"title": f"largest torque of {words} on the output of the gear"}
-            for name, (torque, words, _) in torques.items()
+            name: entry(load.torque, "N.m")
+            | {"title": f"largest torque of {load.words} on the output of the gear"}
+            for name, load in order.loads.items()
         },
         "decided_by": reason,
     }

@@ -25,10 +25,8 @@ from .conditions import (
     is_one_of,
 )
 from .foreign_machine import ForeignModel
-from .parts import Parts, parts_of
+from .parts import FMU, Parts, parts_of
 from .sections import Ratios
-
-FMU = ".fmu"
 
 
 @dataclass(frozen=True)
@@ -101,7 +99,7 @@ def has_sides() -> Condition:
     return _any([machine_is(name) for name, model in MACHINES.items() if model.sides])
 
 
-def is_designation() -> Condition:
+def names_designation() -> Condition:
     """Whether the file names a motor by its designation in a catalogue."""
     return given("system.motor") & ~(motor_is(*MOTORS) | MOTOR_FMU)
 
@@ -109,7 +107,7 @@ def is_designation() -> Condition:
 def motor_of_catalogue() -> Condition:
     """Whether the motor is one of a catalogue, by its designation or that of the machine's example."""
     by_example = _any([machine_is(name) for name in MACHINES if _default(name).designation])
-    return is_designation() | (by_example & ~(given("system.motor") | given("motor") | given("sizing")))
+    return names_designation() | (by_example & ~(given("system.motor") | given("motor") | given("sizing")))
 
 
 def all_rules() -> tuple[Rule, ...]:
@@ -171,7 +169,7 @@ def _of_sides() -> Iterator[Rule]:
 def _of_motors() -> Iterator[Rule]:
     """Rules of the motor and of the tables that choose one."""
     beside = "given beside system.motor = {motor}, which is the motor; leave out one of the two"
-    yield Rule("motor", is_designation() | MOTOR_FMU, beside)
+    yield Rule("motor", names_designation() | MOTOR_FMU, beside)
     yield Rule("sizing", given("system.motor"), beside)
     deaf = motor_is(*(name for name, motor in MOTORS.items() if "tau_ff" not in motor.input_layout.names))
     words = "a motor of the type {type} has no input for the torque; leave it out"

@@ -26,6 +26,7 @@ from .config import Config
 from .coupling import recommended_setting
 from .coupling_alternatives import alternatives
 from .event import Event
+from .event_torques import from_event_on
 from .measures import read_answers, read_measure
 from .monte_carlo import Task
 from .monte_carlo import run as run_monte_carlo
@@ -145,9 +146,8 @@ def _with_class_of_all_starts(study: StudyRecord) -> None:
     study.relay_class = found.start_class
     for name in study.overloads:
         if study.answers[name].coupling_trip_time is None:
-            begin = study.event[name]
             phase = Phase.LOADED_START if study.config.events[name].from_rest else Phase.EVENT
-            window = study.window(phase, study.runs[name].sel(time=slice(begin, None)), begin)
+            window = study.window(phase, from_event_on(study, name), study.event[name])
             later = read_measure("thermal_trip_time", window)
             study.answers[name] = replace(study.answers[name], thermal_trip_time=later)
 

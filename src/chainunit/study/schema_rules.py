@@ -12,8 +12,8 @@ from ..drives.shafts import SECTIONS as PROFILES
 from ..models import MACHINES
 from .conditions import Condition, Schema, ends_with, given, is_one_of
 from .event import TYPES
-from .parts import LINKAGE
-from .rules import FMU, all_rules, machine_is, motor_is
+from .parts import FMU, LINKAGE
+from .rules import all_rules, machine_is, motor_is
 
 OF_PARTS = ("machine", "feed", "motor")
 """Tables whose keys follow from the machine and the motor that the file names."""

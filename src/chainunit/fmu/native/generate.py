@@ -160,17 +160,19 @@ def _printf(text: str) -> str:
     return "".join(x.replace("%", "%%") + (kinds[kind or ""] if name else "") for x, name, kind, _ in pieces)
 
 
+def _quantity(v: Variable) -> str:
+    """The row of a variable in the table of the declared quantities."""
+    q = v.quantity
+    return (
+        f"{{{_text(v.name)}, {_unit(v.unit)}, {_text(q.allowed_range)}, {number(q.low)}, {number(q.high)}, "
+        f"{number(q.slack)}, {int(q.open_low)}, {int(q.tunable)}, {q.type.upper()}}}"
+    )
+
+
 def tables(interface: Interface, guid: str, room: int) -> str:
     """``model.c``: the tables that model.h declares, with the GUID (in FMI 3.0 the instantiation token) and the
     memory `room` of the kernels."""
     model = interface.model
-
-    def quantity(v: Variable) -> str:
-        q = v.quantity
-        return (
-            f"{{{_text(v.name)}, {_unit(v.unit)}, {_text(q.allowed_range)}, {number(q.low)}, {number(q.high)}, "
-            f"{number(q.slack)}, {int(q.open_low)}, {int(q.tunable)}, {q.type.upper()}}}"
-        )
 
     def rate_of(name: str) -> int:
         return model.input_layout.names.index(model.input_rates[name]) if name in model.input_rates else -1
@@ -194,7 +196,7 @@ def tables(interface: Interface, guid: str, room: int) -> str:
         '#include "model.h"',
         "",
         _array("double", "starts", [number(x or 0.0) for x in starts]),
-        _array("Quantity", "declared", [quantity(v) for v in (*interface.parameters, *interface.inputs)]),
+        _array("Quantity", "declared", [_quantity(v) for v in (*interface.parameters, *interface.inputs)]),
         _array("double", "nominal", [number(v.quantity.nominal or 1.0) for v in interface.states]),
         _array("int", "rate_of", [str(rate_of(v.name)) for v in interface.inputs]),
         _array("int", "place", [str(place[i]) for i in range(n_y)]),
