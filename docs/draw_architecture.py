@@ -10,6 +10,7 @@ PACKAGE = Path(__file__).parents[1] / "src" / "chainunit"
 DRAWING = Path(__file__).with_name("architecture.svg")
 LAYERS = (
     ("app",),
+    ("capabilities",),
     ("papers",),
     ("report",),
     ("study",),
@@ -85,6 +86,7 @@ def _is_module(base: list[str], name: str) -> bool:
 
 TEXTS = {
     "app": "the commands, and studies from Python",
+    "capabilities": "one folder for each question: table, analysis, section, command",
     "papers": "the four papers, row by row, and two bars against the catenary",
     "report": "tables, page, figures and files of a study",
     "study": "a file, events, runs, and measures read from the runs",

@@ -70,7 +70,7 @@ def test_a_flywheel_makes_a_small_motor_fit_a_load_that_comes_and_goes(sized):
 
 def test_random_overloads_of_a_machine_without_sides(sized):
     study, _ = sized
-    random = study.monte_carlo
+    random = study.findings.get("monte_carlo")
     runs = random.dataset
     assert random.runs == 2 and random.failures == 0 and random.sides == {}
     assert (runs["side"] == 0).all() and np.isnan(runs["rocker_torque_peak"]).all()

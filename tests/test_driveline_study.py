@@ -18,6 +18,11 @@ from scipy.linalg import expm
 
 from chainunit import InputError
 from chainunit.app import cli
+from chainunit.capabilities.torsion import analysis as torsion_findings
+from chainunit.capabilities.torsion import page as torsion_report
+from chainunit.capabilities.torsion.analysis import TorsionAnalysis, as_dict
+from chainunit.capabilities.torsion.line import Rotation, analyse
+from chainunit.capabilities.torsion.page import PICTURES
 from chainunit.core.engines import MATH, numpy_
 from chainunit.core.quantities import Layout
 from chainunit.drives import shafts, torsion
@@ -25,17 +30,14 @@ from chainunit.drives.cardan import Cardan, Twist, frozen_frequency, two_joints
 from chainunit.drives.torsion import rigid, settling_time, simulate, steady, with_damping_ratio
 from chainunit.reading.text import number
 from chainunit.report import blocks, figure
-from chainunit.report import torsion as torsion_report
-from chainunit.report.torsion import PICTURES
-from chainunit.study import config, parts, remarks, torsion_findings
+from chainunit.study import config, parts, remarks
+from chainunit.study.analysis import Work
 from chainunit.study.choice import choose
 from chainunit.study.record import StudyRecord
 from chainunit.study.rig import Rig
 from chainunit.study.sections import TorsionTable
 from chainunit.study.shaft import UNEVEN, remedies, two_masses
 from chainunit.study.statics import statics
-from chainunit.study.torsion import Rotation, analyse
-from chainunit.study.torsion_findings import TorsionAnalysis, as_dict
 from chainunit.system import CoSimulation
 
 SYSTEM = '[system]\nmachine = "Accelerator"\n'
@@ -65,7 +67,7 @@ def study_of(text):
 
 def findings(text):
     study = study_of(SYSTEM + ("" if "[driveline]" in text else BARE) + text)
-    return TorsionAnalysis.find(study, Rig(study.config, study.drive, {}), lambda *_: None)
+    return TorsionAnalysis.find(study, Work(Rig(study.config, study.drive, {}), lambda *_: None))
 
 
 def line_of(text):
@@ -532,7 +534,7 @@ damping_ratios = [0.05]
 def test_ranges_of_the_natural_frequency_say_over_what_they_are():
     """The inertia of a chain unit varies over its turn, i23 over that of the shaft; an order meets both."""
     study = study_of(SLOW_LINE)
-    found = TorsionAnalysis.find(study, Rig(study.config, study.drive, {}), lambda *_: None)
+    found = TorsionAnalysis.find(study, Work(Rig(study.config, study.drive, {}), lambda *_: None))
     J = study.statics.normal.outputs.J
     ratio = found.analysis.ratio
     low, high = (
@@ -635,7 +637,7 @@ def test_a_slow_line_is_not_analysed(monkeypatch, speed, made):
     # a table of its own asks for it
     for more in ("", "[torsion]\nspeeds = 2\n"):
         study = study_of(text + more)
-        found = TorsionAnalysis.find(study, Rig(study.config, study.drive, {}), lambda *_: None)
+        found = TorsionAnalysis.find(study, Work(Rig(study.config, study.drive, {}), lambda *_: None))
         assert (found is not None) == (made or bool(more))
         assert [remark.kind for remark in study.remarks] == [] if found else ["torsion left out"]
 

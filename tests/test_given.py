@@ -46,10 +46,10 @@ def drive_of(study, folder):
 def test_the_motor_is_shown_as_it_is_and_turns_with_gear_and_flywheel(tmp_path):
     """Its FMU has all inertia on its shaft."""
     study = parse(KNIFE.replace("[gear]\n", "[gear]\nJ = 0.003\n"))
-    assert study.gear.J == 0.003 and study.flywheel.J > 0.0
+    assert study.gear.J == 0.003 and study.values["flywheel"].J > 0.0
     drive, plate = drive_of(study, tmp_path), study.plate.model()[1].rotor
     assert (drive.parameters.rotor.J, drive.parameters.rotor.d) == (plate.J, plate.d)
-    whole = plate.J + 0.003 + study.flywheel.J
+    whole = plate.J + 0.003 + study.values["flywheel"].J
     assert drive.fmu_parameters.rotor.J == drive.rotor_inertia == pytest.approx(whole, rel=1e-12)
     assert drive.fmu_parameters.rotor.d > plate.d
     assert drive.graph.components["motor"].start["rotor.J"] == pytest.approx(whole, rel=1e-12)
@@ -211,11 +211,17 @@ def test_a_study_can_be_repeated_from_its_result(text, tmp_path):
     study = study_of(parse(text), tmp_path)
     again = parse(toml_of(json.loads(json.dumps(as_dict(study)))))
     for each in dataclasses.fields(again):
-        if each.name in (*_OF_THE_FILE, "choices", "machine", "events", "random"):
+        if each.name in (*_OF_THE_FILE, "choices", "machine", "events", "plans"):
             continue
         assert getattr(again, each.name) == getattr(study.config, each.name), each.name
     assert again.machine.by_name == pytest.approx(study.config.machine.by_name, rel=1e-12)
-    assert again.random.as_dict() == study.config.random.as_dict()
+    for name, plan in study.config.plans.items():
+        event = getattr(plan, "event", None)
+        if name == "random_overloads":
+            assert again.plans[name].event.as_dict() == event.as_dict()
+            assert again.plans[name].table == plan.table
+        else:
+            assert again.plans[name] == plan, name
     for name, event in study.config.events.items():
         assert (again.events[name].p, again.events[name].side) == (event.p, event.side)
 

@@ -14,6 +14,10 @@ from reports import said_of, write
 from scipy.integrate import solve_ivp
 
 from chainunit import InputError, RunError
+from chainunit.capabilities.blade.analysis import BladeAnalysis, in_stack
+from chainunit.capabilities.flywheels import analysis as flywheels
+from chainunit.capabilities.flywheels.analysis import FlywheelFindings, least_flywheel
+from chainunit.capabilities.flywheels.wheel import FlywheelAnswers, Wheel
 from chainunit.core.engines import MATH
 from chainunit.core.quantities import Layout
 from chainunit.drives.induction_motor import steady
@@ -22,12 +26,10 @@ from chainunit.models import MACHINES
 from chainunit.reading.text import entry, number
 from chainunit.report.study import report
 from chainunit.report.study_motion import motion
-from chainunit.study import flywheels
-from chainunit.study.blade import BladeAnalysis, in_stack
+from chainunit.study.analysis import Work
 from chainunit.study.choice import choose
 from chainunit.study.config import load, parse
 from chainunit.study.drive import Drive
-from chainunit.study.flywheels import FlywheelFindings, least_flywheel
 from chainunit.study.limits import given_motor
 from chainunit.study.measures import read_answers
 from chainunit.study.parts import example
@@ -37,7 +39,6 @@ from chainunit.study.run import run_study
 from chainunit.study.statics import statics
 from chainunit.study.stored import cutting_power
 from chainunit.study.turn import TurnAnalysis
-from chainunit.study.wheel import FlywheelAnswers, Wheel
 from chainunit.study.window import Phase, Window
 from chainunit.system import CoSimulation, energy_residual, monolithic
 
@@ -59,7 +60,7 @@ def bare(text=""):
     study = StudyRecord(config, drive, statics(config, drive))
     rig = Rig(config, drive, {})
     for analysis in (TurnAnalysis, BladeAnalysis):
-        study.findings[analysis.name] = analysis.find(study, rig, lambda *_: None)
+        study.findings[analysis.name] = analysis.find(study, Work(rig, lambda *_: None))
     return study
 
 

@@ -19,8 +19,7 @@ from chainunit.drives.motor import Motor
 from chainunit.drives.terminal_signals import terminal_signals
 from chainunit.machines.load_observer import FARTHEST, Inputs, rotor_torque
 from chainunit.study import config
-from chainunit.study.choice import choose
-from chainunit.study.observation import with_observer
+from chainunit.study.choice import choose, with_parts_beside
 from chainunit.study.package import export_study, study_system
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
@@ -47,7 +46,7 @@ TEXT = f"[observer]\n[coupling]\ntrip_torque = {TRIP}\n{RUN}{EVENTS}"
 
 def drive_of(text, folder):
     values = config.parse(text)
-    return with_observer(values, choose(values, folder, lambda *_: None).drive)
+    return with_parts_beside(values, choose(values, folder, lambda *_: None).drive)
 
 
 @pytest.fixture(scope="module")

@@ -22,8 +22,8 @@ from chainunit.reading.text import entry
 from chainunit.report import blocks, terminal
 from chainunit.report.sizing import _best, _starter
 from chainunit.study import config, coupling_alternatives, run, sizing
-from chainunit.study.analyses import ANALYSES
-from chainunit.study.analysis import Analysis
+from chainunit.study.analyses import all_analyses
+from chainunit.study.analysis import Analysis, Work
 from chainunit.study.bearings import hardest_run, mean_load
 from chainunit.study.coupling import coupling_sentence, recommended_setting, way_words
 from chainunit.study.coupling_alternatives import (
@@ -94,7 +94,7 @@ def test_the_relay_that_is_ordered_is_simulated(on_line, monkeypatch):
         later = study.answers[name].thermal_trip_time
         assert later == by_hand and (later is None or later > light[name])
     # an analysis that reads the trips comes after the class is known, so that a report has one time
-    order = [analysis.name for analysis in ANALYSES]
+    order = [analysis.name for analysis in all_analyses()]
     assert order.index("starts") < order.index("observer")
     seen = []
 
@@ -102,18 +102,18 @@ def test_the_relay_that_is_ordered_is_simulated(on_line, monkeypatch):
         name, needs_runs = "reader", True
 
         @staticmethod
-        def find(study, rig, report):
+        def find(study, work):
             seen.append((study.relay_class, {n: study.answers[n].thermal_trip_time for n in light}))
 
     class Starts(StartAnalysis):
         @staticmethod
-        def find(study, rig, report):
+        def find(study, work):
             return study.findings["starts"]
 
     later = {name: study.answers[name].thermal_trip_time for name in light}
     study.relay_class, study.answers = 10, dict(on_line.answers)
-    monkeypatch.setattr(run, "ANALYSES", (Starts, Reader))
-    run._analyse(study, Rig(study.config, study.drive, {}), None, needs_runs=True)
+    monkeypatch.setattr(run, "all_analyses", lambda: (Starts, Reader))
+    run._analyse(study, Work(Rig(study.config, study.drive, {}), lambda *_: None), needs_runs=True)
     assert seen == [(30, later)]
     protection = as_dict(study)["sizing"]["protection"]
     assert protection["relay_class"]["value"] == "class 30"
@@ -146,7 +146,7 @@ def test_a_motor_is_not_judged_by_turns_that_are_not_steady(on_line):
     assert verdict["holds"] == "false" and verdict["text"].startswith(
         "The motor is not judged: the crank turns at"
     )
-    assert "its turns are not steady" in verdict["text"] and GearAnalysis.find(early, None, None) is None
+    assert "its turns are not steady" in verdict["text"] and GearAnalysis.find(early, None) is None
 
 
 def test_a_stall_is_the_time_from_which_it_stands():

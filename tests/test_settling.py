@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from chainunit.study.analysis import Work
 from chainunit.study.catalogue_drive import catalogue_drive
 from chainunit.study.config import parse
 from chainunit.study.cycle import cycle
@@ -55,7 +56,7 @@ def mill():
     config = parse(MILL)
     bars = cycle(config.machine, config.run.crank_speed, config.feed)
     drive = catalogue_drive(config, config.plate, bars.crank_torque)
-    drive = replace(drive, flywheel=config.flywheel.J)
+    drive = replace(drive, flywheel=config.values["flywheel"].J)
     rig = Rig(config, drive, None)
     with rig.from_rest() as simulation:
         start = rig.start_up(simulation, config.stop, lambda time: None, {})
@@ -137,10 +138,10 @@ def test_the_loss_of_the_gear_stands_beside_the_net_power(mill):
     rig, _, told, _ = mill
     study = StudyRecord(rig.config, rig.drive, statics(rig.config, rig.drive))
     assert GearAnalysis.applies(rig.config, rig.drive)
-    assert GearAnalysis.find(study, rig, lambda *_: None) is None  # no steady running yet
+    assert GearAnalysis.find(study, Work(rig, lambda *_: None)) is None  # no steady running yet
     study.runs["start_up"], study.steady_from = told, float(told["time"][0])
     study.answers["steady"] = SimpleNamespace(power_mean=read_measure("power_mean", window(rig, told)))
-    findings = GearAnalysis.find(study, rig, lambda *_: None)
+    findings = GearAnalysis.find(study, Work(rig, lambda *_: None))
     torque, w = study.statics.normal.crank_torque, read_measure("speed_mean", window(rig, told))
     loss = findings.loss
     assert loss.by_load == pytest.approx((1.0 / 0.94 - 1.0) * np.mean(np.abs(torque)) * w, rel=0.03)

@@ -17,12 +17,12 @@ from fmpy.validation import validate_fmu
 from reports import write
 
 from chainunit import EMPTY, ChainUnitMachine, SideLoads
+from chainunit.capabilities.sides.analysis import factors_for, sides_over_speed
 from chainunit.core.ledger import NAME, Ledger
 from chainunit.machines.chain_unit import Feed
 from chainunit.report import study as study_report
 from chainunit.study.cycle import cycle
-from chainunit.study.one_sided import alone
-from chainunit.study.organs import factors_for, overload_factors, sides_over_speed
+from chainunit.study.one_sided import alone, overload_factors
 
 SHORT = """
 [run]

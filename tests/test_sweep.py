@@ -105,7 +105,7 @@ def by_hand(study, values):
         return str(error)
     layout = machine.model.feed_layout
     speed = values.get("run.crank_speed", study.config.run.crank_speed)
-    turn = cycle(machine, speed, layout.from_names(loads, feed), study.config.sweep.angles)
+    turn = cycle(machine, speed, layout.from_names(loads, feed), study.config.plans["sweep"].angles)
     out, rms = turn.outputs, np.sqrt(np.mean(turn.outputs.tau**2))
     return {
         "peak(crank_torque)": np.max(np.abs(turn.crank_torque)),
@@ -151,7 +151,9 @@ def test_points_of_a_sequence_are_those_of_the_machines(spread):
     np.testing.assert_allclose(table["machine.r"], 0.13 + 0.04 * u[:, 0], atol=1e-10)
     for number in (0, 77, 199):
         row = table.iloc[number]
-        wanted = by_hand(study, {name: row[name] for name in study.config.sweep and table.columns[:3]})
+        wanted = by_hand(
+            study, {name: row[name] for name in study.config.plans["sweep"] and table.columns[:3]}
+        )
         for name in ("peak(crank_torque)", "rms(crank_torque)"):
             assert row[name] == pytest.approx(wanted[name], rel=1e-11)
     assert set(table["reason"]) == {""}
@@ -216,7 +218,7 @@ def test_a_linkage_file():
     config = parse(text)
     task = sweep.task_of(config)
     results = sweep.make_points(pickle.loads(pickle.dumps(task)), 0, 8)
-    value = float(config.sweep.values(3, 4)["machine.coupler.mass"][0])
+    value = float(config.plans["sweep"].values(3, 4)["machine.coupler.mass"][0])
     turn = cycle(task.machine.replace({"coupler.mass": value}), config.run.crank_speed, config.feed, 36)
     assert results["peak_crank_torque"][3] == pytest.approx(np.max(np.abs(turn.crank_torque)), rel=1e-11)
 
@@ -381,11 +383,11 @@ def test_measures_are_those_of_the_co_simulation():
 def test_the_largest_loads_come_first_and_the_limit_of_the_current_is_told():
     text = TRANSIENTS.replace('quantities = ["min(margin)"]\n', "")
     plans = [
-        Study.from_text(text.replace("[sweep]\n", f"[sweep]\n{more}")).config.sweep
+        Study.from_text(text.replace("[sweep]\n", f"[sweep]\n{more}")).config.plans["sweep"]
         for more in ("", "best = 'current_peak'\n", "best_is = 'least'\n")
     ]
     assert [plan.best_is for plan in plans] == ["largest", "least", "least"]
-    assert Study.from_text(TRANSIENTS).config.sweep.best_is == "least"
+    assert Study.from_text(TRANSIENTS).config.plans["sweep"].best_is == "least"
     limit = Study.from_text("").config.motor.limit.i
     hard, soft = (Study.from_text(ONE_JAM.format(force)).sweep(workers=1) for force in (3889, 300))
     assert hard.table["current_peak"].max() == pytest.approx(limit, rel=1e-3)

@@ -396,13 +396,12 @@ class StudyResult:
         """
         with claim(Path(folder), "study", *results.names(self.record.config)) as place:
             if place.resolve() != self._folder.resolve():
-                clear(place, *results.FILES)
+                clear(place, *results.file_names())
                 (place / "fmu").mkdir(exist_ok=True)
                 for fmu in (self._folder / "fmu").iterdir():
                     with whole(place / "fmu" / fmu.name) as part:
                         shutil.copyfile(fmu, part)
-                if self.record.monte_carlo is not None:
-                    store = self.record.monte_carlo.file
+                for store in filter(None, (each.store for each in self.record.findings.values())):
                     shutil.copytree(store, place / store.name, dirs_exist_ok=True)
             return self._write(place)
 

@@ -8,6 +8,7 @@ from ..study.measures import MEASURES
 from ..study.record import StudyRecord
 from . import blocks as b
 from . import chains, run_names, sizing
+from .capability import capabilities
 from .lines import Line, Strong, join, line
 from .runs import number
 
@@ -41,34 +42,12 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         yield b.Cards(tuple(_cards(s, study, reference)))
     else:
         yield b.Text("The study ended before any run could be evaluated.", "lead", "long")
-    if study.monte_carlo is not None:
-        yield b.Text(_random(s, study))
+    for part in capabilities():
+        yield from part.answer(s, study)
     warnings = [*(b.Judgement("warning", each) for each in s.lines("warnings")), *chains.speeds_to_avoid(s)]
     yield from warnings
     if answers and not warnings:
         yield b.Text("No run gives cause for a warning.", "fine", "long")
-
-
-_LARGEST, _ENDS = (
-    "crank_torque_peak",
-    {"trips": "the safety coupling opens", "stalls": "the crank stands at the end"},
-)
-"""The quantity of random overloads that the answer states, and the ways in which a run may end badly."""
-
-
-def _random(s: b.Source, study: StudyRecord) -> Line:
-    """The sentence on random overloads: the largest quantile of the crank torque, and how often a run ends badly."""
-    quantiles = s.result["monte_carlo"]["quantiles"]
-    ends = dict(_ENDS) if study.config.coupling else {"stalls": _ENDS["stalls"]}
-    parts: list[Line] = [
-        line(f"{words} in ", s.estimate(f"monte_carlo.quantiles.{name}.share", ".low", ".high"))
-        for name, words in ends.items()
-        if name in quantiles
-    ]
-    if quantile_names := list(quantiles.get(_LARGEST, ())):
-        peak = s.estimate(f"monte_carlo.quantiles.{_LARGEST}.{quantile_names[-1]}", ".low", ".high")
-        parts.insert(0, line(f"{quantile_names[-1][1:]} % stay below a crank torque of ", peak))
-    return s.line("Of {=monte_carlo.runs} overloads at random: {parts}.", parts=join(parts, "; "))
 
 
 def _speed(s: b.Source, study: StudyRecord, run: str) -> Line:

@@ -96,7 +96,7 @@ def _group_title(study: StudyRecord, runs: list[str]) -> str:
 @PICTURES.declare(lambda study: study.statics.cycles, "torque_angle.png")
 def _turn(s: b.Source, study: StudyRecord) -> fig.Figure:
     torques: dict[str, Callable[[Cycle], Any]] = {"crank": lambda c: c.crank_torque}
-    organs = "organs" in study.findings
+    organs = bool(study.drive.machine.model.sides)
     if organs:
         torques["rocker"] = lambda c: c.outputs.rocker.tau
     items: dict[fig.Axis, list[fig.Item]] = {}

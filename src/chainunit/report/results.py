@@ -12,8 +12,8 @@ from ..models import MODELS
 from ..reading.tables import in_file
 from ..study.choice import check_files
 from ..study.config import Config
-from ..study.monte_carlo import check_workers
 from ..study.record import LOAD_CYCLE, StudyRecord
+from ..study.registry import registered
 from ..study.run import run_study
 from ..work.progress import Report as Progress
 from . import files, series
@@ -21,14 +21,17 @@ from . import study as contents
 from .blocks import Report
 
 NAME = "result"
-FILES = (*files.names(NAME, contents.PICTURES), series.SERIES, LOAD_CYCLE)
-"""The names of all files that a study may write into its folder, apart from FMUs and random overloads."""
+
+
+def file_names() -> tuple[str, ...]:
+    """The names of all files that a study may write into its folder, apart from FMUs and random overloads."""
+    return (*files.names(NAME, contents.pictures()), series.SERIES, LOAD_CYCLE)
 
 
 def names(config: Config) -> tuple[str, ...]:
     """The names of all files that this study may write, with the FMUs."""
     models = dict.fromkeys((*MODELS, config.machine.model.name))
-    return (*FILES, *(f"fmu/{name}.fmu" for name in models))
+    return (*file_names(), *(f"fmu/{name}.fmu" for name in models))
 
 
 def compute(
@@ -51,8 +54,9 @@ def compute(
         # before the files of an earlier run are removed, and before any progress is reported
         check_files(config)
     if scheduler is not None:
-        check_workers(config, scheduler)
-    clear(folder, *FILES)
+        for part in registered():
+            part.check_scheduler(config, scheduler)
+    clear(folder, *file_names())
     if progress is not None:
         progress("the machine at constant speed", 0.0, 1.0)
     with file_context():

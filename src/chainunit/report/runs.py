@@ -1,4 +1,4 @@
-"""The section on every run in numbers: all answers, forces in the pins, random overloads, the speed loop."""
+"""The section on every run in numbers: all answers, forces in the pins, the speed loop."""
 
 from __future__ import annotations
 
@@ -8,17 +8,16 @@ from typing import Any
 from ..core.quantities import Layout
 from ..study.bearings import hardest_run
 from ..study.measures import MEASURES, Answers, measures_of
-from ..study.monte_carlo import Sample
 from ..study.record import StudyRecord
 from ..study.window import Phase
 from . import blocks as b
 from . import run_names
-from .lines import Line, Number, capital, join, line, spoken
+from .lines import Number, capital, join, line, spoken
 from .terminal import plain_line
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
-    """Tables of the answers of every run, the forces in the bearings, random overloads and the speed loop."""
+    """Tables of the answers of every run, the forces in the bearings and the speed loop."""
     if s.result["answers"]:
         yield table_of_runs(s, study)
     for run, phase in (("start_up", Phase.START_UP), ("settling", Phase.SETTLING)):
@@ -26,8 +25,6 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
             yield from _begin(s, study, run, phase)
     if s.result["pins"]:
         yield _pins(s, study)
-    if study.monte_carlo is not None:
-        yield from _random(s)
     if loops := s.result.get("speed_loop"):
         title = "The linearised speed loop; deviation and settling are those after a step of the load torque"
         rows = {loop: spoken(loop) if len(loops) > 1 else "constant inertia" for loop in loops}
@@ -128,41 +125,6 @@ def _pins(s: b.Source, study: StudyRecord) -> b.Table:
             b.Column("in", form="short"),
         ),
         title="Forces in the bearings (equivalent load: ISO 281)",
-    )
-
-
-_METHODS: dict[str, str] = {
-    "compiled": "on the compiled system",
-    "cs": "by co-simulation of the FMUs",
-    "me": "by Model Exchange of the FMUs",
-}
-"""The ways in which random overloads are run, see `study.monte_carlo.Task.method`."""
-
-
-def _random(s: b.Source) -> Iterator[b.Block]:
-    """The table of the quantiles of random overloads, and how they were run."""
-    quantiles = {name: sizes for name, sizes in s.result["monte_carlo"]["quantiles"].items() if sizes}
-    descriptions = {v.name: v.description.removeprefix("1 where ") for v in Layout(Sample).variables}
-    columns = list(dict.fromkeys(k for sizes in quantiles.values() for k in sizes))
-
-    def cell(name: str, k: str) -> Line:
-        return (
-            s.estimate(f"monte_carlo.quantiles.{name}.{k}", ".low", ".high") if k in quantiles[name] else ""
-        )
-
-    rows = tuple(b.TableRow((descriptions[name], *(cell(name, k) for k in columns))) for name in quantiles)
-    heads = (f"{k[1:]} % of runs below" if k.startswith("q") else "share of runs" for k in columns)
-    sides = join(s.line(f"{{=monte_carlo.sides.{side}}} {side}") for side in s.result["monte_carlo"]["sides"])
-    of_sides = line(" (", sides, ")") if sides else ()
-    title = s.line(
-        "Random overloads, {=monte_carlo.runs} runs{sides}; in brackets: the interval of {=monte_carlo.confidence} "
-        "confidence",
-        sides=of_sides,
-    )
-    if rows:
-        yield b.Table(rows, b.heads("", *heads), title=title)
-    yield b.Text(
-        line(f"The random overloads were run {_METHODS[s.result['monte_carlo']['method']]}."), "fine"
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import platform
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from functools import cache
 from importlib import metadata
 from typing import Any
 
@@ -15,7 +16,8 @@ from ..study.result import as_dict
 from ..study.rig import DIFFERENCE
 from . import answer, chains, figures, run_names, runs, shaft, sizing, wording
 from . import blocks as b
-from .analyses import ANALYSES, Contents
+from .analyses import analysis_sections
+from .capability import Contents, capabilities
 from .drawing import drawing
 from .lines import Line, capital, join, line, spoken
 from .study_motion import motion
@@ -31,8 +33,8 @@ def report(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Rep
     with shown_in(study.config.units):
         sections = [
             b.Section(name, each.heading, tuple(each.blocks(s, study)), beside=name == QUESTION)
-            for name, each in _SECTIONS.items()
-            if name in study.findings or name not in ANALYSES
+            for name, each in _sections().items()
+            if name in study.findings or name not in analysis_sections()
         ]
         return b.Report(
             study.config.title,
@@ -101,11 +103,8 @@ def _question(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     if names := study.overloads:
         words = "; ".join(run_names.title(study, name) for name in names)
         question += line(f" Then come overloads, each by itself: {words}.")
-    if study.monte_carlo is not None:
-        question += s.line(
-            " Then come {=monte_carlo.runs} overloads at random, each by itself: {event}.",
-            event=study.config.random.title,
-        )
+    for part in capabilities():
+        question = line(question, part.question(s, study))
     yield b.Text(question, form="long")
     has_sizing, feed = "sizing" in s.result, study.config.feed
     parts = {"machine": study.drive.machine.p, "run": study.config.run}
@@ -211,18 +210,24 @@ def _version(name: str) -> str:
         return "not installed"
 
 
-_SECTIONS: Mapping[str, Contents] = {
-    "answer": Contents("The answer", answer.blocks),
-    QUESTION: Contents("The question", _question),
-    "sizing": Contents("The drive", sizing.blocks),
-    "runs": Contents("Every run in numbers", runs.blocks),
-    "shaft": Contents("The driveline", shaft.blocks, shaft.PICTURES.files),
-    "chains": Contents("Chains and two bars", chains.blocks, chains.PICTURES.files),
-    **ANALYSES,
-    "plots": Contents("Plots", figures.PICTURES.figures, figures.PICTURES.files),
-    "motion": Contents("The machine in motion", lambda s, study: iter(_motion(study))),
-    "basis": Contents("Basis of the results", _basis),
-    "given": Contents("Given values", _given),
-}
-PICTURES = (DRAWING, *(picture for each in _SECTIONS.values() for picture in each.pictures))
-"""The files of all figures that a report may have."""
+@cache
+def _sections() -> Mapping[str, Contents]:
+    """By name, all sections that a report may have."""
+    return {
+        "answer": Contents("The answer", answer.blocks),
+        QUESTION: Contents("The question", _question),
+        "sizing": Contents("The drive", sizing.blocks),
+        "runs": Contents("Every run in numbers", runs.blocks),
+        "shaft": Contents("The driveline", shaft.blocks, shaft.PICTURES.files),
+        "chains": Contents("Chains and two bars", chains.blocks, chains.PICTURES.files),
+        **analysis_sections(),
+        "plots": Contents("Plots", figures.PICTURES.figures, figures.PICTURES.files),
+        "motion": Contents("The machine in motion", lambda s, study: iter(_motion(study))),
+        "basis": Contents("Basis of the results", _basis),
+        "given": Contents("Given values", _given),
+    }
+
+
+def pictures() -> tuple[str, ...]:
+    """The files of all figures that a report may have."""
+    return (DRAWING, *(picture for each in _sections().values() for picture in each.pictures))

@@ -13,10 +13,9 @@ from ..mechanism.machine import MachineState
 from ..mechanism.models import CrankMotion, names_of
 from ..study.record import StudyRecord
 from . import linkage, linkage_loads, run_names
-from .edge_motion import EdgeMotion
+from .capability import capabilities
 from .lines import capital
 from .motion import Animation, Clip, DrawnLink, Reading
-from .organ_motion import organ_motion
 from .supplement import Supplement
 
 _PER_SECOND = 60
@@ -34,8 +33,8 @@ def motion(study: StudyRecord) -> Animation:
     interval = min(1.0 / _PER_SECOND, turn / _PER_TURN)
     spans = (float(np.ptp(run["time"].values)) for run in study.runs.values())
     interval = max(interval, sum(spans) / MOST)
-    model = machine.model
-    supplement = (organ_motion if model.sides else EdgeMotion if model.cuts else Supplement)(study)
+    supplements = (part.supplement(study) for part in capabilities())
+    supplement = next((each for each in supplements if each is not None), Supplement(study))
     angles = np.linspace(0.0, 2.0 * math.pi, _PER_TURN + 1)
     whole = machine.state(machine.inputs({"phi": angles * machine.ratio})).m
     paths, crank = linkage.paths(whole), whole.linkage.driver

@@ -1,24 +1,20 @@
-"""The analyses that a study may have, in the order in which they are made."""
+"""The analyses that a study may have, in the order in which they are made: those of the base, then those of the
+capabilities."""
 
 from __future__ import annotations
 
+from functools import cache
+
 from .analysis import Analysis
-from .blade import BladeAnalysis
-from .flywheels import FlywheelAnalysis
 from .gear_loss import GearAnalysis
-from .notices import ObserverAnalysis
-from .organs import OrganAnalysis
+from .registry import registered
 from .starts import StartAnalysis
-from .torsion_findings import TorsionAnalysis
 from .turn import TurnAnalysis
 
-ANALYSES: tuple[type[Analysis], ...] = (
-    OrganAnalysis,
-    TurnAnalysis,
-    BladeAnalysis,
-    FlywheelAnalysis,
-    GearAnalysis,
-    TorsionAnalysis,
-    StartAnalysis,
-    ObserverAnalysis,
-)
+ANALYSES: tuple[type[Analysis], ...] = (TurnAnalysis, GearAnalysis, StartAnalysis)
+
+
+@cache
+def all_analyses() -> tuple[type[Analysis], ...]:
+    """Those of the base and of all capabilities."""
+    return (*ANALYSES, *(analysis for part in registered() for analysis in part.analyses()))

@@ -1,14 +1,15 @@
 """Analyses of a study: each is made where the system has the parts that it needs, and adds its findings to
 the study.
 
-A new analysis is a module with a subclass of `Analysis` and a line in `chainunit.study.analyses`; its section
-on the page
-is a function of the same name in `chainunit.report.analyses`.
+An analysis of the base stands in `chainunit.study.analyses`, with its section of the page in
+`chainunit.report.analyses`; all others belong to a capability.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..work.progress import Report
@@ -28,9 +29,27 @@ class Findings(ABC):
         """The findings ready for JSON, each number with its unit: the part of the result under the name of
         the analysis."""
 
+    @property
+    def store(self) -> Path | None:
+        """The store of its runs, a folder beside the files of the study, if it has one."""
+        return None
+
     @abstractmethod
     def remark(self, study: StudyRecord) -> None:
         """Add to the study the remarks that the reader needs beside the numbers."""
+
+
+@dataclass(frozen=True)
+class Work:
+    """The means of an analysis: the rig, without FMUs before the runs; the function that reports progress; the folder
+    of the study's files; the address of a Dask scheduler, if one is to make its runs; and the time of the steady
+    state from which the events of the study branched [s]."""
+
+    rig: Rig
+    report: Report
+    folder: Path | None = None
+    scheduler: str | None = None
+    steady: float = 0.0
 
 
 class Analysis(ABC):
@@ -48,8 +67,8 @@ class Analysis(ABC):
 
     @staticmethod
     @abstractmethod
-    def find(study: StudyRecord, rig: Rig, report: Report) -> Findings | None:
-        """Make the analysis; before the runs the rig has no FMUs.
+    def find(study: StudyRecord, work: Work) -> Findings | None:
+        """Make the analysis.
 
         Raises
         ------

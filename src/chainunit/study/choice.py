@@ -23,6 +23,7 @@ from .catalogue_drive import catalogue_drive, gear_with, with_wheel
 from .config import Config
 from .cycle import cycle
 from .drive import Drive
+from .registry import registered
 from .shaft import two_masses
 from .sizing import SizingResult, size
 
@@ -56,7 +57,7 @@ def _drive_of_file(config: Config) -> Drive:
     else:
         motor, p = config.motor_type, config.motor
         drive = Drive(motor, p, config.machine, motor.follows(p), chain=config.chain)
-    flywheel = 0.0 if config.flywheel is None else config.flywheel.J
+    flywheel = sum(part.shaft_inertia(config) for part in registered())
     return with_wheel(config, replace(drive, feed_forward=config.feed_forward), flywheel)
 
 
@@ -75,6 +76,13 @@ def as_chosen(config: Config, drive: Drive) -> Config:
         gear=replace(config.gear, efficiency=efficiency),
         starter=replace(config.starter, inverter=inverter),
     )
+
+
+def with_parts_beside(config: Config, drive: Drive) -> Drive:
+    """The drive with the parts that capabilities add to its system."""
+    for part in registered():
+        drive = part.beside(config, drive)
+    return drive
 
 
 def check_files(config: Config) -> None:
@@ -115,13 +123,9 @@ def with_motor(config: Config, file: Path, names: Mapping[str, str] | None = Non
     motor = foreign_component(file, "motor", names)
     if config.driveline is not None:
         raise InputError(f"{file}: the inertia of its rotor is not known; leave [driveline] out")
-    if config.flywheel is not None:
-        raise InputError(f"{file}: its rotor takes no flywheel; leave [flywheel] out")
-    if config.monte_carlo.runs:
-        raise InputError(
-            f"{file}: its current and torque are not known, of which random overloads tell the quantiles; leave "
-            "monte_carlo.runs out"
-        )
+    for part in registered():
+        if words := part.not_with_foreign_motor(config):
+            raise InputError(f"{file}: {words}")
     if config.feed_forward and "tau_ff" not in motor.connectors:
         raise InputError(f"{file}: has no input tau_ff in N.m; leave feed_forward out")
     follows = "w_ref" in motor.connectors

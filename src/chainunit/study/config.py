@@ -24,34 +24,27 @@ from ..reading.text import DEFAULT_UNITS, Units, chosen_units
 from ..reading.toml_lines import lines_of
 from .checks import check_order
 from .event import Event
-from .event_table import RandomEvent, read_events, read_random_event
+from .event_table import read_events
 from .events import OneSidedFeed
+from .file_reading import FileReading
+from .file_section import FileSection
 from .first_checks import check_values, independent, missing_recordings, plate_of, without
 from .foreign_machine import ForeignMachine, ForeignModel
-from .identification.reading import IdentificationPlan, WatchPlan, read_identification, read_watch
-from .observer_table import ObserverTable
-from .optimum.table import read_wishes
-from .optimum.wishes import Wishes
 from .organ_limits import highest_of_sweep
 from .parts import Parts, beside, example, over_example, with_linkage
-from .run_checks import endless, loads_beyond, without_feed
+from .registry import registered
+from .run_checks import endless, loads_beyond
 from .sections import (
     CHOICES,
     ChainOrgans,
     Coupling,
     Driveline,
-    FileSection,
-    FlywheelTable,
     ForeignMotor,
-    MonteCarlo,
     Ratios,
     Run,
     Starter,
-    TorsionTable,
 )
 from .sizing_table import Sizing
-from .sweep_plan import SweepPlan
-from .sweep_reading import Sweepable, read_plan
 
 
 @dataclasses.dataclass(frozen=True)
@@ -69,17 +62,12 @@ class Config:
     run: Run
     events: Mapping[str, Event]
     coupling: Coupling | None
-    monte_carlo: MonteCarlo
-    random: RandomEvent
     feed_forward: bool
     empty_start: bool
     """whether the feed comes once the machine runs"""
     sizing: Sizing | None
     plate: CatalogueMotor | None
     """the motor, where the file names one of the catalogue"""
-    flywheel: FlywheelTable | None
-    flywheels: tuple[float, ...]
-    """inertias of flywheels that are compared [kg m2]"""
     gear: Transmission
     start: str
     starter: Starter
@@ -91,25 +79,10 @@ class Config:
     """place of the driveline, one of `PLACES`"""
     damping_ratio: float | None
     """damping ratio of the driveline's torsion, in place of d2 and d3"""
-    torsion: TorsionTable
-    """values of the analysis of a driveline in rotation"""
-    joint: str
-    """joint whose bend the map of stability varies, one of `JOINTS`"""
-    damping_ratios: tuple[float, ...]
-    """damping ratios of that map; empty for that of the line itself"""
     chain: ChainOrgans | None
     """the organs as chains, or None for two bars"""
-    optimize: Wishes | None
-    """the table of a search for the best machine; a study makes none"""
-    identify: IdentificationPlan | None
-    """the table of an identification; a study makes none"""
-    observer: ObserverTable | None
-    """the load observer beside the motor"""
-    watch: WatchPlan | None
-    """the recording that is watched; a study has none"""
     foreign: ForeignMotor | None
     """the motor, if it is a foreign FMU; `motor` then has no meaning"""
-    sweep: SweepPlan | None
     source: str
     given: frozenset[str]
     """names of all values that the file sets, such as "machine.crank.m"; see `of_example`"""
@@ -130,6 +103,10 @@ class Config:
     """the tables and keys as the file has them"""
     lines: Mapping[str, int] = dataclasses.field(default_factory=dict)
     """the line of each key in the file"""
+    values: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    """by table, the values of its declared quantities; None for an optional table that the file does not have"""
+    plans: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    """by capability, the plan that its tables state, or None"""
 
     @property
     def turn(self) -> float:
@@ -284,6 +261,12 @@ def _with_hints(fault: InputError, unusual: Iterable[Slip]) -> InputError:
     return InputError("; ".join([str(fault), *hints]), fault.key) if hints else fault
 
 
+_OF_PARTS = ("machine", "ratios", "motor")
+"""Tables whose values follow from others, too: `Config` has them as machine and motor."""
+_OWN_TABLES = ("feed", "run", "coupling", "sizing", "gear", "starter", "driveline", "chain")
+"""Tables whose values are fields of a `Config`."""
+
+
 def _config(
     data: Mapping[str, Any],
     checked: Any,
@@ -296,9 +279,10 @@ def _config(
     sections, faults = parts.sections, Faults()
     tables, values = _read_sections(sections, checked, faults)
     faults.add(check_order(values))
-    of_study = {name: values[name] for name in ("feed", "run", "monte_carlo", "gear", "starter", "torsion")}
-    of_study |= {
-        name: values[name] if name in data else None for name, each in sections.items() if each.optional
+    of_study: dict[str, Any] = {
+        name: values[name] if name in data or not each.optional else None
+        for name, each in sections.items()
+        if name not in _OF_PARTS
     }
     if "sizing" in data and "inertia_ratio" not in tables["sizing"]:
         # a rule for servo drives: time, current and heat of its start limit the inertia of an induction motor
@@ -318,32 +302,30 @@ def _config(
     with faults.collected(), refusal_prefix("motor: ", "motor"):
         if parts.gives_motor:
             parts.motor.check(values["motor"])
-    with faults.collected(), refusal_prefix("", "monte_carlo.event"):
-        random = read_random_event(checked.monte_carlo.event, "monte_carlo.event")
-    of_study |= _tasks(data, checked, parts, machine, values, events, source, faults)
+    reading = FileReading(data, checked, parts, values, tables, machine, events, source)
+    plans: dict[str, Any] = {}
+    for capability in registered():
+        with faults.collected():
+            plans[capability.name] = capability.plan(reading)
     faults.refuse()
     if chain is not None and "sweep_highest" not in tables["chain"]:
         highest = highest_of_sweep(machine, values["feed"], values["run"].crank_speed)
         chain = dataclasses.replace(chain, sweep_highest=max(highest, chain.sweep_lowest))
+    of_study["chain"] = chain
     config = Config(
         title=checked.title,
         machine=machine,
         motor_type=parts.motor,
         motor=values["motor"] if parts.gives_motor else None,
         plate=plate,
-        flywheels=tuple(sorted(set(tables["flywheel"].get("compare", [])))),
         events=events,
-        random=random,
         feed_forward=checked.feed_forward,
         empty_start=checked.empty_start,
         start=checked.start,
         simulation=checked.simulation,
         catalogue=own_motors,
         place=checked.driveline.place,
-        joint=checked.torsion.joint,
-        damping_ratios=tuple(sorted(set(checked.torsion.damping_ratios))),
         damping_ratio=checked.driveline.damping_ratio,
-        chain=chain,
         foreign=ForeignMotor(beside(parts.file, source), given_values(checked.system.motor_names))
         if parts.file
         else None,
@@ -353,75 +335,16 @@ def _config(
         slips=unusual,
         units=chosen_units(checked.report.units),
         labels=checked.report.labels,
-        **of_study,
+        values=of_study,
+        plans=plans,
+        **{name: of_study[name] for name in _OWN_TABLES},
     )
     faults.add(loads_beyond(config))
-    faults.add(without_feed(config))
+    for capability in registered():
+        faults.add(capability.faults(config))
     faults.add(endless(config))
     faults.refuse()
     return config
-
-
-def _tasks(
-    data: Mapping[str, Any],
-    checked: Any,
-    parts: Parts,
-    machine: Machine | None,
-    values: Mapping[str, Any],
-    events: Mapping[str, Event],
-    source: str,
-    faults: Faults,
-) -> dict[str, Any]:
-    """What commands beside `study` are to do: the plans of their tables, by name; their refusals go to `faults`."""
-    plans: dict[str, Any] = dict.fromkeys(("sweep", "optimize", "identify", "watch"))
-    with faults.collected():
-        plans["sweep"] = _sweep(data, checked, parts, machine, values, events)
-    with faults.collected():
-        if "optimize" in data:
-            loads, run, by_motor = values["feed"], values["run"], bool(parts.designation or "sizing" in data)
-            given = values["optimize"], checked.optimize, parts.machine
-            plans["optimize"] = read_wishes(*given, machine, loads, run.crank_speed, by_motor)
-    with faults.collected():
-        plans["identify"] = _identification(data, checked, parts, machine, values, source)
-    with faults.collected():
-        if "watch" in data:
-            plans["watch"] = read_watch(checked.watch, values["run"].crank_speed, source)
-    return plans
-
-
-def _sweep(
-    data: Mapping[str, Any],
-    checked: Any,
-    parts: Parts,
-    machine: Machine | None,
-    values: Mapping[str, Any],
-    events: Mapping[str, Event],
-) -> SweepPlan | None:
-    """The plan of the table [sweep]; None without one, and for a machine that was refused."""
-    if "sweep" not in data or machine is None:
-        return None
-    fixed = {"machine.ratio": "follows from the motor's rated speed"} if parts.designation else {}
-    quantities = Sweepable.of(machine, values["feed"], values["run"], events)
-    return read_plan(checked.sweep, values["sweep"], parts.machine, quantities, fixed)
-
-
-def _identification(
-    data: Mapping[str, Any],
-    checked: Any,
-    parts: Parts,
-    machine: Machine | None,
-    values: Mapping[str, Any],
-    source: str,
-) -> IdentificationPlan | None:
-    """The plan of the table [identify]; None without one, and for a machine that was refused."""
-    if "identify" not in data or machine is None:
-        return None
-    declared = [(machine.p, "machine"), (values["feed"], "feed")]
-    if parts.gives_motor:
-        declared.append((values["motor"], "motor"))
-    fixed = {"machine.ratio": "is needed to read the recordings; count the teeth"}
-    speed = values["run"].crank_speed
-    return read_identification(checked.identify, values["identify"], declared, speed, fixed, source)
 
 
 def _read_sections(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +14,12 @@ from ..drives.motors import MOTORS
 from ..models import MACHINES
 from ..reading.tables import read_table
 from ..reading.text import chosen_units
-from .checks import LOWER_LIMITS
-from .event_table import read_events, read_random_event
+from .checks import lower_limits
+from .event_table import read_events
 from .parts import Parts, beside, is_designation, named_table, parts_of
+from .registry import registered
 from .rules import refusals
+from .sections import all_sections
 
 _OF_MACHINE = ("machine", "ratios", "feed", "motor", "system")
 """Tables that cannot be checked without machine and motor."""
@@ -36,10 +39,9 @@ def check_values(data: Mapping[str, Any], source: str) -> tuple[Parts | None, li
     with faults.collected():
         if isinstance(data.get("event", []), list):
             read_events(data.get("event", []), known.machine if parts else None)
-    with faults.collected():
-        random = named_table(data, "monte_carlo").get("event")
-        if isinstance(random, Mapping):
-            read_random_event(random, "monte_carlo.event")
+    for part in registered():
+        with faults.collected():
+            part.check_values(data)
     with faults.collected():
         _check_catalogue(data, source)
     with faults.collected():
@@ -70,17 +72,11 @@ def _check_catalogue(data: Mapping[str, Any], source: str) -> None:
 
 def missing_recordings(data: Mapping[str, Any], source: str) -> Iterator[InputError]:
     """The refusals of recordings that are not there."""
-    runs, watched = named_table(data, "identify").get("run"), named_table(data, "watch").get("file")
-    names = {f"identify.run.{k}.file": each.get("file") for k, each in enumerate(_tables_of(runs), 1)}
-    for key, name in {**names, "watch.file": watched}.items():
+    for file in (file for part in registered() for file in part.files(data) if file.is_recording):
+        name = file.table.get(file.name)
         with contextlib.suppress(InputError):
             if isinstance(name, str) and name and not beside(name, source).exists():
-                yield InputError(f"{key} = {shown(name)}: there is no such file", key)
-
-
-def _tables_of(entries: Any) -> list[Mapping[str, Any]]:
-    """The tables among the entries of a list of a file."""
-    return [each for each in entries if isinstance(each, Mapping)] if isinstance(entries, list) else []
+                yield InputError(f"{file.key} = {shown(name)}: there is no such file", file.key)
 
 
 def plate_of(designation: str, file: Path | None) -> CatalogueMotor | None:
@@ -114,18 +110,16 @@ def without(data: Mapping[str, Any], faults: Collection[InputError]) -> dict[str
     return rest
 
 
-_LISTS = (
-    *(f"identify.{name}" for name in ("parameter", "run", "sensor")),
-    *(f"sweep.{name}" for name in ("parameter", "quantities", "measures")),
-    *(f"optimize.{name}" for name in ("objectives", "free", "limits")),
-)
+@cache
+def _lists() -> tuple[str, ...]:
+    return tuple(f"{table}.{key}" for table, section in all_sections().items() for key in section.single_keys)
 
 
 def _table(key: str) -> str:
     """The table of a key; the lists of a sweep and of a search, and each of their parameters and limits, count as
     tables by themselves."""
     names = key.split(".")
-    return ".".join(names[:3]) if ".".join(names[:2]) in _LISTS else names[0]
+    return ".".join(names[:3]) if ".".join(names[:2]) in _lists() else names[0]
 
 
 def _key(fault: InputError) -> str:
@@ -145,15 +139,14 @@ def independent(
     if "catalogue" in wrong:
         # it is not known whether the catalogue has the motor
         tables.add("system")
-    if "sweep.method" in wrong:
-        # it decides whether the parameters have points
-        further = [fault for fault in further if fault.key.split(".")[::3] != ["sweep", "points"]]
+    for table, section in all_sections().items():
+        for key, decider in section.deciders.items():
+            if f"{table}.{decider}" in wrong:
+                further = [fault for fault in further if fault.key.split(".")[::3] != [table, key]]
+    lower = lower_limits()
     return [
         fault
         for fault in further
         if fault.key not in wrong
-        and (
-            _table(fault.key) not in tables
-            or (fault.key in LOWER_LIMITS and LOWER_LIMITS[fault.key] not in wrong)
-        )
+        and (_table(fault.key) not in tables or (fault.key in lower and lower[fault.key] not in wrong))
     ]

@@ -9,12 +9,10 @@ import numpy as np
 
 from ..core.quantities import Value, declaration, quantity
 from ..reading.text import entries, number
-from ..work.progress import Report
-from .analysis import Analysis, Findings
+from .analysis import Analysis, Findings, Work
 from .config import Config
 from .drive import Drive
 from .record import StudyRecord
-from .rig import Rig
 from .verdict import STEADY
 from .window import Phase
 
@@ -85,7 +83,7 @@ class GearAnalysis(Analysis):
         return drive.gear_friction > 0.0
 
     @staticmethod
-    def find(study: StudyRecord, rig: Rig, report: Report) -> GearFindings | None:
+    def find(study: StudyRecord, work: Work) -> GearFindings | None:
         """The loss in the steady turns; None without them, and where no mean power of them stands for running
         that lasts."""
         if STEADY not in study.answers:

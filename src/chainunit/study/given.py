@@ -9,10 +9,11 @@ from typing import Any
 from ..core.quantities import variables
 from ..drives.line_table import Damping
 from ..reading.text import entries, entry
-from .analyses import ANALYSES
+from .analyses import all_analyses
 from .config import Config
 from .record import StudyRecord
-from .sections import CHOICES, SECTIONS, SystemTable
+from .registry import registered
+from .sections import CHOICES, SystemTable, all_sections
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,8 @@ class GivenSection:
         """Its place in the result; it is under `asked` where the result has other things of the same
         names."""
         table, _, inner = self.name.partition(".")
-        if table not in SECTIONS or not SECTIONS[table].apart:
+        sections = all_sections()
+        if table not in sections or not sections[table].apart:
             return self.name
         return f"{table}.asked.{inner}" if inner else f"{table}.asked"
 
@@ -103,24 +105,25 @@ def _system(config: Config) -> dict[str, Any]:
 
 
 def _tables(study: StudyRecord) -> Iterator[GivenSection]:
-    config, analyses = study.config, {analysis.name for analysis in ANALYSES}
-    for name, section in SECTIONS.items():
-        values = getattr(config, name)
+    config, analyses = study.config, {analysis.name for analysis in all_analyses()}
+    randoms = {key: each for part in registered() for key, each in part.random_events(config).items()}
+    for name, section in all_sections().items():
+        values = config.values[name]
         if values is None or not section.is_used(config) or (name in analyses and name not in study.findings):
             continue
         prefix = f"{name}."
         keys = {full.removeprefix(prefix): x for full, x in config.choices.items() if full.startswith(prefix)}
-        event = keys.pop("event", None)
+        events = [key for key in section.random_events if keys.pop(key, None) is not None]
         # without its own ratio the gear has that of the machine, which follows from the motor's speed
         follows = frozenset({"ratio"} if name == "gear" and "gear.ratio" not in config.given else ())
         choices = {key: x for key, x in keys.items() if x}
         yield GivenSection(name, section.title, values, choices, unused_names=follows)
-        if event is not None:
-            random = config.random
+        for key in events:
+            random = randoms[f"{name}.{key}"]
             side = {"side": random.side} if random.side else {}
             title = f"Overload at random: {random.of.heading}"
             yield GivenSection(
-                f"{name}.event", title, random.p, {"type": random.of.kind} | side, random.ranges
+                f"{name}.{key}", title, random.p, {"type": random.of.kind} | side, random.ranges
             )
 
 
@@ -132,7 +135,8 @@ def description(name: str) -> str:
     if table == "system":
         field = SystemTable.model_fields.get(key)
         return str(field.description) if field else "name of it in the FMU"
-    keys = SECTIONS[table].keys if table in SECTIONS else {}
+    sections = all_sections()
+    keys = sections[table].keys if table in sections else {}
     if key in keys:
         return str(keys[key][1].description)
     return next((v.description for v in variables(Damping) if v.name == key), "")

@@ -10,7 +10,7 @@ from . import verdict
 from .chain import HIGH
 from .limits import Check, given_motor, reaches
 from .measures import Answers
-from .organs import OrganAnalysis
+from .organ_limits import slack_and_mode
 from .quantiles import runs_needed
 from .record import StudyRecord
 from .rig import worst_residual
@@ -22,7 +22,7 @@ from .window import Phase
 
 def model_verdict(study: StudyRecord) -> Verdict:
     """The verdict on the model of the machine, from the numbers of the runs."""
-    config, organs, answers = study.config, study.findings.get(OrganAnalysis.name), study.answers
+    config, answers = study.config, study.answers
     steady = answers.get(STEADY)
     mean = steady.speed_mean if steady else config.run.crank_speed
     speed, residuals = max(config.run.crank_speed, mean), _residuals(study)
@@ -33,15 +33,16 @@ def model_verdict(study: StudyRecord) -> Verdict:
         runs[verdict.SETTLING] = study.settling
     if study.drive.outsider:
         return verdict.outsider(speed, residuals, actual=mean)
-    if organs is None:
+    if not study.drive.machine.model.sides:
         return verdict.rigid_links(speed, residuals, actual=mean)
     if config.chain is None:
         empty = {name for name in study.overloads if config.events[name].empties}
         always = 0.0 in (config.feed.left.material_mass, config.feed.right.material_mass)
+        slack_speed, resonance = slack_and_mode(study.drive.chain_unit, config.feed)
         return verdict.two_bars(
             speed,
-            organs.limits.chain_resonance,
-            organs.limits.slack_speed,
+            resonance,
+            slack_speed,
             study.pulls,
             residuals,
             empty={""} if always else empty,

@@ -8,6 +8,7 @@ import typing
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
+from types import MappingProxyType
 from typing import Any
 
 from pydantic.fields import FieldInfo
@@ -24,49 +25,21 @@ from ..models import MACHINES
 from ..reading.text import CHOICES as UNITS
 from .config import Config, parse
 from .event import TYPES, Event
-from .identification.table import RUN_KEYS, SENSOR_KEYS, ParameterEntry, RunTable, SensorTable
+from .file_section import EntryTable, FileSection
 from .parts import ReportTable
-from .sections import CHOICES, SECTIONS, Ratios, SystemTable
-from .sweep_table import SweepEntry
+from .sections import CHOICES, Ratios, SystemTable, all_sections
 
-_FOLLOWS = {
-    "gear.ratio": "the one that gives the crank its speed under the mean load; with [sizing] the nearest on offer",
-    "gear.efficiency": "98 % a stage of a helical gear, 70 % of a worm gear, 95 % of a V-belt; see sizing.gear_kind",
-    "starter.inverter.boost": "5 %; with [sizing] the least of 5, 10 and 15 % with which the machine starts",
-    "starter.inverter.slip": "that of the rated slip of the motor; none with a flywheel, against which it works",
-    "sizing.inertia_ratio": "none",
-    "chain.sweep_highest": "twice run.crank_speed, or 1.2 times the lowest mode of an organ if that is more",
-    "motor.speed_control.kp": "tuned",
-    "motor.speed_control.ki": "tuned",
-    "motor.current_control.kp": "tuned",
-    "motor.current_control.ki": "tuned",
-    "driveline.d2": "from damping_ratio",
-    "driveline.d3": "from damping_ratio",
-    "sweep.quantities": "without measures peak(crank_torque) and rms(crank_torque)",
-    "sweep.event": "the only one of the study, or that whose quantities are swept",
-    "sweep.best": "the first one",
-    "identify.run.name": "run_1, run_2, ..",
-    "identify.run.crank_speed": "run.crank_speed",
-    "identify.run.begin": "the first row",
-    "identify.run.end": "the last row",
-    "identify.run.switched_off": "never",
-    "watch.crank_speed": "run.crank_speed",
-    "watch.begin": "the first row",
-    "watch.end": "the last row",
-    "identify.sensor.noise": "identify.noise",
-    "identify.sensor.gain": "identify.gain",
-    "identify.sensor.offset": "5 % of the RMS of a current or torque, 0 of others",
-    "identify.sensor.resolution": "0",
+_OF_MOTORS = {
+    "speed_control.kp": "tuned",
+    "speed_control.ki": "tuned",
+    "current_control.kp": "tuned",
+    "current_control.ki": "tuned",
 }
-"""By key, the source of its value if the file leaves the key out."""
+"""By key of [motor], the source of its value if the file leaves the key out."""
 
 
+NONE: Mapping[str, str] = MappingProxyType({})
 _VALUE = "a number, or a text with a unit"
-
-
-def _fields(keys: Mapping[str, Any]) -> dict[str, FieldInfo]:
-    """Fields with their types, from pairs of both."""
-    return {name: FieldInfo.from_annotated_attribute(of, field) for name, (of, field) in keys.items()}
 
 
 @dataclass(frozen=True)
@@ -124,7 +97,7 @@ class KeyTable:
     @property
     def is_list(self) -> bool:
         """Whether a file may have several tables of this name."""
-        return self.name in ("event", *ENTRIES)
+        return self.name == "event" or self.name in entry_tables()
 
     @property
     def bracketed(self) -> str:
@@ -134,15 +107,14 @@ class KeyTable:
         return f"[{self.name}]" if self.name else "before all tables"
 
 
-_ENTRIES: Mapping[str, tuple[str, type | None, Mapping[str, Any]]] = {
-    "sweep.parameter": ("Parameter of a sweep", None, SweepEntry.model_fields),
-    "identify.parameter": ("Number that is sought", None, ParameterEntry.model_fields),
-    "identify.run": ("Recorded run", RunTable, _fields(RUN_KEYS)),
-    "identify.sensor": ("Sensor of a recording", SensorTable, _fields(SENSOR_KEYS)),
-}
-"""By the name of a list of tables in a table: its title, the declaration of its quantities, and its other keys."""
-ENTRIES = tuple(_ENTRIES)
-"""Names of the lists of tables in a table."""
+@cache
+def entry_tables() -> dict[str, EntryTable]:
+    """The declarations of the lists of tables in a table, by name: ``sweep.parameter``."""
+    return {
+        f"{table}.{key}": entry
+        for table, section in all_sections().items()
+        for key, entry in section.entries.items()
+    }
 
 
 @cache
@@ -163,8 +135,11 @@ def key_tables() -> tuple[KeyTable, ...]:
             for name in MACHINES
         ),
         *(KeyTable("motor", "Motor", tuple(_of_motor(name)), name) for name in MOTORS),
-        *(KeyTable(name, SECTIONS[name].title, tuple(_of_section(name))) for name in SECTIONS),
-        *(KeyTable(name, title, tuple(_of_entry(name))) for name, (title, *_) in _ENTRIES.items()),
+        *(
+            KeyTable(name, section.title, tuple(_of_section(name, section)))
+            for name, section in all_sections().items()
+        ),
+        *(KeyTable(name, entry.title, tuple(_of_entry(entry))) for name, entry in entry_tables().items()),
         KeyTable("report", "Report", tuple(_of_report())),
         *(KeyTable("event", _first_sentence(of), tuple(_of_event(of)), name) for name, of in TYPES.items()),
     )
@@ -183,15 +158,18 @@ def _study(machine: str = "ChamberForces", motor: str = "") -> Config:
     return parse("\n".join(["[system]", *names]))
 
 
-def _numbers(declared: type, values: Any = None, prefix: str = "", table: str = "") -> Iterator[Key]:
-    """Keys of declared quantities. `values` are the values of a file that leaves them out."""
+def _numbers(
+    declared: type, values: Any = None, prefix: str = "", sources: Mapping[str, str] = NONE
+) -> Iterator[Key]:
+    """Keys of declared quantities. `values` are the values of a file that leaves them out, and `sources` says by key
+    where they come from."""
     known = Layout(declared).by_name(values) if values is not None else {}
     for v in variables(declared):
         value = known.get(v.name, v.quantity.start)
         left_out = "" if value is None else shortest_text(value, v.unit, v.kind)
         if value is not None and v.type != "Real":
             left_out = written(value, v.type)
-        follows = _FOLLOWS.get(f"{table}.{v.name}", "")
+        follows = sources.get(v.name, "")
         yield Key(
             prefix + v.name,
             v.description,
@@ -209,18 +187,16 @@ def _of_machine(name: str, table: str) -> Iterator[Key]:
 
 
 def _of_motor(name: str) -> Iterator[Key]:
-    return _numbers(MOTORS[name].Parameters, _study(motor=name).motor, table="motor")
+    return _numbers(MOTORS[name].Parameters, _study(motor=name).motor, sources=_OF_MOTORS)
 
 
-def _of_section(name: str) -> Iterator[Key]:
-    section = SECTIONS[name]
-    values = getattr(_study(), name)
+def _of_section(name: str, section: FileSection) -> Iterator[Key]:
+    values = _study().values[name]
     if values is None:
         values = section.default or section.declaration()
-    yield from _numbers(section.declaration, values, table=name)
+    yield from _numbers(section.declaration, values, sources=section.follows)
     for key in _of_fields(section.keys):
-        follows = _FOLLOWS.get(f"{name}.{key.name}", "")
-        yield dataclasses.replace(key, follows=follows) if follows else key
+        yield dataclasses.replace(key, follows=section.follows.get(key.name, ""))
     if name == "driveline":
         yield from _numbers(Damping)
         for shaft, stiffness in SHAFTS.items():
@@ -282,14 +258,11 @@ def _of_event(of: type[Event]) -> Iterator[Key]:
     yield from _numbers(of.Parameters, of.Parameters())
 
 
-def _of_entry(name: str) -> Iterator[Key]:
-    _, declared, fields = _ENTRIES[name]
-    keys = list(_of_fields({key: (field.annotation, field) for key, field in fields.items()}))
-    if declared is not None:
-        keys += _numbers(declared, declared(), table=name)
-    for key in keys:
-        follows = _FOLLOWS.get(f"{name}.{key.name}", "")
-        yield dataclasses.replace(key, follows=follows) if follows else key
+def _of_entry(entry: EntryTable) -> Iterator[Key]:
+    for key in _of_fields({name: (field.annotation, field) for name, field in entry.fields.items()}):
+        yield dataclasses.replace(key, follows=entry.follows.get(key.name, ""))
+    if entry.declaration is not None:
+        yield from _numbers(entry.declaration, entry.declaration(), sources=entry.follows)
 
 
 def _of_fields(fields: Mapping[str, Any], config: Config | None = None) -> Iterator[Key]:

@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import __version__
-from ..core.errors import InputError, printable
 from ..core.native.compilers import compiler
 from ..core.quantities import Layout, Value, declaration, quantity, variables
 from ..core.temporary_folders import remove_folder, temporary_folder
@@ -27,16 +26,19 @@ from ..machines.chain_unit import SIDES, SideName
 from ..reading.text import entry
 from ..work.job import Job, ResultVariable, texts
 from ..work.progress import Report
-from ..work.runner import check_scheduler
 from ..work.runner import run as run_job
+from ..work.store import made_anew
+from .analysis import Findings
 from .config import Config
 from .drive import Drive
 from .event import AnySide, Event
 from .event_block import EventBlock
 from .event_runs import EventRun, EventSimulation, Request
 from .event_table import RandomEvent
+from .limits import limit_reached
 from .measures import MEASURES, read_measure, same_measure
 from .quantiles import CONFIDENCE, Estimate, quantile, runs_needed, share
+from .record import StudyRecord
 from .rig import Rig
 from .window import Phase, Window
 
@@ -112,8 +114,10 @@ class Task:
             "start": drive.graph.values,
             "feed": asdict(config.feed),
             "run": asdict(config.run),
-            "event": config.random.as_dict(),
-            "monte_carlo": {k: v for k, v in asdict(config.monte_carlo).items() if k != "runs"},
+            "event": config.plans["random_overloads"].event.as_dict(),
+            "monte_carlo": {
+                k: v for k, v in asdict(config.plans["random_overloads"].table).items() if k != "runs"
+            },
             "coupling": asdict(config.coupling) if config.coupling else None,
             "steady": self.steady,
             "fed_from": self.fed_from,
@@ -127,7 +131,7 @@ class Task:
 
     def block(self, states: Any = None) -> EventBlock:
         """The compiled system in its steady state, with these `states` if they are known."""
-        return EventBlock(self.rig, self.config.random, self.steady, states)
+        return EventBlock(self.rig, self.config.plans["random_overloads"].event, self.steady, states)
 
 
 def result_variables(event: RandomEvent) -> list[ResultVariable]:
@@ -218,25 +222,25 @@ class Draw:
 def draw(config: Config, number: int) -> Draw:
     """The event of the run with that number. It is the same in every process, and in whatever order the runs
     are made."""
-    random = np.random.default_rng([int(config.monte_carlo.seed), number])
+    random = np.random.default_rng([int(config.plans["random_overloads"].table.seed), number])
     offset = random.uniform(0.0, config.turn)
-    values = config.random.draw(random)
+    values = config.plans["random_overloads"].event.draw(random)
     spread = random.standard_normal()
     trip = (
         config.coupling.trip_torque * max(0.1, 1.0 + config.coupling.scatter * spread)
         if config.coupling
         else math.inf
     )
-    side: AnySide = config.random.side
-    if config.random.of.has_side and not side:
+    side: AnySide = config.plans["random_overloads"].event.side
+    if config.plans["random_overloads"].event.of.has_side and not side:
         side = SIDES[random.integers(len(SIDES))]
-    return Draw(config.random.event(side, values), values, offset, trip)
+    return Draw(config.plans["random_overloads"].event.event(side, values), values, offset, trip)
 
 
 def request(task: Task, chance: Draw) -> Request:
     """The run with these random quantities."""
     begin = task.steady + chance.offset
-    stop = begin + task.config.monte_carlo.duration
+    stop = begin + task.config.plans["random_overloads"].table.duration
     return Request(chance.event, begin, stop, chance.trip_torque / task.drive.ratio)
 
 
@@ -280,8 +284,15 @@ def _result_of(task: Task, chance: Draw, run: EventRun) -> dict[str, Any]:
     }
 
 
+_OUTCOMES = {
+    "trips": "in {share} of them the safety coupling opens",
+    "stalls": "in {share} of them the crank stands at the end",
+}
+"""By quantity of a random run, the words on the share of the runs that end so."""
+
+
 @dataclass(frozen=True)
-class MonteCarloResult:
+class MonteCarloResult(Findings):
     """The results of the runs, by the names of `result_variables`, over the dimension ``run``; and their store."""
 
     dataset: xr.Dataset
@@ -292,6 +303,11 @@ class MonteCarloResult:
     """number of runs that the store had before"""
     damaged_batches: int = 0
     """number of batches that were damaged in the store; their runs were computed anew"""
+
+    @property
+    def store(self) -> Path:
+        """The store of the runs."""
+        return self.file
 
     @property
     def runs(self) -> int:
@@ -318,8 +334,37 @@ class MonteCarloResult:
             estimates_of[v.name] = {name: each for name, each in estimates.items() if each is not None}
         return estimates_of
 
+    def remark(self, study: StudyRecord) -> None:
+        """Warn of runs that end badly, and note what limits the numbers."""
+        note, shares = study.note, self.quantiles()
+        for name, words in _OUTCOMES.items():
+            share = shares.get(name, {}).get("share")
+            if share is not None and share.value > 0.0:
+                study.warn(
+                    f"random overload {name}",
+                    f"overloads at random: {words}.",
+                    share=(share.value, "1", "percent"),
+                )
+        if self.shortage:
+            note("too few runs", "overloads at random: {text}", text=self.shortage)
+        currents = [each.value for each in shares.get("current_peak", {}).values()]
+        limit = limit_reached(study.drive, currents)
+        if limit is not None:
+            note(
+                "random overloads at current limit",
+                "overloads at random: the largest currents are at their limit of {limit}; a harder overload does not "
+                "raise them.",
+                limit=(limit, "A"),
+            )
+        if self.damaged_batches:
+            note(
+                "runs made anew",
+                "overloads at random: {text}.",
+                text=made_anew(self.damaged_batches, "runs", self.file.name),
+            )
+
     @property
-    def remark(self) -> str:
+    def shortage(self) -> str:
         """Words on the quantiles for which there are too few runs; empty where there are enough."""
         count = self.runs - self.failures
         omissions = [q for q in QUANTILES if count < runs_needed(q)]
@@ -362,31 +407,15 @@ class MonteCarloResult:
         }
 
 
-def check_workers(config: Config, scheduler: str) -> None:
-    """Refuse a scheduler that is not needed, or does not answer, before the runs that come first.
-
-    Raises
-    ------
-    InputError
-        see `chainunit.work.runner.check_scheduler`.
-    """
-    if not config.monte_carlo.runs:
-        raise InputError(
-            f"scheduler {printable(scheduler)}: is for random overloads, and this study has none (monte_carlo.runs); "
-            "leave it out"
-        )
-    check_scheduler(scheduler)
-
-
 def job_of(task: Task) -> Job:
     """The random overloads of a task, as work in batches."""
     parcel = Parcel.of(task)
     return Job(
         name="monte_carlo",
         title="overloads at random",
-        points=int(task.config.monte_carlo.runs),
+        points=int(task.config.plans["random_overloads"].table.runs),
         batch=BATCH if task.is_compiled else COSIMULATED_BATCH,
-        variables=result_variables(task.config.random),
+        variables=result_variables(task.config.plans["random_overloads"].event),
         work=make_runs,
         task=parcel,
         digest=parcel.digest,

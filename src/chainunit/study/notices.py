@@ -13,15 +13,13 @@ import xarray as xr
 from ..core.quantities import Value, declaration, quantity
 from ..machines.chain_unit import SIDES
 from ..reading.text import entries, entry
-from ..work.progress import Report
-from .analysis import Analysis, Findings
+from .analysis import Analysis, Findings, Work
 from .arrays import peak
 from .config import Config
 from .drive import Drive
 from .event_torques import from_event_on
 from .organ_limits import slack_and_mode
 from .record import StudyRecord
-from .rig import Rig
 
 AT_LIMIT = 0.99
 """Share of the limit of its current from which a motor counts as at the limit."""
@@ -137,7 +135,7 @@ class ObserverAnalysis(Analysis):
         return drive.observer is not None
 
     @staticmethod
-    def find(study: StudyRecord, rig: Rig, report: Report) -> ObserverFindings | None:
+    def find(study: StudyRecord, work: Work) -> ObserverFindings | None:
         """The notices, from the runs that the study has made; None without steady running. A start under load is left
         out: the observer learns the loads in it."""
         if "steady" not in study.answers:

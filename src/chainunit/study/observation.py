@@ -26,16 +26,14 @@ FORCE_CHANGE, FORCE_FLUCTUATION = 0.01, 0.005
 """Change of a processing force in a second that is followed, and its natural fluctuation, in parts of an overload."""
 
 
-def with_observer(config: Config, drive: Drive) -> Drive:
-    """The drive with the observer of the study, if it has one."""
-    if config.observer is None:
-        return drive
+def with_observer(config: Config, table: ObserverTable, drive: Drive) -> Drive:
+    """The drive with a load observer by that `table`."""
     p, speed = drive.fmu_parameters, config.run.crank_speed * drive.ratio
     turn = cycle(drive.machine, config.run.crank_speed, config.feed)
     torque = np.asarray(turn.crank_torque) / drive.ratio + p.rotor.d * speed
     signals = terminal_signals(drive.motor, p, speed, float(np.mean(torque)))
     values = drive.machine.by_name | {"rotor.J": p.rotor.J, "rotor.d": p.rotor.d}
-    values |= weights(signals) | tuning(config.observer, config.feed, speed, rms(torque))
+    values |= weights(signals) | tuning(table, config.feed, speed, rms(torque))
     component = ModelComponent(LoadObserver, LoadObserver.parameter_layout.from_names(values))
     wires = {"phi": "phi", "w": "w", **signals.outputs}
     return replace(drive, observer=component, observed=wires)

@@ -24,10 +24,9 @@ from ..reading.tables import file_text, toml
 from ..system import ModelComponent, System, compiled
 from ..system.compiled import input_starts
 from ..system.ssp import export
-from .choice import choose
+from .choice import choose, with_parts_beside
 from .config import Config
 from .drive import Drive
-from .observation import with_observer
 from .sections import ChainOrgans
 
 
@@ -211,7 +210,7 @@ def _drive(config: Config, backend: Backend | None, report: Callable[[str], None
         choice = choose(config, folder, lambda what, done, todo: report(what), backend)
     if choice.sizing is not None and choice.sizing.chosen_candidate is None:
         raise RunError(f"[sizing]: {choice.sizing.answer}")
-    return with_observer(config, choice.drive)
+    return with_parts_beside(config, choice.drive)
 
 
 def export_study(

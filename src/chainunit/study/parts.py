@@ -20,8 +20,9 @@ from ..machines.linkages.file import read_linkage
 from ..mechanism.models import MachineModel
 from ..models import MACHINES
 from ..reading.tables import Title, file_form, given_values, merged, packaged, read_table, toml
+from .file_section import FileSection
 from .foreign_machine import foreign_model
-from .sections import CHOICES, FileSection, SystemTable, sections_of
+from .sections import CHOICES, SystemTable, sections_of
 
 
 def _as_text(value: Any) -> Any:

@@ -20,7 +20,6 @@ from .config import Config
 from .drive import Drive
 from .limits import reaches
 from .measures import Answers, not_known
-from .monte_carlo import MonteCarloResult
 from .parts import LENGTHS
 from .protection import Alternative, Setting
 from .pulls import LeastPull
@@ -149,7 +148,6 @@ class StudyRecord:
     """`Findings` of each analysis, by its name"""
     chain: ChainResult | None = None
     """results of the organs as chains at constant speed, where the study has chains"""
-    monte_carlo: MonteCarloResult | None = None
     verdict: Verdict | None = None
     """the verdict on the model, once there are runs"""
     remarks: list[Remark] = field(default_factory=list)

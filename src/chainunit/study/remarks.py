@@ -17,11 +17,9 @@ from .event_torques import peaks_in_events
 from .events import Jam
 from .judgement import lasts, model_verdict, motor_limits, no_reserve
 from .measures import STARTED, Answers
-from .random_remarks import remark_on_random_overloads
 from .record import LOAD_CYCLE, Amount, StudyRecord
 from .sections import ChainOrgans
 from .shaft import AMPLIFIED, UNEVEN, remedies
-from .torsion_findings import TorsionAnalysis
 from .verdict import RESIDUAL, START, STEADY, shown_speed
 from .window import CLOSED, DRIFT, STORED
 
@@ -78,7 +76,6 @@ def conclude(study: StudyRecord) -> None:
     remark_on_rams(study)
     _on_runs(study)
     _on_inverter(study)
-    remark_on_random_overloads(study)
     _on_assumptions(study)
     if study.statics.torsion is not None:
         _on_shaft(study)
@@ -483,7 +480,7 @@ def _on_shaft(study: StudyRecord) -> None:
     _, i, _ = two_joints(numpy_(), line, np.linspace(0.0, np.pi, 361))
     unevenness = float(np.ptp(i))
     if unevenness > UNEVEN:
-        say = warn if TorsionAnalysis.name in study.findings else note
+        say = warn if "torsion" in study.findings else note
         say(
             "uneven joints",
             "The joints turn unevenly: shaft 3 turns {least} to {largest} times as fast as shaft 2 (ratio i23), and "

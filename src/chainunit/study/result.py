@@ -173,8 +173,6 @@ def _parts(study: StudyRecord) -> dict[str, Any]:
     parts = {name: findings.as_dict() for name, findings in study.findings.items()}
     if study.sizing:
         parts["sizing"] = study.sizing.as_dict() | {"gear": _gear(study), "protection": _protection(study)}
-    if study.monte_carlo:
-        parts["monte_carlo"] = study.monte_carlo.as_dict()
     if study.statics.torsion is not None:
         parts |= _driveline(study)
     if config.chain:

@@ -19,13 +19,12 @@ from .conditions import (
     ends_with,
     given,
     has_entries,
-    has_entry,
-    is_above_zero,
     is_empty_table,
     is_one_of,
 )
 from .foreign_machine import ForeignModel
 from .parts import FMU, Parts, parts_of
+from .registry import registered
 from .sections import Ratios
 
 
@@ -118,11 +117,12 @@ def all_rules() -> tuple[Rule, ...]:
 @cache
 def _with_motors(names: tuple[str, ...]) -> tuple[Rule, ...]:
     """The rules for the registered motors of these names."""
-    return (*_of_parts(), *_of_sides(), *_of_motors(), *_of_sweeps(), *_of_tasks(), *_of_lines())
+    own = (rule for part in registered() for rule in part.rules())
+    return (*_of_parts(), *_of_sides(), *_of_motors(), *own)
 
 
-_NEEDS_MODEL = "needs a model of the machine, which is an FMU; leave it out"
-_TWO_BARS = 'quantities of a turn are of organs with two bars; leave out organ = "chain"'
+NEEDS_MODEL = "needs a model of the machine, which is an FMU; leave it out"
+TWO_BARS = 'quantities of a turn are of organs with two bars; leave out organ = "chain"'
 
 
 def _of_parts() -> Iterator[Rule]:
@@ -136,13 +136,7 @@ def _of_parts() -> Iterator[Rule]:
     for part, foreign in (("motor", MOTOR_FMU), ("machine", MACHINE_FMU)):
         words = f'are of an FMU of somebody else; add {part} = "file.fmu", or leave them out'
         yield Rule(f"system.{part}_names", ~foreign, words)
-    yield Rule("feed_forward", MACHINE_FMU, _NEEDS_MODEL, is_one_of("feed_forward", True))
-    yield Rule("monte_carlo.runs", MACHINE_FMU, _NEEDS_MODEL, is_above_zero("monte_carlo.runs"))
-    words = "draws jams of two sides, and the machine is {machine}; give the event in monte_carlo.event"
-    some = is_above_zero("monte_carlo.runs")
-    yield Rule("monte_carlo.runs", ~(has_sides() | MACHINE_FMU | given("monte_carlo.event")), words, some)
-    yield Rule("sweep", MACHINE_FMU, _NEEDS_MODEL)
-    yield Rule("optimize", MACHINE_FMU, _NEEDS_MODEL)
+    yield Rule("feed_forward", MACHINE_FMU, NEEDS_MODEL, is_one_of("feed_forward", True))
 
 
 def _of_sides() -> Iterator[Rule]:
@@ -157,13 +151,6 @@ def _of_sides() -> Iterator[Rule]:
     for name in ratios(**filled(Ratios, {})):
         words = "given beside [ratios], which sets it; leave out one of the two"
         yield Rule(f"machine.{name}", has_sides() & has_entries("ratios"), words)
-    words = (
-        "is of the chain unit, and the machine is {machine}: the observer compares the feed and the force of two "
-        "sides, which this machine does not have; leave it out. chainunit identify finds the loads of this machine "
-        "from its recordings"
-    )
-    yield Rule("watch", ~has_sides(), words)
-    yield Rule("observer", ~has_sides(), "knows the chain unit, and the machine is {machine}; leave it out")
 
 
 def _of_motors() -> Iterator[Rule]:
@@ -178,8 +165,6 @@ def _of_motors() -> Iterator[Rule]:
     another = "is of the DC motor, and [sizing] picks another; leave out one of the two"
     yield Rule("motor", given("sizing"), another, has_entries("motor"))
     yield Rule("feed_forward", given("sizing"), another, switched_on)
-    words = "sizing finds its own; leave out one of the two"
-    yield Rule("flywheel", given("sizing"), words, has_entries("flywheel"))
     yield Rule(
         "run.winding_temperature", given("sizing"), "is sizing.temperature with [sizing]; leave it out"
     )
@@ -189,54 +174,3 @@ def _of_motors() -> Iterator[Rule]:
         yield Rule(name, ~(given("sizing") | motor_of_catalogue()), words)
     words = "follows from the motor's rated speed; to have another, give gear.ratio"
     yield Rule("machine.ratio", ~given("sizing") & motor_of_catalogue(), words)
-
-
-def _of_sweeps() -> Iterator[Rule]:
-    """Rules of the tables [sweep] and [optimize]."""
-    yield Rule(
-        "sweep", given("sizing"), "varies one drive, and [sizing] tries many; leave out one of the two"
-    )
-    yield Rule(
-        "sweep.points",
-        is_one_of("sweep.method", "grid"),
-        "a grid has the points of its parameters; leave it out, or give another method",
-    )
-    yield Rule(
-        "sweep.measures",
-        ~given("coupling"),
-        "coupling_trip_time is of a safety coupling; add [coupling], or leave it out",
-        has_entry("sweep.measures", "coupling_trip_time"),
-    )
-    words = "need a model of the motor, which is an FMU; leave them out"
-    yield Rule("sweep.measures", MOTOR_FMU, words, has_entries("sweep.measures"))
-    yield Rule("sweep.quantities", CHAINS, f"{_TWO_BARS}, or give measures", has_entries("sweep.quantities"))
-    yield Rule("optimize", CHAINS, _TWO_BARS)
-
-
-def _of_tasks() -> Iterator[Rule]:
-    """Rules of tables that compare the drive with recordings."""
-    unfit = (
-        (MACHINE_FMU, "machine is an FMU"),
-        (MOTOR_FMU, "motor is an FMU"),
-        (given("sizing"), "motor is not known before it is chosen"),
-        (given("driveline"), "driveline stands between motor and machine"),
-        (CHAINS, "organs are chains"),
-    )
-    for name in ("identify", "watch"):
-        for condition, words in unfit:
-            yield Rule(
-                name,
-                condition,
-                f"needs a motor and a machine of two-bar organs as models, and here the {words}",
-            )
-    yield Rule("observer", MOTOR_FMU, "needs a model of the motor, which is an FMU; leave it out")
-    yield Rule(
-        "observer",
-        given("driveline"),
-        "takes the shaft between motor and machine for rigid; leave out [driveline] or [observer]",
-    )
-
-
-def _of_lines() -> Iterator[Rule]:
-    """Rules of the line between motor and machine."""
-    yield Rule("torsion", ~given("driveline"), "is of a driveline; add [driveline], or leave it out")

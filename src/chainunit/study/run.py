@@ -18,21 +18,20 @@ from ..reading.text import number, shown_in
 from ..system import Simulation
 from ..work.progress import Progress, Report
 from . import verdict
-from .analyses import ANALYSES
+from .analyses import all_analyses
+from .analysis import Work
 from .bearings import pin_loads
 from .chain import study_chain
-from .choice import as_chosen, choose
+from .choice import as_chosen, choose, with_parts_beside
 from .config import Config
 from .coupling import recommended_setting
 from .coupling_alternatives import alternatives
 from .event import Event
 from .event_torques import from_event_on
 from .measures import read_answers, read_measure
-from .monte_carlo import Task
-from .monte_carlo import run as run_monte_carlo
-from .observation import with_observer
 from .pulls import least_pulls
 from .record import Spread, StudyRecord
+from .registry import registered
 from .relay import start_class
 from .remarks import conclude
 from .rig import Rig, Transient
@@ -87,14 +86,15 @@ def _run_study(
     """See `run_study`."""
     choice = choose(config, folder / "fmu", report, backend)
     config = as_chosen(config, choice.drive)
-    drive = with_observer(config, choice.drive)
+    drive = with_parts_beside(config, choice.drive)
     if check and drive.outsiders:
         titles = " and ".join(drive.outsiders)
         raise InputError(f"--check: the equations of {titles} are not known; leave --check out")
     study = StudyRecord(config, drive, statics(config, drive), choice.tuning, choice.sizing)
-    if config.monte_carlo.runs:
-        _check_random(config, Rig(config, drive, {}))
-    _analyse(study, Rig(config, drive, {}), report, needs_runs=False)
+    unmade = Rig(config, drive, {})
+    for part in registered():
+        part.check_runs(config, unmade)
+    _analyse(study, Work(unmade, report), needs_runs=False)
     files, study.fmus = drive.export(folder / "fmu", backend, lambda what: report(what, 0.0, 1.0))
     if backend is None and "python" in {origin.backend for origin in study.fmus.values()}:
         study.note(
@@ -105,10 +105,7 @@ def _run_study(
     runner = Runner(study, Rig(config, drive, files), report)
     try:
         runner.run(check, lambda: drive.coasting(folder / "fmu", backend))
-        if config.monte_carlo.runs:
-            task = Task(config, replace(drive, observer=None), files, runner.stop, runner.rig.fed_from)
-            study.monte_carlo = run_monte_carlo(task, folder, report, scheduler=scheduler)
-        _analyse(study, runner.rig, report, needs_runs=True)
+        _analyse(study, Work(runner.rig, report, folder, scheduler, runner.stop), needs_runs=True)
         study.setting = recommended_setting(study)
         study.alternatives = alternatives(study, runner.rig, report)
     except RunError as error:
@@ -125,11 +122,11 @@ def _run_study(
     return study
 
 
-def _analyse(study: StudyRecord, rig: Rig, report: Report, *, needs_runs: bool) -> None:
+def _analyse(study: StudyRecord, work: Work, *, needs_runs: bool) -> None:
     """Make every analysis for which the system has the parts."""
-    for analysis in ANALYSES:
+    for analysis in all_analyses():
         if analysis.needs_runs == needs_runs and analysis.applies(study.config, study.drive):
-            findings = analysis.find(study, rig, report)
+            findings = analysis.find(study, work)
             if findings is not None:
                 study.findings[analysis.name] = findings
             if analysis.name == StartAnalysis.name:
@@ -150,13 +147,6 @@ def _with_class_of_all_starts(study: StudyRecord) -> None:
             window = study.window(phase, from_event_on(study, name), study.event[name])
             later = read_measure("thermal_trip_time", window)
             study.answers[name] = replace(study.answers[name], thermal_trip_time=later)
-
-
-def _check_random(config: Config, rig: Rig) -> None:
-    """Refuse random overloads for which the drive has no inputs."""
-    for event in config.random.hardest():
-        if not rig.takes(event):
-            raise InputError(f'monte_carlo.event.type = "{event.kind}": {event.without}')
 
 
 def _chains(study: StudyRecord, file: Path, report: Report) -> None:

@@ -12,6 +12,7 @@ from ..drives.motors import MOTORS
 from ..machines.chain_unit import SideLoads
 from ..system.signals import Profile
 from .event_table import inputs_of
+from .registry import registered
 
 MOST_STEPS = 1e6
 """Most steps of a study."""
@@ -35,12 +36,18 @@ def loads_beyond(config: Any) -> Iterator[InputError]:
     hardest = [
         (f"event.{name}", f"event.{k}", event) for k, (name, event) in enumerate(config.events.items(), 1)
     ]
-    hardest += [("monte_carlo.event", "monte_carlo.event", event) for event in config.random.hardest()]
+    beside = {key: part for part in registered() for key in part.random_events(config)}
+    hardest += [
+        (key, key, event)
+        for part in registered()
+        for key, random in part.random_events(config).items()
+        for event in random.hardest()
+    ]
     of_motors = {name for motor in MOTORS.values() for name in motor.input_layout.names}
     for where, key, event in hardest:
         needed = set(event.inputs(event.side))
         if not needed <= set(inputs):
-            asked = config.monte_carlo.runs or where != "monte_carlo.event"
+            asked = where not in beside or beside[where].longest_run(config)
             if asked and config.foreign is None and not needed <= {*inputs, *of_motors}:
                 near = "".join(near_name(name, Layout(model.Feed).names) for name in needed)
                 yield InputError(
@@ -73,26 +80,12 @@ def loads_beyond(config: Any) -> Iterator[InputError]:
                 )
 
 
-def without_feed(config: Any) -> Iterator[InputError]:
-    """The refusal of an observer of a feed that is zero, in a `Config`."""
-    asked = [table for table in ("observer", "watch") if getattr(config, table) is not None]
-    if asked and config.machine.model.sides:
-        feed = config.feed
-        if not feed.left.material_mass + feed.right.material_mass > 0.0:
-            for table in asked:
-                yield InputError(
-                    f"{table}: watches for a feed that moves to one side, and feed.left.material_mass and "
-                    f"feed.right.material_mass are 0 kg; give the feed of normal running, or leave [{table}] out",
-                    key=table,
-                )
-
-
 def endless(config: Any) -> Iterator[InputError]:
     """The refusal of a study, a `Config`, that would never end."""
     run, turn = config.run, config.turn
     seconds = config.steady_begin + run.turns * turn
     seconds += sum(event.follow(turn) + 2.0 * turn for event in config.events.values())
-    steps = max(seconds, config.monte_carlo.duration) / run.step
+    steps = max(seconds, *(part.longest_run(config) for part in registered())) / run.step
     if not steps <= MOST_STEPS:
         yield InputError(
             f"run.step = {run.step:g} s: the study would take {steps:.2g} steps, more than {MOST_STEPS:.0e}; "

@@ -8,7 +8,7 @@ with which the crank cannot turn, nor read another file: the reader of study fil
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from ..core.quantities import Variable
@@ -17,13 +17,10 @@ from ..reading.tables import may_be_share
 from ..reading.unit_patterns import pattern, zero
 from .event import TYPES
 from .event_table import LONGEST_NAME, PLACED, RESERVED
-from .identification.measurands import MEASURANDS
-from .identification.table import MOST_PARAMETERS as MOST_SOUGHT
-from .identification.table import MOST_RUNS, MOST_SENSORS, MOST_SPEEDS
-from .keys import ENTRIES, Key, KeyTable, key_tables
+from .keys import Key, KeyTable, entry_tables, key_tables
 from .parts import LONGEST_FILE
 from .schema_rules import OF_PARTS, rules
-from .sweep_table import MEASURES_OF_SWEEP, MOST_PARAMETERS, MOST_RESULTS, MOST_VALUES
+from .sections import all_sections
 
 FILE = "chainunit.schema.json"
 """The name by which examples refer to it."""
@@ -33,43 +30,19 @@ _EVENT_NAME = {
 }
 _VALUE: dict[str, Any] = {"type": ["number", "string"]}
 _FORMS: dict[str, dict[str, Any]] = {
-    "optimize.objectives": {"items": {"type": "string"}, "maxItems": 2},
-    "sweep.quantities": {"items": {"type": "string"}, "maxItems": MOST_RESULTS},
-    "sweep.measures": {"items": {"enum": list(MEASURES_OF_SWEEP)}, "maxItems": len(MEASURES_OF_SWEEP)},
-    "sweep.parameter": {"maxItems": MOST_PARAMETERS},
-    "sweep.parameter.name": {"minLength": 1},
-    "identify.parameter": {"maxItems": MOST_SOUGHT, "minItems": 1},
-    "identify.run": {"maxItems": MOST_RUNS, "minItems": 1},
-    "identify.sensor": {"maxItems": MOST_SENSORS},
-    "identify.parameter.name": {"minLength": 1},
-    "identify.run.name": {"pattern": r"^[a-z][a-z0-9_]{0,19}$"},
-    "identify.run.file": {"minLength": 1},
-    "watch.file": {"minLength": 1},
-    "identify.run.speeds": {
-        "maxItems": MOST_SPEEDS,
-        "items": {"type": "array", "items": _VALUE, "minItems": 3, "maxItems": 3},
-    },
-    "identify.sensor.column": {"enum": [name for name, each in MEASURANDS.items() if each.analog]},
-    "sweep.parameter.values": {"items": _VALUE, "minItems": 1, "maxItems": MOST_VALUES},
     "event.name": _EVENT_NAME,
     "catalogue": {"maxLength": LONGEST_FILE, "pattern": r"^[^\x00-\x1f\x7f]*$"},
     "system.machine": {"minLength": 1, "maxLength": LONGEST_FILE},
     "system.motor": {"minLength": 1, "maxLength": LONGEST_FILE},
 }
-"""By the name of a key, further conditions on its text or list."""
-_CONDITIONS: dict[str, dict[str, Any]] = {
-    "sweep.parameter": {
-        "required": ["name"],
-        "oneOf": [{"required": ["from", "to"]}, {"required": ["values"]}, {"required": ["tolerance"]}],
-    },
-    "identify.parameter": {
-        "required": ["name"],
-        "anyOf": [{"required": ["from", "to"]}, {"required": ["deviation"]}],
-    },
-    "identify.run": {"required": ["file"]},
-    "identify.sensor": {"required": ["column"]},
-}
-"""By the name of a list of tables, the keys that each of them must have."""
+"""By the name of a key of the base, further conditions on its text or list."""
+
+
+def _further(name: str) -> Mapping[str, Any] | None:
+    """Further conditions on the text or list of a key, by its full name; None where there are none."""
+    table, _, key = name.partition(".")
+    sections = all_sections()
+    return _FORMS.get(name) or (sections[table].forms.get(key) if table in sections else None)
 
 
 def json_schema() -> dict[str, Any]:
@@ -94,7 +67,7 @@ class _Schema:
                 self.definitions[f"event.{table.of}"] = self._event(table)
                 continue
             place = properties
-            if table.name in ENTRIES:
+            if table.name in entry_tables():
                 above, _, name = table.name.partition(".")
                 properties[above]["properties"][name]["items"] = self._entry(table)
                 continue
@@ -117,7 +90,7 @@ class _Schema:
             "those of the example",
             "items": {"anyOf": [_reference(f"event.{name}") for name in TYPES]},
         }
-        properties["monte_carlo"]["properties"]["event"] = {
+        random = {
             "description": "the event; a quantity may be a range, [least, most]",
             "anyOf": [
                 self._event(table, random=True)
@@ -125,6 +98,9 @@ class _Schema:
                 if table.name == "event" and not TYPES[table.of].from_rest
             ],
         }
+        for name, section in all_sections().items():
+            for event in section.random_events:
+                properties[name]["properties"][event] = random
         properties["system"]["properties"]["motor"]["examples"] += [each.designation for each in catalogue()]
         return {
             "$schema": "http://json-schema.org/draft-07/schema#",
@@ -184,7 +160,7 @@ class _Schema:
             "description": table.title,
             "additionalProperties": False,
             "properties": {key.name: self._form(key, table) for key in table.keys},
-        } | _CONDITIONS[table.name]
+        } | dict(entry_tables()[table.name].conditions)
 
     def _form(self, key: Key, table: KeyTable) -> dict[str, Any]:
         description = {"description": _sentence(key)}
@@ -193,7 +169,7 @@ class _Schema:
         if key.sort == "switch":
             return {"type": "boolean"} | description
         if key.sort == "list" and key.items is None:
-            return {"type": "array"} | _FORMS[f"{table.name}.{key.name}"] | description
+            return {"type": "array"} | dict(_further(f"{table.name}.{key.name}") or {}) | description
         if key.sort == "list":
             return self._list(key) | description
         if key.sort == "value":
@@ -205,9 +181,8 @@ class _Schema:
             return {"type": "string", "enum": choices} | description
         # a file or a designation is allowed beside the known names
         name = f"{table.name}.{key.name}".lstrip(".")
-        form: dict[str, Any] = {"type": "string"} | _FORMS.get(
-            name, {"minLength": 1} if "_names." in name else {}
-        )
+        further = _further(name) or ({"minLength": 1} if "_names." in name else {})
+        form: dict[str, Any] = {"type": "string"} | dict(further)
         return form | ({"examples": choices} if choices else {}) | description
 
     def _list(self, key: Key) -> dict[str, Any]:

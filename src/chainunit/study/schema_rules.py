@@ -14,6 +14,7 @@ from .conditions import Condition, Schema, ends_with, given, is_one_of
 from .event import TYPES
 from .parts import FMU, LINKAGE
 from .rules import all_rules, machine_is, motor_is
+from .sections import all_sections
 
 OF_PARTS = ("machine", "feed", "motor")
 """Tables whose keys follow from the machine and the motor that the file names."""
@@ -34,8 +35,9 @@ def rules() -> Iterator[Schema]:
     for name in MOTORS:
         own = motor_is(name) | ~given("system.motor") if name == "DcMotor" else motor_is(name)
         yield _where(own, {"properties": {"motor": {"$ref": f"#/definitions/motor.{name}"}}})
-    for key in ("watch.file", "identify.parameter", "identify.run"):
-        yield from _needs(given(key.partition(".")[0]), given(key))
+    for table, section in all_sections().items():
+        for key in section.required:
+            yield from _needs(given(table), given(f"{table}.{key}"))
     yield _where(given("driveline"), {"properties": {"driveline": _of_driveline()}})
 
 

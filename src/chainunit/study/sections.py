@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -14,18 +14,14 @@ from ..core.quantities import Value, declaration, group, quantity
 from ..drives.driveline import Mounted
 from ..drives.gearing import KINDS, Transmission
 from ..drives.induction_motor import InverterControl, SoftStart
-from ..drives.line_table import Damping, form, line_values
+from ..drives.line_table import form, line_values
 from ..drives.motor import Motor
 from ..machines.chain_organs import LEAST, MOST, OrganLaw
 from ..mechanism.models import MachineModel
-from ..reading.tables import given_values, schema
 from ..system import NAMES
-from .entry_values import numbers
-from .identification import table as identify_table
-from .observer_table import ObserverTable
-from .optimum import table as optimize_table
+from .file_section import FileSection
+from .registry import registered
 from .sizing_table import SIZING_KEYS, Sizing
-from .sweep_table import FIELDS, SweepTable
 
 
 @declaration
@@ -98,36 +94,6 @@ class Coupling:
 
 
 @declaration
-class MonteCarlo:
-    """Overloads at random crank angles and times."""
-
-    runs: Value = quantity(
-        "1", "number of runs; with 0 there are none", default=0, min=0, max=1_000_000, type="Integer"
-    )
-    duration: Value = quantity(
-        "s", "time that is followed after the event", default=2.0, min=0.05, max=1e4, usual=(0.05, 600.0)
-    )
-    seed: Value = quantity(
-        "1", "seed of the random numbers", default=1, min=0, max=1_000_000_000, type="Integer"
-    )
-
-
-@declaration
-class FlywheelTable:
-    """A flywheel on the motor's shaft, and the fluctuation for which the least one is searched."""
-
-    J: Value = quantity("kg.m2", "inertia of the flywheel, on the motor shaft", default=0.0, min=0.0, max=1e6)
-    fluctuation: Value = quantity(
-        "1",
-        "permitted fluctuation of the speed, (largest - least)/mean",
-        default=0.05,
-        min=1e-4,
-        max=1.0,
-        kind="percent",
-    )
-
-
-@declaration
 class Starter:
     """The starter of an induction motor, where `start` is "soft" or "inverter"; the key `start` chooses
     between them."""
@@ -155,37 +121,6 @@ class Driveline(Mounted):
         min=1.0,
         max=20.0,
     )
-
-
-@declaration
-class TorsionTable:
-    """The analysis of the torsion of a cardan line in rotation: the speeds of the shaft that are analysed,
-    the permitted values, and the grid of the map of stability."""
-
-    slowest: Value = quantity(
-        "1", "least speed, in parts of that of normal running", default=0.3, above=0.0, max=1e3
-    )
-    fastest: Value = quantity(
-        "1", "largest speed, in parts of that of normal running", default=2.0, above=0.0, max=1e3
-    )
-    points: Value = quantity(
-        "1", "number of speeds of the resonance curve", default=200, min=10, max=5000, type="Integer"
-    )
-    margin: Value = quantity(
-        "1",
-        "permitted nearness to a resonance, as a share of the speed",
-        default=0.15,
-        min=0.0,
-        max=1.0,
-        kind="percent",
-    )
-    factor: Value = quantity(
-        "1", "permitted ratio of the peak torque to that of the load alone", default=1.5, min=1.0, max=100.0
-    )
-    bend_low: Value = quantity("rad", "least bend of the map", default=0.0, min=0.0, max=1.5)
-    bend_high: Value = quantity("rad", "largest bend of the map", default=0.7, min=0.0, max=1.5)
-    speeds: Value = quantity("1", "number of speeds of the map", default=64, min=2, max=1000, type="Integer")
-    bends: Value = quantity("1", "number of bends of the map", default=14, min=2, max=1000, type="Integer")
 
 
 @declaration
@@ -227,9 +162,6 @@ class ChainOrgans(OrganLaw):
 
 ORGANS = ("two-bar", "chain")
 """The models of the organs."""
-
-JOINTS = ("alpha1", "alpha2", "both")
-"""The bends that the map of stability may vary."""
 
 PLACES = ("crank", "motor")
 """The places of a driveline: on the crank's shaft behind the gear, or on the motor's shaft before it."""
@@ -322,72 +254,46 @@ class ForeignMotor:
     """the FMU's names by ours, where they differ"""
 
 
-@dataclasses.dataclass(frozen=True)
-class FileSection:
-    """A table of a study file. The study has its values, or None if the table is `optional` and the file does
-    not have it; a value that the table does not name is that of `default`."""
-
-    declaration: type
-    default: Any = None
-    optional: bool = False
-    keys: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-    """other keys than quantities, as pydantic fields with their descriptions"""
-    title: str = ""
-    """title of the table in a report"""
-    is_used: Callable[[Any], bool] = lambda config: True
-    """whether a study uses the table, by its configuration"""
-    apart: bool = False
-    """whether the result has other things of the same names"""
-    form: Callable[..., type[BaseModel]] = schema
-    values: Callable[[Any], dict[str, Any]] = given_values
-    """the values of a checked table, by the name of the quantity"""
-
-
 SECTIONS: Mapping[str, FileSection] = {
     "run": FileSection(Run, title="Run"),
     "coupling": FileSection(Coupling, optional=True, title="Safety coupling"),
-    "monte_carlo": FileSection(
-        MonteCarlo,
-        keys={
-            "event": (
-                dict[str, Any],
-                Field(
-                    {},
-                    description="event that comes at random: keys of an [[event]], quantities may be ranges",
-                ),
-            )
-        },
-        title="Overloads at random",
-        is_used=lambda config: config.monte_carlo.runs > 0,
-        apart=True,
-    ),
-    "sizing": FileSection(Sizing, optional=True, keys=SIZING_KEYS, title="Demands on the motor", apart=True),
-    "flywheel": FileSection(
-        FlywheelTable,
+    "sizing": FileSection(
+        Sizing,
         optional=True,
-        keys={
-            "compare": (
-                numbers(FlywheelTable, "J", "flywheel.compare", 12),
-                Field([], description="flywheels that are compared [kg m2]"),
-            )
-        },
-        title="Flywheel",
+        keys=SIZING_KEYS,
+        title="Demands on the motor",
+        apart=True,
+        follows={"inertia_ratio": "none"},
+        order=(("poles_least", ">=", "poles_most"), ("ambient", ">", "temperature")),
     ),
     "gear": FileSection(
-        Transmission, default=KINDS["gear"], title="Gear", is_used=lambda config: config.of_catalogue
+        Transmission,
+        default=KINDS["gear"],
+        title="Gear",
+        is_used=lambda config: config.of_catalogue,
+        follows={
+            "ratio": "the one that gives the crank its speed under the mean load; with [sizing] the nearest on offer",
+            "efficiency": "98 % a stage of a helical gear, 70 % of a worm gear, 95 % of a V-belt; see "
+            "sizing.gear_kind",
+        },
     ),
     "starter": FileSection(
-        Starter, title="Starter", is_used=lambda config: config.of_catalogue and config.start != "direct"
+        Starter,
+        title="Starter",
+        is_used=lambda config: config.of_catalogue and config.start != "direct",
+        follows={
+            "inverter.boost": "5 %; with [sizing] the least of 5, 10 and 15 % with which the machine starts",
+            "inverter.slip": "that of the rated slip of the motor; none with a flywheel, against which it works",
+        },
     ),
-    "optimize": FileSection(
-        optimize_table.Optimize,
-        optional=True,
-        keys=optimize_table.FIELDS,
-        title="Search for the best machine",
-        is_used=lambda config: False,
-        apart=True,
+    "chain": FileSection(
+        ChainOrgans,
+        title="Chains",
+        follows={
+            "sweep_highest": "twice run.crank_speed, or 1.2 times the lowest mode of an organ if that is more"
+        },
+        order=(("sweep_lowest", ">", "sweep_highest"),),
     ),
-    "chain": FileSection(ChainOrgans, title="Chains"),
     "driveline": FileSection(
         Driveline,
         optional=True,
@@ -395,41 +301,19 @@ SECTIONS: Mapping[str, FileSection] = {
         form=form,
         values=partial(line_values, prefix="driveline."),
         title="Driveline",
+        follows={"d2": "from damping_ratio", "d3": "from damping_ratio"},
     ),
-    "torsion": FileSection(
-        TorsionTable,
-        keys={
-            "joint": (Literal[JOINTS], Field("alpha1", description="bend that the map of stability varies")),
-            "damping_ratios": (
-                numbers(Damping, "damping_ratio", "torsion.damping_ratios", 4),
-                Field([], description="damping ratios of the map"),
-            ),
-        },
-        title="Torsion of the driveline",
-    ),
-    "identify": FileSection(
-        identify_table.IdentifyTable,
-        optional=True,
-        keys=identify_table.FIELDS,
-        title="Identification from recordings",
-        is_used=lambda config: False,
-        apart=True,
-    ),
-    "watch": FileSection(
-        identify_table.WatchTable,
-        optional=True,
-        keys=identify_table.WATCH_KEYS,
-        title="Recording that is watched",
-        is_used=lambda config: False,
-        apart=True,
-    ),
-    "observer": FileSection(ObserverTable, optional=True, title="Load observer", apart=True),
-    "sweep": FileSection(SweepTable, optional=True, keys=FIELDS, title="Sweep", is_used=lambda config: False),
 }
-"""The tables of every study file, except those of its machine, its feed, and its motor."""
+"""The tables of every study file beside those of its machine, its feed, its motor, and of the capabilities."""
+
+
+@cache
+def all_sections() -> dict[str, FileSection]:
+    """The tables of a study file, those of the capabilities included, by name; without those of machine and motor."""
+    return dict(SECTIONS) | {name: each for part in registered() for name, each in part.tables.items()}
 
 
 def sections_of(machine: type[MachineModel], motor: type[Motor]) -> dict[str, FileSection]:
     """The tables of a study with this machine and this kind of motor."""
     own = {"machine": machine.Parameters, "ratios": Ratios, "feed": machine.Feed, "motor": motor.Parameters}
-    return {name: FileSection(declaration) for name, declaration in own.items()} | dict(SECTIONS)
+    return {name: FileSection(declaration) for name, declaration in own.items()} | all_sections()

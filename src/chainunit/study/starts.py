@@ -8,13 +8,11 @@ from typing import Any
 
 from ..drives.gearing import START_FACTOR
 from ..reading.text import entries, entry, number
-from ..work.progress import Report
-from .analysis import Analysis, Findings
+from .analysis import Analysis, Findings, Work
 from .config import Config
 from .drive import Drive
 from .event_torques import running_peak, running_words
 from .record import StudyRecord
-from .rig import Rig
 from .sections import SOFTER
 from .start_runs import StartNumbers, longest_start, starts_from_all
 from .torques import at_gear
@@ -120,13 +118,13 @@ class StartAnalysis(Analysis):
         return config.of_catalogue and drive.chain is None
 
     @staticmethod
-    def find(study: StudyRecord, rig: Rig, report: Report) -> StartFindings | None:
+    def find(study: StudyRecord, work: Work) -> StartFindings | None:
         """The starts; None where the motor does not start at all."""
         config = study.config
         if study.start is None or study.start.start_time is None:
             return None
-        report("starts from other crank angles", 1.0, 1.0)
-        starts = starts_from_all(rig, longest_start(config, study.start.start_time))
+        work.report("starts from other crank angles", 1.0, 1.0)
+        starts = starts_from_all(work.rig, longest_start(config, study.start.start_time))
         limit = config.gear.start_limit if "gear.torque_limit" in config.given else math.inf
         running = running_peak(study, at_gear)
         return StartFindings(tuple(starts), running.torque, limit, running.run)

@@ -14,6 +14,7 @@ from typing import Any
 
 from .config import Config
 from .parts import LENGTHS
+from .registry import registered
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -41,9 +42,9 @@ def changed_tables(config: Config, values: Mapping[str, float], title: str, fold
         inner = tables.get(table, {}) if table else tables
         if isinstance(inner.get(key), str) and inner[key].lower().endswith((".toml", ".fmu", ".csv")):
             inner[key] = _from(folder, Path(config.source).parent / inner[key])
-    for recording in (*tables.get("identify", {}).get("run", ()), tables.get("watch", {})):
-        for key in [key for key in ("file", "identification") if key in recording]:
-            recording[key] = _from(folder, Path(config.source).parent / recording[key])
+    for file in (file for part in registered() for file in part.files(tables)):
+        if file.name in file.table:
+            file.table[file.name] = _from(folder, Path(config.source).parent / file.table[file.name])
     return tables
 
 

@@ -208,7 +208,7 @@ def task_of(config: Config) -> SweepTask:
     InputError
         for a study without a sweep or without swept parameters; of measures see `chainunit.study.sweep_runs`.
     """
-    plan = config.sweep
+    plan: SweepPlan | None = config.plans["sweep"]
     if plan is None or not plan.parameters:
         raise InputError(
             "sweep.parameter: the study has none; add a table [[sweep.parameter]] with name, from and to "

@@ -10,12 +10,10 @@ import numpy as np
 
 from ..core.quantities import Value, declaration, quantity
 from ..reading.text import array_entry, entries
-from ..work.progress import Report
-from .analysis import Analysis, Findings
+from .analysis import Analysis, Findings, Work
 from .arrays import peak
 from .cycle import Cycle, cycle, energy_swing, no_feed
 from .record import StudyRecord
-from .rig import Rig
 
 POINTS = 3600
 """Number of crank angles of the turn."""
@@ -86,7 +84,7 @@ class TurnAnalysis(Analysis):
     name = "constant_speed"
 
     @staticmethod
-    def find(study: StudyRecord, rig: Rig, report: Report) -> TurnFindings:
+    def find(study: StudyRecord, work: Work) -> TurnFindings:
         """The turn at the crank speed of the study, by inverse dynamics."""
         config, machine = study.config, study.drive.machine
         feed, w = config.feed, config.run.crank_speed

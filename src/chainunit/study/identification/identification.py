@@ -211,13 +211,14 @@ def plan_of(config: Config) -> IdentificationPlan:
     InputError
         for a study without the table [identify].
     """
-    if config.identify is None:
+    plan: IdentificationPlan | None = config.plans["identification"].identify
+    if plan is None:
         raise InputError(
             "identify: is missing; add [[identify.run]] with the recordings, and [[identify.parameter]] with the "
             "numbers that are sought",
             key="identify",
         )
-    return config.identify
+    return plan
 
 
 def read_signal(of: PlannedRun | WatchPlan) -> Recording:

@@ -168,9 +168,10 @@ def watch_plan_of(config: Config) -> WatchPlan:
     InputError
         for a study without the table [watch].
     """
-    if config.watch is None:
+    plan: WatchPlan | None = config.plans["identification"].watch
+    if plan is None:
         raise InputError("watch: is missing; add [watch] with the recording (file)", key="watch")
-    return config.watch
+    return plan
 
 
 def watch(config: Config, report: Report = lambda *_: None) -> WatchedRecording:
@@ -318,7 +319,7 @@ def _parameters(
     layout = drive.machine.model.feed_layout
     feed = layout.from_names({name: found[f"machine.{name}"] for name in layout.names})
     table = replace(
-        config.observer or instance(ObserverTable, {}),
+        config.plans["identification"].observer or instance(ObserverTable, {}),
         signal_noise=plan.noise * louder[0],
         speed_noise=plan.noise * louder[1],
         rate=1.0 / recording.step,

@@ -130,13 +130,13 @@ def wishes_of(config: Any) -> Wishes:
     InputError
         for a study without the table [optimize].
     """
-    if config.optimize is None:
+    wishes: Wishes | None = config.plans.get("optimize")
+    if wishes is None:
         raise InputError(
             "optimize: is missing; add [optimize] with objectives, and [optimize.free] with the parameters that may "
             "change, such as r = { min = 0.1, max = 0.2 }",
             key="optimize",
         )
-    wishes: Wishes = config.optimize
     return wishes
 
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import xarray as xr
 
-from ..core.quantities import Value, declaration, quantity
-from .limits import Check
-from .measures import same_measure
-from .window import closes
+from ...core.quantities import Value, declaration, quantity
+from ...study.limits import Check
+from ...study.measures import same_measure
+from ...study.window import closes
 
 
 @declaration

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from scipy.signal import find_peaks
 
-from ..core.engines import numpy_
-from ..core.quantities import Value, declaration, quantity
-from ..drives.cardan import (
+from ...core.engines import numpy_
+from ...core.quantities import Value, declaration, quantity
+from ...drives.cardan import (
     ORDERS,
     Cardan,
     FrequencyBand,
@@ -24,7 +24,7 @@ from ..drives.cardan import (
     sensitivity,
     two_joints,
 )
-from ..drives.torsion import (
+from ...drives.torsion import (
     RigidPeaks,
     SimulatedPeaks,
     SteadyMotion,
@@ -36,9 +36,9 @@ from ..drives.torsion import (
     steady,
     with_damping_ratio,
 )
-from ..work.progress import Progress, Report
-from .arrays import stretches
-from .sections import TorsionTable
+from ...study.arrays import stretches
+from ...work.progress import Progress, Report
+from .table import TorsionTable
 
 TONGUES = (1, 2, 3, 4)
 """n of the parametric resonances 2 speed = 2 k/n."""

@@ -6,13 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..drives.cardan import ORDERS
-from ..reading.text import number
-from ..study.record import StudyRecord
-from ..study.torsion import LineAnalysis
-from . import blocks as b
-from . import figure as fig
-from .lines import Line, line
+from ...drives.cardan import ORDERS
+from ...reading.text import number
+from ...report import blocks as b
+from ...report import figure as fig
+from ...report.lines import Line, line
+from ...study.record import StudyRecord
+from .line import LineAnalysis
 
 PICTURES = ("campbell.png", "stability.png", "resonance.png", "ratio.png")
 _OVER_BOTH = "over the turns of shaft and machine"

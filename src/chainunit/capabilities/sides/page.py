@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..core.quantities import Layout
-from ..machines.chain_unit import SIDES
-from ..study.organs import Limits, OverloadFactors
-from ..study.record import StudyRecord
-from ..study.verdict import CRANK_GOOD, ROCKER_GOOD_EMPTY
-from . import blocks as b
-from . import figure as fig
-from .lines import capital
-from .pictures import Pictures
+from ...core.quantities import Layout
+from ...machines.chain_unit import SIDES
+from ...report import blocks as b
+from ...report import figure as fig
+from ...report.lines import capital
+from ...report.pictures import Pictures
+from ...study.one_sided import OverloadFactors
+from ...study.record import StudyRecord
+from ...study.verdict import CRANK_GOOD, ROCKER_GOOD_EMPTY
+from .analysis import Limits
 
 PICTURES = Pictures()
 

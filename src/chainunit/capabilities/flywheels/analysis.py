@@ -12,24 +12,24 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..core.quantities import Layout
-from ..reading.text import entries, entry, number
-from ..work.progress import Report
-from .analysis import Analysis, Findings
-from .catalogue_drive import with_wheel
-from .choice import tune
-from .config import Config
-from .cycle import needed_inertia
-from .drive import Drive
-from .limits import given_motor
-from .measures import Answers, read_answers
-from .record import Amount, StudyRecord
-from .rig import Rig, worst_residual
-from .shaft import remedies
-from .turn import Turn, TurnAnalysis
-from .verdict import CREEPS, RESIDUAL, STEADY
+from ...core.quantities import Layout
+from ...reading.text import entries, entry, number
+from ...study.analysis import Analysis, Findings, Work
+from ...study.catalogue_drive import with_wheel
+from ...study.choice import tune
+from ...study.config import Config
+from ...study.cycle import needed_inertia
+from ...study.drive import Drive
+from ...study.limits import given_motor
+from ...study.measures import Answers, read_answers
+from ...study.record import Amount, StudyRecord
+from ...study.rig import Rig, worst_residual
+from ...study.shaft import remedies
+from ...study.turn import Turn, TurnAnalysis
+from ...study.verdict import CREEPS, RESIDUAL, STEADY
+from ...study.window import Phase, Window, whole_turns
+from .table import FlywheelTable
 from .wheel import FlywheelAnswers, Wheel
-from .window import Phase, Window, whole_turns
 
 CLOSE = 0.03
 """The fluctuation with the least flywheel lies below the permitted one by at most this share of it."""
@@ -116,10 +116,10 @@ class FlywheelAnalysis(Analysis):
     @staticmethod
     def applies(config: Config, drive: Drive) -> bool:
         """Whether the study asks for flywheels, and the motor is one of this package."""
-        return config.flywheel is not None and drive.foreign is None
+        return config.plans["flywheels"] is not None and drive.foreign is None
 
     @staticmethod
-    def find(study: StudyRecord, rig: Rig, report: Report) -> FlywheelFindings:
+    def find(study: StudyRecord, work: Work) -> FlywheelFindings:
         """Run the flywheels.
 
         Raises
@@ -127,8 +127,8 @@ class FlywheelAnalysis(Analysis):
         RunError
             where a run fails; the earlier results are in the study.
         """
-        config, table, drive = study.config, study.config.flywheel, study.drive
-        assert table is not None
+        config, plan, drive = study.config, study.config.plans["flywheels"], study.drive
+        table: FlywheelTable = plan.table
         turn: Turn = study.findings[TurnAnalysis.name].numbers
         findings = FlywheelFindings(
             own=table.J,
@@ -139,12 +139,12 @@ class FlywheelAnalysis(Analysis):
             mean_torque=turn.torque_mean / drive.ratio,
         )
         study.findings[FlywheelAnalysis.name] = findings
-        sizes = sorted({table.J, *config.flywheels})
+        sizes = sorted({table.J, *plan.compared})
 
         def run(flywheel: float) -> Wheel:
             finished = float(len(findings.wheels))
-            report(f"flywheel of {number(flywheel, 'kg.m2')}", finished, float(len(sizes) + 1))
-            return _run(study, rig, findings, flywheel)
+            work.report(f"flywheel of {number(flywheel, 'kg.m2')}", finished, float(len(sizes) + 1))
+            return _run(study, work.rig, findings, flywheel)
 
         for size in sizes:
             findings.wheels.append(_own(study, findings) if size == table.J else run(size))

@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from ..machines.machine import Machine
-from ..reading.text import number
-from ..study.arrays import stretches
-from ..study.blade import BladeFindings, Cutting
-from ..study.record import StudyRecord
-from . import blocks as b
-from . import figure as fig
-from . import linkage
-from .edge_motion import ENDS, edge
-from .motion import DrawnLink
-from .turn import angle_axis
+from ...machines.machine import Machine
+from ...reading.text import number
+from ...report import blocks as b
+from ...report import figure as fig
+from ...report import linkage
+from ...report.motion import DrawnLink
+from ...report.turn import angle_axis
+from ...study.arrays import stretches
+from ...study.record import StudyRecord
+from .analysis import BladeFindings, Cutting
+from .motion import ENDS, edge
 
 PICTURE = "blade_path.png"
 _EDGE = DrawnLink("edge", ENDS, "heavy")

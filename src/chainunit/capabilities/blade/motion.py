@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ..core.planar import Link
-from ..mechanism.machine import MachineState
-from ..study.record import StudyRecord
-from .supplement import Details, Supplement
+from ...core.planar import Link
+from ...mechanism.machine import MachineState
+from ...report.supplement import Details, Supplement
+from ...study.record import StudyRecord
 
 ENDS = ("first end of the edge", "last end of the edge")
 

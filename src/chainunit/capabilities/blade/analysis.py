@@ -10,18 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import InputError
-from ..core.quantities import Value, declaration, quantity
-from ..machines.knife_drive import Stack
-from ..reading.text import array_entry, entries, number
-from ..work.progress import Report
-from .analysis import Analysis, Findings
-from .config import Config
-from .cycle import Cycle, cycle
-from .drive import Drive
-from .record import StudyRecord
-from .rig import Rig
-from .turn import EVERY, POINTS
+from ...core.errors import InputError
+from ...core.quantities import Value, declaration, quantity
+from ...machines.knife_drive import Stack
+from ...reading.text import array_entry, entries, number
+from ...study.analysis import Analysis, Findings, Work
+from ...study.config import Config
+from ...study.cycle import Cycle, cycle
+from ...study.drive import Drive
+from ...study.record import StudyRecord
+from ...study.turn import EVERY, POINTS
 
 
 @declaration
@@ -126,7 +124,7 @@ class BladeAnalysis(Analysis):
         return drive.machine.model.cuts
 
     @staticmethod
-    def find(study: StudyRecord, rig: Rig, report: Report) -> BladeFindings:
+    def find(study: StudyRecord, work: Work) -> BladeFindings:
         """The turn at the crank speed of the study.
 
         Raises

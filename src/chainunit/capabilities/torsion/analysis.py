@@ -9,19 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import InputError
-from ..drives.cardan import ORDERS, frequency_band
-from ..drives.torsion import SteadyMotion
-from ..reading.text import array_entry, entries
-from ..work.progress import Report
-from .analysis import Analysis, Findings
-from .config import Config
-from .drive import Drive
-from .record import Amount, Remark, StudyRecord
-from .rig import Rig
-from .shaft import two_masses
-from .torsion import DRIFT, LineAnalysis, Rotation, analyse
-from .verdict import STEADY
+from ...core.errors import InputError
+from ...drives.cardan import ORDERS, frequency_band
+from ...drives.torsion import SteadyMotion
+from ...reading.text import array_entry, entries
+from ...study.analysis import Analysis, Findings, Work
+from ...study.config import Config
+from ...study.drive import Drive
+from ...study.record import Amount, Remark, StudyRecord
+from ...study.shaft import two_masses
+from ...study.verdict import STEADY
+from .line import DRIFT, LineAnalysis, Rotation, analyse
+from .table import TorsionPlan
 
 ROUNDOFF_TORQUE = 1e-6
 """torque up to which it is roundoff [N.m]"""
@@ -47,9 +46,10 @@ class TorsionAnalysis(Analysis):
         return drive.line is not None
 
     @staticmethod
-    def find(study: StudyRecord, rig: Rig, report: Report) -> TorsionFindings | None:
+    def find(study: StudyRecord, work: Work) -> TorsionFindings | None:
         """See `Analysis`."""
         config, drive, modes = study.config, study.drive, study.statics.torsion
+        plan: TorsionPlan = config.plans["torsion"]
         assert modes is not None
         turn = study.statics.normal
         speed = float(config.run.crank_speed * drive.driven_machine.ratio)
@@ -68,15 +68,15 @@ class TorsionAnalysis(Analysis):
         bands = [frequency_band(two_masses(drive, J)) for J in inertia]
         span = min(band.least for band in bands), max(band.largest for band in bands)
         slowest = SLOWEST * span[1]
-        if config.torsion.slowest * speed < slowest:
+        if plan.table.slowest * speed < slowest:
             raise InputError(
-                f"torsion.slowest = {config.torsion.slowest:g}: the shaft turns at {speed:.4g} rad/s; must be >= "
+                f"torsion.slowest = {plan.table.slowest:g}: the shaft turns at {speed:.4g} rad/s; must be >= "
                 f"{slowest / speed:.3g}, as below a fiftieth of the natural frequency nothing resonates"
             )
         load = float(np.mean(turn.crank_torque)) / drive.driven_machine.ratio
         rotation = Rotation(speed=speed, load=load)
         return TorsionFindings(
-            analyse(line, rotation, config.torsion, config.joint, config.damping_ratios, report, span)
+            analyse(line, rotation, plan.table, plan.joint, plan.damping_ratios, work.report, span)
         )
 
 

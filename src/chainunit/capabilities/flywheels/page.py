@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from ..core.quantities import Layout
-from ..reading.text import number
-from ..study.flywheels import FlywheelFindings
-from ..study.record import StudyRecord
-from ..study.wheel import FlywheelAnswers, Wheel
-from . import blocks as b
-from . import figure as fig
-from .lines import Line, line
-from .style import LINES
-from .turn import angle_axis
+from ...core.quantities import Layout
+from ...reading.text import number
+from ...report import blocks as b
+from ...report import figure as fig
+from ...report.lines import Line, line
+from ...report.style import LINES
+from ...report.turn import angle_axis
+from ...study.record import StudyRecord
+from .analysis import FlywheelFindings
+from .wheel import FlywheelAnswers, Wheel
 
 PICTURE = "flywheel.png"
 _HEADS = {

@@ -3,48 +3,24 @@ model."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ..core.quantities import Value, declaration, quantity
-from ..machines.api import ChainUnitMachine
-from ..machines.chain_unit import SIDES, Feed, SideName, other
-from ..reading.text import array_entry, entries, entry
-from ..work.progress import Report
-from .analysis import Analysis, Findings
-from .arrays import peak
-from .config import Config
-from .cycle import Cycle, cycle
-from .drive import Drive
-from .one_sided import all_on_one, alone, without
-from .organ_limits import slack_and_mode
-from .record import StudyRecord
-from .rig import Rig
-
-
-def _cycle_alone(
-    machine: ChainUnitMachine, side: SideName, crank_speed: float, feed: Feed, points: int = 720
-) -> Cycle:
-    """A turn with only the organ of that side, which keeps its load."""
-    return cycle(alone(machine, side), crank_speed, without(other(side), feed), points)
-
-
-@declaration
-class OverloadFactors:
-    """Five ratios of a load from one side to the load from both, each for another question; see
-    `overload_factors`. The first one sizes the drive."""
-
-    feed_crank_torque: Value = quantity("1", "crank torque, all feed on the side, ratio of cycle maxima")
-    feed_rocker_torque: Value = quantity("1", "rocker torque, all feed on the side, ratio of cycle maxima")
-    crank_torque: Value = quantity("1", "crank torque, organ alone, ratio of cycle maxima")
-    rocker_torque: Value = quantity("1", "rocker torque, organ alone, ratio of cycle maxima")
-    static_at_extreme: Value = quantity(
-        "1", "static overload factor of the papers, at the extreme where it is least"
-    )
+from ...core.quantities import Value, declaration, quantity
+from ...machines.api import ChainUnitMachine
+from ...machines.chain_unit import SIDES, Feed, SideName
+from ...reading.text import array_entry, entries, entry
+from ...study.analysis import Analysis, Findings, Work
+from ...study.arrays import peak
+from ...study.config import Config
+from ...study.cycle import cycle
+from ...study.drive import Drive
+from ...study.one_sided import OverloadFactors, cycle_alone, overload_factors
+from ...study.organ_limits import slack_and_mode
+from ...study.record import StudyRecord
 
 
 def factors_for(factors: Mapping[SideName, OverloadFactors]) -> dict[str, str]:
@@ -58,42 +34,6 @@ def factors_for(factors: Mapping[SideName, OverloadFactors]) -> dict[str, str]:
         "rocker_torque": "rocker of a machine with one organ",
         "static_at_extreme": "comparison with the papers; no design factor",
     }
-
-
-def overload_factors(
-    machine: ChainUnitMachine, crank_speed: float, feed: Feed, side: SideName = "left"
-) -> OverloadFactors:
-    """The overload factors of the machine on its `side` against both.
-
-    The first two factors are for one-sided feed: ratios of cycle maxima at `crank_speed` [rad/s], with all
-    feed on that side over feed on both sides. Both organs are in place. The other factors are for a machine
-    that has only the organ of `side`, as in the papers.
-
-    `static_at_extreme` of the left organ is the papers' R_left/(R_left - R_right) at the right extreme of the
-    rocker, at rest. For the right organ it is R_right/(R_right - R_left) at the left extreme, which is not as
-    far out. The factor diverges as the swing shrinks, and its value at the extreme is its minimum; so it is
-    no design factor (docs/physics.md). In the ratios of one organ alone to both, gravity and inertia cancel
-    or add up, and above a certain speed both sides together are the heavier case.
-    """
-    extremes = machine.rocker_extremes()
-    # each organ pulls hardest at the rocker where the rocker is farthest from it
-    psi = extremes[0 if side == "left" else 1][0]
-    static = machine.chamber(psi, 0.0, 0.0, feed.left, feed.right)
-    both = cycle(machine, crank_speed, feed)
-    one_sided = cycle(machine, crank_speed, all_on_one(side, feed))
-    one = _cycle_alone(machine, side, crank_speed, feed)
-
-    def ratio(x: Any, y: Any) -> float:
-        whole = peak(y)
-        return peak(x) / whole if whole > 0.0 else math.nan
-
-    return OverloadFactors(
-        feed_crank_torque=ratio(one_sided.crank_torque, both.crank_torque),
-        feed_rocker_torque=ratio(one_sided.outputs.rocker.tau, both.outputs.rocker.tau),
-        crank_torque=ratio(one.crank_torque, both.crank_torque),
-        rocker_torque=ratio(one.outputs.rocker.tau, both.outputs.rocker.tau),
-        static_at_extreme=ratio(getattr(static, side).tangential_load, static.rocker.tangential_load),
-    )
 
 
 @dataclass(frozen=True)
@@ -145,7 +85,7 @@ def sides_over_speed(machine: ChainUnitMachine, feed: Feed, highest: float = 15.
     }
     for w in speed:
         turns = {"both": cycle(machine, float(w), feed, 360)} | {
-            side: _cycle_alone(machine, side, float(w), feed, 360) for side in SIDES
+            side: cycle_alone(machine, side, float(w), feed, 360) for side in SIDES
         }
         for which, turn in turns.items():
             peaks[f"rocker_{which}"].append(peak(turn.outputs.rocker.tau))
@@ -208,7 +148,7 @@ class OrganAnalysis(Analysis):
         return bool(drive.machine.model.sides)
 
     @staticmethod
-    def find(study: StudyRecord, rig: Rig, report: Report) -> OrganFindings:
+    def find(study: StudyRecord, work: Work) -> OrganFindings:
         """The findings for two bars, also where the organs are chains."""
         machine, feed, speed = study.drive.chain_unit, study.config.feed, study.config.run.crank_speed
         (right, _), (left, _) = machine.rocker_extremes()

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..core.engines import numpy_
-from ..core.planar import Vec2
-from ..groups.chain import pins
-from ..groups.loads import Resistance
-from ..machines.chain_unit import NAMES, ON_SIDE, OrganNames, SideName
-from ..mechanism.machine import MachineState
-from ..study.record import StudyRecord
-from .motion import Arrow
-from .supplement import Details, Supplement
+from ...core.engines import numpy_
+from ...core.planar import Vec2
+from ...groups.chain import pins
+from ...groups.loads import Resistance
+from ...machines.chain_unit import NAMES, ON_SIDE, OrganNames, SideName
+from ...mechanism.machine import MachineState
+from ...report.motion import Arrow
+from ...report.supplement import Details, Supplement
+from ...study.record import StudyRecord
 
 _CAPTION = (
     "Blue, full: left side; red, dashed: right side; black: crank bearing O1 and rocker pivot C. An arrow is the "

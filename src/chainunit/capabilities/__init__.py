@@ -1,0 +1,13 @@
+"""Capabilities: each folder answers one question, and its name in this list registers it."""
+
+NAMES = (
+    "sides",
+    "blade",
+    "random_overloads",
+    "flywheels",
+    "torsion",
+    "optimize",
+    "identification",
+    "sweep",
+)
+"""The folders of the capabilities, in the order in which their tables, results and sections come."""

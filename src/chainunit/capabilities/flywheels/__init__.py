@@ -1,0 +1,81 @@
+"""Flywheels: the one of the study beside others, and the least one that keeps a permitted fluctuation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from pydantic import Field
+
+from ...report.capability import Capability, Contents
+from ...study.analysis import Analysis
+from ...study.conditions import given, has_entries
+from ...study.config import Config
+from ...study.entry_values import numbers
+from ...study.file_reading import FileReading
+from ...study.file_section import FileSection
+from ...study.rules import Rule
+from .table import FlywheelTable
+
+
+@dataclass(frozen=True)
+class FlywheelPlan:
+    """The flywheel of the study with the permitted fluctuation, and the inertias that are compared [kg m2]."""
+
+    table: FlywheelTable
+    compared: tuple[float, ...]
+
+
+class FlywheelCapability(Capability):
+    """The capability, with the table [flywheel]."""
+
+    name = "flywheels"
+    tables = {  # noqa: RUF012
+        "flywheel": FileSection(
+            FlywheelTable,
+            optional=True,
+            keys={
+                "compare": (
+                    numbers(FlywheelTable, "J", "flywheel.compare", 12),
+                    Field([], description="flywheels that are compared [kg m2]"),
+                )
+            },
+            title="Flywheel",
+        )
+    }
+
+    def rules(self) -> Iterable[Rule]:
+        """Sizing has flywheels of its own."""
+        words = "sizing finds its own; leave out one of the two"
+        yield Rule("flywheel", given("sizing"), words, has_entries("flywheel"))
+
+    def plan(self, reading: FileReading) -> FlywheelPlan | None:
+        """The plan of the table."""
+        if "flywheel" not in reading.data:
+            return None
+        compared: list[float] = reading.form.flywheel.compare
+        return FlywheelPlan(reading.values["flywheel"], tuple(sorted(set(compared))))
+
+    def shaft_inertia(self, config: Config) -> float:
+        """That of the study's flywheel."""
+        plan: FlywheelPlan | None = config.plans[self.name]
+        return 0.0 if plan is None else float(plan.table.J)
+
+    def not_with_foreign_motor(self, config: Config) -> str:
+        """A flywheel is added to the rotor."""
+        return "" if config.plans[self.name] is None else "its rotor takes no flywheel; leave [flywheel] out"
+
+    def analyses(self) -> Iterable[type[Analysis]]:
+        """The runs with each flywheel."""
+        from .analysis import FlywheelAnalysis
+
+        return (FlywheelAnalysis,)
+
+    def contents(self) -> Mapping[str, Contents]:
+        """Table and figure."""
+        from . import page
+
+        return {"flywheels": Contents("Flywheels", page.blocks, (page.PICTURE,))}
+
+
+CAPABILITY = FlywheelCapability()

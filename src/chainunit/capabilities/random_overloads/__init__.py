@@ -1,0 +1,152 @@
+"""Overloads at random crank angles and times, and the quantiles of what they do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import Field
+
+from ...core.errors import InputError, printable, refusal_prefix
+from ...report.blocks import Block, Source, Text
+from ...report.capability import Capability, Contents
+from ...report.lines import Line
+from ...study.analysis import Analysis
+from ...study.conditions import given, is_above_zero
+from ...study.config import Config
+from ...study.event_table import RandomEvent, read_random_event
+from ...study.file_reading import FileReading
+from ...study.file_section import FileSection
+from ...study.parts import named_table
+from ...study.record import StudyRecord
+from ...study.rig import Rig
+from ...study.rules import MACHINE_FMU, NEEDS_MODEL, Rule, has_sides
+from ...work.runner import check_scheduler
+from .table import MonteCarlo
+
+_EVENT = "monte_carlo.event"
+
+
+@dataclass(frozen=True)
+class RandomPlan:
+    """Number, duration and seed of the runs, and their event."""
+
+    table: MonteCarlo
+    event: RandomEvent
+
+    @property
+    def is_asked_for(self) -> bool:
+        """Whether there are runs."""
+        return bool(self.table.runs)
+
+
+class RandomOverloads(Capability):
+    """The capability, with the table [monte_carlo]."""
+
+    name = "random_overloads"
+    tables = {  # noqa: RUF012
+        "monte_carlo": FileSection(
+            MonteCarlo,
+            keys={
+                "event": (
+                    dict[str, Any],
+                    Field(
+                        {},
+                        description="event that comes at random: keys of an [[event]], quantities may be ranges",
+                    ),
+                )
+            },
+            title="Overloads at random",
+            is_used=lambda config: config.plans["random_overloads"].is_asked_for,
+            apart=True,
+            random_events=("event",),
+        )
+    }
+
+    def rules(self) -> Iterable[Rule]:
+        """They need a model of the machine, and an event of its own where it has no sides."""
+        some = is_above_zero("monte_carlo.runs")
+        yield Rule("monte_carlo.runs", MACHINE_FMU, NEEDS_MODEL, some)
+        words = "draws jams of two sides, and the machine is {machine}; give the event in monte_carlo.event"
+        yield Rule("monte_carlo.runs", ~(has_sides() | MACHINE_FMU | given(_EVENT)), words, some)
+
+    def check_values(self, data: Mapping[str, Any]) -> None:
+        """Refuse a wrong event."""
+        event = named_table(data, "monte_carlo").get("event")
+        if isinstance(event, Mapping):
+            read_random_event(event, _EVENT)
+
+    def plan(self, reading: FileReading) -> RandomPlan:
+        """The plan, also of a file without the table."""
+        with refusal_prefix("", _EVENT):
+            event = read_random_event(reading.form.monte_carlo.event, _EVENT)
+        return RandomPlan(reading.values["monte_carlo"], event)
+
+    def random_events(self, config: Config) -> Mapping[str, RandomEvent]:
+        """Their event."""
+        return {_EVENT: _plan(config).event}
+
+    def longest_run(self, config: Config) -> float:
+        """The time that is followed after an event; 0 without runs."""
+        plan = _plan(config)
+        return float(plan.table.duration) if plan.is_asked_for else 0.0
+
+    def not_with_foreign_motor(self, config: Config) -> str:
+        """They read the motor's current and torque."""
+        if not _plan(config).is_asked_for:
+            return ""
+        return (
+            "its current and torque are not known, of which random overloads tell the quantiles; leave "
+            "monte_carlo.runs out"
+        )
+
+    def check_scheduler(self, config: Config, scheduler: str) -> None:
+        """The workers of a scheduler make these runs."""
+        if not _plan(config).is_asked_for:
+            raise InputError(
+                f"scheduler {printable(scheduler)}: is for random overloads, and this study has none "
+                "(monte_carlo.runs); leave it out"
+            )
+        check_scheduler(scheduler)
+
+    def check_runs(self, config: Config, rig: Rig) -> None:
+        """Refuse an event for which the drive has no inputs."""
+        plan = _plan(config)
+        for event in plan.event.hardest() if plan.is_asked_for else ():
+            if not rig.takes(event):
+                raise InputError(f'monte_carlo.event.type = "{event.kind}": {event.without}')
+
+    def analyses(self) -> Iterable[type[Analysis]]:
+        """The runs."""
+        from .analysis import RandomAnalysis
+
+        return (RandomAnalysis,)
+
+    def contents(self) -> Mapping[str, Contents]:
+        """Quantiles."""
+        from . import page
+
+        return {"monte_carlo": Contents("Overloads at random", page.blocks)}
+
+    def question(self, s: Source, study: StudyRecord) -> Line:
+        """Their number and event."""
+        if "monte_carlo" not in study.findings:
+            return ()
+        words = " Then come {=monte_carlo.runs} overloads at random, each by itself: {event}."
+        return s.line(words, event=_plan(study.config).event.title)
+
+    def answer(self, s: Source, study: StudyRecord) -> Iterator[Block]:
+        """The largest quantile of the crank torque, and how often a run ends badly."""
+        if "monte_carlo" in study.findings:
+            from . import page
+
+            yield Text(page.summary(s, study))
+
+
+def _plan(config: Config) -> RandomPlan:
+    plan: RandomPlan = config.plans[RandomOverloads.name]
+    return plan
+
+
+CAPABILITY = RandomOverloads()

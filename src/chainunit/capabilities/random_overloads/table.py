@@ -1,0 +1,20 @@
+"""The table [monte_carlo] of a study file: declarations only."""
+
+from __future__ import annotations
+
+from ...core.quantities import Value, declaration, quantity
+
+
+@declaration
+class MonteCarlo:
+    """Overloads at random crank angles and times."""
+
+    runs: Value = quantity(
+        "1", "number of runs; with 0 there are none", default=0, min=0, max=1_000_000, type="Integer"
+    )
+    duration: Value = quantity(
+        "s", "time that is followed after the event", default=2.0, min=0.05, max=1e4, usual=(0.05, 600.0)
+    )
+    seed: Value = quantity(
+        "1", "seed of the random numbers", default=1, min=0, max=1_000_000_000, type="Integer"
+    )

@@ -1,0 +1,38 @@
+"""One side against both: what the organs of a chain unit ask of its drive, and up to which speed two bars stand for
+them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from ...report.capability import Capability, Contents
+from ...report.supplement import Supplement
+from ...study.analysis import Analysis
+from ...study.record import StudyRecord
+
+
+class SidesCapability(Capability):
+    """The capability; it has no table, and comes with every machine that has organs on its sides."""
+
+    name = "sides"
+
+    def analyses(self) -> Iterable[type[Analysis]]:
+        """Overload factors, and the torques over the speed."""
+        from .analysis import OrganAnalysis
+
+        return (OrganAnalysis,)
+
+    def contents(self) -> Mapping[str, Contents]:
+        """Factors, limits and figure."""
+        from . import page
+
+        return {"organs": Contents("One side against both", page.blocks, page.PICTURES.files)}
+
+    def supplement(self, study: StudyRecord) -> Supplement | None:
+        """The organs in motion."""
+        from .motion import organ_motion
+
+        return organ_motion(study) if study.drive.machine.model.sides else None
+
+
+CAPABILITY = SidesCapability()

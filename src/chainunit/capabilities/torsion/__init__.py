@@ -1,0 +1,66 @@
+"""Torsion of a cardan line in rotation: natural frequencies, resonance, and stability."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Literal
+
+from pydantic import Field
+
+from ...drives.line_table import Damping
+from ...report.capability import Capability, Contents
+from ...study.analysis import Analysis
+from ...study.conditions import given
+from ...study.entry_values import numbers
+from ...study.file_reading import FileReading
+from ...study.file_section import FileSection
+from ...study.rules import Rule
+from .table import JOINTS, TorsionPlan, TorsionTable
+
+
+class TorsionCapability(Capability):
+    """The capability, with the table [torsion]."""
+
+    name = "torsion"
+    tables = {  # noqa: RUF012
+        "torsion": FileSection(
+            TorsionTable,
+            keys={
+                "joint": (
+                    Literal[JOINTS],
+                    Field("alpha1", description="bend that the map of stability varies"),
+                ),
+                "damping_ratios": (
+                    numbers(Damping, "damping_ratio", "torsion.damping_ratios", 4),
+                    Field([], description="damping ratios of the map"),
+                ),
+            },
+            title="Torsion of the driveline",
+            order=(("slowest", ">", "fastest"), ("bend_low", ">", "bend_high")),
+        )
+    }
+
+    def rules(self) -> Iterable[Rule]:
+        """It needs a line."""
+        yield Rule("torsion", ~given("driveline"), "is of a driveline; add [driveline], or leave it out")
+
+    def plan(self, reading: FileReading) -> TorsionPlan:
+        """The plan, also of a file without the table."""
+        form = reading.form.torsion
+        ratios = tuple(sorted(set(form.damping_ratios)))
+        return TorsionPlan(reading.values["torsion"], form.joint, ratios)
+
+    def analyses(self) -> Iterable[type[Analysis]]:
+        """The line in rotation."""
+        from .analysis import TorsionAnalysis
+
+        return (TorsionAnalysis,)
+
+    def contents(self) -> Mapping[str, Contents]:
+        """Tables and maps."""
+        from . import page
+
+        return {"torsion": Contents("Torsion of the driveline in rotation", page.blocks, page.PICTURES)}
+
+
+CAPABILITY = TorsionCapability()

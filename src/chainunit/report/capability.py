@@ -1,0 +1,48 @@
+"""Capabilities, as a report knows them: a question, its section, and the command that answers it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+from ..study.capability import StudyCapability
+from ..study.record import StudyRecord
+from ..study.registry import registered
+from .blocks import Block, Source
+from .lines import Line
+from .supplement import Supplement
+
+
+@dataclass(frozen=True)
+class Contents:
+    """The contents of a section: its heading, its blocks (tables, text, figures), and the files of its figures."""
+
+    heading: str
+    blocks: Callable[[Source, StudyRecord], Iterator[Block]]
+    pictures: tuple[str, ...] = ()
+
+
+class Capability(StudyCapability):
+    """A capability with what it shows: the base of the one that each folder of `chainunit.capabilities` has by the
+    name ``CAPABILITY``."""
+
+    def contents(self) -> Mapping[str, Contents]:
+        """The sections of a study's report on its findings, by the name of the analysis."""
+        return {}
+
+    def question(self, s: Source, study: StudyRecord) -> Line:
+        """The sentence on it in the question of a study; empty where it asks for nothing."""
+        return ()
+
+    def answer(self, s: Source, study: StudyRecord) -> Iterator[Block]:
+        """Its blocks in the answer of a study."""
+        return iter(())
+
+    def supplement(self, study: StudyRecord) -> Supplement | None:
+        """Its additions to the machine in motion."""
+        return None
+
+
+def capabilities() -> tuple[Capability, ...]:
+    """The registered capabilities."""
+    return registered()

@@ -1,0 +1,116 @@
+"""Capabilities, as a study knows them: each is one question that the program answers beside the base of a study.
+
+A capability is one folder of `chainunit.capabilities` and a name in its list; nothing outside of the folder imports
+from it. It brings tables of the study file with their rules, parts of the drive, and analyses with their findings.
+Its section of the report and its commands are those of `chainunit.report.capability.Capability`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from ..core.errors import InputError
+from .analysis import Analysis
+from .config import Config
+from .drive import Drive
+from .event_table import RandomEvent
+from .file_reading import FileReading
+from .file_section import FileSection
+from .rig import Rig
+from .rules import Rule
+
+
+@dataclass(frozen=True)
+class FileReference:
+    """The name of a file in a table of a study file: its full `key`, and the `table` in which it stands by `name`."""
+
+    key: str
+    table: dict[str, Any]
+    name: str
+    is_recording: bool = True
+    """whether it is a recording, which has to be there"""
+
+
+class StudyCapability:
+    """A capability; each method has a default for a capability that has no such thing."""
+
+    name: ClassVar[str]
+    """name of its folder, and of its plan in `Config.plans`"""
+
+    tables: ClassVar[Mapping[str, FileSection]] = {}
+    """its tables of the study file, by name"""
+
+    def rules(self) -> Iterable[Rule]:
+        """The rules of its keys that do not go together with others."""
+        return ()
+
+    def check_values(self, data: Mapping[str, Any]) -> None:
+        """Refuse single values of its tables that their forms cannot refuse.
+
+        Raises
+        ------
+        InputError
+            with a line for each fault.
+        """
+
+    def plan(self, reading: FileReading) -> Any:
+        """The plan that its tables state; None where the file asks for nothing.
+
+        Raises
+        ------
+        InputError
+            for values that do not fit together.
+        """
+        return None
+
+    def files(self, data: Mapping[str, Any]) -> Iterable[FileReference]:
+        """The files that its tables of a study file name."""
+        return ()
+
+    def faults(self, config: Config) -> Iterable[InputError]:
+        """Refusals of a plan that does not fit the rest of the study."""
+        return ()
+
+    def random_events(self, config: Config) -> Mapping[str, RandomEvent]:
+        """By the key that states it, the events with ranges that its runs have."""
+        return {}
+
+    def longest_run(self, config: Config) -> float:
+        """Time of the longest of its runs [s]."""
+        return 0.0
+
+    def shaft_inertia(self, config: Config) -> float:
+        """Inertia that it adds to the motor's shaft [kg m2]."""
+        return 0.0
+
+    def not_with_foreign_motor(self, config: Config) -> str:
+        """The reason and the remedy where its plan needs a motor of this package; empty where it does not."""
+        return ""
+
+    def beside(self, config: Config, drive: Drive) -> Drive:
+        """The drive with the parts of the system that the capability adds beside the line."""
+        return drive
+
+    def check_scheduler(self, config: Config, scheduler: str) -> None:
+        """Refuse the address of a scheduler whose workers have nothing to do, or that does not answer.
+
+        Raises
+        ------
+        InputError
+            see `chainunit.work.runner.check_scheduler`.
+        """
+
+    def check_runs(self, config: Config, rig: Rig) -> None:
+        """Refuse runs that the drive cannot make, before any is made.
+
+        Raises
+        ------
+        InputError
+            for the keys that ask for them.
+        """
+
+    def analyses(self) -> Iterable[type[Analysis]]:
+        """Its analyses of a study."""
+        return ()

@@ -1,0 +1,67 @@
+"""A table of a study file, as its declaration."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from ..reading.tables import given_values, schema
+
+
+@dataclass(frozen=True)
+class EntryTable:
+    """The declaration of the entries of a list of tables in a table: its quantities, and its other keys."""
+
+    title: str
+    fields: Mapping[str, FieldInfo]
+    declaration: type | None = None
+    conditions: Mapping[str, Any] = field(default_factory=dict)
+    """the conditions of the JSON Schema on the keys of an entry"""
+    follows: Mapping[str, str] = field(default_factory=dict)
+    """by key, the source of its value if an entry leaves the key out"""
+
+
+@dataclass(frozen=True)
+class FileSection:
+    """A table of a study file. The study has its values, or None if the table is `optional` and the file does
+    not have it; a value that the table does not name is that of `default`."""
+
+    declaration: type
+    default: Any = None
+    optional: bool = False
+    keys: Mapping[str, Any] = field(default_factory=dict)
+    """other keys than quantities, as pydantic fields with their descriptions"""
+    title: str = ""
+    """title of the table in a report"""
+    is_used: Callable[[Any], bool] = lambda config: True
+    """whether a study uses the table, by its configuration"""
+    apart: bool = False
+    """whether the result has other things of the same names"""
+    form: Callable[..., type[BaseModel]] = schema
+    values: Callable[[Any], dict[str, Any]] = given_values
+    """the values of a checked table, by the name of the quantity"""
+    entries: Mapping[str, EntryTable] = field(default_factory=dict)
+    """by key, the lists of tables in it"""
+    follows: Mapping[str, str] = field(default_factory=dict)
+    """by key, the source of its value if the file leaves the key out"""
+    order: tuple[tuple[str, str, str], ...] = ()
+    """triples (low, relation, high) of keys: the value of `high` has to have this relation to that of `low`"""
+    forms: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    """by key, also of entries, further conditions of the JSON Schema on its text or list"""
+    required: tuple[str, ...] = ()
+    """keys that the table must have"""
+    random_events: tuple[str, ...] = ()
+    """keys that hold an event whose quantities may be ranges"""
+    single_keys: tuple[str, ...] = ()
+    """lists and tables in it whose faults say nothing of its other keys"""
+    deciders: Mapping[str, str] = field(default_factory=dict)
+    """by a key of entries, the key of the table that decides whether it has a meaning"""
+
+
+def fields(keys: Mapping[str, Any]) -> dict[str, FieldInfo]:
+    """Fields with their types, from pairs of both."""
+    return {name: FieldInfo.from_annotated_attribute(of, each) for name, (of, each) in keys.items()}

@@ -1,0 +1,93 @@
+"""Each capability is one folder and a name in the list: without both the rest works, and its keys are unknown."""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import chainunit
+from chainunit.capabilities import NAMES
+from chainunit.study.registry import registered
+
+PACKAGE = Path(chainunit.__file__).parent
+STUDY = """
+[run]
+crank_speed = 6
+ramp = 0.2
+settle_turns = 1
+step = 0.004
+
+[[event]]
+type = "one_sided_feed"
+side = "left"
+"""
+SMOKE = """
+import json, sys
+from pathlib import Path
+from chainunit import Study
+from chainunit.core.errors import InputError
+from chainunit.fmu.export import export
+from chainunit.models import MODELS
+from chainunit.study.schema import json_schema
+
+folder, tables = Path(sys.argv[1]), sys.argv[2:]
+properties = json_schema()["properties"]
+refused = {}
+for table in tables:
+    try:
+        Study(**{table: {}})
+    except InputError as error:
+        refused[table] = str(error)
+result = Study.from_text((folder / "study.toml").read_text()).run(folder / "result")
+export(MODELS["ChamberForces"], folder / "ChamberForces.fmu")
+print(json.dumps({"properties": list(properties), "refused": refused}))
+"""
+
+
+def test_the_list_names_the_folders():
+    folders = {path.name for path in (PACKAGE / "capabilities").iterdir() if (path / "__init__.py").exists()}
+    assert folders == set(NAMES) and len(NAMES) == len(folders)
+    assert [part.name for part in registered()] == list(NAMES)
+
+
+def test_nothing_outside_a_folder_imports_from_it():
+    for file in PACKAGE.rglob("*.py"):
+        parts = file.relative_to(PACKAGE).parts
+        own = parts[1] if parts[0] == "capabilities" else ""
+        for node in ast.walk(ast.parse(file.read_text("utf-8"))):
+            if not isinstance(node, ast.ImportFrom) or not node.level:
+                continue
+            target = [*parts[: len(parts) - node.level], *(node.module or "").split(".")]
+            if target[0] == "capabilities" and len(target) > 1:
+                assert target[1] == own, f"{file}: line {node.lineno}"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_rest_works_without(name, tmp_path):
+    """A study, an export and the schema; a table of the capability is refused as an unknown key."""
+    copy = tmp_path / "src" / "chainunit"
+    shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.rmtree(copy / "capabilities" / name)
+    line, file = f'    "{name}",\n', copy / "capabilities" / "__init__.py"
+    text = file.read_text("utf-8")
+    assert text.count(line) == 1
+    file.write_text(text.replace(line, ""), "utf-8")
+    (tmp_path / "study.toml").write_text(STUDY)
+    tables = list(next(part for part in registered() if part.name == name).tables)
+    call = [sys.executable, "-c", SMOKE, str(tmp_path), *tables]
+    env = os.environ | {"PYTHONPATH": str(copy.parent)}
+    process = subprocess.run(call, env=env, capture_output=True, text=True, cwd=tmp_path)
+    assert process.returncode == 0, process.stderr
+    said = json.loads(process.stdout.splitlines()[-1])
+    assert not set(tables) & set(said["properties"])
+    assert list(said["refused"]) == tables
+    assert all(f"{table}: unknown key" in words for table, words in said["refused"].items())
+    result = json.loads((tmp_path / "result" / "result.json").read_text())
+    assert result["status"] == "complete" and "one_sided_feed_left" in result["answers"]
