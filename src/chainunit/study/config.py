@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from ..machines.api import machine_of, ratios
 from ..machines.chain_unit import SideName
 from ..machines.machine import Machine
 from ..mechanism.models import MachineModel
-from ..reading.tables import Slip, filled, given_values, read, read_table, slips, toml
+from ..reading.tables import Slip, filled, given_values, in_file, read, read_table, slips, toml
 from ..reading.text import DEFAULT_UNITS, Units, chosen_units
 from ..reading.toml_lines import lines_of
 from .checks import check_order
@@ -130,6 +131,11 @@ class Config:
     """the tables and keys as the file has them"""
     lines: Mapping[str, int] = dataclasses.field(default_factory=dict)
     """the line of each key in the file"""
+
+    def of_file(self) -> AbstractContextManager[None]:
+        """A context in which an InputError begins with the name of the study file and the line of its key; with
+        tables from Python the error stays as it is."""
+        return in_file(self.source, lambda: self.lines) if self.lines else nullcontext()
 
     @property
     def turn(self) -> float:

@@ -16,7 +16,7 @@ from ..core.errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
 from ..reading.text import number, shown_in
 from ..system import Simulation
-from ..work.progress import Progress, Report
+from ..work.progress import Progress, Report, quiet
 from . import verdict
 from .analyses import ANALYSES
 from .bearings import pin_loads
@@ -28,7 +28,7 @@ from .coupling_alternatives import alternatives
 from .event import Event
 from .event_torques import from_event_on
 from .measures import read_answers, read_measure
-from .monte_carlo import Task
+from .monte_carlo import RandomTask
 from .monte_carlo import run as run_monte_carlo
 from .observation import with_observer
 from .pulls import least_pulls
@@ -71,9 +71,7 @@ def run_study(
         save its state.
     """
     with shown_in(config.units):
-        return _run_study(
-            config, folder, report or (lambda what, done, todo: None), check, backend, scheduler
-        )
+        return _run_study(config, folder, report or quiet, check, backend, scheduler)
 
 
 def _run_study(
@@ -106,7 +104,7 @@ def _run_study(
     try:
         runner.run(check, lambda: drive.coasting(folder / "fmu", backend))
         if config.monte_carlo.runs:
-            task = Task(config, replace(drive, observer=None), files, runner.stop, runner.rig.fed_from)
+            task = RandomTask(config, replace(drive, observer=None), files, runner.stop, runner.rig.fed_from)
             study.monte_carlo = run_monte_carlo(task, folder, report, scheduler=scheduler)
         _analyse(study, runner.rig, report, needs_runs=True)
         study.setting = recommended_setting(study)

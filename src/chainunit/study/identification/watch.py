@@ -20,7 +20,7 @@ from ...fmu.backends import export
 from ...machines.load_observer import LoadObserver
 from ...reading.tables import instance
 from ...system.instance import Fmu, Instance
-from ...work.progress import Report
+from ...work.progress import Report, quiet
 from ..arrays import rms, stretches
 from ..config import Config
 from ..drive import Drive
@@ -173,7 +173,7 @@ def watch_plan_of(config: Config) -> WatchPlan:
     return config.watch
 
 
-def watch(config: Config, report: Report = lambda *_: None) -> WatchedRecording:
+def watch(config: Config, report: Report = quiet) -> WatchedRecording:
     """Run the load observer over the recording of the table [watch].
 
     Raises

@@ -12,7 +12,7 @@ import numpy as np
 from ...core.temporary_folders import scratch
 from ...fmu.backends import Backend
 from ...machines.machine import Machine
-from ...work.progress import Report
+from ...work.progress import Report, quiet
 from ..cycle import cycle
 from ..cycle_quantities import CycleQuantity
 from .checks import FmuValue, Neighbours, by_fmu, neighbours
@@ -104,11 +104,7 @@ def machine_at(wishes: Wishes, x: Any) -> Machine:
     return wishes.machine.replace(dict(zip(wishes.names, map(float, x), strict=True)))
 
 
-def _quiet(what: str, done: float, total: float) -> None:
-    pass
-
-
-def find_best(wishes: Wishes, report: Report = _quiet, backend: Backend | None = None) -> Best:
+def find_best(wishes: Wishes, report: Report = quiet, backend: Backend | None = None) -> Best:
     """Search for the best machine, and check it.
 
     Raises
