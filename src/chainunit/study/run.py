@@ -51,7 +51,7 @@ _PEAKS = ("crank_torque", "motor_torque", "rocker_torque")
 def run_study(
     config: Config,
     folder: Path,
-    report: Report | None = None,
+    report: Report = quiet,
     *,
     check: bool = False,
     backend: Backend | None = None,
@@ -71,56 +71,46 @@ def run_study(
         save its state.
     """
     with shown_in(config.units):
-        return _run_study(config, folder, report or quiet, check, backend, scheduler)
-
-
-def _run_study(
-    config: Config,
-    folder: Path,
-    report: Report,
-    check: bool,
-    backend: Backend | None,
-    scheduler: str | None,
-) -> StudyRecord:
-    """See `run_study`."""
-    choice = choose(config, folder / "fmu", report, backend)
-    config = as_chosen(config, choice.drive)
-    drive = with_observer(config, choice.drive)
-    if check and drive.outsiders:
-        titles = " and ".join(drive.outsiders)
-        raise InputError(f"--check: the equations of {titles} are not known; leave --check out")
-    study = StudyRecord(config, drive, statics(config, drive), choice.tuning, choice.sizing)
-    if config.monte_carlo.runs:
-        _check_random(config, Rig(config, drive, {}))
-    _analyse(study, Rig(config, drive, {}), report, needs_runs=False)
-    files, study.fmus = drive.export(folder / "fmu", backend, lambda what: report(what, 0.0, 1.0))
-    if backend is None and "python" in {origin.backend for origin in study.fmus.values()}:
-        study.note(
-            "no compiler",
-            "No C compiler was found: the FMUs run in Python. With one the runs take about a tenth of the time: "
-            "install gcc or clang, or the compiler that comes with pip install 'chainunit[cross]'.",
-        )
-    runner = Runner(study, Rig(config, drive, files), report)
-    try:
-        runner.run(check, lambda: drive.coasting(folder / "fmu", backend))
+        choice = choose(config, folder / "fmu", report, backend)
+        config = as_chosen(config, choice.drive)
+        drive = with_observer(config, choice.drive)
+        if check and drive.outsiders:
+            titles = " and ".join(drive.outsiders)
+            raise InputError(f"--check: the equations of {titles} are not known; leave --check out")
+        study = StudyRecord(config, drive, statics(config, drive), choice.tuning, choice.sizing)
         if config.monte_carlo.runs:
-            task = RandomTask(config, replace(drive, observer=None), files, runner.stop, runner.rig.fed_from)
-            study.monte_carlo = run_monte_carlo(task, folder, report, scheduler=scheduler)
-        _analyse(study, runner.rig, report, needs_runs=True)
-        study.setting = recommended_setting(study)
-        study.alternatives = alternatives(study, runner.rig, report)
-    except RunError as error:
-        if error.partial is not None:
-            study.runs["unfinished"] = error.partial
-        study.failure = error
-    except KeyboardInterrupt:
-        # Ctrl-C came between two runs, or in a run that is not a co-simulation
-        study.failure = InterruptedRunError("interrupted")
-    study.setting = study.setting or recommended_setting(study)
-    if drive.chain is not None and not isinstance(study.failure, InterruptedRunError):
-        _chains(study, files["machine"], report)
-    conclude(study)
-    return study
+            _check_random(config, Rig(config, drive, {}))
+        _analyse(study, Rig(config, drive, {}), report, needs_runs=False)
+        files, study.fmus = drive.export(folder / "fmu", backend, lambda what: report(what, 0.0, 1.0))
+        if backend is None and "python" in {origin.backend for origin in study.fmus.values()}:
+            study.note(
+                "no compiler",
+                "No C compiler was found: the FMUs run in Python. With one the runs take about a tenth of the time: "
+                "install gcc or clang, or the compiler that comes with pip install 'chainunit[cross]'.",
+            )
+        runner = Runner(study, Rig(config, drive, files), report)
+        try:
+            runner.run(check, lambda: drive.coasting(folder / "fmu", backend))
+            if config.monte_carlo.runs:
+                task = RandomTask(
+                    config, replace(drive, observer=None), files, runner.stop, runner.rig.fed_from
+                )
+                study.monte_carlo = run_monte_carlo(task, folder, report, scheduler=scheduler)
+            _analyse(study, runner.rig, report, needs_runs=True)
+            study.setting = recommended_setting(study)
+            study.alternatives = alternatives(study, runner.rig, report)
+        except RunError as error:
+            if error.partial is not None:
+                study.runs["unfinished"] = error.partial
+            study.failure = error
+        except KeyboardInterrupt:
+            # Ctrl-C came between two runs, or in a run that is not a co-simulation
+            study.failure = InterruptedRunError("interrupted")
+        study.setting = study.setting or recommended_setting(study)
+        if drive.chain is not None and not isinstance(study.failure, InterruptedRunError):
+            _chains(study, files["machine"], report)
+        conclude(study)
+        return study
 
 
 def _analyse(study: StudyRecord, rig: Rig, report: Report, *, needs_runs: bool) -> None:
