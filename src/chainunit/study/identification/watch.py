@@ -144,7 +144,7 @@ class WatchedRecording:
 
     @property
     def noises(self) -> tuple[float, float]:
-        """See `noises`."""
+        """The noise of the signal and of the measured speed, over the stated noise [1], see `noises`."""
         return noises(self.checks, self.problem.runs[0].recording)
 
     @property
