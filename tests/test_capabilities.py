@@ -25,7 +25,7 @@ settle_turns = 1
 step = 0.004
 
 [[event]]
-type = "one_sided_feed"
+type = "jam"
 side = "left"
 """
 SMOKE = """
@@ -79,6 +79,7 @@ def test_the_rest_works_without(name, tmp_path):
     text = file.read_text("utf-8")
     assert text.count(line) == 1
     file.write_text(text.replace(line, ""), "utf-8")
+    shutil.copytree(Path(__file__).parents[1] / "fmu", tmp_path / "fmu")
     (tmp_path / "study.toml").write_text(STUDY)
     tables = list(next(part for part in registered() if part.name == name).tables)
     call = [sys.executable, "-c", SMOKE, str(tmp_path), *tables]
@@ -90,4 +91,4 @@ def test_the_rest_works_without(name, tmp_path):
     assert list(said["refused"]) == tables
     assert all(f"{table}: unknown key" in words for table, words in said["refused"].items())
     result = json.loads((tmp_path / "result" / "result.json").read_text())
-    assert result["status"] == "complete" and "one_sided_feed_left" in result["answers"]
+    assert result["status"] == "complete" and "jam_left" in result["answers"]

@@ -21,6 +21,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
+from chainunit.study.random_remarks import remark_on_random_overloads
 from command import chainunit
 
 from chainunit.core.errors import RunError
@@ -37,7 +38,6 @@ from chainunit.study.drive import Drive
 from chainunit.study.event_block import EventBlock
 from chainunit.study.event_runs import EventSimulation
 from chainunit.study.quantiles import Estimate
-from chainunit.study.random_remarks import remark_on_random_overloads
 from chainunit.study.rig import Rig
 from chainunit.system import CoSimulation, monolithic
 from chainunit.work.job import CHECKS
@@ -70,7 +70,7 @@ SCRIPT = """
         config = parse(Path("study.toml").read_text())
         drive = Drive(DcMotor, config.motor, config.machine)
         files, _ = drive.export(Path("."))
-        task = monte_carlo.Task(config, drive, files, 1.0, cosimulated=True)
+        task = monte_carlo.RandomTask(config, drive, files, 1.0, cosimulated=True)
         result = monte_carlo.run(task, Path("."), lambda what, done, todo: print(done, todo, flush=True), workers=2)
         print("resumed", result.earlier_runs, result.damaged_batches, flush=True)
 """
@@ -143,7 +143,7 @@ def task_of(folder, runs=RUNS, text=STUDY, cosimulated=True):
     config = parse(text.format(runs=runs))
     drive = Drive(DcMotor, config.motor, config.machine)
     files = {name: folder / f"{part.model.name}.fmu" for name, part in drive.graph.components.items()}
-    return monte_carlo.Task(config, drive, files, 1.0, cosimulated=cosimulated)
+    return monte_carlo.RandomTask(config, drive, files, 1.0, cosimulated=cosimulated)
 
 
 def test_a_killed_study_goes_on_from_what_it_saved(killed):
@@ -246,7 +246,7 @@ def test_the_lump_comes_on_the_side_of_its_number(number):
         STUDY.format(runs=10)
         + "[feed]\nleft = { processing_force = 100 }\nright = { processing_force = 700 }\n"
     )
-    task = monte_carlo.Task(config, Drive(DcMotor, config.motor, config.machine), {}, 1.0)
+    task = monte_carlo.RandomTask(config, Drive(DcMotor, config.motor, config.machine), {}, 1.0)
     drawn, simulation = monte_carlo.draw(config, number), Still()
     assert drawn == monte_carlo.draw(parse(STUDY.format(runs=99)), number)
     (branch,) = branches(task, simulation, drawn)
@@ -429,7 +429,7 @@ def test_question_and_answer_tell_of_random_overloads(tmp_path):
 def test_runs_of_the_fmus_are_told_as_such(key, words, monkeypatch):
     """Those that the study asks for, and those that it makes as there is no C compiler."""
     config = parse(f'simulation = "{key}"\n' + STUDY.format(runs=4))
-    task = monte_carlo.Task(config, Drive(DcMotor, config.motor, config.machine), {}, 1.0)
+    task = monte_carlo.RandomTask(config, Drive(DcMotor, config.motor, config.machine), {}, 1.0)
     assert dataclasses.replace(task, cosimulated=True).method == key
     monkeypatch.setattr(monte_carlo, "compiler", lambda: None)
     # without quantiles there is no table, and the line stands alone
@@ -452,7 +452,7 @@ def compiled_task(text, folder=None, runs=6):
     config = parse(text.format(runs=runs).replace("step = 0.004", "step = 0.001"))
     drive = choose(config, Path("fmu"), lambda *said: None).drive
     files = drive.export(folder)[0] if folder else {}
-    return monte_carlo.Task(config, drive, files, 1.2)
+    return monte_carlo.RandomTask(config, drive, files, 1.2)
 
 
 @needs_compiler

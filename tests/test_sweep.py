@@ -704,6 +704,18 @@ def test_the_command(tmp_path):
     assert other.returncode == 2 and "map: has the result of a sweep, which would be lost" in other.stderr
 
 
+def test_a_result_is_saved_with_its_store(grid, tmp_path):
+    files = grid.save(tmp_path / "out")
+    store = tmp_path / "out" / grid.file.name
+    assert store in files and {"report.html", "result.json", "result.md"} <= {file.name for file in files}
+    contents = [
+        {file.relative_to(root): file.read_bytes() for file in root.rglob("*") if file.is_file()}
+        for root in (grid.file, store)
+    ]
+    assert contents[0] == contents[1] and len(contents[0]) > 2
+    assert (tmp_path / "out" / "result.json").read_text("utf-8") == grid.to_json()
+
+
 def test_the_command_refuses(tmp_path):
     (tmp_path / "x.toml").write_text(
         "[sweep]\npoints = 0\n[[sweep.parameter]]\nname = 'r'\nvalues = [1]\n", "utf-8"

@@ -9,23 +9,20 @@ import sys
 from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 import typer.core
 
 from ..core.errors import InputError, InterruptedRunError, RunError, printable
-from ..core.files import claim, clear, full, written
+from ..core.files import full, written
 from ..work import interrupts
 from .command_options import BackendOption
-from .console import finish, leave, progress_bar, study_file, terminal_console
+from .console import carry_out, exit_status, study_file, terminal_console
 from .export_command import ExportCommand, export, export_ssp
 from .identify_command import identify
 from .sweep_command import sweep
 from .watch_command import watch
-
-if TYPE_CHECKING:
-    from rich.console import Console
 
 
 class Example(StrEnum):
@@ -117,34 +114,10 @@ def study(
         text = parts.example(example.value)
         print(commented(text) if example is Example.full else f"#:schema {FILE}\n{text}", end="")
         return
-    loaded = study_file(config)
-    from ..report import results
-    from ..report import study as contents
-    from ..study.record import INSUFFICIENT, SPEED_MISSED
+    question = study_file(config)
+    from ..report.study_task import TASK
 
-    with claim(output, "study", *results.names(loaded)):
-        errors = terminal_console(stderr=True)
-        with progress_bar(errors) as progress:
-            record = results.compute(
-                loaded,
-                output,
-                progress,
-                check=check,
-                backend=backend.value if backend else None,
-                scheduler=scheduler,
-            )
-        report = contents.report(record)
-        unwritten = leave(report, results.writers(record, report, output), remarks=not errors.is_terminal)
-    if record.failure is not None:
-        _stopped_early(record.failure, output, errors)
-    if unwritten is not None:
-        raise unwritten
-    if record.insufficient:
-        errors.print(INSUFFICIENT)
-    elif not record.reaches:
-        errors.print(SPEED_MISSED)
-    if record.insufficient or not record.reaches:
-        raise typer.Exit(1)
+    carry_out(TASK, question, output, check=check, backend=backend and backend.value, scheduler=scheduler)
 
 
 @app.command()
@@ -159,15 +132,10 @@ def compare(
 
     Writes report.html, comparison.json and comparison.md into the output folder.
     """
-    from ..report import comparison, files
-    from ..study.comparison import compare as compared
+    from ..report.comparison import TASK
     from ..study.comparison import read_result
 
-    results = read_result(first), read_result(second)
-    with claim(output, "compare"):
-        contents = comparison.comparison_report(compared(*results))
-        clear(output, *files.names(comparison.NAME, ()))
-        finish(contents, output, comparison.NAME)
+    carry_out(TASK, (read_result(first), read_result(second)), output)
 
 
 @app.command()
@@ -180,24 +148,10 @@ def optimize(
 
     Writes best.toml, report.html, result.json, result.md and pictures into the output folder.
     """
-    from ..report import optimum
+    question = study_file(config)
+    from ..report.optimum import TASK
 
-    loaded = study_file(config)
-    with claim(output, "optimize", *optimum.FILES):
-        with progress_bar(terminal_console(stderr=True)) as progress:
-            best = optimum.compute(loaded, output, progress, backend.value if backend else None)
-        contents = optimum.optimum_report(best, loaded)
-        unwritten = leave(contents, optimum.writers(best, loaded, contents, output))
-    if unwritten is not None:
-        raise unwritten
-    if not best.met:
-        raise typer.Exit(1)
-
-
-def _stopped_early(failure: RunError, output: Path, errors: Console) -> None:
-    sentence = f"The run stopped early: {failure}. What was computed before is in {output}."
-    errors.print(printable(sentence, 2000), soft_wrap=True)
-    sys.exit(_status(failure))
+    carry_out(TASK, question, output, backend=backend and backend.value)
 
 
 app.command()(sweep)
@@ -245,15 +199,9 @@ def reproduce(
 
     Writes report.html, reproduction.json, reproduction.md and the figures into the output folder.
     """
-    with claim(output, "reproduce"):
-        from ..papers import reproduce as compute
-        from ..papers.output import report
-        from ..report import files
+    from ..papers.output import TASK
 
-        with terminal_console(stderr=True).status("computing"):
-            contents = report(compute())
-        clear(output, *files.names("reproduction", tuple(figure.file for figure in contents.figures)))
-        finish(contents, output, "reproduction")
+    carry_out(TASK, None, output)
 
 
 @app.command("two-bar-error")
@@ -264,17 +212,9 @@ def two_bar_error(
 
     Writes report.html, two_bar_error.json, two_bar_error.md and two_bar_error.png into the output folder.
     """
-    from ..papers import two_bar
-    from ..report import files
+    from ..papers.two_bar import TASK
 
-    names = files.names(two_bar.NAME, (two_bar.PICTURE,))
-    with claim(output, "two-bar-error", *names):
-        clear(output, *names)
-        with progress_bar(terminal_console(stderr=True)) as progress:
-            progress("bars and catenaries", 0.0, 1.0)
-            comparison = two_bar.two_bar_error(lambda done: progress("bars and catenaries", done, 1.0))
-        contents = two_bar.report(comparison)
-        finish(contents, output, two_bar.NAME)
+    carry_out(TASK, None, output)
 
 
 @app.command("linkage")
@@ -293,25 +233,13 @@ def linkage_command(
     from ..machines.linkages.file import read_linkage
     from ..machines.machine import Machine
     from ..reading.tables import option_value
-    from ..report import files, linkage_report
-    from ..study.linkage_turn import linkage_findings
+    from ..report.linkage_report import TASK, LinkageQuestion
 
     machine = Machine(read_linkage(file))
     turns = machine.model.turns
     usual, unit = ("60 rpm", "rad/s") if turns else ("0.1 m/s", "m/s")
     rate = option_value("--speed", speed or usual, unit, "speed of the driver")
-    names = files.names(linkage_report.NAME, linkage_report.PICTURES)
-    with claim(output, "linkage", *names):
-        clear(output, *names)
-        contents = linkage_report.linkage_report(linkage_findings(machine, rate), str(file))
-        finish(contents, output, linkage_report.NAME)
-
-
-def _status(error: BaseException) -> int:
-    """Exit status of a run that failed with `error`."""
-    if isinstance(error, InterruptedRunError):
-        return interrupts.status()
-    return 2 if isinstance(error, InputError) else 1
+    carry_out(TASK, LinkageQuestion(machine, rate, str(file)), output)
 
 
 def main() -> None:
@@ -362,7 +290,7 @@ def _outcome() -> tuple[int, str]:
     except SystemExit as end:
         return int(end.code or 0), ""
     except (InputError, RunError) as error:
-        return _status(error), str(error)
+        return exit_status(error), str(error)
     except (typer.Abort, KeyboardInterrupt):
         return interrupts.status(), _INTERRUPTED
     except BrokenPipeError:

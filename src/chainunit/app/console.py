@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from ..core.errors import RemarkWarning, WriteError, printable
-from ..core.files import write_all
+from ..core.errors import InputError, InterruptedRunError, RemarkWarning, printable
+from ..work import interrupts
 
 if TYPE_CHECKING:
-    from ..report.blocks import Report
+    from ..report.task import Outcome, Question, Task
 
 
 def terminal_console(**options: Any) -> Console:
@@ -25,28 +26,55 @@ def terminal_console(**options: Any) -> Console:
     return Console(markup=False, highlight=False, **options)
 
 
-def leave(
-    report: Report, writers: Iterable[Callable[[], list[Path]]], *, remarks: bool = True
-) -> WriteError | None:
-    """Write all files of a report and show the report. Returns the error of the first file that the disk had
-    no room for; the other files are written all the same. Without `remarks` the report is shown without its
-    remarks, which the terminal then has already.
+def carry_out(
+    task: Task[Question, Outcome],
+    question: Question,
+    output: Path,
+    errors: Console | None = None,
+    **options: Any,
+) -> None:
+    """Run a task in the folder `output`, show its report, and name the files. `errors` is the console of the standard
+    error, for the progress; the options are those of the task.
+
+    Raises
+    ------
+    InputError, RunError
+        see the task.
+    WriteError
+        of the first file that could not be written; the other files are written.
+    typer.Exit, SystemExit
+        with the exit status, where the outcome is not what was sought, and where the computation ended early.
     """
-    from ..report import terminal
+    errors = errors or terminal_console(stderr=True)
+    with task.claimed(question, output):
+        with progress_bar(errors) as progress:
+            outcome = task.outcome(question, output, progress, **options)
+        report = task.report(outcome)
+        written, unwritten = task.write(outcome, report, output)
+        from ..report import terminal
 
-    written, unwritten = write_all(writers)
-    console = terminal_console()
-    terminal.show(report, console, remarks=remarks or not console.is_terminal)
-    console.print("Written: " + ", ".join(printable(str(path), 500) for path in written), soft_wrap=True)
-    return unwritten
-
-
-def finish(report: Report, output: Path, name: str) -> None:
-    """Write and show a report whose run is complete."""
-    from ..report import files
-
-    if (unwritten := leave(report, files.writers(report, output, name))) is not None:
+        console = terminal_console()
+        has_remarks = task.tells_remarks and errors.is_terminal and console.is_terminal
+        terminal.show(report, console, remarks=not has_remarks)
+        words = ", ".join(printable(str(path), 500) for path in written)
+        console.print(f"Written: {words}", soft_wrap=True)
+    if (failure := task.failure(outcome)) is not None:
+        sentence = f"The run stopped early: {failure}. What was computed before is in {output}."
+        errors.print(printable(sentence, 2000), soft_wrap=True)
+        sys.exit(exit_status(failure))
+    if unwritten is not None:
         raise unwritten
+    if (shortfall := task.shortfall(outcome)) is not None:
+        if shortfall:
+            errors.print(shortfall)
+        raise typer.Exit(1)
+
+
+def exit_status(error: BaseException) -> int:
+    """Exit status of a command that failed with `error`."""
+    if isinstance(error, InterruptedRunError):
+        return interrupts.status()
+    return 2 if isinstance(error, InputError) else 1
 
 
 @contextmanager

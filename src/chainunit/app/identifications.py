@@ -2,38 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..report import identification as contents
-from ..report import watch as watching
-from ..report.blocks import Report
+from ..report import identification, watch
 from ..study.config import Config
-from ..study.identification.identification import IdentifiedMachine, identify
+from ..study.identification.identification import IdentifiedMachine
 from ..study.identification.watch import Alarm, WatchedRecording
-from ..study.identification.watch import watch as watched_by
-from ..work.progress import Report as Progress
-from .results import WrittenResult
+from .results import ReportedResult
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
-class IdentificationResult(WrittenResult):
+class IdentificationResult(ReportedResult[Config, IdentifiedMachine]):
     """An identified machine. Its `repr` shows the numbers and the limits of the recordings; `found` is all that the
     fit found."""
 
-    _command = "identify"
-    _names = (contents.FILE,)
+    _task = identification.TASK
 
-    def __init__(self, found: IdentifiedMachine) -> None:
-        self.found = found
-
-    @cached_property
-    def _report(self) -> Report:
-        return contents.identification_report(self.found)
+    @property
+    def found(self) -> IdentifiedMachine:
+        """All results of the fit, as the report reads them."""
+        return self._outcome
 
     @property
     def is_described(self) -> bool:
@@ -59,47 +49,18 @@ class IdentificationResult(WrittenResult):
         }
         return pd.DataFrame.from_dict(rows, orient="index")
 
-    def _clear(self, folder: Path) -> None:
-        contents.prepare(folder)
 
-    def _writers(self, folder: Path) -> list[Callable[[], list[Path]]]:
-        return contents.writers(self.found, self._report, folder)
-
-
-def make_identification(
-    config: Config, folder: str | Path | None, progress: Progress | None = None
-) -> IdentificationResult:
-    """Identify the machine of a study, see `chainunit.Study.identify`."""
-    report = progress or (lambda *_: None)
-    return IdentificationResult._made(lambda: IdentificationResult(identify(config, report)), folder)
-
-
-class WatchResult(WrittenResult):
+class WatchResult(ReportedResult[Config, WatchedRecording]):
     """A watched recording. Its `repr` shows the alarms; `watched` has the outputs of the observer at all rows."""
 
-    _command = "watch"
-    _names = watching.PICTURES
+    _task = watch.TASK
 
-    def __init__(self, watched: WatchedRecording) -> None:
-        self.watched = watched
-
-    @cached_property
-    def _report(self) -> Report:
-        return watching.watch_report(self.watched)
+    @property
+    def watched(self) -> WatchedRecording:
+        """The alarms and the outputs of the observer at all rows."""
+        return self._outcome
 
     @property
     def alarms(self) -> tuple[Alarm, ...]:
         """The alarms in order: side, begin, end and ground of each."""
         return self.watched.alarms
-
-    def _clear(self, folder: Path) -> None:
-        watching.prepare(folder)
-
-    def _writers(self, folder: Path) -> list[Callable[[], list[Path]]]:
-        return watching.writers(self._report, folder)
-
-
-def make_watch(config: Config, folder: str | Path | None, progress: Progress | None = None) -> WatchResult:
-    """Watch the recording of a study, see `chainunit.Study.watch`."""
-    report = progress or (lambda *_: None)
-    return WatchResult._made(lambda: WatchResult(watched_by(config, report)), folder)

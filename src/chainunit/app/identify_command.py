@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..core.files import claim
-from .console import leave, progress_bar, study_file, terminal_console
+from .console import carry_out, study_file, terminal_console
 
 
 def identify(
@@ -21,19 +20,11 @@ def identify(
     result.md and pictures into the output folder. The exit status is 1 where the model does not describe the
     recordings.
     """
-    loaded = study_file(config)
-    from ..report import identification as contents
-    from ..study.identification.identification import identify as identified
+    question = study_file(config)
+    from ..report.identification import TASK
     from ..study.identification.result import outlook
 
-    console = terminal_console(stderr=True)
-    with claim(output, "identify", contents.FILE):
-        with progress_bar(console) as progress:
-            found = identified(loaded, progress, lambda *told: console.print(outlook(*told), soft_wrap=True))
-        contents.prepare(output)
-        report = contents.identification_report(found)
-        unwritten = leave(report, contents.writers(found, report, output))
-    if unwritten is not None:
-        raise unwritten
-    if not found.is_described:
-        raise typer.Exit(1)
+    errors = terminal_console(stderr=True)
+    carry_out(
+        TASK, question, output, errors, told=lambda *before: errors.print(outlook(*before), soft_wrap=True)
+    )

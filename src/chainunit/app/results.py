@@ -1,44 +1,73 @@
-"""The common part of results from Python: their report as text, page and files."""
+"""The common part of results from Python: a task is run, and its report is shown as text, page and files."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cached_property
+import shutil
+from functools import cached_property, partial
 from pathlib import Path
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Generic, Self
 
 from ..core.errors import WriteError
-from ..core.files import claim, write_all
+from ..core.files import whole
+from ..core.temporary_folders import in_temporary_folder
 from ..report import files, html, terminal
 from ..report.blocks import Report
+from ..report.task import Outcome, Question, Task
+from ..work.progress import Report as Progress
+from ..work.progress import quiet
 
 
-class ReportedResult:
-    """A result with a report. Its `repr` shows the report as text."""
+class ReportedResult(Generic[Question, Outcome]):
+    """The result of a task. Its `repr` shows the report as text."""
+
+    _task: ClassVar[Task[Any, Any]]
+
+    def __init__(self, question: Question, outcome: Outcome, folder: Path | None) -> None:
+        self._question, self._outcome, self._folder = question, outcome, folder
+
+    @classmethod
+    def made(
+        cls, question: Question, folder: str | Path | None, progress: Progress | None, **options: Any
+    ) -> Self:
+        """The result of the task, with its files in a `folder` where one is named.
+
+        Raises
+        ------
+        InputError
+            for a question that is refused, and for a folder that cannot be claimed.
+        RunError
+            of a computation that ended early; its `partial` is the result up to there.
+        WriteError
+            for a file that cannot be written; the others are written.
+        """
+        task = cls._task
+        compute = partial(task.outcome, question, progress=progress or quiet, **options)
+        if folder is not None:
+            with task.claimed(question, Path(folder)) as place:
+                result = cls(question, compute(folder=place), place)
+                result._write(place)
+        elif task.kept is None:
+            result = cls(question, compute(folder=None), None)
+        else:
+            result = in_temporary_folder(lambda place: cls(question, compute(folder=place), place))
+        failure = task.failure(result._outcome)
+        if failure is not None:
+            failure.partial = result
+            raise failure
+        return result
 
     @cached_property
     def _report(self) -> Report:
-        raise NotImplementedError
+        return self._task.report(self._outcome)
+
+    @property
+    def _shown(self) -> Report:
+        """The report that `repr` shows."""
+        return self._report
 
     def to_json(self) -> str:
         """All numbers with their units, as the text of result.json."""
-        return files.numbers_text(self._report)
-
-    def __repr__(self) -> str:
-        return terminal.plain(self._report)
-
-    def _repr_html_(self) -> str:
-        """The same as HTML, for notebooks."""
-        return html.fragment(self._report)
-
-
-class WrittenResult(ReportedResult):
-    """A result whose files can be written into any folder."""
-
-    _command: ClassVar[str]
-    """the command that writes the same files"""
-    _names: ClassVar[tuple[str, ...]] = ()
-    """of further files that it writes, see `claim`"""
+        return files.numbers_text(self._shown)
 
     def save(self, folder: str | Path) -> list[Path]:
         """Write the files of the command of the same name with ``-o``; returns the files.
@@ -50,30 +79,35 @@ class WrittenResult(ReportedResult):
         WriteError
             for a file that cannot be written; the others are written.
         """
-        with claim(Path(folder), self._command, *self._names) as place:
-            self._clear(place)
+        task = self._task
+        with task.claimed(self._question, Path(folder)) as place:
+            if task.kept is None or self._folder is None:
+                task.clear(place)
+            elif place.resolve() != self._folder.resolve():
+                task.clear(place)
+                for kept in task.kept(self._outcome, self._folder):
+                    _copy(kept, place / kept.relative_to(self._folder))
             return self._write(place)
 
-    @classmethod
-    def _made(cls, make: Callable[[], Self], folder: str | Path | None) -> Self:
-        """The result of `make`, with its files in a `folder`, which is claimed before the work."""
-        if folder is None:
-            return make()
-        with claim(Path(folder), cls._command, *cls._names) as place:
-            result = make()
-            result._clear(place)
-            result._write(place)
-        return result
-
     def _write(self, folder: Path) -> list[Path]:
-        paths, failure = write_all(self._writers(folder))
+        paths, failure = self._task.write(self._outcome, self._report, folder)
         if failure is not None:
             raise WriteError(str(failure)) from failure
         return paths
 
-    def _clear(self, folder: Path) -> None:
-        """Remove the files of an earlier result."""
-        raise NotImplementedError
+    def __repr__(self) -> str:
+        return terminal.plain(self._shown)
 
-    def _writers(self, folder: Path) -> list[Callable[[], list[Path]]]:
-        raise NotImplementedError
+    def _repr_html_(self) -> str:
+        """The same as HTML, for notebooks."""
+        return html.fragment(self._shown)
+
+
+def _copy(kept: Path, to: Path) -> None:
+    """Copy a file, or a folder with all that is in it."""
+    if kept.is_dir():
+        shutil.copytree(kept, to, dirs_exist_ok=True)
+        return
+    to.parent.mkdir(exist_ok=True)
+    with whole(to) as part:
+        shutil.copyfile(kept, part)

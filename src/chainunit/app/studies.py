@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-import shutil
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import cached_property
 from html import escape
 from pathlib import Path
@@ -14,16 +13,14 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from ..core.errors import InputError, RemarkWarning, RunError, WriteError, near_name, shown
-from ..core.files import claim, clear, whole, write_all
+from ..core.errors import InputError, RemarkWarning, RunError, near_name, shown
 from ..core.quantities import Layout
-from ..core.temporary_folders import in_temporary_folder
 from ..fmu.backends import Backend
 from ..machines.machine import Machine
 from ..reading.tables import in_file
 from ..reading.text import number, shown_in
 from ..reading.toml_lines import lines_of
-from ..report import files, html, optimum, results, series, terminal
+from ..report import optimum, series, study_task
 from ..report import study as contents
 from ..report.blocks import Report
 from ..report.drawing import drawing
@@ -39,9 +36,9 @@ from ..study.record import INSUFFICIENT, StudyRecord
 from ..study.result import as_dict
 from ..study.window import Phase
 from ..work.progress import Report as Progress
-from .identifications import IdentificationResult, WatchResult, make_identification, make_watch
-from .results import WrittenResult
-from .sweeps import SweepResult, make_sweep
+from .identifications import IdentificationResult, WatchResult
+from .results import ReportedResult
+from .sweeps import SweepResult
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -196,22 +193,8 @@ class Study:
         WriteError
             for a file that cannot be written; the others are written.
         """
-
-        def result_in(place: Path) -> StudyResult:
-            options: dict[str, Any] = {"check": check, "backend": backend, "scheduler": scheduler}
-            return StudyResult(results.compute(self.config, place, progress, **options), place)
-
-        if folder is None:
-            result = in_temporary_folder(result_in)
-        else:
-            with claim(Path(folder), "study", *results.names(self.config)) as place:
-                result = result_in(place)
-                result._write(place)
-        failure = result.record.failure
-        if failure is not None:
-            failure.partial = result
-            raise failure
-        return result
+        options = {"check": check, "backend": backend, "scheduler": scheduler}
+        return StudyResult.made(self.config, folder, progress, **options)
 
     def optimize(
         self,
@@ -233,12 +216,7 @@ class Study:
         WriteError
             for a file that cannot be written; the others are written.
         """
-        if folder is None:
-            return BestResult(self.config, optimum.search(self.config, progress, backend))
-        with claim(Path(folder), "optimize", *optimum.FILES) as place:
-            result = BestResult(self.config, optimum.compute(self.config, place, progress, backend))
-            result._write(place)
-        return result
+        return BestResult.made(self.config, folder, progress, backend=backend)
 
     def identify(
         self, folder: str | Path | None = None, progress: Progress | None = None
@@ -259,14 +237,14 @@ class Study:
         WriteError
             for a file that cannot be written; the others are written.
         """
-        return make_identification(self.config, folder, progress)
+        return IdentificationResult.made(self.config, folder, progress)
 
     def watch(self, folder: str | Path | None = None, progress: Progress | None = None) -> WatchResult:
         """Run the load observer over the recording of the table [watch].
 
         Parameters and errors are those of `identify`, without RunError.
         """
-        return make_watch(self.config, folder, progress)
+        return WatchResult.made(self.config, folder, progress)
 
     def sweep(
         self,
@@ -294,7 +272,7 @@ class Study:
         WriteError
             for a file that cannot be written.
         """
-        return make_sweep(self.config, None if folder is None else Path(folder), workers, scheduler, progress)
+        return SweepResult.made(self.config, folder, progress, workers=workers, scheduler=scheduler)
 
     def __repr__(self) -> str:
         config = self.config
@@ -316,20 +294,27 @@ class Study:
         return f'{words}<div style="background: white; max-width: 60em">{drawing(self.machine)}</div>'
 
 
-class StudyResult:
+class StudyResult(ReportedResult[Config, StudyRecord]):
     """The result of a study. Its `repr` shows the title, the verdicts and the main answers of every run."""
 
-    def __init__(self, record: StudyRecord, folder: Path) -> None:
-        self.record = record
+    _task = study_task.TASK
+
+    @property
+    def record(self) -> StudyRecord:
         """All computed values, as the report reads them."""
-        self._folder = folder
+        return self._outcome
 
     @cached_property
     def _numbers(self) -> dict[str, Any]:
         return as_dict(self.record)
 
+    @property
+    def _report(self) -> Report:
+        # the numbers are computed once; the report with its figures is large, and not kept
+        return contents.report(self.record, self._numbers)
+
     @cached_property
-    def _summary(self) -> Report:
+    def _shown(self) -> Report:
         return contents.summary(self.record, self._numbers)
 
     @cached_property
@@ -382,58 +367,21 @@ class StudyResult:
         """The assumptions behind the numbers, a text each."""
         return [note["text"] for note in self._numbers["notes"]]
 
-    def to_json(self) -> str:
-        """All numbers with their units, as the text of result.json."""
-        return files.numbers_text(self._summary)
 
-    def save(self, folder: str | Path) -> list[Path]:
-        """Write the files of ``chainunit study -o``: page, numbers, series, plots, and the FMUs; returns the files.
-
-        Raises
-        ------
-        InputError, WriteError
-            as `Study.run`.
-        """
-        with claim(Path(folder), "study", *results.names(self.record.config)) as place:
-            if place.resolve() != self._folder.resolve():
-                clear(place, *results.file_names())
-                (place / "fmu").mkdir(exist_ok=True)
-                for fmu in (self._folder / "fmu").iterdir():
-                    with whole(place / "fmu" / fmu.name) as part:
-                        shutil.copyfile(fmu, part)
-                for store in filter(None, (each.store for each in self.record.findings.values())):
-                    shutil.copytree(store, place / store.name, dirs_exist_ok=True)
-            return self._write(place)
-
-    def _write(self, folder: Path) -> list[Path]:
-        report = contents.report(self.record, self._numbers)
-        paths, failure = write_all(results.writers(self.record, report, folder))
-        if failure is not None:
-            raise WriteError(str(failure)) from failure
-        return paths
-
-    def __repr__(self) -> str:
-        return terminal.plain(self._summary)
-
-    def _repr_html_(self) -> str:
-        """The summary as HTML, for notebooks."""
-        return html.fragment(self._summary)
-
-
-class BestResult(WrittenResult):
+class BestResult(ReportedResult[Config, optimum.OptimizedStudy]):
     """The result of a search for the best machine. Its `repr` shows the answer, the parameters and what binds."""
 
-    _command = "optimize"
-    _names = optimum.FILES
+    _task = optimum.TASK
 
-    def __init__(self, config: Config, best: Best) -> None:
-        self.config = config
-        self.best = best
-        """all that the search found"""
+    @property
+    def config(self) -> Config:
+        """The configuration of the study."""
+        return self._outcome.config
 
-    @cached_property
-    def _report(self) -> Report:
-        return optimum.optimum_report(self.best, self.config)
+    @property
+    def best(self) -> Best:
+        """All that the search found."""
+        return self._outcome.best
 
     @property
     def met(self) -> bool:
@@ -454,20 +402,11 @@ class BestResult(WrittenResult):
         RunError
             where no machine meets all limits.
         """
-        source = Path(self.config.source).parent / optimum.FILE
-        config = study_files.of_tables(self._tables(source.parent), str(source))
-        return Study.__new__(Study)._take(config, str(source))
-
-    def _tables(self, folder: Path) -> dict[str, Any]:
         if self.best.machine is None:
             raise RunError("no machine meets all limits: " + " ".join(conflict_sentences(self.best)))
-        return best_tables(self.best, self.config, folder)
-
-    def _clear(self, folder: Path) -> None:
-        clear(folder, *optimum.FILES)
-
-    def _writers(self, folder: Path) -> list[Callable[[], list[Path]]]:
-        return optimum.writers(self.best, self.config, self._report, folder)
+        source = Path(self.config.source).parent / optimum.FILE
+        config = study_files.of_tables(best_tables(self.best, self.config, source.parent), str(source))
+        return Study.__new__(Study)._take(config, str(source))
 
 
 def _plain(value: Any) -> Any:

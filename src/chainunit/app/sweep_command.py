@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..core.files import claim
-from .console import leave, progress_bar, study_file, terminal_console
+from .console import carry_out, study_file
 
 
 def sweep(
@@ -33,15 +32,7 @@ def sweep(
     Writes report.html, result.json, result.md, plots and the store of all points into the output folder. A sweep that
     was killed goes on from its store.
     """
-    loaded = study_file(config)
-    from ..report import sweep as contents
+    question = study_file(config)
+    from ..report.sweep import TASK
 
-    with claim(output, "sweep"):
-        with progress_bar(terminal_console(stderr=True)) as progress:
-            summary = contents.compute(loaded, output, progress, workers, scheduler)
-        report = contents.report(summary)
-        unwritten = leave(report, contents.writers(summary, report, output))
-    if unwritten is not None:
-        raise unwritten
-    if not summary.feasible:
-        raise typer.Exit(1)
+    carry_out(TASK, question, output, workers=workers, scheduler=scheduler)

@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..core.files import claim
-from .console import leave, progress_bar, study_file, terminal_console
+from .console import carry_out, study_file
 
 
 def watch(
@@ -19,15 +18,7 @@ def watch(
 
     Writes report.html, result.json, result.md and pictures into the output folder.
     """
-    loaded = study_file(config)
-    from ..report import watch as contents
-    from ..study.identification.watch import watch as watched
+    question = study_file(config)
+    from ..report.watch import TASK
 
-    with claim(output, "watch", *contents.PICTURES):
-        with progress_bar(terminal_console(stderr=True)) as progress:
-            found = watched(loaded, progress)
-        contents.prepare(output)
-        report = contents.watch_report(found)
-        unwritten = leave(report, contents.writers(report, output))
-    if unwritten is not None:
-        raise unwritten
+    carry_out(TASK, question, output)

@@ -110,12 +110,12 @@ class CompositeModel(Model):
 
     @classmethod
     def start_guess(cls, xp: Any, p: Any, u: Any) -> list[Any]:
-        """See `Model.start_guess`."""
+        """First guess of the unknowns of the start, of all components in order."""
         return cls._begin(xp, p, u, lambda model, own, entries: model.start_guess(xp, own, entries))[0]
 
     @classmethod
     def start_improved(cls, xp: Any, p: Any, u: Any, z: list[Any]) -> list[Any]:
-        """See `Model.start_improved`."""
+        """The unknowns of the start after one more round, of all components in order."""
         before = iter(z)
 
         def improved(model: type[Model], own: Any, entries: Any) -> list[Any]:
@@ -126,7 +126,7 @@ class CompositeModel(Model):
 
     @classmethod
     def start_states(cls, xp: Any, p: Any, u: Any, z: list[Any]) -> Any:
-        """See `Model.start_states`."""
+        """States at the start with the inputs `u`, from the unknowns `z` of all components."""
         before = iter(z)
 
         def given(model: type[Model], own: Any, entries: Any) -> list[Any]:

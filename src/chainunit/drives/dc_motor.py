@@ -190,7 +190,7 @@ class DcMotor(Motor):
 
     @classmethod
     def tune(cls, p: Any, inertia: float, fixed: Container[str] = ()) -> tuple[Any, Tuning | None]:
-        """See `chainunit.drives.speed_control.tune`."""
+        """The parameters with tuned gains at a total `inertia` at the shaft [kg m2]; gains in `fixed` stay."""
         from .speed_control import tune
 
         tuning = tune(p.armature, inertia)
@@ -199,7 +199,7 @@ class DcMotor(Motor):
 
     @staticmethod
     def speed_loop(p: Any, inertia: float) -> Loop | None:
-        """See `chainunit.drives.speed_control.loop`."""
+        """The loop of the speed control at a total `inertia` at the shaft [kg m2]."""
         from .speed_control import loop
 
         return loop(p, inertia)

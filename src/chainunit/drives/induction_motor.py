@@ -28,6 +28,7 @@ from ..core.model import Part, Requirement
 from ..core.planar import Vec2
 from ..core.ports import LoadInput, measured_terminal
 from ..core.quantities import Value, declaration, group, quantity
+from ..core.search import lowest
 from .motor import (
     T_RATED,
     Motor,
@@ -313,7 +314,6 @@ def steady(xp: Any, p: Any, w: Any, voltage_share: Any = 1.0, f: Any = None, T: 
 
 
 _SLIPS = tuple(10.0 ** (k / 10.0) for k in range(-30, 1))
-_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
 
 def breakdown(p: Any, voltage_share: float = 1.0, f: float | None = None, T: float = T_RATED) -> Steady:
@@ -332,18 +332,8 @@ def breakdown(p: Any, voltage_share: float = 1.0, f: float | None = None, T: flo
     while k + 1 < len(_SLIPS) and (next_tau := at(_SLIPS[k + 1]).tau) >= tau:
         k, tau = k + 1, next_tau
     low, high = _SLIPS[max(k - 1, 0)], _SLIPS[min(k + 1, len(_SLIPS) - 1)]
-    left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-    at_left, at_right = at(left), at(right)
-    while high - low > 1e-5 * high:
-        if at_left.tau < at_right.tau:
-            low, left, at_left = left, right, at_right
-            right = low + _GOLDEN * (high - low)
-            at_right = at(right)
-        else:
-            high, right, at_right = right, left, at_left
-            left = high - _GOLDEN * (high - low)
-            at_left = at(left)
-    return max(at_left, at_right, at(high), key=lambda s: s.tau)
+    slip, _ = lowest(lambda slip: -float(at(slip).tau), low, high)
+    return max(at(slip), at(high), key=lambda s: s.tau)
 
 
 class InductionMotorPoint(MotorPoint):

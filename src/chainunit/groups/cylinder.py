@@ -54,13 +54,13 @@ class Cylinder(Driver):
 
     @property
     def joints(self) -> tuple[Joint, ...]:
-        """See `Group`."""
+        """Pin and link of the reactions, in their order."""
         barrel, rod, lever = (bar.name for bar in self.bars)
         return (self.bar.pin, barrel), (self.guide, rod), (self.end, rod), (self.lever.pin, lever)
 
     @property
     def guides(self) -> Mapping[Joint, str | None]:
-        """See `Group`."""
+        """The sliding joints, with the link on which the opposite reaction acts; None for the ground."""
         return {(self.guide, self.rod.name): self.bar.name}
 
     @property
@@ -125,7 +125,7 @@ class SolvedCylinder(SolvedDriver):
     def third(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """See `SolvedGroup`."""
+        """Third derivatives by q of the links and the pins, from those of the outer pins and the rails."""
         barrel, _, lever = self.links
         e, r, d = self._e, self._r, barrel.u
         t1, t2, turn1, turn2 = barrel.t1, barrel.t2, lever.t1, lever.t2

@@ -122,7 +122,7 @@ class SolvedDriver(SolvedGroup):
     def third(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """See `SolvedGroup`."""
+        """Third derivatives by q of the links and the pins, from those of the outer pins and the rails."""
         (link,) = self.links
         return [(ZERO, 0.0)], [link.third(end.p - link.pin.p, ZERO, 0.0) for end in self.pins]
 
@@ -142,7 +142,7 @@ class TurnedCrank(SolvedDriver):
     __slots__ = ()
 
     def effort(self, loads: Sequence[Load]) -> Any:
-        """See `SolvedDriver`."""
+        """The torque [N m], or of a ram the force [N], that holds against the loads of the links."""
         return loads[0][1] * -self.links[0].t1
 
     def reactions(self, loads: Sequence[Load]) -> tuple[Vec2, ...]:
@@ -156,7 +156,7 @@ class PushedRam(SolvedDriver):
     __slots__ = ()
 
     def effort(self, loads: Sequence[Load]) -> Any:
-        """See `SolvedDriver`."""
+        """The torque [N m], or of a ram the force [N], that holds against the loads of the links."""
         return -loads[0][0].dot(self.links[0].u)
 
     def reactions(self, loads: Sequence[Load]) -> tuple[Vec2, ...]:

@@ -102,7 +102,7 @@ class Weight(NamedTuple):
     by_reactions: bool = False
 
     def effect(self, xp: Any, m: Moving, w: Any, reactions: Any) -> Effect:
-        """See `Acting`."""
+        """The moment of the weight along the coordinate, and the energy of the bodies [J]."""
         moment, energy = 0.0, 0.0
         for body in m.bodies.values():
             moment, energy = moment + body.m * body.c.p1.y, energy + body.m * body.c.p.y
@@ -117,7 +117,7 @@ class Push(NamedTuple):
     by_reactions: bool = False
 
     def effect(self, xp: Any, m: Moving, w: Any, reactions: Any) -> Effect:
-        """See `Acting`."""
+        """The force on its point [N], which counts as dissipated."""
         return Effect(
             (wrench_at(m, self.point, self.force),), dissipative=-self.force.dot(m.pins[self.point].p1)
         )
@@ -136,7 +136,7 @@ class Resistance(NamedTuple):
         return self.force / xp.sqrt(v2 + self.law.v_smooth * self.law.v_smooth)
 
     def effect(self, xp: Any, m: Moving, w: Any, reactions: Any) -> Effect:
-        """See `Acting`."""
+        """The force on its point against the motion [N], which dissipates."""
         p1 = m.pins[self.point].p1
         v2 = p1.squared()
         per = self.per_speed(xp, v2 * (w * w)) * w
@@ -153,7 +153,7 @@ class Brake(NamedTuple):
     by_reactions: bool = False
 
     def effect(self, xp: Any, m: Moving, w: Any, reactions: Any) -> Effect:
-        """See `Acting`."""
+        """The torque on its link against the rotation [N m], which dissipates."""
         k, small = m.links[self.link].t1, self.law.w_smooth
         turning = k * w
         moment = self.torque * turning / xp.sqrt(turning * turning + small * small)
@@ -174,7 +174,7 @@ class Cut(NamedTuple):
     by_reactions: bool = False
 
     def effect(self, xp: Any, m: Moving, w: Any, reactions: Any) -> Effect:
-        """See `Acting`."""
+        """The force on its point inside the stack [N], which dissipates."""
         k, stack = m.pins[self.point], self.stack
         small2 = stack.v_smooth * stack.v_smooth
         inside = _smooth_step(xp, (stack.top - k.p.y) / stack.edge) * _smooth_step(
@@ -196,7 +196,7 @@ class Block(NamedTuple):
     by_reactions: bool = False
 
     def effect(self, xp: Any, m: Moving, w: Any, reactions: Any) -> Effect:
-        """See `Acting`."""
+        """The torque of spring and damper on its link [N m], with the energy of the spring [J]."""
         link, stop = m.links[self.link], self.stop
         k, twist = link.t1, xp.asin(link.u.x) - stop.psi
         spring, damper = stop.stiffness * twist, stop.damping * k * w
@@ -222,7 +222,7 @@ class PinLosses(NamedTuple):
     by_reactions: bool = True
 
     def effect(self, xp: Any, m: Moving, w: Any, reactions: Mapping[Joint, Vec2]) -> Effect:
-        """See `Acting`."""
+        """The torque of friction and damping in all pins along the coordinate."""
         per_newton, smooth2, w2, loss = *self._law(), w * w, 0.0
         damping = self.damping
         for joint, turn in m.turns.items():
@@ -275,7 +275,7 @@ class GuideLosses(NamedTuple):
     by_reactions: bool = True
 
     def effect(self, xp: Any, m: Moving, w: Any, reactions: Mapping[Joint, Vec2]) -> Effect:
-        """See `Acting`."""
+        """The effort of friction and damping in all guides along the coordinate."""
         smooth2, w2, loss = self.guide.v_smooth * self.guide.v_smooth, w * w, 0.0
         for joint, slide in m.slides.items():
             per = self.damping

@@ -40,32 +40,32 @@ class RRP(Group):
 
     @property
     def bars(self) -> tuple[Bar, ...]:
-        """See `Group`."""
+        """The links of the group, in order."""
         return self.first, self.slider
 
     @property
     def pins(self) -> dict[str, str]:
-        """See `Group`."""
+        """The pins that the group adds, with the links on which further groups hang."""
         return {self.inner: self.slider.name}
 
     @property
     def joints(self) -> tuple[tuple[str, str], ...]:
-        """See `Group`."""
+        """Pin and link of the reactions, in their order."""
         first, slider = self.first.name, self.slider.name
         return (self.first.pin, first), (self.inner, first), (self.guide, slider)
 
     @property
     def guides(self) -> Mapping[tuple[str, str], str | None]:
-        """See `Group`."""
+        """The sliding joints, with the link on which the opposite reaction acts; None for the ground."""
         return {(self.guide, self.slider.name): self.rail.of}
 
     @property
     def rails(self) -> tuple[Rail, ...]:
-        """See `Group`."""
+        """The lines of earlier links on which the group slides."""
         return (self.rail,)
 
     def solve(self, xp: Any, q: Any, at: Placed, derived: Sequence[Any]) -> SolvedRRP:
-        """See `Group`."""
+        """The group at the coordinate `q` of the driver [rad, m]."""
         return SolvedRRP.between(
             xp, at.pins[self.first.pin], self.rail.placed(at.links), self.first.length, self.side
         )
@@ -122,7 +122,7 @@ class SolvedRRP(SolvedGroup):
     def third(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """See `SolvedGroup`."""
+        """Third derivatives by q of the links and the pins, from those of the outer pins and the rails."""
         (p,), ((base, t3),), (rod, slider), rail = outer, rails, self.links, self._rail
         (slide,), inner = self.slides, slider.pin
         r, r1, r2 = inner.p - rod.pin.p, inner.p1 - rod.pin.p1, inner.p2 - rod.pin.p2
@@ -166,7 +166,7 @@ class RPR(Group):
 
     @property
     def bars(self) -> tuple[Bar, ...]:
-        """See `Group`."""
+        """The links of the group, in order."""
         return self.first, self.second
 
     @property
@@ -176,17 +176,17 @@ class RPR(Group):
 
     @property
     def joints(self) -> tuple[tuple[str, str], ...]:
-        """See `Group`."""
+        """Pin and link of the reactions, in their order."""
         first, second = self.first, self.second
         return (first.pin, first.name), (self.guide, first.name), (second.pin, second.name)
 
     @property
     def guides(self) -> Mapping[tuple[str, str], str | None]:
-        """See `Group`."""
+        """The sliding joints, with the link on which the opposite reaction acts; None for the ground."""
         return {(self.guide, self.first.name): self.second.name}
 
     def solve(self, xp: Any, q: Any, at: Placed, derived: Sequence[Any]) -> SolvedRPR:
-        """See `Group`."""
+        """The group at the coordinate `q` of the driver [rad, m]."""
         return SolvedRPR.between(
             xp, at.pins[self.first.pin], at.pins[self.second.pin], self.offset, self.side
         )
@@ -237,7 +237,7 @@ class SolvedRPR(SolvedGroup):
     def third(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """See `SolvedGroup`."""
+        """Third derivatives by q of the links and the pins, from those of the outer pins and the rails."""
         (p, q), (slide,), (link, _) = outer, self.slides, self.links
         n, t1, t2 = slide.d.turned(), link.t1, link.t2
         # the part along n of v''' = (t3 - t1^3) (L n - offset d) - 3 t1 t2 v + 3 t2 L' n - 3 t1^2 L' d

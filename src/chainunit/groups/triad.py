@@ -141,7 +141,7 @@ class Triad(Group):
 
     @property
     def guides(self) -> Mapping[Joint, str | None]:
-        """See `Group`."""
+        """The sliding joints, with the link on which the opposite reaction acts; None for the ground."""
         return {
             leg.joints[0] if leg.rail else leg.joints[1]: leg.rail.of if leg.rail else self.name
             for leg in self.legs
@@ -150,7 +150,7 @@ class Triad(Group):
 
     @property
     def rails(self) -> tuple[Rail, ...]:
-        """See `Group`."""
+        """The lines of earlier links on which the group slides."""
         return tuple(leg.rail for leg in self.legs if leg.rail)
 
     def solve(self, xp: Any, q: Any, at: Placed, derived: Sequence[Any]) -> SolvedTriad:
@@ -317,7 +317,7 @@ class SolvedTriad(SolvedGroup):
     def third(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """See `SolvedGroup`."""
+        """Third derivatives by q of the links and the pins, from those of the outer pins and the rails."""
         *_, ternary = self.links
         starts, lines = iter(outer), iter(rails)
         before = [next(lines) if leg.on_rail else (next(starts), 0.0) for leg in self.legs]

@@ -29,33 +29,33 @@ class PRP(Group):
 
     @property
     def bars(self) -> tuple[Bar, ...]:
-        """See `Group`."""
+        """The links of the group, in order."""
         return self.first, self.second
 
     @property
     def pins(self) -> dict[str, str]:
-        """See `Group`."""
+        """The pins that the group adds, with the links on which further groups hang."""
         return {self.inner: self.second.name}
 
     @property
     def joints(self) -> tuple[tuple[str, str], ...]:
-        """See `Group`."""
+        """Pin and link of the reactions, in their order."""
         first, second = self.first.name, self.second.name
         return (self.guides_at[0], first), (self.inner, first), (self.guides_at[1], second)
 
     @property
     def guides(self) -> Mapping[tuple[str, str], str | None]:
-        """See `Group`."""
+        """The sliding joints, with the link on which the opposite reaction acts; None for the ground."""
         first, _, second = self.joints
         return {first: self.first_rail.of, second: self.second_rail.of}
 
     @property
     def rails(self) -> tuple[Rail, ...]:
-        """See `Group`."""
+        """The lines of earlier links on which the group slides."""
         return self.first_rail, self.second_rail
 
     def solve(self, xp: Any, q: Any, at: Placed, derived: Sequence[Any]) -> SolvedPRP:
-        """See `Group`."""
+        """The group at the coordinate `q` of the driver [rad, m]."""
         return SolvedPRP.between(self.first_rail.placed(at.links), self.second_rail.placed(at.links))
 
 
@@ -101,7 +101,7 @@ class SolvedPRP(SolvedGroup):
     def third(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """See `SolvedGroup`."""
+        """Third derivatives by q of the links and the pins, from those of the outer pins and the rails."""
         (a, b, per), (one, other), (inner,) = self._rails, self.slides, self.pins
         most = []
         for rail, slide, (base, t3) in ((a, one, rails[0]), (b, other, rails[1])):
@@ -145,7 +145,7 @@ class RPP(Group):
 
     @property
     def bars(self) -> tuple[Bar, ...]:
-        """See `Group`."""
+        """The links of the group, in order."""
         return self.block, self.yoke
 
     @property
@@ -155,23 +155,23 @@ class RPP(Group):
 
     @property
     def joints(self) -> tuple[tuple[str, str], ...]:
-        """See `Group`."""
+        """Pin and link of the reactions, in their order."""
         block, yoke = self.block, self.yoke
         return (block.pin, block.name), (self.guides_at[0], block.name), (self.guides_at[1], yoke.name)
 
     @property
     def guides(self) -> Mapping[tuple[str, str], str | None]:
-        """See `Group`."""
+        """The sliding joints, with the link on which the opposite reaction acts; None for the ground."""
         _, slot, rail = self.joints
         return {slot: self.yoke.name, rail: self.rail.of}
 
     @property
     def rails(self) -> tuple[Rail, ...]:
-        """See `Group`."""
+        """The lines of earlier links on which the group slides."""
         return (self.rail,)
 
     def solve(self, xp: Any, q: Any, at: Placed, derived: Sequence[Any]) -> SolvedRPP:
-        """See `Group`."""
+        """The group at the coordinate `q` of the driver [rad, m]."""
         return SolvedRPP.between(at.pins[self.block.pin], self.rail.placed(at.links), self.slot)
 
 
@@ -223,7 +223,7 @@ class SolvedRPP(SolvedGroup):
     def third(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """See `SolvedGroup`."""
+        """Third derivatives by q of the links and the pins, from those of the outer pins and the rails."""
         (p,), ((base, t3),), rail, (slot, way) = outer, rails, self._rail, self.slides
         block, yoke = self.links
         d, e = way.d, slot.d

@@ -253,7 +253,7 @@ class Organs:
         return loads, -forces[0]
 
     def probes(self, xp: Any, p: Any, u: Any, s: Any, a: Any) -> dict[str, Any]:
-        """See `InverseMachine`."""
+        """The outputs of the machine at the state `s` and the crank acceleration `a` [rad/s2]."""
         reactions = s.reactions(a)
         sides: dict[str, Any] = {}
         for side, names in NAMES.items():

@@ -281,7 +281,7 @@ def _on_sides(xp: Any, p: Any, s: MachineState, reactions: Mapping[Any, Vec2], r
 
 
 def _pulls(s: MachineState, reactions: Mapping[Any, Vec2]) -> Pulls:
-    """See `organ_pulls`."""
+    """Axial pull in the rods just inside their pins [N], from the reactions [N]."""
     pulls: Pulls = {}
     for side, (a1, b, wall, web, processing, _) in NAMES.items():
         of_wall, of_web = s.m.links[wall].u, s.m.links[web].u

@@ -96,28 +96,28 @@ class ChainedModel(LinkageModel):
 
     @classmethod
     def start_limits(cls, xp: Any, p: Any, u: Any, x: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """See `Organs.start_limits`."""
+        """Value, lower and upper limit of the requirements at the start: closed chains, and rods off their stops."""
         return cls.organs.start_limits(xp, p, u, x, cls.at_crank(p, u, x)[0])
 
     @classmethod
     def start_guess(cls, xp: Any, p: Any, u: Any) -> list[Any]:
-        """See `Organs.guess`."""
+        """First guess of the unknowns of the start."""
         return cls.organs.guess(xp, p, u, cls.at_crank(p, u)[0])
 
     @classmethod
     def start_improved(cls, xp: Any, p: Any, u: Any, z: Sequence[Any]) -> list[Any]:
-        """See `Organs.improved`."""
+        """The unknowns of the start after one more round."""
         return cls.organs.improved(xp, p, u, cls.at_crank(p, u)[0], z)
 
     @classmethod
     def start_states(cls, xp: Any, p: Any, u: Any, z: Sequence[Any]) -> Any:
-        """See `Organs.start_states`."""
+        """States of both organs at the start."""
         assert cls.States is not None
         return cls.States(**cls.organs.start_states(xp, p, u, *cls.at_crank(p, u), z))
 
     @classmethod
     def closed(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
-        """See `Organs.closed`."""
+        """The states with which both chains end at A2 and move with it."""
         return cls.organs.closed(xp, p, u, x, *cls.at_crank(p, u, x))
 
     @classmethod
@@ -148,13 +148,13 @@ class TurningChains(ChainedModel, DirectMachine):
 
     @classmethod
     def start_states(cls, xp: Any, p: Any, u: Any, z: Sequence[Any]) -> Any:
-        """See `Organs.start_states`."""
+        """States at the start: angle and speed of the motor, and both organs."""
         chains = cls.organs.start_states(xp, p, u, *cls.at_crank(p, u), z, p.rods_start)
         return cls.States(**vars(cls.initial_states(xp, p)), **chains)
 
     @classmethod
     def closed(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
-        """See `Organs.closed`."""
+        """The states with which both chains end at A2 and move with it."""
         return [x.phi, x.w, *super().closed(xp, p, u, x)]
 
     @classmethod
@@ -233,7 +233,7 @@ def _flexible(walls: int, webs: int) -> type[InverseMachine]:
         @classmethod
         @functools.cache
         def direct(cls) -> type[DirectMachine]:
-            """See `InverseMachine`."""
+            """The direct model of the same machine: torque in, motion out."""
             words = "start of the rods"
             rods = group(chains.RodsStart, words, default=chains.RodsStart())
             return cls._turning(TurningChains, [("rods_start", chains.RodsStart, rods)], organs=chains)

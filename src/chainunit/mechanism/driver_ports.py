@@ -8,12 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from ..core.integrators import Solver
 from ..core.model import Requirement, Terminal
 from ..core.ports import PortSlopes, PortValues, ShaftMotion, Start, flanges, load_terminal, way_terminals
-from ..core.quantities import Value, declaration, group, quantity
+from ..core.quantities import Fields, Value, declaration, declared_class, fields_of, quantity
 
 
 class DriverWords(NamedTuple):
@@ -102,90 +101,73 @@ ROTATING = DriverPort(
 """A driver that a motor turns."""
 
 
-@declaration
-class WayMotion:
-    """Motion of a driver that slides."""
-
-    phi: Value = quantity("m", "way of the driver", default=0.0)
-    w: Value = quantity("m/s", "speed of the driver", default=0.0)
-    a: Value = quantity("m/s2", "acceleration of the driver", default=0.0)
-
-
-@declaration
-class WayPortValues:
-    """The load of a driver that slides, at the point (phi0, w0)."""
-
-    tau_bias: Value = quantity("N", "force needed at constant speed of the driver", nominal=1000.0)
-    J: Value = quantity("kg", "mass reflected to the driver", min=0.0)
-    dJ_dphi: Value = quantity("kg/m", "derivative of J by the way of the driver")
-    phi0: Value = quantity("m", "way of the driver at which the load was evaluated")
-    w0: Value = quantity("m/s", "speed of the driver at which the load was evaluated")
-
-
-@declaration
-class WayPortSlopes:
-    """Exact derivatives of the load of a driver that slides."""
-
-    tau_bias_dphi: Value = quantity("N/m", "derivative of tau_bias by the way of the driver", nominal=1000.0)
-    tau_bias_dw: Value = quantity("N.s/m", "derivative of tau_bias by the speed of the driver")
-
-
-@declaration
-class WayStart:
-    """Start of a driver that slides."""
-
-    phi_start: Value = quantity("m", "way of the driver at the start", default=0.0)
-    w_start: Value = quantity("m/s", "speed of the driver at the start", default=0.0)
-    solver: Solver = group(Solver, "internal integrator", default=Solver())
+_UNITS = {
+    "rad": "m",
+    "rad/s": "m/s",
+    "rad/s2": "m/s2",
+    "N.m": "N",
+    "kg.m2": "kg",
+    "kg.m2/rad": "kg/m",
+    "N.m/rad": "N/m",
+    "N.m.s/rad": "N.s/m",
+}
+"""The units of a driver that slides, by those of one that turns."""
+_NOMINAL = {"rad/s2": 0.1, "N.m": 10.0, "N.m/rad": 10.0}
+"""By the unit of a driver that turns, the factor of the nominal size."""
+_WORDS = {
+    "; crank angle is phi/ratio": "",
+    "torque of the motor": "force",
+    "the motor's shaft": "the driver",
+    "the motor shaft": "the driver",
+    "the shaft": "the driver",
+    "motor angle": "way of the driver",
+    "motor speed": "speed of the driver",
+    "motor acceleration": "acceleration of the driver",
+    "angle of": "way of",
+    "torque": "force",
+    "inertia": "mass",
+}
+"""The words on a driver that slides, by those on one that turns; the longer ones come first."""
 
 
-@declaration
-class AddedMass:
-    """The mass on a driver that slides by itself."""
-
-    J_added: Value = quantity(
-        "kg", "mass on the driver beside the machine's", default=0.0, min=0.0, tunable=True
-    )
-
-
-@declaration
-class WayStates:
-    """States of a machine whose driver slides by itself."""
-
-    phi: Value = quantity("m", "way of the driver")
-    w: Value = quantity("m/s", "speed of the driver")
-
-
-@declaration
-class DrivingForce:
-    """Force on a driver that slides."""
-
-    tau: Value = quantity("N", "force on the driver", default=0.0, nominal=1000.0)
+def _sliding(name: str, turning: type, words: str, fields: Fields = ()) -> type:
+    """The declaration of a driver that turns, for one that slides: the same names in other units and words, and more
+    `fields`. `words` are its description."""
+    slid: list[tuple[str, Any, Any]] = []
+    for field in fields_of(turning):
+        q = field[2].metadata.get("quantity")
+        if q is not None:
+            text = q.description
+            for turned, pushed in _WORDS.items():
+                text = text.replace(turned, pushed)
+            nominal = q.nominal and q.nominal * _NOMINAL[q.unit]
+            more = {"default": q.start, "min": q.low, "nominal": nominal, "tunable": q.tunable}
+            field = field[0], field[1], quantity(_UNITS[q.unit], text, **more)
+        slid.append(field)
+    made: type = declared_class(name, (), [*slid, *fields])
+    made.__doc__, made.__module__ = words, __name__
+    return made
 
 
-@declaration
-class WayAnswer:
-    """Acceleration of a driver that slides, and the force that it needs."""
-
-    a: Value = quantity("m/s2", "acceleration of the driver", nominal=10.0)
-    tau_bias: Value = quantity("N", "force needed at constant speed of the driver", nominal=1000.0)
-    J: Value = quantity("kg", "mass reflected to the driver")
-    end_stop_force: Value = quantity(
-        "N",
-        "force of the end stops against the driver: above 0 behind the upper end of its range",
-        nominal=1000.0,
-    )
-
-
+_END_STOPS = quantity(
+    "N",
+    "force of the end stops against the driver: above 0 behind the upper end of its range",
+    nominal=1000.0,
+)
 SLIDING = DriverPort(
-    WayMotion,
-    WayPortValues,
-    WayPortSlopes,
-    WayStart,
-    AddedMass,
-    WayStates,
-    DrivingForce,
-    WayAnswer,
+    _sliding("WayMotion", ShaftMotion, "Motion of a driver that slides."),
+    _sliding("WayPortValues", PortValues, "The load of a driver that slides, at the point (phi0, w0)."),
+    _sliding("WayPortSlopes", PortSlopes, "Exact derivatives of the load of a driver that slides."),
+    _sliding("WayStart", Start, "Start of a driver that slides."),
+    _sliding("AddedMass", AddedInertia, "The mass on a driver that slides by itself."),
+    _sliding("WayStates", TurningStates, "States of a machine whose driver slides by itself."),
+    _sliding("DrivingForce", DrivingTorque, "Force on a driver that slides."),
+    _sliding(
+        "WayAnswer",
+        Turning,
+        "Acceleration of a driver that slides, and the force that it needs.",
+        [("end_stop_force", Value, _END_STOPS)],
+    ),
     way_terminals(load=True),
     way_terminals(load=False),
     Requirement(
@@ -194,6 +176,6 @@ SLIDING = DriverPort(
         "at a dead point nothing else carries the force; give the link a mass, or J_added",
     ),
     DriverWords("force on the driver", "way"),
-    MappingProxyType({"rad": "m", "rad/s": "m/s", "N.m": "N", "kg.m2": "kg"}),
+    MappingProxyType({unit: _UNITS[unit] for unit in ("rad", "rad/s", "N.m", "kg.m2")}),
 )
 """A driver that a cylinder pushes."""

@@ -6,7 +6,6 @@ of its own lengths before a run. Standard library only: FMUs carry this file. Se
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -16,8 +15,6 @@ Course = Callable[[Any], tuple[Any, Any, Any]]
 ROUNDS = 4
 """Newton steps from the best place: the error of the place squares in each, from half of a step at first."""
 _NO_CURVATURE = 1e-100
-_GOLDEN = 0.6180339887498949
-_STEPS = 24
 
 
 def extreme(
@@ -61,26 +58,6 @@ def extreme(
     for _ in range(ROUNDS - 1):
         place, _ = vertex(place, around, reach)
     return place, course(place)[0]
-
-
-def lowest(value_at: Callable[[float], float], low: float, high: float) -> tuple[float, float]:
-    """The place of the least value in a range that has one low, and that value, by golden sections; where a value is
-    NaN, the first such place."""
-    a, b = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-    at_a, at_b = value_at(a), value_at(b)
-    for _ in range(_STEPS):
-        for q, value in ((a, at_a), (b, at_b)):
-            if math.isnan(value):
-                return q, value
-        if at_a < at_b:
-            high, b, at_b = b, a, at_a
-            a = high - _GOLDEN * (high - low)
-            at_a = value_at(a)
-        else:
-            low, a, at_a = a, b, at_b
-            b = low + _GOLDEN * (high - low)
-            at_b = value_at(b)
-    return (a, at_a) if at_a < at_b else (b, at_b)
 
 
 class MotionExtreme(NamedTuple):

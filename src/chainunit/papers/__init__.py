@@ -4,6 +4,7 @@ The tables are in ``data/papers``, one for each paper; the functions that comput
 the paper. The errors of the papers stand only here, for comparison; the models have the corrected physics.
 """
 
+from ..work.progress import Report, quiet
 from . import paper000, paper001, paper002, paper003
 from .table import PaperNumber, rows
 
@@ -13,6 +14,10 @@ PAPERS = {"000": paper000, "001": paper001, "002": paper002, "003": paper003}
 """The module of each paper."""
 
 
-def reproduce() -> list[PaperNumber]:
-    """Every row, by paper and item."""
-    return [row for paper, functions in PAPERS.items() for row in rows(paper, functions)]
+def reproduce(progress: Report = quiet) -> list[PaperNumber]:
+    """All rows, by paper and item."""
+    numbers: list[PaperNumber] = []
+    for k, (paper, functions) in enumerate(PAPERS.items()):
+        progress(f"paper {paper}", float(k), float(len(PAPERS)))
+        numbers += rows(paper, functions)
+    return numbers

@@ -9,7 +9,8 @@ from .. import __version__
 from ..reading.text import DEFAULT_UNITS
 from ..report.blocks import Column, Report, Section, Table, TableRow, Text
 from ..report.markdown import block_lines
-from . import PAPERS
+from ..report.task import Task
+from . import PAPERS, reproduce
 from .figures import FIGURES
 from .table import PaperNumber
 
@@ -79,3 +80,11 @@ def report(rows: Sequence[PaperNumber]) -> Report:
         (),
         (*sections, Section("count", "Count", (Text((count,)),))),
     )
+
+
+TASK: Task[None, list[PaperNumber]] = Task(
+    "reproduce",
+    lambda question, folder, progress: reproduce(progress),
+    report,
+    files=tuple(f"{beginning}-*.png" for beginning in (*PAPERS, "two-bar")),
+)

@@ -22,10 +22,11 @@ from ..reading.text import array_entry
 from ..report.blocks import Column, Report, Section, Table, TableRow, Text
 from ..report.figure import Axis, Curve, Field, Figure, Item, Panel
 from ..report.print_figures import contours
+from ..report.task import Task, no_check
 from ..study.arrays import stretches
 from ..work.progress import Progress
 
-NAME, PICTURE = "two_bar_error", "two_bar_error.png"
+PICTURE = "two_bar_error.png"
 MU = tuple(np.round(np.arange(0.30, 0.801, 0.05), 2))
 ZETA = tuple(np.round(np.arange(0.15, 0.951, 0.05), 2))
 PSI = tuple(math.radians(x) for x in (-12.0, -6.0, 0.0, 6.0, 12.0))
@@ -231,3 +232,12 @@ def _figure(comparison: TwoBarError) -> Figure:
         file=PICTURE,
         widths=(1.2, 1.0),
     )
+
+
+TASK: Task[None, TwoBarError] = Task(
+    "two-bar-error",
+    lambda question, folder, progress: two_bar_error(lambda done: progress("bars and catenaries", done, 1.0)),
+    report,
+    files=(PICTURE,),
+    accept=no_check,
+)

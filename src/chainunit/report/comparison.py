@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from ..study.comparison import StoredResult, compare
 from ..study.measures import MEASURES
 from . import blocks as b
 from .lines import Aside, Line, Name, capital, line
+from .task import Task
 
-NAME = "comparison"
 _SIDES = ("a", "b")
 _FOLLOWS = {"tuned": "tuned", "catalogue": "of the catalogue", "sizing": "by sizing"}
 """By origin, the words beside a given value that the file does not give."""
@@ -150,3 +151,8 @@ def _row(s: b.Source, run: str, name: str, is_short: bool) -> b.TableRow:
     numbers = (s.number(f"{path}.{of}") for of in (*_SIDES, "difference", "relative"))
     title = s.result["runs"][run]["measures"][name]["title"]
     return b.TableRow((title, *numbers), form="both" if is_short else "long")
+
+
+TASK: Task[tuple[StoredResult, StoredResult], Mapping[str, Any]] = Task(
+    "compare", lambda results, folder, progress: compare(*results), comparison_report
+)

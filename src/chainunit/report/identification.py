@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from ..core.files import clear, whole
+from ..core.files import whole
 from ..reading.text import shown_in
 from ..study.config import Config
-from ..study.identification.identification import IdentifiedMachine
+from ..study.identification.identification import IdentifiedMachine, identify
 from ..study.identification.measurands import MEASURANDS
 from ..study.identification.result import as_dict, identified_notes, identified_tables, sentences
 from ..study.study_file import toml_text
 from . import blocks as b
 from . import figure as fig
-from . import files
 from .lines import Line, Name, line
+from .task import Task, Writer
 
-NAME = "result"
 WRONG = "The model does not describe the recordings: these are not the numbers of the machine."
 FILE = "identified.toml"
 """The study file with the identified values."""
@@ -53,14 +52,8 @@ def pictures(found: IdentifiedMachine) -> tuple[str, ...]:
     return tuple(f"course_{run.name}.png" for run in found.plan.runs)
 
 
-def prepare(folder: Path) -> None:
-    """Remove the files of an earlier identification."""
-    drawn = tuple(sorted(each.name for each in folder.glob("course_*.png")))
-    clear(folder, *files.names(NAME, drawn), FILE)
-
-
-def writers(found: IdentifiedMachine, report: b.Report, folder: Path) -> list[Callable[[], list[Path]]]:
-    """The functions that write the study file with the identified values, and the files of the report."""
+def _writers(found: IdentifiedMachine, folder: Path, of_report: list[Writer]) -> list[Writer]:
+    """With the study file of the identified values."""
 
     def study_file() -> list[Path]:
         with whole(folder / FILE) as part:
@@ -69,7 +62,17 @@ def writers(found: IdentifiedMachine, report: b.Report, folder: Path) -> list[Ca
             part.write_text(text, "utf-8")
         return [folder / FILE]
 
-    return [study_file, *files.writers(report, folder, NAME)]
+    return [study_file, *of_report]
+
+
+TASK: Task[Config, IdentifiedMachine] = Task(
+    "identify",
+    lambda config, folder, progress, **options: identify(config, progress, **options),
+    identification_report,
+    files=(FILE, "course_*.png"),
+    writers=_writers,
+    shortfall=lambda found: None if found.is_described else "",
+)
 
 
 def _opening(s: b.Source, found: IdentifiedMachine) -> Iterator[b.Block]:

@@ -3,26 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from .. import __version__
 from ..core.engines import MATH
 from ..core.quantities import Layout
+from ..machines.machine import Machine
 from ..mechanism.assur import PRISMATIC
 from ..mechanism.machine import MachineState
 from ..reading.text import array_entry
-from ..study.linkage_turn import GroupTurn, JointTurn, LinkageFindings
+from ..study.linkage_turn import GroupTurn, JointTurn, LinkageFindings, linkage_findings
 from . import blocks as b
 from . import figure as fig
 from . import linkage, linkage_loads
 from .drawing import drawing
 from .lines import Name, Number, capital, join, line
 from .motion import Animation, Clip, Reading
+from .task import Task, no_check
 
-NAME, PICTURES = "linkage", ("linkage.svg", "linkage.png", "linkage_reactions.png", "linkage_stroke.png")
+PICTURES = ("linkage.svg", "linkage.png", "linkage_reactions.png", "linkage_stroke.png")
 _PICTURES_PER_TURN = 120
+
+
+class LinkageQuestion(NamedTuple):
+    """A linkage, the constant speed of its driver, and its file."""
+
+    machine: Machine
+    speed: float
+    """[rad/s], of a driver that slides [m/s]"""
+    file: str
 
 
 def linkage_report(findings: LinkageFindings, source: str) -> b.Report:
@@ -288,3 +299,12 @@ def _variables(f: LinkageFindings) -> Iterator[b.Block]:
         )
         if sections:
             yield b.Given(((title, sections),))
+
+
+TASK: Task[LinkageQuestion, tuple[LinkageFindings, str]] = Task(
+    "linkage",
+    lambda question, folder, progress: (linkage_findings(question.machine, question.speed), question.file),
+    lambda outcome: linkage_report(*outcome),
+    files=PICTURES,
+    accept=no_check,
+)

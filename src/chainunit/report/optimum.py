@@ -2,33 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.files import clear, whole
+from ..core.files import whole
 from ..fmu.backends import Backend
-from ..reading.tables import in_file
 from ..study.config import Config
 from ..study.optimum.best import Best, find_best
 from ..study.optimum.result import as_dict, best_tables, units_of
 from ..study.optimum.table import wishes_of
-from ..study.optimum.wishes import Wishes
 from ..study.study_file import toml_text
 from ..work.progress import Report as Progress
 from . import blocks as b
 from . import figure as fig
-from . import files
 from .lines import Line, Name, line
+from .task import Task, Writer
 
-NAME, PICTURES = "result", ("torque.png", "front.png")
+PICTURES = ("torque.png", "front.png")
 FILE = "best.toml"
 """The study file with the best machine."""
-FILES = (*files.names(NAME, PICTURES), FILE)
-"""The names of all files that a search may write into its folder."""
 
 
 def optimum_report(best: Best, config: Config) -> b.Report:
@@ -60,44 +55,29 @@ def _title(best: Best, config: Config) -> str:
     return f"{config.title}: no machine found" if config.title else "No machine found"
 
 
-def compute(
-    config: Config, folder: Path, progress: Progress | None = None, backend: Backend | None = None
-) -> Best:
-    """Search for the best machine of a study; the files of an earlier search in the folder are removed. A refusal
-    begins with the name of the study file, if there is one.
+class OptimizedStudy(NamedTuple):
+    """A study, and what the search for its best machine found."""
 
-    Raises
-    ------
-    InputError
-        with a line for each fault of the table [optimize].
-    """
-    wishes = _wishes(config)
-    clear(folder, *FILES)
-    return _search(wishes, config, progress, backend)
+    config: Config
+    best: Best
 
 
-def search(config: Config, progress: Progress | None = None, backend: Backend | None = None) -> Best:
-    """The same without a folder."""
-    return _search(_wishes(config), config, progress, backend)
+def _compute(
+    config: Config, folder: Path | None, progress: Progress, *, backend: Backend | None = None
+) -> OptimizedStudy:
+    """Search for the best machine of a study. A refusal begins with the name of the study file, if there is one."""
+    with config.of_file():
+        return OptimizedStudy(config, find_best(wishes_of(config), progress, backend))
 
 
-def _wishes(config: Config) -> Wishes:
-    with _of_file(config):
-        return wishes_of(config)
+def _accept(config: Config, **options: Any) -> None:
+    with config.of_file():
+        wishes_of(config)
 
 
-def _search(wishes: Wishes, config: Config, progress: Progress | None, backend: Backend | None) -> Best:
-    with _of_file(config):
-        return find_best(wishes, progress or (lambda *_: None), backend)
-
-
-def _of_file(config: Config) -> AbstractContextManager[None]:
-    return in_file(config.source, lambda: config.lines) if config.lines else nullcontext()
-
-
-def writers(best: Best, config: Config, report: b.Report, folder: Path) -> list[Callable[[], list[Path]]]:
-    """The functions that write the study file with the best machine, where there is one, and the files of the
-    report."""
+def _writers(outcome: OptimizedStudy, folder: Path, of_report: list[Writer]) -> list[Writer]:
+    """With the study file of the best machine, where there is one."""
+    config, best = outcome
 
     def study_file() -> list[Path]:
         text = toml_text(best_tables(best, config, folder))
@@ -105,8 +85,18 @@ def writers(best: Best, config: Config, report: b.Report, folder: Path) -> list[
             part.write_text(text, "utf-8")
         return [folder / FILE]
 
-    own = [study_file] if best.met else []
-    return [*own, *files.writers(report, folder, NAME)]
+    return [*([study_file] if best.met else []), *of_report]
+
+
+TASK: Task[Config, OptimizedStudy] = Task(
+    "optimize",
+    _compute,
+    lambda outcome: optimum_report(outcome.best, outcome.config),
+    files=(*PICTURES, FILE),
+    accept=_accept,
+    writers=_writers,
+    shortfall=lambda outcome: None if outcome.best.met else "",
+)
 
 
 def _opening(s: b.Source, best: Best) -> Iterator[b.Block]:

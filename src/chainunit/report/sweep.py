@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from numbers import Integral
 from pathlib import Path
 
-from ..core.files import clear
+from ..core.errors import InputError, shown
 from ..reading.text import shown_in
 from ..study.config import Config
 from ..study.sweep import run_sweep
 from ..study.sweep_summary import SweepSummary
 from ..work.progress import Report as Progress
 from . import blocks as b
-from . import files, sweep_figures
+from . import sweep_figures
 from .lines import Line, Name, Number, capital, join, line
+from .task import Task
 
-NAME = "result"
 _MOST_COLUMNS = 8
 """Columns of a table on the terminal."""
 
@@ -46,20 +47,26 @@ def report(summary: SweepSummary) -> b.Report:
         )
 
 
-def writers(summary: SweepSummary, contents: b.Report, folder: Path) -> list[Callable[[], list[Path]]]:
-    """The functions that write the numbers, the pictures, the text and the page of a sweep. The store is written
-    while the sweep runs."""
-    return [*files.writers(contents, folder, NAME), lambda: [summary.findings.outcome.file]]
-
-
-def compute(
-    config: Config, folder: Path, progress: Progress, workers: int | None = None, scheduler: str | None = None
+def _compute(
+    config: Config,
+    folder: Path,
+    progress: Progress,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
 ) -> SweepSummary:
-    """Run the sweep of a study in a folder that belongs to this process alone (see `files.claim`). The files of an
-    earlier report in it are removed; a store that fits is continued. Errors are those of `run_sweep`."""
-    findings = run_sweep(config, folder, progress, workers, scheduler)
-    clear(folder, *files.names(NAME, tuple(sorted(each.name for each in folder.glob("sweep_*.png")))))
-    return SweepSummary(findings)
+    """Run the sweep of a study; a store in the folder that fits is continued. Errors are those of `run_sweep`, and an
+    InputError for a number of workers that is none."""
+    if workers is not None and (
+        isinstance(workers, bool) or not isinstance(workers, Integral) or workers < 1
+    ):
+        raise InputError(f"workers = {shown(workers)}: must be a whole number >= 1")
+    return SweepSummary(run_sweep(config, folder, progress, workers, scheduler))
+
+
+def _store_in(summary: SweepSummary, folder: Path) -> Path:
+    """The store of all points, which is written while the sweep runs."""
+    return folder / summary.findings.outcome.file.name
 
 
 def _opening(s: b.Source) -> Iterator[b.Block]:
@@ -285,3 +292,14 @@ def _basis(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
     if s.result["made_anew"]:
         yield b.Text(s.line("{made_anew}."), "note")
     yield b.Text(s.line("All points: {store} (Zarr)."), "fine", "long")
+
+
+TASK: Task[Config, SweepSummary] = Task(
+    "sweep",
+    _compute,
+    report,
+    files=("sweep_*.png",),
+    writers=lambda summary, folder, of_report: [*of_report, lambda: [_store_in(summary, folder)]],
+    kept=lambda summary, folder: [_store_in(summary, folder)],
+    shortfall=lambda summary: None if summary.feasible else "",
+)

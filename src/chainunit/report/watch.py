@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from ..core.files import clear
 from ..reading.text import shown_in
+from ..study.config import Config
 from ..study.identification.residuals import LOUD
-from ..study.identification.watch import WatchedRecording
+from ..study.identification.watch import WatchedRecording, watch
 from ..study.identification.watch_result import as_dict
 from . import blocks as b
 from . import figure as fig
-from . import files
 from .lines import Name, join, line
+from .task import Task
 
-NAME, PICTURES = "result", ("loads.png", "imbalance.png")
+PICTURES = ("loads.png", "imbalance.png")
 _USUAL = {
     "left.material_mass": "feed, left",
     "right.material_mass": "feed, right",
@@ -55,14 +54,9 @@ def watch_report(watched: WatchedRecording) -> b.Report:
         )
 
 
-def prepare(folder: Path) -> None:
-    """Remove the files of an earlier report."""
-    clear(folder, *files.names(NAME, PICTURES))
-
-
-def writers(report: b.Report, folder: Path) -> list[Callable[[], list[Path]]]:
-    """The functions that write the files of the report."""
-    return files.writers(report, folder, NAME)
+TASK: Task[Config, WatchedRecording] = Task(
+    "watch", lambda config, folder, progress: watch(config, progress), watch_report, files=PICTURES
+)
 
 
 def _opening(s: b.Source) -> Iterator[b.Block]:

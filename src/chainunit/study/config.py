@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from ..machines.api import machine_of, ratios
 from ..machines.chain_unit import SideName
 from ..machines.machine import Machine
 from ..mechanism.models import MachineModel
-from ..reading.tables import Slip, filled, given_values, read, read_table, slips, toml
+from ..reading.tables import Slip, filled, given_values, in_file, read, read_table, slips, toml
 from ..reading.text import DEFAULT_UNITS, Units, chosen_units
 from ..reading.toml_lines import lines_of
 from .checks import check_order
@@ -107,6 +108,11 @@ class Config:
     """by table, the values of its declared quantities; None for an optional table that the file does not have"""
     plans: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     """by capability, the plan that its tables state, or None"""
+
+    def of_file(self) -> AbstractContextManager[None]:
+        """A context in which an InputError begins with the name of the study file and the line of its key; with
+        tables from Python the error stays as it is."""
+        return in_file(self.source, lambda: self.lines) if self.lines else nullcontext()
 
     @property
     def turn(self) -> float:

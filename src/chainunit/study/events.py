@@ -353,11 +353,11 @@ class Surge(Event):
 
     @classmethod
     def of_input(cls, name: str) -> type[Event]:
-        """See `Event`."""
+        """The event that multiplies the input `name`."""
         return _surge_of(name)
 
     def fault(self, normal: Values) -> str:
-        """See `Event`."""
+        """Why the event cannot act on the input; empty where it can."""
         (name,) = self.acts_on
         return (
             "" if normal[name] else f"{name} is 0 in normal running, and so is its multiple; give feed.{name}"

@@ -73,7 +73,7 @@ QUANTILES = (0.05, 0.5, 0.95, 0.99)
 
 
 @dataclass(frozen=True)
-class Task:
+class RandomTask:
     """The data that a worker needs: the study, its drive, the FMUs, the time of the steady state [s].
 
     The runs are made on the compiled system; without a C compiler, or if they are to be `cosimulated`, by the
@@ -155,13 +155,13 @@ class Parcel:
     """A task as it goes to a worker, which may be on another machine: with the steady states of the compiled system,
     or with the content of its FMUs by their names."""
 
-    task: Task
+    task: RandomTask
     digest: str
     content: Mapping[str, bytes]
     states: Any = None
 
     @classmethod
-    def of(cls, task: Task) -> Parcel:
+    def of(cls, task: RandomTask) -> Parcel:
         """The parcel of a task whose FMUs are files."""
         if task.is_compiled:
             block = task.block()
@@ -237,14 +237,14 @@ def draw(config: Config, number: int) -> Draw:
     return Draw(config.plans["random_overloads"].event.event(side, values), values, offset, trip)
 
 
-def request(task: Task, chance: Draw) -> Request:
+def request(task: RandomTask, chance: Draw) -> Request:
     """The run with these random quantities."""
     begin = task.steady + chance.offset
     stop = begin + task.config.plans["random_overloads"].table.duration
     return Request(chance.event, begin, stop, chance.trip_torque / task.drive.ratio)
 
 
-def sample(task: Task, chance: Draw, run: EventRun) -> Sample:
+def sample(task: RandomTask, chance: Draw, run: EventRun) -> Sample:
     """The results of a run that did not fail."""
     assert run.series is not None
     config, drive, begin = task.config, task.drive, task.steady + chance.offset
@@ -271,7 +271,7 @@ def make_runs(parcel: Parcel, begin: int, end: int) -> dict[str, Any]:
     return {name: [result[name] for result in results] for name in results[0]}
 
 
-def _result_of(task: Task, chance: Draw, run: EventRun) -> dict[str, Any]:
+def _result_of(task: RandomTask, chance: Draw, run: EventRun) -> dict[str, Any]:
     """The results of a run by name; one that fails is a result, too."""
     numbers = dict.fromkeys(Layout(Sample).names)
     if run.error is None:
@@ -298,7 +298,7 @@ class MonteCarloResult(Findings):
     dataset: xr.Dataset
     file: Path
     method: str
-    """see `Task.method`"""
+    """see `RandomTask.method`"""
     earlier_runs: int = 0
     """number of runs that the store had before"""
     damaged_batches: int = 0
@@ -407,7 +407,7 @@ class MonteCarloResult(Findings):
         }
 
 
-def job_of(task: Task) -> Job:
+def job_of(task: RandomTask) -> Job:
     """The random overloads of a task, as work in batches."""
     parcel = Parcel.of(task)
     return Job(
@@ -425,7 +425,7 @@ def job_of(task: Task) -> Job:
 
 
 def run(
-    task: Task, folder: Path, report: Report, workers: int | None = None, scheduler: str | None = None
+    task: RandomTask, folder: Path, report: Report, workers: int | None = None, scheduler: str | None = None
 ) -> MonteCarloResult:
     """Make the missing runs of the task and write them to the store in `folder`; the other arguments and the errors
     are those of `chainunit.work.runner.run`."""

@@ -16,7 +16,7 @@ from ..core.errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
 from ..reading.text import number, shown_in
 from ..system import Simulation
-from ..work.progress import Progress, Report
+from ..work.progress import Progress, Report, quiet
 from . import verdict
 from .analyses import all_analyses
 from .analysis import Work
@@ -50,7 +50,7 @@ _PEAKS = ("crank_torque", "motor_torque", "rocker_torque")
 def run_study(
     config: Config,
     folder: Path,
-    report: Report | None = None,
+    report: Report = quiet,
     *,
     check: bool = False,
     backend: Backend | None = None,
@@ -70,56 +70,42 @@ def run_study(
         save its state.
     """
     with shown_in(config.units):
-        return _run_study(
-            config, folder, report or (lambda what, done, todo: None), check, backend, scheduler
-        )
-
-
-def _run_study(
-    config: Config,
-    folder: Path,
-    report: Report,
-    check: bool,
-    backend: Backend | None,
-    scheduler: str | None,
-) -> StudyRecord:
-    """See `run_study`."""
-    choice = choose(config, folder / "fmu", report, backend)
-    config = as_chosen(config, choice.drive)
-    drive = with_parts_beside(config, choice.drive)
-    if check and drive.outsiders:
-        titles = " and ".join(drive.outsiders)
-        raise InputError(f"--check: the equations of {titles} are not known; leave --check out")
-    study = StudyRecord(config, drive, statics(config, drive), choice.tuning, choice.sizing)
-    unmade = Rig(config, drive, {})
-    for part in registered():
-        part.check_runs(config, unmade)
-    _analyse(study, Work(unmade, report), needs_runs=False)
-    files, study.fmus = drive.export(folder / "fmu", backend, lambda what: report(what, 0.0, 1.0))
-    if backend is None and "python" in {origin.backend for origin in study.fmus.values()}:
-        study.note(
-            "no compiler",
-            "No C compiler was found: the FMUs run in Python. With one the runs take about a tenth of the time: "
-            "install gcc or clang, or the compiler that comes with pip install 'chainunit[cross]'.",
-        )
-    runner = Runner(study, Rig(config, drive, files), report)
-    try:
-        runner.run(check, lambda: drive.coasting(folder / "fmu", backend))
-        _analyse(study, Work(runner.rig, report, folder, scheduler, runner.stop), needs_runs=True)
-        study.setting = recommended_setting(study)
-        study.alternatives = alternatives(study, runner.rig, report)
-    except RunError as error:
-        if error.partial is not None:
-            study.runs["unfinished"] = error.partial
-        study.failure = error
-    except KeyboardInterrupt:
-        # Ctrl-C came between two runs, or in a run that is not a co-simulation
-        study.failure = InterruptedRunError("interrupted")
-    study.setting = study.setting or recommended_setting(study)
-    if drive.chain is not None and not isinstance(study.failure, InterruptedRunError):
-        _chains(study, files["machine"], report)
-    conclude(study)
-    return study
+        choice = choose(config, folder / "fmu", report, backend)
+        config = as_chosen(config, choice.drive)
+        drive = with_parts_beside(config, choice.drive)
+        if check and drive.outsiders:
+            titles = " and ".join(drive.outsiders)
+            raise InputError(f"--check: the equations of {titles} are not known; leave --check out")
+        study = StudyRecord(config, drive, statics(config, drive), choice.tuning, choice.sizing)
+        unmade = Rig(config, drive, {})
+        for part in registered():
+            part.check_runs(config, unmade)
+        _analyse(study, Work(unmade, report), needs_runs=False)
+        files, study.fmus = drive.export(folder / "fmu", backend, lambda what: report(what, 0.0, 1.0))
+        if backend is None and "python" in {origin.backend for origin in study.fmus.values()}:
+            study.note(
+                "no compiler",
+                "No C compiler was found: the FMUs run in Python. With one the runs take about a tenth of the time: "
+                "install gcc or clang, or the compiler that comes with pip install 'chainunit[cross]'.",
+            )
+        runner = Runner(study, Rig(config, drive, files), report)
+        try:
+            runner.run(check, lambda: drive.coasting(folder / "fmu", backend))
+            _analyse(study, Work(runner.rig, report, folder, scheduler, runner.stop), needs_runs=True)
+            study.setting = recommended_setting(study)
+            study.alternatives = alternatives(study, runner.rig, report)
+        except RunError as error:
+            if error.partial is not None:
+                study.runs["unfinished"] = error.partial
+            study.failure = error
+        except KeyboardInterrupt:
+            # Ctrl-C came between two runs, or in a run that is not a co-simulation
+            study.failure = InterruptedRunError("interrupted")
+        study.setting = study.setting or recommended_setting(study)
+        if drive.chain is not None and not isinstance(study.failure, InterruptedRunError):
+            _chains(study, files["machine"], report)
+        conclude(study)
+        return study
 
 
 def _analyse(study: StudyRecord, work: Work, *, needs_runs: bool) -> None:

@@ -122,7 +122,7 @@ def input_starts(system: System, model: type[Model]) -> dict[str, float]:
 
 
 def _description(system: System, models: Mapping[str, type[Model]], name: str, title: str) -> dict[str, Any]:
-    """See `chainunit.core.composition.Composition`."""
+    """The description of a system that a `chainunit.core.composition.Composition` takes."""
     exact = hold_loads(system).connections
     influences = {each: _influences(model) for each, model in models.items()}
     free = _free_terminals(system)

@@ -186,10 +186,10 @@ class CompiledSimulation(Simulation):
         """See `Simulation`; the state can always be saved."""
 
     def save(self) -> float:
-        """See `Simulation`."""
+        """Keep the state, and return its time [s]."""
         self._saved = self.time, self._states
         return self.time
 
     def restore(self) -> None:
-        """See `Simulation`."""
+        """Go back to the state that was kept."""
         self.time, self._states = self._saved

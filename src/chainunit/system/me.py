@@ -253,6 +253,6 @@ class ModelExchange(FmuSimulation):
         return super().save()
 
     def restore(self) -> None:
-        """See `Simulation.restore`."""
+        """Go back to the state that was kept."""
         super().restore()
         self._pace = self._saved_pace

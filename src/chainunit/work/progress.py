@@ -8,3 +8,7 @@ Progress = Callable[[float], None]
 """A function that a task calls with the amount of work that is complete."""
 Report = Callable[[str, float, float], None]
 """A function that a task calls with its name, the amount of work that is complete, and the total amount."""
+
+
+def quiet(what: str, done: float, total: float) -> None:
+    """Report nothing: `what` is the task, `done` of `total` is complete."""

@@ -7,7 +7,7 @@ from dataclasses import replace
 from ...study.analysis import Analysis, Work
 from ...study.config import Config
 from ...study.drive import Drive
-from ...study.monte_carlo import MonteCarloResult, Task, run
+from ...study.monte_carlo import MonteCarloResult, RandomTask, run
 from ...study.record import StudyRecord
 
 
@@ -34,5 +34,5 @@ class RandomAnalysis(Analysis):
         files = work.rig.files
         assert work.folder is not None and files is not None
         drive = replace(study.drive, observer=None)
-        task = Task(study.config, drive, files, work.steady, work.rig.fed_from)
+        task = RandomTask(study.config, drive, files, work.steady, work.rig.fed_from)
         return run(task, work.folder, work.report, scheduler=work.scheduler)

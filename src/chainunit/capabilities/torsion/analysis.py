@@ -42,12 +42,12 @@ class TorsionAnalysis(Analysis):
 
     @staticmethod
     def applies(config: Config, drive: Drive) -> bool:
-        """See `Analysis`."""
+        """Whether the driveline turns, so that its torsion is analysed."""
         return drive.line is not None
 
     @staticmethod
     def find(study: StudyRecord, work: Work) -> TorsionFindings | None:
-        """See `Analysis`."""
+        """The torsion of the line in rotation; None of a slow line without the table [torsion]."""
         config, drive, modes = study.config, study.drive, study.statics.torsion
         plan: TorsionPlan = config.plans["torsion"]
         assert modes is not None
@@ -99,7 +99,7 @@ class TorsionFindings(Findings):
         return as_dict(self.analysis)
 
     def remark(self, study: StudyRecord) -> None:
-        """See `Findings`."""
+        """Add the remarks and notes on the torsion to the study."""
         study.remarks += self.remarks()
         steady = study.shaft.get(STEADY)
         peak = float(self.analysis.operating.peak2[0])

@@ -147,7 +147,7 @@ class LoadReader(EntryReader):
     # extremes of the motion
 
     def further(self, given: Expression, in_load: bool) -> dict[str, str | None]:
-        """See `EntryReader.further`."""
+        """The units of the extremes and tables of an expression, by name; a load may have them."""
         if not in_load:
             return super().further(given, in_load)
         found: dict[str, str | None] = {each: self.extreme(each, given.text) for each in given.extremes}
@@ -162,7 +162,7 @@ class LoadReader(EntryReader):
         return found
 
     def note(self, name: str, known: Any) -> str:
-        """See `EntryReader.note`."""
+        """A hint on a name that an expression does not know, such as a table over x."""
         if name in self.curve_units:
             return f"; it is a table over x: write table(x, {name})"
         return super().note(name, known)

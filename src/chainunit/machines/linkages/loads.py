@@ -104,7 +104,7 @@ class ForceLaw(NamedTuple):
     by_reactions: bool = False
 
     def effect(self, xp: Any, m: Moving, w: Any, reactions: Any) -> Effect:
-        """See `Acting`."""
+        """Force and moment [N, N m], and the dissipated power by speed."""
         at, link = m.pins[self.point], m.links[self.link]
         known = _motion(xp, m, w, self) | {
             "x": at.p.x, "y": at.p.y, "vx": at.p1.x * w, "vy": at.p1.y * w
@@ -129,7 +129,7 @@ class TorqueLaw(NamedTuple):
     by_reactions: bool = False
 
     def effect(self, xp: Any, m: Moving, w: Any, reactions: Any) -> Effect:
-        """See `Acting`."""
+        """The torque on the link [N m], which counts as dissipated."""
         link = m.links[self.link]
         torque = value_of(xp, self.torque, _motion(xp, m, w, self))
         return Effect((Wrench(self.link, ZERO, torque),), dissipative=-(torque * link.t1))
@@ -153,7 +153,7 @@ class SpringDamper(NamedTuple):
     by_reactions: bool = False
 
     def effect(self, xp: Any, m: Moving, w: Any, reactions: Any) -> Effect:
-        """See `Acting`."""
+        """Forces on both ends [N], with the energy of the spring [J]."""
         (one, a), (other, b) = ((link, m.pins[pin]) for link, pin in self.ends)
         arm = b.p - a.p
         length = arm.length(xp)

@@ -412,7 +412,7 @@ class LinkageDescription(LinkageOutputs):
 
             @staticmethod
             def linkage(xp: Any, p: Any, u: Any) -> Linkage:
-                """See `LinkageDescription.linkage`."""
+                """The linkage with its loads, with the parameters `p` and the inputs `u`."""
                 return described.linkage(xp, p, u)
 
             @classmethod
@@ -431,7 +431,7 @@ class LinkageDescription(LinkageOutputs):
 
             @staticmethod
             def probes(xp: Any, p: Any, u: Any, s: MachineState, a: Any) -> dict[str, Any]:
-                """See `LinkageDescription.probes`."""
+                """The machine's outputs at the state `s` and the driver's acceleration `a` [rad/s2, m/s2]."""
                 return described.probes(xp, p, u, s, a)
 
         FileMachine.required = required
@@ -473,5 +473,5 @@ class LinkageDescription(LinkageOutputs):
 
     @property
     def notes(self) -> str:
-        """See `chainunit.core.model.Model.notes`."""
+        """Words for the description of the FMU."""
         return notes_on(self.structure.driver, self.span, self.angle_counts)

@@ -10,8 +10,8 @@ from typing import Any
 
 from ...core.engines import MATH
 from ...core.errors import InputError
+from ...core.search import lowest
 from ...groups.triad import MOST_MISFIT, Triad
-from ...mechanism.extremes import lowest
 from ...mechanism.linkage import Linkage
 from ...mechanism.machine import Mechanism, derived_numbers
 

@@ -13,7 +13,7 @@ from ...core.errors import Faults, InputError, printable
 from ...core.temporary_folders import scratch
 from ...drives.induction_motor import InductionMotor
 from ...system import Profile
-from ...work.progress import Report
+from ...work.progress import Report, quiet
 from ..arrays import rms
 from ..choice import choose
 from ..config import Config
@@ -158,7 +158,7 @@ def system_name(name: str) -> str:
 
 def identify(
     config: Config,
-    report: Report = lambda *_: None,
+    report: Report = quiet,
     told: Callable[[IdentificationPlan, Information], None] = lambda *_: None,
 ) -> IdentifiedMachine:
     """Identify the machine of a study from the recordings of its table [identify].
@@ -293,7 +293,7 @@ def drive_of(config: Config, recordings: Mapping[str, Recording]) -> Drive:
             "motor",
         )
     with scratch() as folder:
-        return choose(config, folder, lambda *_: None).drive
+        return choose(config, folder, quiet).drive
 
 
 def _problem(

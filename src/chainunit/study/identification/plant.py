@@ -245,7 +245,7 @@ class Plant:
         return self._drive.machine
 
     def with_names(self, by: Sequence[str]) -> Plant:
-        """See `AnyPlant.with_names`."""
+        """The same plant, of which the parameters and inputs `by` are sought."""
         return Plant(self._drive, self._measured, by)
 
     @cached_property
@@ -262,7 +262,7 @@ class Plant:
     def respond(
         self, course: Course, directions: Mapping[str, tuple[str, float]], workers: int = 1
     ) -> Response:
-        """See `AnyPlant.respond`."""
+        """Simulate a run; the slopes are derivatives by changes of the size of the `directions`."""
         loop, changes = self._loop, list(directions.values())
         speed, lead = course.crank_speed * self.ratio, course.begin - LEAD
         angle = course.nuisances[ANGLE] * self.ratio - speed * LEAD

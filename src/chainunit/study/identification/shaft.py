@@ -100,7 +100,7 @@ class MeasuredShaft:
         return self._machine
 
     def with_names(self, by: Sequence[str]) -> MeasuredShaft:
-        """See `AnyPlant.with_names`."""
+        """The same plant, of which the parameters and inputs `by` are sought."""
         return MeasuredShaft(self._machine, self._measured, by)
 
     def nuisances(self, run: Overview) -> Iterator[Nuisance]:
@@ -124,7 +124,7 @@ class MeasuredShaft:
     def respond(
         self, course: Course, directions: Mapping[str, tuple[str, float]], workers: int = 1
     ) -> Response:
-        """See `AnyPlant.respond`."""
+        """Simulate a run; the slopes are derivatives by changes of the size of the `directions`."""
         changes = list(directions.values())
         if course.off is not None:
             return self._switched_off(course, course.off, changes, workers)

@@ -20,7 +20,7 @@ from ...fmu.backends import export
 from ...machines.load_observer import LoadObserver
 from ...reading.tables import instance
 from ...system.instance import Fmu, Instance
-from ...work.progress import Report
+from ...work.progress import Report, quiet
 from ..arrays import rms, stretches
 from ..config import Config
 from ..drive import Drive
@@ -144,7 +144,7 @@ class WatchedRecording:
 
     @property
     def noises(self) -> tuple[float, float]:
-        """See `noises`."""
+        """The noise of the signal and of the measured speed, over the stated noise [1], see `noises`."""
         return noises(self.checks, self.problem.runs[0].recording)
 
     @property
@@ -174,7 +174,7 @@ def watch_plan_of(config: Config) -> WatchPlan:
     return plan
 
 
-def watch(config: Config, report: Report = lambda *_: None) -> WatchedRecording:
+def watch(config: Config, report: Report = quiet) -> WatchedRecording:
     """Run the load observer over the recording of the table [watch].
 
     Raises

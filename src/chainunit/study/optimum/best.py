@@ -12,7 +12,7 @@ import numpy as np
 from ...core.temporary_folders import scratch
 from ...fmu.backends import Backend
 from ...machines.machine import Machine
-from ...work.progress import Report
+from ...work.progress import Report, quiet
 from ..cycle import cycle
 from ..cycle_quantities import CycleQuantity
 from .checks import FmuValue, Neighbours, by_fmu, neighbours
@@ -40,32 +40,32 @@ class Best:
     """What a search found. Without a machine that meets all limits, `answer` is None and `conflict` says why."""
 
     wishes: Wishes
-    answer: Answer | None
-    conflict: Conflict | None
     starts: int
     moved: int
     """starts that were moved until the machine can be assembled"""
-    feasible: int
-    """starts that ended at a machine that meets all limits"""
-    agree: int
-    """starts that reached the best value"""
-    values: tuple[float, ...]
-    """the value that each feasible start reached, in rising order"""
     today: Mapping[str, float]
     """quantities of today's machine, by name"""
-    found: Mapping[str, float]
+    effort: Effort
+    idle: Mapping[str, tuple[float, float]]
+    """bounds of the free parameters without any effect, which keep their values; `wishes` has the others"""
+    found: Mapping[str, float] = field(default_factory=dict)
     """quantities of the best machine, or of the nearest one"""
-    pulls: tuple[float, float] | None
+    pulls: tuple[float, float] | None = None
     """least mean pull along a web up to the slack-free speed, of today's machine and of the best or nearest one [N];
     None without that wish"""
-    neighbours: Neighbours | None
-    fmu: Mapping[str, FmuValue]
-    front: tuple[FrontPoint, ...]
-    effort: Effort
+    conflict: Conflict | None = None
+    answer: Answer | None = None
+    feasible: int = 0
+    """starts that ended at a machine that meets all limits"""
+    agree: int = 0
+    """starts that reached the best value"""
+    values: tuple[float, ...] = ()
+    """the values that the feasible starts reached, in rising order"""
+    neighbours: Neighbours | None = None
+    fmu: Mapping[str, FmuValue] = field(default_factory=dict)
+    front: tuple[FrontPoint, ...] = ()
     turns: Mapping[str, Any] = field(default_factory=dict)
     """crank angle [rad] and crank torque [N m] of today's machine and of the best one"""
-    idle: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    """bounds of the free parameters without any effect, which keep their values; `wishes` has the others"""
 
     @property
     def quantities(self) -> dict[str, CycleQuantity]:
@@ -104,11 +104,7 @@ def machine_at(wishes: Wishes, x: Any) -> Machine:
     return wishes.machine.replace(dict(zip(wishes.names, map(float, x), strict=True)))
 
 
-def _quiet(what: str, done: float, total: float) -> None:
-    pass
-
-
-def find_best(wishes: Wishes, report: Report = _quiet, backend: Backend | None = None) -> Best:
+def find_best(wishes: Wishes, report: Report = quiet, backend: Backend | None = None) -> Best:
     """Search for the best machine, and check it.
 
     Raises
@@ -125,28 +121,11 @@ def find_best(wishes: Wishes, report: Report = _quiet, backend: Backend | None =
     if not good:
         report("a machine that meets all limits", 0.0, 1.0)
         good, failure = _repaired(search, starts)
-    today = _values(search, search.today)
+    begun = Best(wishes, len(starts), moved, _values(search, search.today), search.effort, idle)
     if not good:
         assert failure is not None
-        found, pulls = _values(search, failure.nearest.x), _pulls(search, failure.nearest.x)
-        return Best(
-            wishes,
-            None,
-            failure,
-            len(starts),
-            moved,
-            0,
-            0,
-            (),
-            today,
-            found,
-            pulls,
-            None,
-            {},
-            (),
-            search.effort,
-            idle=idle,
-        )
+        at = failure.nearest.x
+        return replace(begun, conflict=failure, found=_values(search, at), pulls=_pulls(search, at))
     best = min(good, key=lambda answer: answer.value)
     front: tuple[FrontPoint, ...] = ()
     if len(wishes.objectives) > 1:
@@ -158,24 +137,18 @@ def find_best(wishes: Wishes, report: Report = _quiet, backend: Backend | None =
     around = neighbours(search, best.x, objective, limits, search.value(objective, best.x))
     found = _values(search, best.x)
     machine = machine_at(wishes, best.x)
-    return Best(
-        wishes,
-        best,
-        None,
-        len(starts),
-        moved,
-        len(good),
-        agree,
-        tuple(sorted(answer.value for answer in good)),
-        today,
-        found,
-        _pulls(search, best.x),
-        around,
-        _by_fmu(search, best, machine, found, backend),
-        front,
-        search.effort,
-        _turns(wishes, machine),
-        idle,
+    return replace(
+        begun,
+        answer=best,
+        found=found,
+        pulls=_pulls(search, best.x),
+        feasible=len(good),
+        agree=agree,
+        values=tuple(sorted(answer.value for answer in good)),
+        neighbours=around,
+        fmu=_by_fmu(search, best, machine, found, backend),
+        front=front,
+        turns=_turns(wishes, machine),
     )
 
 
@@ -219,7 +192,8 @@ def _values(search: Search, x: Any) -> dict[str, float]:
 
 
 def _pulls(search: Search, x: Any) -> tuple[float, float] | None:
-    """See `Best.pulls`."""
+    """The least mean pull along a web up to the slack-free speed, of today's machine and of the machine with the free
+    parameters `x` [N], see `Best.pulls`; NaN where one does not turn."""
     if not search.wishes.slack_free_speed:
         return None
     today, own = (search.least_pull(at) if search.turns(at) else math.nan for at in (search.today, x))

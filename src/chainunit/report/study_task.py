@@ -1,0 +1,69 @@
+"""The task of ``chainunit study``: the runs of a study, their report, and their files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from ..models import MODELS
+from ..study.choice import check_files
+from ..study.config import Config
+from ..study.record import INSUFFICIENT, LOAD_CYCLE, SPEED_MISSED, StudyRecord
+from ..study.registry import registered
+from ..study.run import run_study
+from ..work.progress import Report as Progress
+from . import series
+from . import study as contents
+from .task import Task, Writer
+
+
+def _accept(config: Config, *, scheduler: str | None = None, **options: Any) -> None:
+    with config.of_file():
+        check_files(config)
+    if scheduler is not None:
+        for part in registered():
+            part.check_scheduler(config, scheduler)
+
+
+def _compute(config: Config, folder: Path, progress: Progress, **options: Any) -> StudyRecord:
+    """Run a study; options and errors are those of `run_study`. A refusal begins with the name of the study file, if
+    there is one."""
+    progress("the machine at constant speed", 0.0, 1.0)
+    with config.of_file():
+        return run_study(config, folder, progress, **options)
+
+
+def _writers(record: StudyRecord, folder: Path, of_report: list[Writer]) -> list[Writer]:
+    numbers, *others = of_report
+    return [numbers, lambda: series.write(record, folder), *others]
+
+
+def _fmus(config: Config) -> tuple[str, ...]:
+    return tuple(f"fmu/{name}.fmu" for name in dict.fromkeys((*MODELS, config.machine.model.name)))
+
+
+def _kept(record: StudyRecord, folder: Path) -> Iterator[Path]:
+    yield from (folder / "fmu").iterdir()
+    yield from filter(None, (findings.store for findings in record.findings.values()))
+
+
+def _shortfall(record: StudyRecord) -> str | None:
+    if record.insufficient:
+        return INSUFFICIENT
+    return None if record.reaches else SPEED_MISSED
+
+
+TASK: Task[Config, StudyRecord] = Task(
+    "study",
+    _compute,
+    contents.report,
+    files=(*contents.pictures(), series.SERIES, LOAD_CYCLE),
+    accept=_accept,
+    writers=_writers,
+    replaced=_fmus,
+    kept=_kept,
+    failure=lambda record: record.failure,
+    shortfall=_shortfall,
+    tells_remarks=True,
+)

@@ -1,0 +1,105 @@
+"""A task: what a command computes, reports and leaves in a folder.
+
+The command line (`chainunit.app.console.carry_out`) and Python (`chainunit.app.results.ReportedResult`) take the same
+steps by it: they claim the folder, clear it, compute, report and write.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from ..core.errors import RunError, WriteError
+from ..core.files import RESULTS, claim, clear, write_all
+from ..work.progress import Report as Progress
+from . import files
+from .blocks import Report
+
+Question = TypeVar("Question")
+"""What a task is asked: the configuration of a study, or the content of other files."""
+Outcome = TypeVar("Outcome")
+"""What a task computes."""
+Writer = Callable[[], list[Path]]
+"""A function that writes files, and returns them."""
+
+
+def no_check(question: Any, **options: Any) -> None:
+    """Accept a question that was checked before."""
+
+
+@dataclass(frozen=True)
+class Task(Generic[Question, Outcome]):
+    """A command with a report in a folder."""
+
+    name: str
+    """name of the command; the folder is claimed for it, see `chainunit.core.files.claim`"""
+    compute: Callable[..., Outcome]
+    """gets the question, the folder (None without one), the function for the progress, and options by their names"""
+    report: Callable[[Outcome], Report]
+    files: tuple[str, ...] = ()
+    """names of the files beside the numbers, the text and the page. One with * stands for all files of such a name:
+    it is cleared, and not claimed."""
+    accept: Callable[..., object] | None = None
+    """gets the question and the options, and refuses what is wrong. With it the files of an earlier result are
+    removed before the computation; without it after the computation, which then refuses."""
+    writers: Callable[[Outcome, Path, list[Writer]], list[Writer]] = lambda outcome, folder, of_report: (
+        of_report
+    )
+    """gets the outcome, the folder and the writers of the report: numbers, pictures, text, page. Gives all writers in
+    their order."""
+    replaced: Callable[[Question], tuple[str, ...]] = lambda question: ()
+    """names of the files that the computation replaces by itself: they are claimed, and not cleared"""
+    kept: Callable[[Outcome, Path], Iterable[Path]] | None = None
+    """the files and folders that the computation left in its folder; a task without it computes without a folder"""
+    failure: Callable[[Outcome], RunError | None] = lambda outcome: None
+    """the error that ended the computation early; what was computed before this error is reported and written"""
+    shortfall: Callable[[Outcome], str | None] = lambda outcome: None
+    """None where the outcome is what was sought, else a sentence for the terminal, or "": the exit status is 1"""
+    tells_remarks: bool = False
+    """whether a terminal has the remarks of the report already, as those on the study file"""
+
+    @property
+    def _stem(self) -> str:
+        return RESULTS[self.name].file.removesuffix(".json")
+
+    def claimed(self, question: Question, folder: Path) -> AbstractContextManager[Path]:
+        """The folder, for this process alone. Errors are those of `chainunit.core.files.claim`."""
+        names = [name for name in self.files if "*" not in name]
+        return claim(folder, self.name, *names, *self.replaced(question))
+
+    def clear(self, folder: Path) -> None:
+        """Remove the files of an earlier result from a folder, see `chainunit.core.files.clear`."""
+        names: list[str] = []
+        for name in self.files:
+            names += sorted(file.name for file in folder.glob(name)) if "*" in name else [name]
+        clear(folder, *files.names(self._stem, tuple(names)))
+
+    def outcome(self, question: Question, folder: Path | None, progress: Progress, **options: Any) -> Outcome:
+        """Compute in a claimed folder, or without one. The files of an earlier result are removed once the question
+        is accepted.
+
+        Raises
+        ------
+        InputError
+            for a question that is refused; an earlier result stays.
+        RunError
+            see the task.
+        """
+        if self.accept is not None:
+            self.accept(question, **options)
+            self._clear_if_any(folder)
+        outcome = self.compute(question, folder, progress, **options)
+        if self.accept is None:
+            self._clear_if_any(folder)
+        return outcome
+
+    def _clear_if_any(self, folder: Path | None) -> None:
+        if folder is not None:
+            self.clear(folder)
+
+    def write(self, outcome: Outcome, report: Report, folder: Path) -> tuple[list[Path], WriteError | None]:
+        """Write all files. Returns the files, and the first error of a file that could not be written, or None."""
+        return write_all(self.writers(outcome, folder, files.writers(report, folder, self._stem)))
