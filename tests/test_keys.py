@@ -19,7 +19,7 @@ from chainunit.models import MACHINES
 from chainunit.study.commented import commented
 from chainunit.study.config import parse
 from chainunit.study.event import TYPES
-from chainunit.study.keys import ENTRIES, catalogue_columns, key_tables
+from chainunit.study.keys import LISTS, catalogue_columns, key_tables
 from chainunit.study.parts import Parts, example
 from chainunit.study.schema import json_schema
 
@@ -51,7 +51,7 @@ def test_each_key_of_the_form_is_documented(machine, motor):
     assert {
         name
         for name in documented - asked
-        if not name.startswith(("event.", "report.units.", *(f"{each}." for each in ENTRIES)))
+        if not name.startswith(("event.", "report.units.", *(f"{each}." for each in LISTS)))
     } == set()
 
 

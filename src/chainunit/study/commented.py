@@ -10,7 +10,7 @@ from ..core.messages import unit_behind
 from ..drives.motors import MOTORS
 from ..reading.tables import toml
 from ..reading.toml_lines import Statement, statements
-from .keys import ENTRIES, Key, KeyTable, key_tables
+from .keys import LISTS, Key, KeyTable, key_tables
 from .schema import FILE
 
 _OF_OTHERS = ("motor_names.", "machine_names.")
@@ -46,7 +46,7 @@ def commented(text: str, machine: str = "ChamberForces") -> str:
 def _keys(table: str, machine: str, types: list[str]) -> Iterator[Key]:
     """The keys of a table of the file; of an event, those of its type."""
     name, _, number = table.partition(".")
-    name = next((each for each in ENTRIES if table.startswith(f"{each}.")), name)
+    name = next((each for each in LISTS if table.startswith(f"{each}.")), name)
     of = types[int(number) - 1] if name == "event" else machine
     for each in key_tables():
         if each.name == name and each.of in ("", of):

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import typing
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -21,13 +21,14 @@ from ..drives.motors import MOTORS
 from ..drives.shafts import SECTIONS as PROFILES
 from ..drives.shafts import Shaft
 from ..models import MACHINES
+from ..reading.lists import TableList
 from ..reading.text import CHOICES as UNITS
 from .config import Config, parse
 from .event import TYPES, Event
-from .identification.table import RUN_KEYS, SENSOR_KEYS, ParameterEntry, RunTable, SensorTable
+from .identification.table import RUNS, SENSORS, SOUGHT
 from .parts import ReportTable
 from .sections import CHOICES, SECTIONS, Ratios, SystemTable
-from .sweep_table import SweepEntry
+from .sweep_table import SWEPT
 
 _FOLLOWS = {
     "gear.ratio": "the one that gives the crank its speed under the mean load; with [sizing] the nearest on offer",
@@ -62,11 +63,6 @@ _FOLLOWS = {
 
 
 _VALUE = "a number, or a text with a unit"
-
-
-def _fields(keys: Mapping[str, Any]) -> dict[str, FieldInfo]:
-    """Fields with their types, from pairs of both."""
-    return {name: FieldInfo.from_annotated_attribute(of, field) for name, (of, field) in keys.items()}
 
 
 @dataclass(frozen=True)
@@ -124,7 +120,7 @@ class KeyTable:
     @property
     def is_list(self) -> bool:
         """Whether a file may have several tables of this name."""
-        return self.name in ("event", *ENTRIES)
+        return self.name in ("event", *LISTS)
 
     @property
     def bracketed(self) -> str:
@@ -134,15 +130,8 @@ class KeyTable:
         return f"[{self.name}]" if self.name else "before all tables"
 
 
-_ENTRIES: Mapping[str, tuple[str, type | None, Mapping[str, Any]]] = {
-    "sweep.parameter": ("Parameter of a sweep", None, SweepEntry.model_fields),
-    "identify.parameter": ("Number that is sought", None, ParameterEntry.model_fields),
-    "identify.run": ("Recorded run", RunTable, _fields(RUN_KEYS)),
-    "identify.sensor": ("Sensor of a recording", SensorTable, _fields(SENSOR_KEYS)),
-}
-"""By the name of a list of tables in a table: its title, the declaration of its quantities, and its other keys."""
-ENTRIES = tuple(_ENTRIES)
-"""Names of the lists of tables in a table."""
+LISTS: Mapping[str, TableList] = {each.name: each for each in (SWEPT, SOUGHT, RUNS, SENSORS)}
+"""By name, the lists of tables in a table."""
 
 
 @cache
@@ -164,7 +153,7 @@ def key_tables() -> tuple[KeyTable, ...]:
         ),
         *(KeyTable("motor", "Motor", tuple(_of_motor(name)), name) for name in MOTORS),
         *(KeyTable(name, SECTIONS[name].title, tuple(_of_section(name))) for name in SECTIONS),
-        *(KeyTable(name, title, tuple(_of_entry(name))) for name, (title, *_) in _ENTRIES.items()),
+        *(KeyTable(name, each.title, tuple(_of_entry(each))) for name, each in LISTS.items()),
         KeyTable("report", "Report", tuple(_of_report())),
         *(KeyTable("event", _first_sentence(of), tuple(_of_event(of)), name) for name, of in TYPES.items()),
     )
@@ -218,9 +207,7 @@ def _of_section(name: str) -> Iterator[Key]:
     if values is None:
         values = section.default or section.declaration()
     yield from _numbers(section.declaration, values, table=name)
-    for key in _of_fields(section.keys):
-        follows = _FOLLOWS.get(f"{name}.{key.name}", "")
-        yield dataclasses.replace(key, follows=follows) if follows else key
+    yield from _followed(name, _of_fields(section.keys))
     if name == "driveline":
         yield from _numbers(Damping)
         for shaft, stiffness in SHAFTS.items():
@@ -282,13 +269,16 @@ def _of_event(of: type[Event]) -> Iterator[Key]:
     yield from _numbers(of.Parameters, of.Parameters())
 
 
-def _of_entry(name: str) -> Iterator[Key]:
-    _, declared, fields = _ENTRIES[name]
-    keys = list(_of_fields({key: (field.annotation, field) for key, field in fields.items()}))
-    if declared is not None:
-        keys += _numbers(declared, declared(), table=name)
+def _of_entry(of: TableList) -> Iterator[Key]:
+    yield from _followed(of.name, _of_fields(of.keys))
+    if of.declared is not None:
+        yield from _numbers(of.declared, of.declared(), table=of.name)
+
+
+def _followed(table: str, keys: Iterable[Key]) -> Iterator[Key]:
+    """The keys with the source of a value that a file leaves out."""
     for key in keys:
-        follows = _FOLLOWS.get(f"{name}.{key.name}", "")
+        follows = _FOLLOWS.get(f"{table}.{key.name}", "")
         yield dataclasses.replace(key, follows=follows) if follows else key
 
 

@@ -18,12 +18,11 @@ from ..reading.unit_patterns import pattern, zero
 from .event import TYPES
 from .event_table import LONGEST_NAME, PLACED, RESERVED
 from .identification.measurands import MEASURANDS
-from .identification.table import MOST_PARAMETERS as MOST_SOUGHT
-from .identification.table import MOST_RUNS, MOST_SENSORS, MOST_SPEEDS
-from .keys import ENTRIES, Key, KeyTable, key_tables
+from .identification.table import MOST_SPEEDS, RUNS, SOUGHT
+from .keys import LISTS, Key, KeyTable, key_tables
 from .parts import LONGEST_FILE
 from .schema_rules import OF_PARTS, rules
-from .sweep_table import MEASURES_OF_SWEEP, MOST_PARAMETERS, MOST_RESULTS, MOST_VALUES
+from .sweep_table import MEASURES_OF_SWEEP, MOST_RESULTS, MOST_VALUES
 
 FILE = "chainunit.schema.json"
 """The name by which examples refer to it."""
@@ -36,11 +35,9 @@ _FORMS: dict[str, dict[str, Any]] = {
     "optimize.objectives": {"items": {"type": "string"}, "maxItems": 2},
     "sweep.quantities": {"items": {"type": "string"}, "maxItems": MOST_RESULTS},
     "sweep.measures": {"items": {"enum": list(MEASURES_OF_SWEEP)}, "maxItems": len(MEASURES_OF_SWEEP)},
-    "sweep.parameter": {"maxItems": MOST_PARAMETERS},
+    **{name: {"maxItems": each.most} for name, each in LISTS.items()},
     "sweep.parameter.name": {"minLength": 1},
-    "identify.parameter": {"maxItems": MOST_SOUGHT, "minItems": 1},
-    "identify.run": {"maxItems": MOST_RUNS, "minItems": 1},
-    "identify.sensor": {"maxItems": MOST_SENSORS},
+    **{each.name: {"maxItems": each.most, "minItems": 1} for each in (SOUGHT, RUNS)},
     "identify.parameter.name": {"minLength": 1},
     "identify.run.name": {"pattern": r"^[a-z][a-z0-9_]{0,19}$"},
     "identify.run.file": {"minLength": 1},
@@ -94,7 +91,7 @@ class _Schema:
                 self.definitions[f"event.{table.of}"] = self._event(table)
                 continue
             place = properties
-            if table.name in ENTRIES:
+            if table.name in LISTS:
                 above, _, name = table.name.partition(".")
                 properties[above]["properties"][name]["items"] = self._entry(table)
                 continue
