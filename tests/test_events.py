@@ -64,7 +64,10 @@ def test_events_are_named_after_type_and_side():
         ),
         ('[[event]]\nside = "left"', "event 1: type: must be given, one of jam, lumps, "),
         ('[[event]]\ntype = "dip"\nname = "Dip 1"', 'event 1 (dip): name = "Dip 1": must be small letters'),
-        ('[[event]]\ntype = "dip"\nname = "steady"', 'event 1 (dip): name = "steady": is that of another'),
+        (
+            '[[event]]\ntype = "dip"\nname = "steady"',
+            'event 1 (dip): name = "steady": is the name of another',
+        ),
         ('event = [{ type = "dip" }, { type = "blocked", name = "dip" }]', 'event 2 (blocked): name = "dip"'),
         ('[[event]]\ntype = "lumps"\nside = "left"\nnumber = 2.5', "event.lumps_left.number = 2.5: must be"),
         ("[monte_carlo]\nevent = { crank_angle = 1 }", "monte_carlo.event.crank_angle: is not of random"),

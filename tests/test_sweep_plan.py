@@ -92,7 +92,7 @@ def test_values_of_the_study_and_the_results():
         ("[[sweep.parameter]]\nname = 'run.step'\nvalues = [1]\n", "must be the full name of a number"),
         ("[[sweep.parameter]]\nvalues = [1]\n", "sweep.parameter.1.name: must be given"),
         (R + "tolerance = 1\n", "take one of these ways only"),
-        (R + R, "machine.r stands there twice"),
+        (R + R, 'sweep.parameter.2.name = "machine.r": stands there twice'),
         (SPEED + "distribution = 'normal'\n", "is of a tolerance"),
         (SPEED.replace("4", "'30 rpm'"), "has a value twice"),
         (SPEED.replace("4", "true"), "must be a number, or a text with a unit"),

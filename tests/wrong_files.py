@@ -158,7 +158,7 @@ FILES = [
         "duration = ['1 s', '1 m']\nfoce = 3",
         [
             (2, "run.step", "must be"),
-            (5, "monte_carlo.event: side", '"left" or "right"'),
+            (5, "monte_carlo.event.side", '"left" or "right"'),
             (6, "monte_carlo.event.turns", "at any crank angle"),
             (7, "monte_carlo.event.force = [1, 2, 3]", "from where to where"),
             (8, "monte_carlo.event.duration", 'such as "2 s"'),

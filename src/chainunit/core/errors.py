@@ -7,7 +7,7 @@ import itertools
 import json
 import re
 import unicodedata
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import date, time
 from typing import Any
@@ -92,11 +92,11 @@ class Faults:
 
     @contextmanager
     def collected(self) -> Iterator[None]:
-        """Add the InputErrors of a block, and go on after the block."""
+        """Add the InputErrors of a block that are not yet collected, and go on after the block."""
         try:
             yield
         except InputError as error:
-            self.errors += error.faults
+            self.errors += [fault for fault in error.faults if fault not in self.errors]
 
     def add(self, errors: Iterable[InputError]) -> None:
         """Add some errors."""
@@ -124,6 +124,11 @@ def near_name(given: str, known: Iterable[str]) -> str:
 def meant(given: str, known: Iterable[str]) -> str:
     """Words to add to a refusal that goes on behind: with a question where a name is similar, else a semicolon."""
     return near_name(given, known) or ";"
+
+
+def one_of(given: object, known: Collection[str]) -> str:
+    """Words on the allowed names: all of them, and the one that is similar to the `given` name."""
+    return f"one of {', '.join(known)}{near_name(str(given), known)}"
 
 
 _JOINERS = "\u200c\u200d"  # some scripts and signs need these characters inside a word

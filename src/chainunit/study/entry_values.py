@@ -26,6 +26,16 @@ Entered = Annotated[Any, BeforeValidator(_admitted)]
 """A number, or a text with a unit."""
 
 
+def entered(description: str) -> Any:
+    """The key of a number, or a text with a unit, as a pydantic field; without a value where it is left out."""
+    return Entered, Field(None, description=description)
+
+
+def filled_text(description: str) -> Any:
+    """The key of a text that is not empty, as a pydantic field."""
+    return str, Field("", min_length=1, description=description)
+
+
 def numbers(
     declaration: type, quantity_name: str, name: str, most: int, is_empty_allowed: bool = True
 ) -> Any:

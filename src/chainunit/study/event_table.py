@@ -13,6 +13,7 @@ Without it, the name is made from type and side, with a number for further event
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -22,11 +23,12 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel
 
-from ..core.errors import Faults, InputError, each_refusal, near_name, shown
+from ..core.errors import Faults, InputError, each_refusal, near_name
 from ..core.quantities import Layout, Variable, variables
 from ..machines.chain_unit import SIDES
 from ..mechanism.models import MachineModel
-from ..reading.tables import given_values, instance, read_table, schema, to_number
+from ..reading.lists import Entry, read_entries
+from ..reading.tables import given_values, instance, read_table, schema
 from .event import TYPES, AnySide, Event, on_side
 from .events import Jam
 
@@ -55,20 +57,22 @@ def read_events(tables: Sequence[Any], machine: type[MachineModel] | None = None
     """
     events: dict[str, Event] = {}
     faults = Faults()
-    for k, table in enumerate(tables, 1):
-        with faults.collected():
-            of = _type(table, f"event {k}", f"event.{k}")
-            of = _with_input(of, table, f"event {k} ({of.kind})", f"event.{k}", faults)
-            where, place = f"event {k} ({of.kind})", f"event.{k}"
-            side = _side(of, table, where, place, faults)
-            if "side" not in table and of.has_side:
-                words = 'side: must be given, "left" or "right"'
-                if machine is not None and not machine.sides:
-                    words = f"the {machine.name} has no sides; {inputs_of(machine)}"
-                faults.add([InputError(f"{where}: {words}", place)])
-            usual = of.on(side).name if side or not of.has_side else of.kind
-            name = _name(table, usual, events, where, place, faults)
-            events[name] = of.on(side, _parameters(of, table, f"event.{name}.", f"{place}."), name)
+
+    def read(entry: Entry, number: int) -> None:
+        of = _type(entry)
+        entry.title += f" ({of.kind})"
+        of, side = _with_input(of, entry), _side(of, entry)
+        if "side" not in entry.given and of.has_side:
+            if machine is None or machine.sides:
+                entry.fault("side", 'must be given, "left" or "right"')
+            else:
+                line = f"{entry.title}: the {machine.name} has no sides; {inputs_of(machine)}"
+                entry.add([InputError(line, entry.place)])
+        usual = of.on(side).name if side or not of.has_side else of.kind
+        name = _name(entry, usual, events)
+        events[name] = of.on(side, _parameters(of, entry.given, f"event.{name}.", f"{entry.place}."), name)
+
+    read_entries(enumerate(tables, 1), "event", faults, read, "event")
     faults.refuse()
     return events
 
@@ -123,102 +127,85 @@ def read_random_event(table: Mapping[str, Any], where: str) -> RandomEvent:
     InputError
         see `read_events`.
     """
-    faults = Faults()
-    of = _type({"type": Jam.kind, **table}, where, where)
-    of = _with_input(of, table, where, where, faults)
+    entry = Entry(where, {"type": Jam.kind, **table})
+    of = _with_input(_type(entry), entry)
     if of.from_rest:
-        key = f"{where}.type"
-        raise InputError(f'{key} = "{of.kind}": must be an event in steady running', key)
+        entry.wrong("type", of.kind, "must be an event in steady running")
+        entry.refuse()
     for name in (*PLACED, "name"):
         if name in table:
-            key = f"{where}.{name}"
-            faults.add([InputError(f"{key}: is not of random overloads, which come at any crank angle", key)])
+            entry.fault(name, "is not of random overloads, which come at any crank angle")
     ranges = {name: ends for name, ends in of.draws.items() if name not in table}
     given = [v for v in variables(of.Parameters) if isinstance(table.get(v.name), list)]
     for v in given:
-        with faults.collected():
-            ranges[v.name] = _range(replace(v, name=f"{where}.{v.name}"), table[v.name])
+        ranges[v.name] = _range(entry, v)
     drawn = {*ranges, *(v.name for v in given), *PLACED, "name", "input"}
     ordered = {name: ranges[name] for name in Layout(of.Parameters).names if name in ranges}
-    side = _side(of, table, where, where, faults)
-    with faults.collected():
+    side = _side(of, entry)
+    with entry.collected():
         fixed = {name: value for name, value in table.items() if name not in drawn}
         p = _parameters(of, fixed, f"{where}.")
-    faults.refuse()
+    entry.refuse()
     return RandomEvent(of, side, p, ordered)
 
 
-def _range(variable: Variable, ends: Any) -> tuple[float, float]:
+def _range(entry: Entry, variable: Variable) -> tuple[float, float]:
     """The range from which a quantity is drawn."""
-    name = variable.name
+    name, ends = variable.name, entry.given[variable.name]
     if len(ends) != 2:
-        raise InputError(f"{name} = {shown(ends)}: must be a number, or two: from where to where", name)
-    try:
-        low, high = (to_number(variable, end) for end in ends)
-    except ValueError as error:
-        raise InputError(str(error), name) from error
+        entry.wrong(name, ends, "must be a number, or two: from where to where")
+        return math.nan, math.nan
+    low, high = (entry.quantity(name, variable, end) for end in ends)
     if high < low:
-        raise InputError(f"{name} = {shown(ends)}: the second must be >= the first", name)
+        entry.wrong(name, ends, "the second must be >= the first")
     return low, high
 
 
-def _type(table: Any, where: str, place: str) -> type[Event]:
-    """The type that the table names; a refusal begins with `where`, and its key with `place`."""
-    if not isinstance(table, Mapping):
-        raise InputError(f"{where} = {shown(table)}: must be a table", place)
-    name = table.get("type")
-    of = TYPES.get(name) if isinstance(name, str) else None
-    if of is None:
-        refused = ": must be given," if name is None else f" = {shown(name)}: must be"
-        line = f"{where}: type{refused} one of {', '.join(TYPES)}{near_name(str(name), TYPES)}"
-        raise InputError(line, f"{place}.type")
+def _type(entry: Entry) -> type[Event]:
+    """The type that the table names."""
+    of = entry.choice("type", TYPES)
+    entry.refuse()
+    assert of is not None
     return of
 
 
-def _with_input(
-    of: type[Event], table: Mapping[str, Any], where: str, place: str, faults: Faults
-) -> type[Event]:
-    """The type for the input that the table names; a refusal of that goes to the `faults`."""
-    name = table.get("input")
+def _with_input(of: type[Event], entry: Entry) -> type[Event]:
+    """The type for the input that the table names."""
+    name = entry.given.get("input")
     if of.has_input and isinstance(name, str) and name:
         return of.of_input(name)
-    words = ""
-    if of.has_input:
-        given = ": must be given," if name is None else f" = {shown(name)}: must be"
-        words = f"{given} the name of an input, as [feed] has it"
+    if of.has_input and name is None:
+        entry.fault("input", "must be given, the name of an input, as [feed] has it")
+    elif of.has_input:
+        entry.wrong("input", name, "must be the name of an input, as [feed] has it")
     elif name is not None:
-        words = ": this event has none; leave it out"
-    if words:
-        faults.add([InputError(f"{where}: input{words}", f"{place}.input")])
+        entry.fault("input", "this event has none; leave it out")
     return of
 
 
-def _side(of: type[Event], table: Mapping[str, Any], where: str, place: str, faults: Faults) -> AnySide:
-    """The side that the table names; empty for a wrong one, whose refusal goes to the `faults`."""
-    if "side" not in table:
-        return ""
-    for side in SIDES if of.has_side else ():
-        if table["side"] == side:
-            return side
-    wrong = f' = {shown(table["side"])}: must be "left" or "right"{near_name(str(table["side"]), SIDES)}'
-    words = wrong if of.has_side else ": this event has none; leave it out"
-    faults.add([InputError(f"{where}: side{words}", f"{place}.side")])
+def _side(of: type[Event], entry: Entry) -> AnySide:
+    """The side that the table names; empty, with a fault, for a wrong one."""
+    given = entry.given.get("side", "")
+    if "side" in entry.given and not of.has_side:
+        entry.fault("side", "this event has none; leave it out")
+    elif "side" in entry.given and given not in SIDES:
+        entry.wrong("side", given, f'must be "left" or "right"{near_name(str(given), SIDES)}')
+    else:
+        return given
     return ""
 
 
-def _name(
-    table: Mapping[str, Any], usual: str, others: Mapping[str, Event], where: str, place: str, faults: Faults
-) -> str:
-    """The name of the run; the usual name in place of a wrong one, whose refusal goes to the `faults`."""
-    if "name" in table:
-        name = table["name"]
+def _name(entry: Entry, usual: str, others: Mapping[str, Event]) -> str:
+    """The name of the run; the usual name, with a fault, in place of a wrong one."""
+    if "name" in entry.given:
+        name = entry.given["name"]
         if not isinstance(name, str) or not _NAME.fullmatch(name) or name.endswith("_coasting"):
             words = f"must be small letters, digits and _, at most {LONGEST_NAME}, with a letter first"
         elif name in others or name in RESERVED:
-            words = "is that of another run"
+            words = "is the name of another run; give it another"
         else:
             return name
-        faults.add([InputError(f"{where}: name = {shown(name)}: {words}", f"{place}.name")])
+        entry.wrong("name", name, words)
     numbers = (usual if k == 1 else f"{usual}_{k}" for k in range(1, len(others) + 2))
     return next(name for name in numbers if name not in others)
 

@@ -7,22 +7,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from pydantic import BaseModel
-from pydantic.fields import FieldInfo
 
+from ..reading.lists import TableList
 from ..reading.tables import given_values, schema
-
-
-@dataclass(frozen=True)
-class EntryTable:
-    """The declaration of the entries of a list of tables in a table: its quantities, and its other keys."""
-
-    title: str
-    fields: Mapping[str, FieldInfo]
-    declaration: type | None = None
-    conditions: Mapping[str, Any] = field(default_factory=dict)
-    """the conditions of the JSON Schema on the keys of an entry"""
-    follows: Mapping[str, str] = field(default_factory=dict)
-    """by key, the source of its value if an entry leaves the key out"""
 
 
 @dataclass(frozen=True)
@@ -44,7 +31,7 @@ class FileSection:
     form: Callable[..., type[BaseModel]] = schema
     values: Callable[[Any], dict[str, Any]] = given_values
     """the values of a checked table, by the name of the quantity"""
-    entries: Mapping[str, EntryTable] = field(default_factory=dict)
+    entries: Mapping[str, TableList] = field(default_factory=dict)
     """by key, the lists of tables in it"""
     follows: Mapping[str, str] = field(default_factory=dict)
     """by key, the source of its value if the file leaves the key out"""
@@ -60,8 +47,3 @@ class FileSection:
     """lists and tables in it whose faults say nothing of its other keys"""
     deciders: Mapping[str, str] = field(default_factory=dict)
     """by a key of entries, the key of the table that decides whether it has a meaning"""
-
-
-def fields(keys: Mapping[str, Any]) -> dict[str, FieldInfo]:
-    """Fields with their types, from pairs of both."""
-    return {name: FieldInfo.from_annotated_attribute(of, each) for name, (of, each) in keys.items()}

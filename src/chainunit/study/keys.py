@@ -22,10 +22,11 @@ from ..drives.motors import MOTORS
 from ..drives.shafts import SECTIONS as PROFILES
 from ..drives.shafts import Shaft
 from ..models import MACHINES
+from ..reading.lists import TableList
 from ..reading.text import CHOICES as UNITS
 from .config import Config, parse
 from .event import TYPES, Event
-from .file_section import EntryTable, FileSection
+from .file_section import FileSection
 from .parts import ReportTable
 from .sections import CHOICES, Ratios, SystemTable, all_sections
 
@@ -108,7 +109,7 @@ class KeyTable:
 
 
 @cache
-def entry_tables() -> dict[str, EntryTable]:
+def entry_tables() -> dict[str, TableList]:
     """The declarations of the lists of tables in a table, by name: ``sweep.parameter``."""
     return {
         f"{table}.{key}": entry
@@ -258,11 +259,11 @@ def _of_event(of: type[Event]) -> Iterator[Key]:
     yield from _numbers(of.Parameters, of.Parameters())
 
 
-def _of_entry(entry: EntryTable) -> Iterator[Key]:
-    for key in _of_fields({name: (field.annotation, field) for name, field in entry.fields.items()}):
+def _of_entry(entry: TableList) -> Iterator[Key]:
+    for key in _of_fields(entry.keys):
         yield dataclasses.replace(key, follows=entry.follows.get(key.name, ""))
-    if entry.declaration is not None:
-        yield from _numbers(entry.declaration, entry.declaration(), sources=entry.follows)
+    if entry.declared is not None:
+        yield from _numbers(entry.declared, entry.declared(), sources=entry.follows)
 
 
 def _of_fields(fields: Mapping[str, Any], config: Config | None = None) -> Iterator[Key]:

@@ -40,6 +40,9 @@ _FORMS: dict[str, dict[str, Any]] = {
 
 def _further(name: str) -> Mapping[str, Any] | None:
     """Further conditions on the text or list of a key, by its full name; None where there are none."""
+    if name in (lists := entry_tables()):
+        least = {"minItems": lists[name].least} if lists[name].least else {}
+        return {"maxItems": lists[name].most} | least
     table, _, key = name.partition(".")
     sections = all_sections()
     return _FORMS.get(name) or (sections[table].forms.get(key) if table in sections else None)

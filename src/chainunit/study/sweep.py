@@ -30,8 +30,8 @@ from .cycle_quantities import CycleQuantity, cycle_quantity, evaluate
 from .measures import Answers
 from .rig import Rig
 from .sweep_plan import SweepPlan
-from .sweep_reading import SPEED
 from .sweep_runs import REASONS_OF_RUNS, SweepBlock, check_drive
+from .sweep_table import SPEED
 
 if TYPE_CHECKING:
     import xarray as xr

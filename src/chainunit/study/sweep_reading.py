@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import Faults, InputError, near_name, refusal_prefix, shown
+from ..core.errors import Faults, InputError, near_name, one_of, refusal_prefix, shown
 from ..core.messages import unit_behind
 from ..core.quantities import Quantity, Variable, named_values, variables
 from ..mechanism.models import MachineModel
-from ..reading.tables import given_values, read_table, to_number
+from ..reading.lists import Entry
 from .cycle_quantities import CycleBasis, cycle_quantity
 from .event import Event
 from .sweep_plan import MOST_OF_HYPERCUBE, SweepPlan, SweptParameter
@@ -21,12 +21,12 @@ from .sweep_table import (
     LOADS_OF_SWEEP,
     MEASURES_OF_SWEEP,
     MOST_VALUES,
+    SPEED,
+    SWEPT,
     USUAL_QUANTITIES,
-    SweepEntry,
     SweepTable,
 )
 
-SPEED = "run.crank_speed"
 _MOST_OF_GRID = 1_000_000_000
 _VALUES, _VALUES_OF_TOLERANCE = 11, 3
 
@@ -69,15 +69,12 @@ def read_plan(
         with a line for each fault: the key, its value and the allowed range.
     """
     faults = Faults()
-    parameters: list[SweptParameter] = []
-    for k, entry in enumerate(form.parameter, 1):
-        with faults.collected():
-            parameters.append(_parameter(entry, k, form.method == "grid", quantities, fixed))
-    names = [each.name for each in parameters]
-    for name in sorted({name for name in names if names.count(name) > 1}):
-        faults.add(
-            [InputError(f"sweep.parameter: {name} stands there twice; take one out", "sweep.parameter")]
-        )
+
+    def read(entry: Entry, name: str) -> SweptParameter:
+        return _parameter(entry, quantities.variables[name], quantities.values[name], form.method == "grid")
+
+    swept = SWEPT.read(form.parameter, faults, read, known=quantities.variables, fixed=fixed)
+    names, parameters = list(swept), list(swept.values())
     with faults.collected():
         _check_results(form, model)
     results = _results(form)
@@ -124,8 +121,7 @@ def _check_results(form: Any, model: type[MachineModel]) -> None:
             cycle_quantity(name, model)
     for name in dict.fromkeys(form.measures):
         if name not in MEASURES_OF_SWEEP:
-            hint = near_name(name, MEASURES_OF_SWEEP)
-            line = f"sweep.measures: {shown(name)}: must be one of {', '.join(MEASURES_OF_SWEEP)}{hint}"
+            line = f"sweep.measures: {shown(name)}: must be {one_of(name, MEASURES_OF_SWEEP)}"
             faults.add([InputError(line, "sweep.measures")])
     faults.refuse()
 
@@ -183,28 +179,9 @@ def _event(form: Any, names: list[str], events: Mapping[str, Event]) -> str:
     return candidates[0]
 
 
-def _parameter(
-    entry: Any, k: int, of_grid: bool, quantities: Sweepable, fixed: Mapping[str, str]
-) -> SweptParameter:
-    """A parameter of the sweep from the entry with the number `k`."""
-    place = f"sweep.parameter.{k}"
-    if not isinstance(entry, Mapping):
-        raise InputError(f"{place} = {shown(entry)}: must be a table", place)
-    given = given_values(read_table(SweepEntry, entry, f"{place}."))
-    name = given.get("name", "")
-    if not name:
-        raise InputError(f'{place}.name: must be given, such as "machine.r"', f"{place}.name")
-    if name not in quantities.variables:
-        raise InputError(
-            f"{place}.name = {shown(name)}: must be the full name of a number of the machine (machine.r), of its "
-            f"feed (feed. ..), of an event of the study (event.NAME. ..), or {SPEED}"
-            f"{near_name(name, quantities.variables)}",
-            f"{place}.name",
-        )
-    if name in fixed:
-        raise InputError(f"{place}.name = {shown(name)}: {fixed[name]}", f"{place}.name")
-    variable, centre = quantities.variables[name], quantities.values[name]
-    reader = _EntryReader(place, variable, given)
+def _parameter(entry: Entry, variable: Variable, centre: float, of_grid: bool) -> SweptParameter:
+    """A parameter of the sweep, in the one of three forms that its entry has."""
+    given = entry.given
     forms = [
         form
         for form in ("from", "values", "tolerance")
@@ -212,76 +189,61 @@ def _parameter(
     ]
     if len(forms) != 1:
         words = "take one of these ways only" if forms else "has no values"
-        raise InputError(f"{place} ({name}): {words}: from and to, values, or tolerance", place)
-    parameter = reader.parameter(forms[0], centre, of_grid)
-    reader.refuse()
-    return parameter
-
-
-class _EntryReader(Faults):
-    """The numbers of an entry, with the faults among them."""
-
-    def __init__(self, place: str, variable: Variable, given: Mapping[str, Any]) -> None:
-        super().__init__()
-        self._place, self._variable, self._given = place, variable, given
-
-    def parameter(self, form: str, centre: float, of_grid: bool) -> SweptParameter:
-        """The parameter that is given in this form."""
-        variable, given = self._variable, self._given
-        if form == "values":
-            self._without("points", "is of from and to, or of a tolerance; leave it out")
-            self._without("distribution", "is of a tolerance; leave it out")
-            values = tuple(self._number("values", each) for each in given["values"])
-            if not values:
-                self._fault("values", "must have at least one value")
-            if len(set(values)) < len(values):
-                self._fault("values", "has a value twice; take one out")
-            return SweptParameter(variable, centre, values or (centre,))
-        if form == "tolerance":
-            wide = self._number("tolerance", given["tolerance"], self._of_tolerance())
-            low, high = centre - wide, centre + wide
-        else:
-            low, high = (self._number(name, given.get(name)) for name in ("from", "to"))
-            wide = None
-            if not high > low and not self.errors:
-                self._fault("to", f"must be > from, {low:g}{unit_behind(variable.unit)}")
+        line = f"{entry.place} ({variable.name}): {words}: from and to, values, or tolerance"
+        raise InputError(line, entry.place)
+    entry.more = f" ({variable.name})"
+    if forms == ["values"]:
+        _without(entry, "points", "is of from and to, or of a tolerance; leave it out")
+        _without(entry, "distribution", "is of a tolerance; leave it out")
+        values = tuple(entry.quantity("values", variable, each) for each in given["values"])
+        if not values:
+            entry.fault("values", "must have at least one value")
+        if len(set(values)) < len(values):
+            entry.fault("values", "has a value twice; take one out")
+        return SweptParameter(variable, centre, values)
+    wide = None
+    if forms == ["tolerance"]:
+        wide = entry.quantity("tolerance", _tolerance_of(variable), given["tolerance"])
+        low, high = centre - wide, centre + wide
+    else:
+        low, high = (_end(entry, name, variable) for name in ("from", "to"))
+        if not high > low and not entry.errors:
+            entry.fault("to", f"must be > from, {low:g}{unit_behind(variable.unit)}")
+    if wide is None or of_grid:
+        _without(entry, "distribution", "is of a tolerance with points that are no grid; leave it out")
+    if not of_grid:
+        _without(entry, "points", "is of a grid; the number of all points is sweep.points")
         distribution = given.get("distribution", "uniform")
-        if wide is None or of_grid:
-            self._without("distribution", "is of a tolerance with points that are no grid; leave it out")
-        if not of_grid:
-            self._without("points", "is of a grid; the number of all points is sweep.points")
-            return SweptParameter(variable, centre, (), low, high, wide, distribution)
-        count = self._count(_VALUES if wide is None else _VALUES_OF_TOLERANCE)
-        values = tuple(float(x) for x in np.linspace(low, high, count)) if not self.errors else (centre,)
-        return SweptParameter(variable, centre, values, low, high, wide)
+        return SweptParameter(variable, centre, (), low, high, wide, distribution)
+    usual = _VALUES if wide is None else _VALUES_OF_TOLERANCE
+    count = entry.quantity("points", _COUNT, given.get("points", usual))
+    entry.refuse()
+    values = tuple(float(x) for x in np.linspace(low, high, int(count)))
+    return SweptParameter(variable, centre, values, low, high, wide)
 
-    def _of_tolerance(self) -> Variable:
-        """The declaration of a tolerance of the quantity."""
-        v = self._variable
-        kind = "difference" if v.unit == "K" else ""
-        q = Quantity(v.unit, f"tolerance of: {v.description}", low=0.0, open_low=True, kind=kind)
-        return Variable(v.name, q.description, q)
 
-    def _number(self, key: str, given: Any, variable: Variable | None = None) -> float:
-        own = dataclasses.replace(variable or self._variable, name=f"{self._place}.{key}")
-        if given is None:
-            self._fault(key, "must be given, beside the other end")
-            return math.nan
-        try:
-            return to_number(own, given)
-        except ValueError as error:
-            self.add([InputError(f"{error} ({self._variable.name})", own.name)])
-            return math.nan
+_COUNT = Variable(
+    "",
+    "number of values",
+    Quantity("1", "number of values", low=2.0, high=float(MOST_VALUES), type="Integer"),
+)
 
-    def _count(self, default: int) -> int:
-        q = Quantity("1", "number of values", low=2.0, high=float(MOST_VALUES), type="Integer")
-        count = self._number("points", self._given.get("points", default), Variable("", q.description, q))
-        return int(count) if math.isfinite(count) else default
 
-    def _without(self, key: str, words: str) -> None:
-        if key in self._given:
-            self._fault(key, words)
+def _tolerance_of(v: Variable) -> Variable:
+    """The declaration of a tolerance of a quantity."""
+    kind = "difference" if v.unit == "K" else ""
+    q = Quantity(v.unit, f"tolerance of: {v.description}", low=0.0, open_low=True, kind=kind)
+    return Variable(v.name, q.description, q)
 
-    def _fault(self, key: str, words: str) -> None:
-        name = f"{self._place}.{key}"
-        self.add([InputError(f"{name}: {words} ({self._variable.name})", name)])
+
+def _end(entry: Entry, name: str, variable: Variable) -> float:
+    """The value of an end of a range; not a number, with a fault, where it is wrong or missing."""
+    if name in entry.given:
+        return entry.quantity(name, variable, entry.given[name])
+    entry.fault(name, "must be given, beside the other end")
+    return math.nan
+
+
+def _without(entry: Entry, key: str, words: str) -> None:
+    if key in entry.given:
+        entry.fault(key, words)

@@ -29,7 +29,7 @@ from .event_block import kept_outputs
 from .measures import read_measure
 from .rig import FEED_RISE, PATIENCE, Rig
 from .sweep_plan import SweepPlan
-from .sweep_reading import SPEED
+from .sweep_table import SPEED
 from .window import Phase, Trip, Window, is_settled, time_at, whole_turns
 
 REASONS_OF_RUNS = (

@@ -23,7 +23,7 @@ from .measures import Answers
 from .organ_limits import limits_of_organs
 from .quantiles import CONFIDENCE, quantile
 from .sweep import SweepFindings
-from .sweep_reading import SPEED
+from .sweep_table import SPEED
 from .verdict import SpeedLimit, passed_limits
 
 if TYPE_CHECKING:

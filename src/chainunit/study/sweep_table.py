@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, create_model
+from pydantic import Field
 
 from ..core.quantities import Value, declaration, quantity
+from ..reading.lists import TableList
 from .cycle_quantities import CycleBasis
-from .entry_values import Entered
+from .entry_values import Entered, entered, filled_text
 
+SPEED = "run.crank_speed"
 METHODS = ("grid", "latin_hypercube", "sobol")
 DISTRIBUTIONS = ("uniform", "normal")
 MEASURES_OF_SWEEP = (
@@ -49,6 +51,48 @@ class SweepTable(CycleBasis):
     angles: Value = quantity("1", "crank angles of a turn", default=720, min=8, max=100_000, type="Integer")
 
 
+SWEPT = TableList(
+    "sweep.parameter",
+    title="Parameter of a sweep",
+    description="swept quantities",
+    most=MOST_PARAMETERS,
+    must_be="the full name of a number of the machine (machine.r), of its feed (feed. ..), of an event of the study "
+    f"(event.NAME. ..), or {SPEED}",
+    example="machine.r",
+    conditions={
+        "required": ["name"],
+        "oneOf": [
+            {"required": ["from", "to"]},
+            {"required": ["values"]},
+            {"required": ["tolerance"]},
+        ],
+    },
+    keys={
+        "name": filled_text(
+            'full name of a quantity, such as "machine.r", "run.crank_speed", '
+            '"feed.left.material_mass", "event.jam_left.force"'
+        ),
+        "from": entered("least value"),
+        "to": entered("largest value"),
+        "points": entered("number of values of a grid between these, 11 by default; of a tolerance 3"),
+        "values": (
+            list[Entered],
+            Field([], max_length=MOST_VALUES, description="values, in place of from and to"),
+        ),
+        "tolerance": entered("largest difference from the value of the study, in place of from and to"),
+        "distribution": (
+            Literal[DISTRIBUTIONS],
+            Field(
+                "uniform",
+                description="of a tolerance, where the method is no grid; of a normal one it is 3 standard "
+                "deviations",
+            ),
+        ),
+    },
+)
+"""The entries [[sweep.parameter]]."""
+
+
 FIELDS: Mapping[str, Any] = {
     "method": (
         Literal[METHODS],
@@ -77,45 +121,6 @@ FIELDS: Mapping[str, Any] = {
             description="which of its values is best; of a load, where best is not given, the largest",
         ),
     ),
-    "parameter": (
-        list[Any],
-        Field([], max_length=MOST_PARAMETERS, description="swept quantities: tables [[sweep.parameter]]"),
-    ),
+    "parameter": SWEPT.field,
 }
 """Keys of the table that are no quantities, as pydantic fields."""
-
-
-_ENTRY: dict[str, Any] = {
-    "name": (
-        str,
-        Field(
-            "",
-            min_length=1,
-            description='full name of a quantity, such as "machine.r", "run.crank_speed", "feed.left.material_mass", '
-            '"event.jam_left.force"',
-        ),
-    ),
-    "from": (Entered, Field(None, description="least value")),
-    "to": (Entered, Field(None, description="largest value")),
-    "points": (
-        Entered,
-        Field(None, description="number of values of a grid between these, 11 by default; of a tolerance 3"),
-    ),
-    "values": (
-        list[Entered],
-        Field([], max_length=MOST_VALUES, description="values, in place of from and to"),
-    ),
-    "tolerance": (
-        Entered,
-        Field(None, description="largest difference from the value of the study, in place of from and to"),
-    ),
-    "distribution": (
-        Literal[DISTRIBUTIONS],
-        Field(
-            "uniform",
-            description="of a tolerance, where the method is no grid; of a normal one it is 3 standard deviations",
-        ),
-    ),
-}
-SweepEntry: type[BaseModel] = create_model("sweep_parameter", __config__=ConfigDict(extra="forbid"), **_ENTRY)
-"""The form of an entry [[sweep.parameter]]."""

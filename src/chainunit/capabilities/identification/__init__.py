@@ -15,22 +15,18 @@ from ...study.conditions import given
 from ...study.config import Config
 from ...study.drive import Drive
 from ...study.file_reading import FileReading
-from ...study.file_section import EntryTable, FileSection, fields
+from ...study.file_section import FileSection
 from ...study.identification.measurands import MEASURANDS
 from ...study.identification.reading import IdentificationPlan, WatchPlan, read_identification, read_watch
 from ...study.identification.table import (
     FIELDS,
-    MOST_PARAMETERS,
-    MOST_RUNS,
-    MOST_SENSORS,
+    FROM_RECORDING,
     MOST_SPEEDS,
-    RUN_KEYS,
-    SENSOR_KEYS,
+    RUNS,
+    SENSORS,
+    SOUGHT,
     WATCH_KEYS,
     IdentifyTable,
-    ParameterEntry,
-    RunTable,
-    SensorTable,
     WatchTable,
 )
 from ...study.observer_table import ObserverTable
@@ -38,11 +34,6 @@ from ...study.parts import named_table
 from ...study.rules import CHAINS, MACHINE_FMU, MOTOR_FMU, Rule, has_sides
 
 _VALUE = {"type": ["number", "string"]}
-_OF_RECORDINGS = {
-    "crank_speed": "run.crank_speed",
-    "begin": "the first row",
-    "end": "the last row",
-}
 
 
 @dataclass(frozen=True)
@@ -67,39 +58,8 @@ class IdentificationCapability(Capability):
             is_used=lambda config: False,
             apart=True,
             required=("parameter", "run"),
-            entries={
-                "parameter": EntryTable(
-                    "Number that is sought",
-                    ParameterEntry.model_fields,
-                    conditions={
-                        "required": ["name"],
-                        "anyOf": [{"required": ["from", "to"]}, {"required": ["deviation"]}],
-                    },
-                ),
-                "run": EntryTable(
-                    "Recorded run",
-                    fields(RUN_KEYS),
-                    RunTable,
-                    {"required": ["file"]},
-                    {**_OF_RECORDINGS, "name": "run_1, run_2, ..", "switched_off": "never"},
-                ),
-                "sensor": EntryTable(
-                    "Sensor of a recording",
-                    fields(SENSOR_KEYS),
-                    SensorTable,
-                    {"required": ["column"]},
-                    {
-                        "noise": "identify.noise",
-                        "gain": "identify.gain",
-                        "offset": "5 % of the RMS of a current or torque, 0 of others",
-                        "resolution": "0",
-                    },
-                ),
-            },
+            entries={"parameter": SOUGHT, "run": RUNS, "sensor": SENSORS},
             forms={
-                "parameter": {"maxItems": MOST_PARAMETERS, "minItems": 1},
-                "run": {"maxItems": MOST_RUNS, "minItems": 1},
-                "sensor": {"maxItems": MOST_SENSORS},
                 "parameter.name": {"minLength": 1},
                 "run.name": {"pattern": r"^[a-z][a-z0-9_]{0,19}$"},
                 "run.file": {"minLength": 1},
@@ -119,7 +79,7 @@ class IdentificationCapability(Capability):
             is_used=lambda config: False,
             apart=True,
             required=("file",),
-            follows=_OF_RECORDINGS,
+            follows=FROM_RECORDING,
             forms={"file": {"minLength": 1}},
         ),
         "observer": FileSection(ObserverTable, optional=True, title="Load observer", apart=True),

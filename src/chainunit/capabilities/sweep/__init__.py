@@ -7,17 +7,16 @@ from collections.abc import Iterable
 from ...report.capability import Capability
 from ...study.conditions import given, has_entries, has_entry, is_one_of
 from ...study.file_reading import FileReading
-from ...study.file_section import EntryTable, FileSection
+from ...study.file_section import FileSection
 from ...study.rules import CHAINS, MACHINE_FMU, MOTOR_FMU, NEEDS_MODEL, TWO_BARS, Rule
 from ...study.sweep_plan import SweepPlan
 from ...study.sweep_reading import Sweepable, read_plan
 from ...study.sweep_table import (
     FIELDS,
     MEASURES_OF_SWEEP,
-    MOST_PARAMETERS,
     MOST_RESULTS,
     MOST_VALUES,
-    SweepEntry,
+    SWEPT,
     SweepTable,
 )
 
@@ -33,20 +32,7 @@ class SweepCapability(Capability):
             keys=FIELDS,
             title="Sweep",
             is_used=lambda config: False,
-            entries={
-                "parameter": EntryTable(
-                    "Parameter of a sweep",
-                    SweepEntry.model_fields,
-                    conditions={
-                        "required": ["name"],
-                        "oneOf": [
-                            {"required": ["from", "to"]},
-                            {"required": ["values"]},
-                            {"required": ["tolerance"]},
-                        ],
-                    },
-                )
-            },
+            entries={"parameter": SWEPT},
             follows={
                 "quantities": "without measures peak(crank_torque) and rms(crank_torque)",
                 "event": "the only one of the study, or that whose quantities are swept",
@@ -58,7 +44,6 @@ class SweepCapability(Capability):
                     "items": {"enum": list(MEASURES_OF_SWEEP)},
                     "maxItems": len(MEASURES_OF_SWEEP),
                 },
-                "parameter": {"maxItems": MOST_PARAMETERS},
                 "parameter.name": {"minLength": 1},
                 "parameter.values": {
                     "items": {"type": ["number", "string"]},

@@ -6,15 +6,15 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
 from dataclasses import fields
 from typing import Any
 
 from ...core import units
-from ...core.errors import Faults, InputError, meant, near_name, printable, refusal_prefix, shown
+from ...core.errors import InputError, near_name, printable, shown
 from ...core.model import About
 from ...core.quantities import Layout, base_units
 from ...mechanism.expressions import CONSTANTS, WORDS, Expression, expression
+from ...reading.lists import Entry
 from .checks import name_fault, words
 from .declarations import CommonParameters
 from .dimensions import checked_dimension
@@ -30,29 +30,18 @@ UNITS = (
 Known = Mapping[str, str | None]
 
 
-class EntryReader:
+class EntryReader(Entry):
     """The reader of the entries of one file."""
 
     def __init__(self, data: Mapping[str, Any], name: str) -> None:
-        self.data, self.faults = data, Faults()
-        self.name = name
+        super().__init__("", data)
+        self.data, self.name = data, name
         self.inputs = self.table("inputs")
         self.units: dict[str, str | None] = {}
         self.derived: dict[str, str] = {}
         self.used: set[str] = set()
         self.refused: set[str] = set()
         self.points: dict[str, dict[str, list[Any]]] = {}
-
-    @contextmanager
-    def at(self, key: str) -> Iterator[None]:
-        """Collect the faults of a key."""
-        with self.faults.collected(), refusal_prefix(f"{key}: ", key):
-            yield
-
-    def fault(self, key: str, message: str) -> None:
-        """Collect a fault."""
-        with self.at(key):
-            raise InputError(message)
 
     def table(self, key: str, of: Mapping[str, Any] | None = None, default: Any = None) -> Mapping[str, Any]:
         """A table; faults where it is none."""
@@ -83,12 +72,15 @@ class EntryReader:
             self.fault(key, f"is {shown(given)}; must be >= 0")
         return value
 
-    def keys(self, key: str, table: Mapping[str, Any], known: tuple[str, ...]) -> None:
-        """Fault the keys of a table that are not known."""
-        for each in table:
-            if each not in known:
-                where = f"{key}.{each}" if key else each
-                self.fault(where, f"unknown key{meant(each, known)} known here: {', '.join(known)}")
+    def tables(self, kind: str, known: tuple[str, ...]) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
+        """The tables in a table, each behind its name and its full key; their keys are `known`."""
+        given = self.table(kind)
+        self.named(kind, given)
+        for name in given:
+            key = f"{kind}.{name}"
+            table = self.table(key, given)
+            self.keys(key, table, known)
+            yield name, key, table
 
     def named(self, key: str, names: Mapping[str, Any]) -> None:
         """Fault names that no variable can have."""
@@ -198,7 +190,7 @@ class EntryReader:
             return [0.0, 0.0]
         return [self.entry(key, each, unit, motion, inputs) for each in given]
 
-    def place(self, key: str, given: Mapping[str, Any]) -> dict[str, list[Any]]:
+    def points_in(self, key: str, given: Mapping[str, Any]) -> dict[str, list[Any]]:
         """Points by name."""
         self.named(key, given)
         return {name: self.vector(f"{key}.{name}", at, "m") for name, at in given.items()}

@@ -90,7 +90,7 @@ class _LinkageReader(LoadReader):
         parameters = self.quantities("parameters")
         inputs = self.quantities("inputs")
         tables = self.curves()
-        ground = self.place("ground", self.table("ground"))
+        ground = self.points_in("ground", self.table("ground"))
         self.points[GROUND] = ground
         links = [self.link(name, table) for name, table in self.links().items()]
         joints = self.joints()
@@ -100,11 +100,11 @@ class _LinkageReader(LoadReader):
         self.unused(parameters, inputs, tables)
         self.all(quantity_names(parameters, inputs, self.table("tables"), RESERVED, links))
         self.all([*spring_faults(loads, joints), *guide_faults(data, joints)])
-        self.faults.refuse()
+        self.refuse()
         alike = alike_points(self.points, self.named_points(links, loads))
         self.all(freedom_faults(links, joints, driver, alike))
         start = self.start(parameters, links, joints, driver)
-        self.faults.refuse()
+        self.refuse()
         described = {
             "name": name,
             "title": title,
@@ -159,7 +159,7 @@ class _LinkageReader(LoadReader):
         self, parameters: list[dict[str, Any]], inputs: list[dict[str, Any]], tables: Mapping[str, Any]
     ) -> None:
         """Fault parameters, inputs and tables that nothing uses; a name in a faulty entry may be meant to be used."""
-        spoilt = bool(self.faults.errors)
+        spoilt = bool(self.errors)
         mentioned = words([self.data[key] for key in self.data if key not in ("parameters", "inputs")])
         for kind, entries in (("parameters", parameters), ("inputs", inputs)):
             for each in entries:
@@ -193,7 +193,7 @@ class _LinkageReader(LoadReader):
         key = f"links.{name}"
         table = self.table(key, self.table("links"))
         self.keys(key, table, _LINK_KEYS)
-        points = self.place(f"{key}.points", self.table(f"{key}.points", table))
+        points = self.points_in(f"{key}.points", self.table(f"{key}.points", table))
         for point in points:
             if point in POINT_NAMES:
                 self.fault(f"{key}.points.{point}", "is a variable of every link; choose another name")
@@ -254,12 +254,7 @@ class _LinkageReader(LoadReader):
     def joints(self) -> list[dict[str, Any]]:
         """The joints: those that are named, and a revolute one for each further link in a point of the same name."""
         joints = []
-        table = self.table("joints")
-        self.named("joints", table)
-        for name in table:
-            key = f"joints.{name}"
-            given = self.table(key, table)
-            self.keys(key, given, _JOINT_KEYS)
+        for name, key, given in self.tables("joints", _JOINT_KEYS):
             kind = given.get("type", PRISMATIC if "toward" in given else REVOLUTE)
             if kind not in (REVOLUTE, PRISMATIC):
                 self.fault(f"{key}.type", f'is {shown(kind)}; must be "revolute" or "prismatic"')
@@ -407,7 +402,7 @@ class _LinkageReader(LoadReader):
             pose.slide = next(each for each, _ in entries if each.name == driver["joint"]), value
         else:
             pose.angles[driver["link"]] = number(driver["zero"]) + driver["sense"] * value
-        self.faults.refuse()
+        self.refuse()
         with self.at("start"):
             return {"value": value, "poses": pose.complete()}
         return {}

@@ -48,12 +48,7 @@ class LoadReader(EntryReader):
     def curves(self) -> dict[str, Any]:
         """Tables over the coordinate, and over a quantity that a load gives."""
         curves = {}
-        given = self.table("tables")
-        self.named("tables", given)
-        for name in given:
-            key = f"tables.{name}"
-            table = self.table(key, given)
-            self.keys(key, table, ("phi", "x", "value", "file"))
+        for name, key, table in self.tables("tables", ("phi", "x", "value", "file")):
             self.refused.add(name)
             with self.at(key):
                 over = "phi" if "phi" in table else "x"

@@ -9,22 +9,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ...core.errors import Faults, InputError, near_name, shown
+from ...core.errors import Faults, InputError, near_name
 from ...core.messages import unit_behind
 from ...core.quantities import Layout, Quantity, Variable, named_values
 from ...core.units import split
-from ...reading.tables import given_values, instance, read_table, to_number
+from ...reading.lists import Entry, leaves
+from ...reading.tables import given_values, instance
 from .measurands import MEASURANDS
-from .table import (
-    RUN_KEYS,
-    SENSOR_KEYS,
-    IdentifyTable,
-    ParameterEntry,
-    RunTable,
-    SensorTable,
-    WatchTable,
-    entry_form,
-)
+from .table import RUNS, SENSORS, SOUGHT, IdentifyTable, RunTable, WatchTable
 from .unknown import Unknown
 
 OFFSET_SHARE = 0.05
@@ -33,6 +25,9 @@ its column."""
 WITH_OFFSET = ("motor.i", "crank.tau")
 """Quantities whose sensors usually have an offset."""
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,19}")
+_FIXED = {"mark": "stands for the mark of a turn; give it another"}
+"""Names that no run may have, each with the reason."""
+_ANALOG = [name for name, each in MEASURANDS.items() if each.analog]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -134,48 +129,28 @@ def read_identification(
     known = {
         v.name: (v, value) for instance, name in declared for v, value in named_values(instance, f"{name}.")
     }
-    faults, sought = Faults(), dict[str, Unknown]()
-    for k, entry in enumerate(form.parameter, 1):
-        with faults.collected():
-            found = _parameter(entry, f"identify.parameter.{k}", known, fixed)
-            if found.name in sought:
-                key = f"identify.parameter.{k}.name"
-                raise InputError(f"{key} = {shown(found.name)}: stands there twice; take one out", key)
-            sought[found.name] = found
+    faults = Faults()
+
+    def read_run(entry: Entry, name: str) -> PlannedRun:
+        run = _run(entry, name, crank_speed, known, source)
+        for other in sorted(run.added.keys() - sought.keys()) if not faults.errors else ():
+            entry.fault(f"added.{other}", "is not sought; add [[identify.parameter]] with this name")
+        return run
+
+    sought = SOUGHT.read(
+        form.parameter, faults, lambda entry, name: _sought(entry, name, *known[name]), known, fixed
+    )
     for name, words in (("parameter", "a number that is sought"), ("run", "a recording")):
         if not getattr(form, name):
             key = f"identify.{name}"
             faults.add([InputError(f"{key}: is missing; add [[{key}]] with {words}", key)])
-    runs: list[PlannedRun] = []
-    for k, entry in enumerate(form.run, 1):
-        with faults.collected():
-            run = _run(entry, f"identify.run.{k}", k, crank_speed, known, source)
-            key = f"identify.run.{k}.name"
-            if any(run.name == other.name for other in runs):
-                raise InputError(
-                    f"{key} = {shown(run.name)}: is the name of another run; give it another", key
-                )
-            if run.name == "mark":
-                raise InputError(
-                    f"{key} = {shown(run.name)}: stands for the mark of a turn; give it another", key
-                )
-            for name in run.added.keys() - sought.keys() if not faults.errors else ():
-                key = f"identify.run.{k}.added.{name}"
-                raise InputError(f"{key}: is not sought; add [[identify.parameter]] with this name", key)
-            runs.append(run)
-    sensors: dict[str, SensorKnowledge] = {}
-    for k, entry in enumerate(form.sensor, 1):
-        with faults.collected():
-            column, knowledge = _sensor(entry, f"identify.sensor.{k}", table)
-            if column in sensors:
-                key = f"identify.sensor.{k}.column"
-                raise InputError(f"{key} = {shown(column)}: stands there twice; take one out", key)
-            sensors[column] = knowledge
+    runs = RUNS.read(form.run, faults, read_run, fixed=_FIXED, usual="run_")
+    sensors = SENSORS.read(form.sensor, faults, lambda entry, column: _sensor(entry, column, table), _ANALOG)
     faults.refuse()
     return IdentificationPlan(
         tuple(sought.values()),
         {name: known[name][0] for name in sought},
-        tuple(runs),
+        tuple(runs.values()),
         sensors,
         SensorKnowledge(float(table.noise), float(table.gain)),
         int(table.starts),
@@ -196,14 +171,13 @@ def read_watch(form: Any, crank_speed: float, source: str) -> WatchPlan:
     InputError
         with a line for each fault.
     """
-    given, usual, faults = given_values(form), instance(WatchTable, {}), Faults()
+    given, usual = given_values(form), instance(WatchTable, {})
+    entry = Entry("watch", given)
     if not given.get("file"):
-        faults.add([InputError("watch.file: must be given, the recording", "watch.file")])
-    begin, end = _part(given, "watch", faults)
-    columns: dict[str, str] = {}
-    with faults.collected():
-        columns = _columns(given, "watch")
-    faults.refuse()
+        entry.fault("file", "must be given, the recording")
+    begin, end = _part(entry)
+    columns = _columns(entry)
+    entry.refuse()
     folder, identification = Path(source).parent, given.get("identification")
     numbers = {name: float(given.get(name, getattr(usual, name))) for name in _OF_WATCH}
     return WatchPlan(
@@ -220,146 +194,103 @@ def read_watch(form: Any, crank_speed: float, source: str) -> WatchPlan:
 _OF_WATCH = ("ambient", "learning", "feed_deviation", "noise", "gain")
 
 
-def _part(given: Mapping[str, Any], place: str, faults: Faults) -> tuple[float, float]:
+def _part(entry: Entry) -> tuple[float, float]:
     """Begin and end of the part that counts [s]."""
-    begin, end = given.get("begin", -math.inf), given.get("end", math.inf)
+    begin, end = entry.given.get("begin", -math.inf), entry.given.get("end", math.inf)
     if not begin < end:
-        faults.add([InputError(f"{place}.end = {end:g} s: must be > begin = {begin:g} s", f"{place}.end")])
+        key = entry.key("end")
+        entry.add([InputError(f"{key} = {end:g} s: must be > begin = {begin:g} s", key)])
     return begin, end
 
 
-def _columns(given: Mapping[str, Any], place: str) -> dict[str, str]:
+def _columns(entry: Entry) -> dict[str, str]:
     """The heads of columns by quantity."""
-    columns, faults = dict[str, str](), Faults()
-    for quantity, head in _leaves(given.get("columns", {})):
-        key = f"{place}.columns.{quantity}"
+    columns: dict[str, str] = {}
+    for quantity, head in leaves(entry.given.get("columns", {})):
+        key = f"columns.{quantity}"
         if quantity not in MEASURANDS:
             hint = near_name(quantity, MEASURANDS) or f"; there are {', '.join(MEASURANDS)}"
-            faults.add([InputError(f"{key}: no such quantity{hint}", key)])
+            entry.fault(key, f"no such quantity{hint}")
         elif not isinstance(head, str):
-            faults.add([InputError(f"{key} = {shown(head)}: must be the head of its column", key)])
+            entry.wrong(key, head, "must be the head of its column")
         else:
             columns[quantity] = head
-    faults.refuse()
     return columns
 
 
-def _checked(entry: Any, form: Any, place: str) -> dict[str, Any]:
-    """What an entry gives, by key."""
-    if not isinstance(entry, Mapping):
-        raise InputError(f"{place} = {shown(entry)}: must be a table", place)
-    return given_values(read_table(form, entry, f"{place}."))
-
-
-def _parameter(
-    entry: Any, place: str, known: Mapping[str, tuple[Variable, float]], fixed: Mapping[str, str]
-) -> Unknown:
+def _sought(entry: Entry, name: str, variable: Variable, value: float) -> Unknown:
     """A sought number, with its bounds and its prior."""
-    given = _checked(entry, ParameterEntry, place)
-    name = given.get("name", "")
-    key = f"{place}.name"
-    if not name:
-        raise InputError(f'{key}: must be given, such as "machine.left.web_mass"', key)
-    if name in fixed:
-        raise InputError(f"{key} = {shown(name)}: {fixed[name]}", key)
-    if name not in known:
-        raise InputError(
-            f"{key} = {shown(name)}: must be the full name of a number of the machine (machine.left.web_mass), of "
-            f"its feed (feed. ..), or of the motor (motor. ..){near_name(name, known)}",
-            key,
-        )
-    variable, value = known[name]
-    q, faults = variable.quantity, Faults()
-    ends: dict[str, float] = {"from": q.low, "to": q.high}
-    for end in [end for end in ends if end in given]:
-        with faults.collected():
-            ends[end] = _number(f"{place}.{end}", given[end], variable)
-    faults.refuse()
-    low, high, unit = ends["from"], ends["to"], unit_behind(variable.unit)
+    given, q, place = entry.given, variable.quantity, entry.place
+    low, high = (
+        entry.quantity(end, variable, given[end]) if end in given else bound
+        for end, bound in (("from", q.low), ("to", q.high))
+    )
+    entry.refuse()
+    unit = unit_behind(variable.unit)
     if not low < high:
-        raise InputError(f"{place}.to: must be > from, {low:g}{unit} ({name})", f"{place}.to")
-    if "deviation" not in given:
-        if not {"from", "to"} <= given.keys():
-            raise InputError(
-                f"{place} ({name}): must have from and to, or the standard deviation of the value of the study "
-                '(deviation = "5 %"), or both',
-                place,
+        entry.fault("to", f"must be > from, {low:g}{unit} ({name})")
+    elif "deviation" in given:
+        deviation = _deviation(entry, variable, value)
+        if not low <= value <= high:
+            line = (
+                f"{place} ({name}): its value in the study, {value:g}{unit}, must lie between from and to, here from "
+                f"{low:g} to {high:g}{unit}, as its deviation is counted from it"
             )
-        return Unknown.within(name, variable.unit, low, high)
-    deviation = _deviation(f"{place}.deviation", given["deviation"], variable, value)
-    if not low <= value <= high:
-        raise InputError(
-            f"{place} ({name}): its value in the study, {value:g}{unit}, must lie between from and to, here from "
-            f"{low:g} to {high:g}{unit}, as its deviation is counted from it",
-            place,
+            raise InputError(line, place)
+        return Unknown(name, variable.unit, value, low, high, deviation)
+    elif not {"from", "to"} <= given.keys():
+        line = (
+            f"{place} ({name}): must have from and to, or the standard deviation of the value of the study "
+            '(deviation = "5 %"), or both'
         )
-    return Unknown(name, variable.unit, value, low, high, deviation)
+        raise InputError(line, place)
+    return Unknown.within(name, variable.unit, low, high)
 
 
-def _deviation(key: str, given: Any, variable: Variable, value: float) -> float:
+def _deviation(entry: Entry, variable: Variable, value: float) -> float:
     """A standard deviation: a number in the unit of the quantity, or a share of the value."""
+    given = entry.given["deviation"]
     parts = split(given) if isinstance(given, str) else None
     if parts is not None and parts[1] == "%":
         deviation = parts[0] / 100.0 * abs(value)
     else:
         kind = "difference" if variable.unit == "K" else ""
         of = Quantity(variable.unit, "standard deviation", low=0.0, open_low=True, kind=kind)
-        deviation = _number(key, given, Variable(key, of.description, of))
+        deviation = entry.quantity("deviation", Variable("", of.description, of), given)
+        entry.refuse()
     if not (math.isfinite(deviation) and deviation > 0.0):
-        raise InputError(
-            f"{key} = {shown(given)}: must be > 0; a share is one of the value of the study, "
-            f"{value:g}{unit_behind(variable.unit)}",
-            key,
-        )
+        share = f"{value:g}{unit_behind(variable.unit)}"
+        entry.wrong("deviation", given, f"must be > 0; a share is one of the value of the study, {share}")
+        entry.refuse()
     return deviation
 
 
-def _number(key: str, given: Any, variable: Variable) -> float:
-    try:
-        return to_number(dataclasses.replace(variable, name=key), given)
-    except ValueError as error:
-        raise InputError(str(error), key) from None
-
-
 def _run(
-    entry: Any,
-    place: str,
-    k: int,
-    crank_speed: float,
-    known: Mapping[str, tuple[Variable, float]],
-    source: str,
+    entry: Entry, name: str, crank_speed: float, known: Mapping[str, tuple[Variable, float]], source: str
 ) -> PlannedRun:
-    given = _checked(entry, entry_form(RunTable, RUN_KEYS, f"{place}."), place)
-    faults, usual = Faults(), instance(RunTable, {})
-    name = given.get("name", f"run_{k}")
+    given, usual = entry.given, instance(RunTable, {})
     if not _NAME.fullmatch(name):
-        key = f"{place}.name"
         words = "must begin with a small letter, and have at most 20 small letters, digits and _"
-        faults.add([InputError(f"{key} = {shown(name)}: {words}", key)])
+        entry.wrong("name", name, words)
     if "file" not in given:
-        faults.add([InputError(f"{place}.file: must be given, the recording", f"{place}.file")])
-    begin, end = _part(given, place, faults)
+        entry.fault("file", "must be given, the recording")
+    begin, end = _part(entry)
     off = float(given["switched_off"]) if "switched_off" in given else None
     if off is not None and not begin < off < end:
-        key = f"{place}.switched_off"
         bounds = (("> begin", begin), ("< end", end))
         words = "must be " + " and ".join(f"{word} = {x:g} s" for word, x in bounds if math.isfinite(x))
-        faults.add([InputError(f"{key} = {off:g} s: {words}", key)])
+        key = entry.key("switched_off")
+        entry.add([InputError(f"{key} = {off:g} s: {words}", key)])
     added: dict[str, float] = {}
-    for full, value in _leaves(given.get("added", {})):
-        key = f"{place}.added.{full}"
-        with faults.collected():
-            if full not in known:
-                raise InputError(f"{key}: no such number of the study{near_name(full, known)}", key)
-            of = Quantity(known[full][0].unit, "amount that was added")
-            added[full] = _number(key, value, Variable(key, of.description, of))
-    speeds: list[tuple[float, float, float]] = []
-    with faults.collected():
-        speeds = list(_speeds(given.get("speeds", []), f"{place}.speeds"))
-    columns: dict[str, str] = {}
-    with faults.collected():
-        columns = _columns(given, place)
-    faults.refuse()
+    for full, value in leaves(given.get("added", {})):
+        if full not in known:
+            entry.fault(f"added.{full}", f"no such number of the study{near_name(full, known)}")
+            continue
+        of = Quantity(known[full][0].unit, "amount that was added")
+        added[full] = entry.quantity(f"added.{full}", Variable("", of.description, of), value)
+    speeds = list(_speeds(entry))
+    columns = _columns(entry)
+    entry.refuse()
     return PlannedRun(
         name,
         Path(source).parent / given["file"],
@@ -375,52 +306,34 @@ def _run(
     )
 
 
-def _speeds(entries: Sequence[Any], key: str) -> Iterator[tuple[float, float, float]]:
+def _speeds(entry: Entry) -> Iterator[tuple[float, float, float]]:
     """The changes of the speed, in order."""
     of = {v.name: v.quantity for v in Layout(RunTable).variables}
     duration = Quantity("s", "duration of the change", low=0.0, open_low=True)
     kinds = (of["begin"], duration, of["crank_speed"])
     end = -math.inf
-    for k, entry in enumerate(entries, 1):
-        if len(entry) != len(kinds):
-            raise InputError(
-                f'{key} = {shown(entry)}: must be a list of begin, duration and crank speed, such as ["5 s", "1 s", '
-                '"2 rad/s"]',
-                key,
-            )
+    for k, change in enumerate(entry.given.get("speeds", []), 1):
+        if len(change) != len(kinds):
+            words = 'must be a list of begin, duration and crank speed, such as ["5 s", "1 s", "2 rad/s"]'
+            entry.wrong("speeds", change, words)
+            continue
         begin, lasts, speed = (
-            _number(key, x, Variable(key, q.description, q)) for x, q in zip(entry, kinds, strict=True)
+            entry.quantity("speeds", Variable("", q.description, q), x)
+            for x, q in zip(change, kinds, strict=True)
         )
         if begin < end:
-            raise InputError(f"{key}: change {k} begins before the one before it ends, at {end:g} s", key)
+            entry.fault("speeds", f"change {k} begins before the one before it ends, at {end:g} s")
         end = begin + lasts
         yield begin, lasts, speed
 
 
-def _leaves(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """The values of nested tables with their full names."""
-    for name, value in table.items():
-        if isinstance(value, Mapping):
-            yield from _leaves(value, f"{prefix}{name}.")
-        else:
-            yield prefix + name, value
-
-
-def _sensor(entry: Any, place: str, table: Any) -> tuple[str, SensorKnowledge]:
-    given = _checked(entry, entry_form(SensorTable, SENSOR_KEYS, f"{place}."), place)
-    column, key = given.get("column", ""), f"{place}.column"
-    analog = [name for name, each in MEASURANDS.items() if each.analog]
-    if column not in analog:
-        words = f"must be one of {', '.join(analog)}{near_name(column, analog)}"
-        raise InputError(f"{key} = {shown(column)}: {words}", key)
-    numbers, faults = dict[str, float](), Faults()
+def _sensor(entry: Entry, column: str, table: IdentifyTable) -> SensorKnowledge:
+    given, numbers = entry.given, dict[str, float]()
     for name in ("offset", "resolution"):
         if name in given:
             of = Quantity(MEASURANDS[column].unit, f"{name} of the sensor", low=0.0)
-            with faults.collected():
-                numbers[name] = _number(f"{place}.{name}", given[name], Variable(name, of.description, of))
-    faults.refuse()
-    return column, SensorKnowledge(
+            numbers[name] = entry.quantity(name, Variable("", of.description, of), given[name])
+    return SensorKnowledge(
         float(given.get("noise", table.noise)),
         float(given.get("gain", table.gain)),
         numbers.get("offset"),

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, create_model
+from pydantic import Field
 
 from ...core.quantities import Value, declaration, quantity
-from ...reading.tables import schema
-from ..entry_values import Entered
+from ...reading.lists import TableList
+from ..entry_values import entered, filled_text
 
 FEEDS = ("same", "none")
 """The feed of a run: that of all loaded runs, or none."""
-MOST_PARAMETERS, MOST_RUNS, MOST_SENSORS, MOST_SPEEDS = 40, 12, 12, 200
+MOST_SPEEDS = 200
 
 
 @declaration
@@ -40,24 +40,6 @@ class IdentifyTable:
         "1", "number of starts of the fit, spread over the bounds", default=1, min=1, max=100, type="Integer"
     )
     seed: Value = quantity("1", "seed of the starts", default=1, min=0, max=1_000_000_000, type="Integer")
-
-
-FIELDS: Mapping[str, Any] = {
-    "parameter": (
-        list[Any],
-        Field(
-            [],
-            max_length=MOST_PARAMETERS,
-            description="numbers that are sought: tables [[identify.parameter]]",
-        ),
-    ),
-    "run": (list[Any], Field([], max_length=MOST_RUNS, description="recordings: tables [[identify.run]]")),
-    "sensor": (
-        list[Any],
-        Field([], max_length=MOST_SENSORS, description="knowledge of sensors: tables [[identify.sensor]]"),
-    ),
-}
-"""Keys of the table that are no quantities, as pydantic fields."""
 
 
 @declaration
@@ -130,39 +112,7 @@ class SensorTable:
     )
 
 
-PARAMETER_KEYS: Mapping[str, Any] = {
-    "name": (
-        str,
-        Field(
-            "",
-            min_length=1,
-            description='full name of a quantity, such as "machine.left.web_mass", "feed.left.material_mass", '
-            '"motor.rotor.J"',
-        ),
-    ),
-    "from": (Entered, Field(None, description="least value")),
-    "to": (Entered, Field(None, description="largest value")),
-    "deviation": (
-        Entered,
-        Field(
-            None,
-            description="standard deviation of the value of the study from the true one, as of a weighing or a "
-            'drawing; a number in the unit of the quantity, or a share of the value, such as "5 %"',
-        ),
-    ),
-}
-SENSOR_KEYS: Mapping[str, Any] = {
-    "column": (str, Field("", min_length=1, description='quantity that it measures, such as "motor.i"')),
-    "offset": (
-        Entered,
-        Field(None, description="standard deviation of its offset, in the unit of the quantity"),
-    ),
-    "resolution": (Entered, Field(None, description="step of its converter, in the unit of the quantity")),
-}
-_FILE: Any = (
-    str,
-    Field("", min_length=1, description="recording (CSV, or CSV.gz), relative to the study file"),
-)
+_FILE: Any = filled_text("recording (CSV, or CSV.gz), relative to the study file")
 _COLUMNS: Any = (
     dict[str, Any],
     Field({}, description="by quantity, the head of its column, where that is not the quantity's name"),
@@ -180,38 +130,96 @@ WATCH_KEYS: Mapping[str, Any] = {
     ),
 }
 """Keys of the table [watch] that are no quantities."""
-RUN_KEYS: Mapping[str, Any] = {
-    "name": (str, Field("", min_length=1, description="name of the run, in small letters, digits and _")),
-    "file": _FILE,
-    "feed": (
-        Literal[FEEDS],
-        Field("same", description="feed of the machine: the one that is sought in all loaded runs, or none"),
-    ),
-    "speeds": (
-        list[list[Any]],
-        Field(
-            [],
-            max_length=MOST_SPEEDS,
-            description="smooth changes of the speed reference, each a list of its time in the recording, its "
-            "duration, and the crank speed after it",
-        ),
-    ),
-    "columns": _COLUMNS,
-    "added": (
-        dict[str, Any],
-        Field(
-            {}, description="what was added to a sought number for this run, by its full name: a known mass"
-        ),
-    ),
+
+FROM_RECORDING: Mapping[str, str] = {
+    "crank_speed": "run.crank_speed",
+    "begin": "the first row",
+    "end": "the last row",
 }
-
-ParameterEntry: type[BaseModel] = create_model(
-    "identify_parameter", __config__=ConfigDict(extra="forbid"), **PARAMETER_KEYS
+"""By key of a recording, the source of its value if the file leaves the key out."""
+SOUGHT = TableList(
+    "identify.parameter",
+    title="Number that is sought",
+    description="numbers that are sought",
+    most=40,
+    must_be="the full name of a number of the machine (machine.left.web_mass), of its feed (feed. ..), or of the "
+    "motor (motor. ..)",
+    example="machine.left.web_mass",
+    least=1,
+    conditions={
+        "required": ["name"],
+        "anyOf": [{"required": ["from", "to"]}, {"required": ["deviation"]}],
+    },
+    keys={
+        "name": filled_text(
+            'full name of a quantity, such as "machine.left.web_mass", "feed.left.material_mass", '
+            '"motor.rotor.J"'
+        ),
+        "from": entered("least value"),
+        "to": entered("largest value"),
+        "deviation": entered(
+            "standard deviation of the value of the study from the true one, as of a weighing or a "
+            'drawing; a number in the unit of the quantity, or a share of the value, such as "5 %"'
+        ),
+    },
 )
-"""The form of an entry [[identify.parameter]]."""
-
-
-def entry_form(declared: type, keys: Mapping[str, Any], prefix: str) -> type[BaseModel]:
-    """The form of an entry of these declared quantities and other keys; `prefix` stands before their names in a
-    refusal."""
-    return schema(declared, "identify_entry", prefix, **keys)
+RUNS = TableList(
+    "identify.run",
+    title="Recorded run",
+    description="recordings",
+    most=12,
+    declared=RunTable,
+    is_twice="is the name of another run; give it another",
+    least=1,
+    conditions={"required": ["file"]},
+    follows={**FROM_RECORDING, "name": "run_1, run_2, ..", "switched_off": "never"},
+    keys={
+        "name": filled_text("name of the run, in small letters, digits and _"),
+        "file": _FILE,
+        "feed": (
+            Literal[FEEDS],
+            Field(
+                "same", description="feed of the machine: the one that is sought in all loaded runs, or none"
+            ),
+        ),
+        "speeds": (
+            list[list[Any]],
+            Field(
+                [],
+                max_length=MOST_SPEEDS,
+                description="smooth changes of the speed reference, each a list of its time in the recording, its "
+                "duration, and the crank speed after it",
+            ),
+        ),
+        "columns": _COLUMNS,
+        "added": (
+            dict[str, Any],
+            Field(
+                {},
+                description="what was added to a sought number for this run, by its full name: a known mass",
+            ),
+        ),
+    },
+)
+SENSORS = TableList(
+    "identify.sensor",
+    title="Sensor of a recording",
+    description="knowledge of sensors",
+    most=12,
+    declared=SensorTable,
+    named_by="column",
+    conditions={"required": ["column"]},
+    follows={
+        "noise": "identify.noise",
+        "gain": "identify.gain",
+        "offset": "5 % of the RMS of a current or torque, 0 of others",
+        "resolution": "0",
+    },
+    keys={
+        "column": filled_text('quantity that it measures, such as "motor.i"'),
+        "offset": entered("standard deviation of its offset, in the unit of the quantity"),
+        "resolution": entered("step of its converter, in the unit of the quantity"),
+    },
+)
+FIELDS: Mapping[str, Any] = {"parameter": SOUGHT.field, "run": RUNS.field, "sensor": SENSORS.field}
+"""Keys of the table that are no quantities, as pydantic fields."""

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+import math
+from collections.abc import Collection, Mapping
 from typing import Any
 
 from pydantic import Field
 
-from ...core.errors import Faults, InputError, meant, near_name, refusal_prefix, shown
+from ...core.errors import Faults, InputError, near_name, refusal_prefix
 from ...core.messages import unit_behind
 from ...core.quantities import Quantity, Value, Variable, declaration, quantity
 from ...machines.machine import Machine
 from ...mechanism.models import MachineModel
-from ...reading.tables import to_number
+from ...reading.lists import Entry, leaves, read_entries
 from ..cycle_quantities import CycleBasis, CycleQuantity, cycle_quantity
 from .wishes import SLACK, TurnLimit, Wishes
 
@@ -93,13 +94,10 @@ def read_wishes(
     for name in form.objectives or [USUAL_OBJECTIVE]:
         with faults.collected(), refusal_prefix("optimize.objectives: ", "optimize.objectives"):
             objectives.append(cycle_quantity(name, model))
-    free: dict[str, tuple[float, float]] = {}
-    with faults.collected():
-        free = _free(form.free, model, of_catalogue)
-    limits: list[TurnLimit] = []
-    for name, ends in form.limits.items():
-        with faults.collected():
-            limits.append(_limit(name, ends, model))
+    free = _free(form.free, model, of_catalogue, faults)
+    limits = read_entries(
+        form.limits.items(), "optimize.limits", faults, lambda entry, name: _limit(entry, name, model)
+    )
     if table.slack_free_speed and machine is not None and not machine.loaded_sides(feed):
         words = "needs webs with mass or load, which this machine has not; leave it out"
         faults.add([InputError(f"optimize.{SLACK}: {words}", f"optimize.{SLACK}")])
@@ -141,29 +139,30 @@ def wishes_of(config: Any) -> Wishes:
 
 
 def _free(
-    tables: Mapping[str, Any], model: type[MachineModel], of_catalogue: bool
+    tables: Mapping[str, Any], model: type[MachineModel], of_catalogue: bool, faults: Faults
 ) -> dict[str, tuple[float, float]]:
     variables = {v.name: v for v in model.parameter_layout.variables}
-    faults, free = Faults(), {}
-    for name, ends in _leaves(tables, "", variables):
-        key = f"optimize.free.{name}"
-        with faults.collected():
-            if name not in variables:
-                raise InputError(f"{key}: no such parameter of the machine{_hint(name, variables)}", key)
-            bounds = _ends(key, ends, variables[name], _ENDS)
-            low, high, unit = bounds["min"], bounds["max"], unit_behind(variables[name].unit)
-            if not low < high:
-                raise InputError(f"{key}: max = {high:g}{unit} must be > min = {low:g}{unit}", key)
-            if name == "ratio" and of_catalogue:
-                raise InputError(f"{key}: follows from the motor of the catalogue; leave it out", key)
-            free[name] = low, high
-    if not free and not faults.errors:
-        raise InputError(
-            "optimize.free: must name at least one parameter, such as r = { min = 0.1, max = 0.2 }",
-            "optimize.free",
-        )
-    faults.refuse()
-    return free
+
+    def read(entry: Entry, name: str) -> tuple[str, tuple[float, float]]:
+        if name not in variables:
+            entry.fault("", f"no such parameter of the machine{_hint(name, variables)}")
+            entry.refuse()
+        low, high, unit = _ends(entry, variables[name], "min and max")
+        if math.isinf(low) or math.isinf(high):
+            entry.wrong("", entry.given, "must have min and max")
+        elif high <= low:
+            entry.fault("", f"max = {high:g}{unit} must be > min = {low:g}{unit}")
+        elif name == "ratio" and of_catalogue:
+            entry.fault("", "follows from the motor of the catalogue; leave it out")
+        return name, (low, high)
+
+    def is_nested(name: str, inner: Mapping[str, Any]) -> bool:
+        return bool(inner) and not set(inner) & set(_ENDS) and name not in variables
+
+    if not tables:
+        line = "optimize.free: must name at least one parameter, such as r = { min = 0.1, max = 0.2 }"
+        faults.add([InputError(line, "optimize.free")])
+    return dict(read_entries(leaves(tables, is_nested), "optimize.free", faults, read))
 
 
 def _hint(name: str, known: Collection[str]) -> str:
@@ -174,48 +173,26 @@ def _hint(name: str, known: Collection[str]) -> str:
     return near_name(own, known) or f"; there are {', '.join(known)}"
 
 
-def _leaves(table: Mapping[str, Any], prefix: str, known: Collection[str]) -> Iterator[tuple[str, Any]]:
-    """The tables of ends in nested tables, with their full names."""
-    for name, inner in table.items():
-        full = f"{prefix}{name}"
-        is_nested = isinstance(inner, Mapping) and inner and not set(inner) & set(_ENDS)
-        if is_nested and full not in known:
-            yield from _leaves(inner, f"{full}.", known)
-        else:
-            yield full, inner
+def _ends(entry: Entry, variable: Variable, needed: str) -> tuple[float, float, str]:
+    """The values of min and max in the declared unit, infinite where they are not given, and words on the unit."""
+    if not isinstance(entry.raw, Mapping) or not entry.raw:
+        entry.wrong("", entry.raw, f"must be a table with {needed}")
+        entry.refuse()
+    entry.keys("", entry.given, _ENDS)
+    low, high = (
+        entry.quantity(end, variable, entry.given[end]) if end in entry.given else missing
+        for end, missing in zip(_ENDS, (-math.inf, math.inf), strict=True)
+    )
+    return low, high, unit_behind(variable.unit)
 
 
-def _ends(key: str, given: Any, variable: Variable, required: Collection[str] = ()) -> dict[str, Any]:
-    """The values of min and max in the declared unit, None for one that is not given."""
-    if not isinstance(given, Mapping) or not given:
-        needed = " and ".join(required) or "min, max, or both"
-        raise InputError(f"{key} = {shown(given)}: must be a table with {needed}", key)
-    ends: dict[str, Any] = dict.fromkeys(_ENDS)
-    faults = Faults()
-    for end, value in given.items():
-        full = f"{key}.{end}"
-        with faults.collected():
-            if end not in _ENDS:
-                words = f"unknown key{meant(str(end), _ENDS)} known here: {', '.join(_ENDS)}"
-                raise InputError(f"{full}: {words}", full)
-            try:
-                ends[end] = to_number(Variable(full, variable.description, variable.quantity), value)
-            except ValueError as error:
-                raise InputError(str(error), full) from None
-    if not set(required) <= set(given):
-        faults.add([InputError(f"{key} = {shown(given)}: must have {' and '.join(required)}", key)])
-    faults.refuse()
-    return ends
-
-
-def _limit(name: str, given: Any, model: type[MachineModel]) -> TurnLimit:
-    key = f"optimize.limits.{name}"
-    with refusal_prefix("optimize.limits: ", key):
+def _limit(entry: Entry, name: str, model: type[MachineModel]) -> TurnLimit:
+    with refusal_prefix("optimize.limits: ", entry.place):
         q = cycle_quantity(name, model)
-    ends = _ends(key, given, Variable(name, q.description, Quantity(q.unit, q.description)))
-    low, high, unit = ends["min"], ends["max"], unit_behind(q.unit)
-    if low is not None and high is not None and not low <= high:
-        raise InputError(f"{key}: max = {high:g}{unit} must be >= min = {low:g}{unit}", key)
-    if low is not None and name == "installed_power":
-        raise InputError(f"{key}.min: installed_power has an upper limit only; leave it out", f"{key}.min")
-    return TurnLimit(q, low, high)
+    variable = Variable(name, q.description, Quantity(q.unit, q.description))
+    low, high, unit = _ends(entry, variable, "min, max, or both")
+    if low > high:
+        entry.fault("", f"max = {high:g}{unit} must be >= min = {low:g}{unit}")
+    elif "min" in entry.given and name == "installed_power":
+        entry.fault("min", "installed_power has an upper limit only; leave it out")
+    return TurnLimit(q, low if "min" in entry.given else None, high if "max" in entry.given else None)
