@@ -418,6 +418,14 @@ def test_the_event_of_each_point_begins_at_its_own_crank_angle(monkeypatch):
 
 
 @NATIVE
+def test_the_limit_of_a_coupling_is_in_the_name_of_the_store(jams):
+    _, task = jams
+    coupled = sweep.task_of(parse(gains() + TRANSIENTS + "[coupling]\ntrip_torque = 400\n"))
+    harder = sweep.task_of(parse(gains() + TRANSIENTS + "[coupling]\ntrip_torque = 500\n"))
+    assert len({each.digest() for each in (task, coupled, harder)}) == 3
+
+
+@NATIVE
 def test_a_motor_that_does_not_settle_has_that_as_its_reason():
     """Masses of 100 t, which a motor on the line brings up for minutes; the code says it, and the sentence comes
     last."""

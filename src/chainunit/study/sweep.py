@@ -154,6 +154,8 @@ class SweepTask:
                 "empty_start": config.empty_start,
                 "ramp_end": config.ramp_end,
             }
+            if config.coupling is not None:
+                relevant["coupling"] = asdict(config.coupling)
         return hashlib.sha256(json.dumps(relevant, sort_keys=True).encode()).hexdigest()
 
 
