@@ -301,9 +301,9 @@ class BlockRuns:
             fed_from = config.steady_begin if config.empty_start else None
             over_time = replace(point.rig, fed_from=fed_from).signals(ramp=True)
             # the rate of the reference, which a feed-forward takes, is no profile
-            own = {full: x if is_evaluated(x) else 0.0 for full, x in over_time.items()}
-            begin = self._inputs | {full: at_time(x, 0.0) for full, x in own.items()}
-            signals.append(own)
+            from_rest = {full: x if is_evaluated(x) else 0.0 for full, x in over_time.items()}
+            begin = self._inputs | {full: at_time(x, 0.0) for full, x in from_rest.items()}
+            signals.append(from_rest)
             rest.append(self.system.start(begin, {name: point.values[name] for name in self._varying}))
             turns = config.run.settle_turns * (2.0 if config.empty_start else 1.0)
             stops.append(config.ramp_end + turns * config.turn)

@@ -86,9 +86,9 @@ def measures(
 
 def _of_system(name: str) -> list[str]:
     """The parameters of the compiled system that a swept quantity sets, by full name."""
-    part, _, own = name.partition(".")
+    part, _, short = name.partition(".")
     # the machine of the feed-forward has the same parameters
-    return [name, f"model.{own}"] if part == "machine" else []
+    return [name, f"model.{short}"] if part == "machine" else []
 
 
 def _point(rig: Rig, plan: SweepPlan, values: Mapping[str, float]) -> RunPoint:
@@ -96,8 +96,8 @@ def _point(rig: Rig, plan: SweepPlan, values: Mapping[str, float]) -> RunPoint:
     config, event = rig.config, rig.config.events[plan.event]
     feed = {name.removeprefix("feed."): x for name, x in values.items() if name.startswith("feed.")}
     begin = f"event.{event.name}."
-    own = {name.removeprefix(begin): x for name, x in values.items() if name.startswith(begin)}
-    event = replace(event, p=replace(event.p, **own))
+    of_event = {name.removeprefix(begin): x for name, x in values.items() if name.startswith(begin)}
+    event = replace(event, p=replace(event.p, **of_event))
     if _RATIO in values:
         machine = rig.drive.machine.replace(ratio=values[_RATIO])
         rig = replace(rig, drive=replace(rig.drive, machine=machine))
