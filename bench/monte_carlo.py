@@ -57,7 +57,7 @@ def timed(task: monte_carlo.Task, folder: Path) -> tuple[monte_carlo.MonteCarloR
 def loop_alone(task: monte_carlo.Task, runs: int = 256) -> float:
     """Seconds a run of the native loop, without what Python does before and after it."""
     block = task.block()
-    requests = [monte_carlo.request(task, monte_carlo.draw(task.config, k)) for k in range(runs)]
+    points = [monte_carlo.point(block.rig, monte_carlo.draw(task.config, k)) for k in range(runs)]
     spent = 0.0
     real = block.loop.run
 
@@ -69,7 +69,7 @@ def loop_alone(task: monte_carlo.Task, runs: int = 256) -> float:
         return result
 
     block.loop.run = run
-    for _ in block.runs(requests):
+    for _ in block.runs(points):
         pass
     return spent / runs
 

@@ -284,6 +284,8 @@ def test_states_without_result_have_a_reason(engine):
     assert texts[1] == {"c: the crank circle must stay left of the pivot C"}
     assert "r: must be > 0 m" in str(texts[2])
     assert "left.material_mass: must be >= 0 kg" in str(texts[3])
+    subjects = [out.reason.attrs["subjects"][next(iter(each))] for each in codes]
+    assert subjects == ["", "c", "r", "left.material_mass", ""]
     for name in ("tau", "J"):
         assert np.isnan(out[name].isel(state=[1, 2, 3])).all()
         for k in (0, 4):

@@ -31,12 +31,11 @@ from chainunit.reading.text import number as shown
 from chainunit.report import runs as report_runs
 from chainunit.report.blocks import Source
 from chainunit.report.terminal import plain_line
-from chainunit.study import event_block, monte_carlo, quantiles
+from chainunit.study import block_runs, monte_carlo, quantiles
+from chainunit.study.block_runs import BlockRuns, Cause, EventSimulation
 from chainunit.study.choice import choose
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
-from chainunit.study.event_block import EventBlock
-from chainunit.study.event_runs import EventSimulation
 from chainunit.study.quantiles import Estimate
 from chainunit.study.rig import Rig
 from chainunit.system import CoSimulation, monolithic
@@ -162,8 +161,8 @@ def test_the_store_is_that_of_an_unbroken_study(killed, tmp_path):
 def branches(task, simulation, *drawn):
     """The runs with these events from the saved state of a simulation."""
     system = EventSimulation.__new__(EventSimulation)
-    system._rig, system._simulation = task.rig, simulation
-    return list(system.runs([monte_carlo.request(task, each) for each in drawn]))
+    system.rig, system._start, system._simulation = task.rig, task.steady, simulation
+    return list(system.runs([monte_carlo.point(system.rig, each) for each in drawn]))
 
 
 def test_a_run_is_what_its_number_says(killed):
@@ -250,7 +249,7 @@ def test_the_lump_comes_on_the_side_of_its_number(number):
     drawn, simulation = monte_carlo.draw(config, number), Still()
     assert drawn == monte_carlo.draw(parse(STUDY.format(runs=99)), number)
     (branch,) = branches(task, simulation, drawn)
-    assert str(branch.error) == "seen"
+    assert str(branch.fault) == "seen"
     feed, lump = {"left": 100.0, "right": 700.0}, drawn.event.p
     for side, normal in feed.items():
         force = simulation.signals[f"machine.{side}.processing_force"]
@@ -463,14 +462,14 @@ def test_the_compiled_system_agrees_with_the_co_simulation(text, tmp_path):
     """To the error of the coupling; the same runs trip, at the same row."""
     task = compiled_task(text, tmp_path)
     drawn = [monte_carlo.draw(task.config, number) for number in range(4)]
-    requests = [monte_carlo.request(task, each) for each in drawn]
+    points = [monte_carlo.point(task.rig, each) for each in drawn]
     reference = EventSimulation(dataclasses.replace(task, cosimulated=True).rig, task.steady)
     try:
-        wanted = list(reference.runs(requests))
+        wanted = list(reference.runs(points))
     finally:
         reference.close()
-    for got, other, each in zip(task.block().runs(requests), wanted, drawn, strict=True):
-        assert got.error is None and got.ended == other.ended and got.series.sizes == other.series.sizes
+    for got, other, each in zip(task.block().runs(points), wanted, drawn, strict=True):
+        assert got.fault is None and got.ended == other.ended and got.series.sizes == other.series.sizes
         a, b = (
             monte_carlo.Layout(monte_carlo.Sample).by_name(monte_carlo.sample(task, each, run))
             for run in (got, other)
@@ -489,8 +488,8 @@ def test_a_compiled_start_is_the_monolithic_solution(text, fed_from, monkeypatch
     task = dataclasses.replace(compiled_task(text), fed_from=fed_from)
     block, rig = task.block(), task.rig
     reference = monolithic(rig.graph, rig.signals(ramp=True), np.linspace(0.0, task.steady, 25))
-    monkeypatch.delattr(event_block, "monolithic")
-    names = block._system.model.state_layout.names
+    monkeypatch.delattr(block_runs, "monolithic")
+    names = block.system.model.state_layout.names
     for name, x in zip(names, block.states, strict=True):
         row = reference[name].values
         assert abs(x - row[-1]) <= 1e-6 * max(np.max(np.abs(row)), 1e-3), (name, x, row[-1])
@@ -503,7 +502,7 @@ def test_a_feed_forward_starts_by_the_monolithic_solution():
     block, rig = task.block(), task.rig
     assert "model.a" in rig.signals(ramp=True)
     reference = monolithic(rig.graph, rig.signals(ramp=True), [0.0, task.steady], rtol=1e-11)
-    wanted = [float(reference[name][-1]) for name in block._system.model.state_layout.names]
+    wanted = [float(reference[name][-1]) for name in block.system.model.state_layout.names]
     np.testing.assert_allclose(block.states, wanted, rtol=1e-6, atol=1e-9)
 
 
@@ -518,8 +517,13 @@ def test_a_start_that_leaves_all_bounds_is_told():
 
 @needs_compiler
 def test_a_parcel_builds_the_system_once(monkeypatch):
-    built, init = [], EventBlock.__init__
-    monkeypatch.setattr(EventBlock, "__init__", lambda self, *more: built.append(1) or init(self, *more))
+    built, init = [], BlockRuns.__init__
+
+    def counted(self, *given, **named):
+        built.append(1)
+        init(self, *given, **named)
+
+    monkeypatch.setattr(BlockRuns, "__init__", counted)
     task = compiled_task(STUDY)
     parcel = monte_carlo.Parcel.of(task)
     assert len(built) == 1 and parcel.digest == task.digest()
@@ -551,11 +555,13 @@ def test_runs_on_the_compiled_system_do_not_depend_on_their_batch(tmp_path):
 def test_a_wild_run_on_the_compiled_system_fails_alone():
     task = compiled_task(STUDY)
     block, drawn = task.block(), [monte_carlo.draw(task.config, k) for k in range(3)]
-    requests = [monte_carlo.request(task, each) for each in drawn]
-    wild = dataclasses.replace(requests[1].event, p=dataclasses.replace(requests[1].event.p, force=1e300))
-    runs = list(block.runs([requests[0], dataclasses.replace(requests[1], event=wild), requests[2]]))
-    assert [run.error is None for run in runs] == [True, False, True]
-    assert "the states left all bounds" in str(runs[1].error)
+    points = [monte_carlo.point(task.rig, each) for each in drawn]
+    wild = dataclasses.replace(points[1].event, p=dataclasses.replace(points[1].event.p, force=1e300))
+    runs = list(block.runs([points[0], dataclasses.replace(points[1], event=wild), points[2]]))
+    assert [run.fault is None for run in runs] == [True, False, True]
+    fault = runs[1].fault
+    assert fault.cause is Cause.LEFT_BOUNDS and fault.time == runs[1].series["time"][-1]
+    assert str(fault) == f"at t = {fault.time:g} s: the states of the drive left all bounds"
     for k in (0, 2):
-        (alone,) = block.runs([requests[k]])
+        (alone,) = block.runs([points[k]])
         xr.testing.assert_identical(alone.series, runs[k].series)

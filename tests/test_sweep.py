@@ -22,6 +22,7 @@ from command import chainunit
 from scipy.stats import qmc, spearmanr
 
 from chainunit import GeometryError, InputError, Study
+from chainunit.batch.evaluate import ReasonKind
 from chainunit.core.errors import InputError as Refusal
 from chainunit.core.ledger import Ledger
 from chainunit.core.native.compilers import compiler
@@ -30,6 +31,7 @@ from chainunit.report import sweep_figures
 from chainunit.report.figure import Hatch, hatch_lines
 from chainunit.report.terminal import plain
 from chainunit.study import sweep, sweep_runs
+from chainunit.study.block_runs import Cause
 from chainunit.study.choice import choose
 from chainunit.study.config import parse
 from chainunit.study.cycle import cycle
@@ -415,6 +417,32 @@ def test_the_event_of_each_point_begins_at_its_own_crank_angle(monkeypatch):
         for x, asked in zip(begun, results[sweep.plain_name("event.jam_left.crank_angle")], strict=True)
     ]
     assert np.abs(off) == pytest.approx(0.0, abs=1e-6)
+
+
+@NATIVE
+def test_the_limit_of_a_coupling_is_in_the_name_of_the_store(jams):
+    _, task = jams
+    coupled = sweep.task_of(parse(gains() + TRANSIENTS + "[coupling]\ntrip_torque = 400\n"))
+    harder = sweep.task_of(parse(gains() + TRANSIENTS + "[coupling]\ntrip_torque = 500\n"))
+    assert len({each.digest() for each in (task, coupled, harder)}) == 3
+
+
+@NATIVE
+def test_a_motor_that_does_not_settle_has_that_as_its_reason():
+    """Masses of 100 t, which a motor on the line brings up for minutes; the code says it, and the sentence comes
+    last."""
+    head, mass, jam = (TRANSIENTS.split("[[sweep.parameter]]")[k] for k in (0, 3, 4))
+    mass = mass.replace("from = 0\nto = 50", "values = [1e5]")
+    text = "[system]\nmotor = 'InductionMotor'\n" + "[[sweep.parameter]]".join([head, mass, jam])
+    task = sweep.task_of(parse(text))
+    results = sweep.make_points(task, 0, 2)
+    code = task.codes[Cause.UNSETTLED, ""]
+    np.testing.assert_array_equal(results["reason"], code)
+    assert str(task.reasons[code]) == "the motor does not settle in 20 turns of the crank"
+    assert np.isnan(results["crank_torque_peak"]).all() and np.isfinite(results["min_margin"]).all()
+    assert (
+        task.reasons[task.codes[ReasonKind.BOUNDS, "event.jam_left.force"]].subject == "event.jam_left.force"
+    )
 
 
 ONE_JAM = """\

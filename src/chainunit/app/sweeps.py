@@ -38,7 +38,7 @@ class SweepResult(ReportedResult[Config, SweepSummary]):
         """A row for each point: its parameters, its results, and ``reason``, a text, empty where there is none."""
         points = self.summary.findings.points.load()
         table = points.to_dataframe()
-        reasons = ["", *self.summary.findings.task.reasons[1:]]
+        reasons = ["", *map(str, self.summary.findings.task.reasons[1:])]
         table["reason"] = [reasons[code] for code in points["reason"].values]
         return table[[*self.summary.variables, "reason"]]
 

@@ -7,6 +7,7 @@ import os
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from enum import Enum
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,36 @@ from .reductions import REDUCTIONS
 ENGINES = ("native", "numpy", "jax")
 _LEAST_INNER = 64
 """A last dimension that is shorter is no loop of its own: all dimensions are one loop then."""
+
+
+class ReasonKind(Enum):
+    """Why a state has no result, with its text; the first is that of a state with a result."""
+
+    NONE = "valid"
+    REQUIREMENT = "{subject}: {words}"
+    POSITION = "the machine cannot be assembled in this position, or stands in a dead position"
+    BOUNDS = "{subject}: must be {words}"
+
+
+@dataclass(frozen=True)
+class StateReason:
+    """A reason for which there is no result: its kind, whose value is its text, and what the text is about."""
+
+    kind: Enum
+    subject: str = ""
+    words: str = ""
+
+    def __str__(self) -> str:
+        return str(self.kind.value).format(subject=self.subject, words=self.words)
+
+
+def reasons_of(model: type[Model]) -> list[StateReason]:
+    """The reasons of a model by their codes; those of values outside their bounds follow them."""
+    return [
+        StateReason(ReasonKind.NONE),
+        *(StateReason(ReasonKind.REQUIREMENT, each.subject, each.why) for each in model.required),
+        StateReason(ReasonKind.POSITION),
+    ]
 
 
 def evaluate(
@@ -64,7 +95,7 @@ def evaluate(
     Returns
     -------
     a Dataset with a variable for each output, and ``reason``: 0 for a valid state. Where it is not 0 the results are
-    NaN; its attributes ``flag_values`` and ``reasons`` say why.
+    NaN; its attributes ``flag_values`` and ``reasons`` say why, and ``subjects`` what the reason is about.
 
     Raises
     ------
@@ -273,16 +304,11 @@ class Grid:
                 x[bad] = np.nan
 
     @property
-    def reasons(self) -> list[str]:
-        """The reasons by their number."""
-        model = self._equations.model
+    def reasons(self) -> list[StateReason]:
+        """The reasons by their codes."""
         bounds = {v.name: v.quantity.allowed_range for v in self._equations.arguments}
-        return [
-            "valid",
-            *(f"{each.subject}: {each.why}" for each in model.required),
-            "the machine cannot be assembled in this position, or stands in a dead position",
-            *(f"{name}: must be {bounds[name]}" for name, _ in self._bounds),
-        ]
+        outside = (StateReason(ReasonKind.BOUNDS, name, bounds[name]) for name, _ in self._bounds)
+        return [*reasons_of(self._equations.model), *outside]
 
     def _dims(self, reductions: Reductions) -> list[str]:
         """The dimensions of the results."""
@@ -310,8 +336,12 @@ class Grid:
             each.name: (dims, x.reshape(shape), {"units": each.unit, "long_name": each.description})
             for each, x in zip(self._columns(reductions), memory.results, strict=True)
         }
-        flags: dict[str, Any] = {"flag_values": list(range(len(self.reasons))), "reasons": self.reasons}
-        flags["long_name"] = "reason for which there is no result"
+        flags: dict[str, Any] = {
+            "flag_values": list(range(len(self.reasons))),
+            "reasons": [str(reason) for reason in self.reasons],
+            "subjects": [reason.subject for reason in self.reasons],
+            "long_name": "reason for which there is no result",
+        }
         variables["reason"] = (dims, memory.reason.reshape(shape), flags)
         coords = {name: c for name, c in self._coords.items() if set(map(str, c.dims)) <= set(dims)}
         return xr.Dataset(variables, coords)

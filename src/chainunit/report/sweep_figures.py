@@ -118,7 +118,7 @@ def _infeasible(summary: SweepSummary, x: Any, y: Any, reason: Any) -> Iterator[
     corners = np.stack([reason[:-1, :-1], reason[1:, :-1], reason[:-1, 1:], reason[1:, 1:]])
     worst = np.max(corners, axis=0)
     for look, code in enumerate(np.unique(worst[worst > 0])):
-        words = textwrap.shorten(summary.findings.task.reasons[int(code)], _NARROW, placeholder=" ...")
+        words = textwrap.shorten(str(summary.findings.task.reasons[int(code)]), _NARROW, placeholder=" ...")
         yield fig.Hatch(words, x, y, worst == code, look)
 
 
@@ -159,7 +159,7 @@ def _gaps(summary: SweepSummary, x: Any, reason: Any) -> Iterator[fig.Shade]:
         if reason[part[0]]:
             low, high = x[max(0, part[0] - 1)], x[min(len(x) - 1, part[-1] + 1)]
             words = textwrap.shorten(
-                summary.findings.task.reasons[int(reason[part[0]])], _NARROW, placeholder=" ..."
+                str(summary.findings.task.reasons[int(reason[part[0]])]), _NARROW, placeholder=" ..."
             )
             look = ("dark", "pale", "band")[int(reason[part[0]]) % 3]
             yield fig.Shade(0.5 * (x[part[0]] + low), 0.5 * (x[part[-1]] + high), words, look=look)

@@ -29,11 +29,10 @@ from ..work.progress import Report
 from ..work.runner import run as run_job
 from ..work.store import made_anew
 from .analysis import Findings
+from .block_runs import BlockRuns, EventRun, EventSimulation, RunPoint
 from .config import Config
 from .drive import Drive
 from .event import AnySide, Event
-from .event_block import EventBlock
-from .event_runs import EventRun, EventSimulation, Request
 from .event_table import RandomEvent
 from .limits import limit_reached
 from .measures import MEASURES, read_measure, same_measure
@@ -103,7 +102,7 @@ class RandomTask:
         """How the runs are made: "compiled", on the compiled system, or by the FMUs as the key `simulation` says."""
         return "compiled" if self.is_compiled else self.config.simulation
 
-    def digest(self, block: EventBlock | None = None) -> str:
+    def digest(self, block: BlockRuns | None = None) -> str:
         """A digest of everything on which the results depend: every parameter, and the code of the compiled system or
         the content of the FMUs. The compiled system is built unless its `block` is given."""
         config, drive = self.config, self.drive
@@ -129,9 +128,11 @@ class RandomTask:
             content.update(Path(self.files[name]).read_bytes())
         return content.hexdigest()[:12]
 
-    def block(self, states: Any = None) -> EventBlock:
+    def block(self, states: Any = None) -> BlockRuns:
         """The compiled system in its steady state, with these `states` if they are known."""
-        return EventBlock(self.rig, self.config.plans["random_overloads"].event, self.steady, states)
+        return BlockRuns(
+            self.rig, self.config.plans["random_overloads"].event.hardest(), start=self.steady, states=states
+        )
 
 
 def result_variables(event: RandomEvent) -> list[ResultVariable]:
@@ -168,7 +169,7 @@ class Parcel:
             return cls(replace(task, files={}), task.digest(block), {}, block.states)
         return cls(task, task.digest(), {name: Path(file).read_bytes() for name, file in task.files.items()})
 
-    def start(self) -> EventBlock | EventSimulation:
+    def start(self) -> BlockRuns | EventSimulation:
         """The system of the task in its steady state.
 
         Raises
@@ -189,11 +190,11 @@ class Parcel:
             remove_folder(folder)
 
 
-_systems: dict[str, EventBlock | EventSimulation] = {}
+_systems: dict[str, BlockRuns | EventSimulation] = {}
 """The system of this process, by the digest of its task."""
 
 
-def _system_of(parcel: Parcel) -> EventBlock | EventSimulation:
+def _system_of(parcel: Parcel) -> BlockRuns | EventSimulation:
     if parcel.digest not in _systems:
         close_system()
         _systems[parcel.digest] = parcel.start()
@@ -237,11 +238,13 @@ def draw(config: Config, number: int) -> Draw:
     return Draw(config.plans["random_overloads"].event.event(side, values), values, offset, trip)
 
 
-def request(task: RandomTask, chance: Draw) -> Request:
-    """The run with these random quantities."""
-    begin = task.steady + chance.offset
-    stop = begin + task.config.plans["random_overloads"].table.duration
-    return Request(chance.event, begin, stop, chance.trip_torque / task.drive.ratio)
+def point(rig: Rig, chance: Draw) -> RunPoint:
+    """The run of a rig with these random quantities."""
+    duration, limit = (
+        rig.config.plans["random_overloads"].table.duration,
+        chance.trip_torque / rig.drive.ratio,
+    )
+    return RunPoint(rig, chance.event, duration, chance.offset, limit)
 
 
 def sample(task: RandomTask, chance: Draw, run: EventRun) -> Sample:
@@ -266,7 +269,8 @@ def make_runs(parcel: Parcel, begin: int, end: int) -> dict[str, Any]:
     """The results of the runs from number `begin` to `end` - 1, by the names of `result_variables`."""
     task = parcel.task
     chances = [draw(task.config, number) for number in range(begin, end)]
-    runs = _system_of(parcel).runs([request(task, chance) for chance in chances])
+    system = _system_of(parcel)
+    runs = system.runs([point(system.rig, chance) for chance in chances])
     results = [_result_of(task, chance, run) for chance, run in zip(chances, runs, strict=True)]
     return {name: [result[name] for result in results] for name in results[0]}
 
@@ -274,13 +278,13 @@ def make_runs(parcel: Parcel, begin: int, end: int) -> dict[str, Any]:
 def _result_of(task: RandomTask, chance: Draw, run: EventRun) -> dict[str, Any]:
     """The results of a run by name; one that fails is a result, too."""
     numbers = dict.fromkeys(Layout(Sample).names)
-    if run.error is None:
+    if run.fault is None:
         numbers = Layout(Sample).by_name(sample(task, chance, run))
     return {
         "side": np.int8((_NO_SIDE, *SIDES).index(chance.event.side or _NO_SIDE)),
         **{f"drawn_{name}": value for name, value in chance.values.items()},
         **{name: math.nan if value is None else float(value) for name, value in numbers.items()},
-        "failed": "" if run.error is None else str(run.error) or type(run.error).__name__,
+        "failed": "" if run.fault is None else str(run.fault),
     }
 
 

@@ -165,6 +165,12 @@ class Rig:
         # a twin lacks the inputs of the part that is left out
         return {full: x for full, x in signals.items() if full.partition(".")[0] in self.graph.components}
 
+    @cached_property
+    def normal(self) -> dict[str, float]:
+        """The inputs in steady running without an event, by full name."""
+        signals: dict[str, Any] = self.signals()
+        return {full: float(value) for full, value in signals.items()}
+
     def _coming(self, empty: float, value: float) -> OverTime:
         """A load of a machine that starts empty, over time."""
         if self.fed_from is None:

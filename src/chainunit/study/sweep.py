@@ -7,8 +7,9 @@ import json
 import math
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
+from enum import Enum
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import __version__
+from ..batch.evaluate import ReasonKind, StateReason, reasons_of
 from ..core.composition import reference
 from ..core.errors import InputError
 from ..core.quantities import Layout
@@ -24,13 +26,14 @@ from ..work.job import Job, ResultVariable
 from ..work.progress import Report
 from ..work.runner import Outcome, check_scheduler
 from ..work.runner import run as run_job
+from .block_runs import BlockRuns, Cause
 from .choice import choose
 from .config import Config
 from .cycle_quantities import CycleQuantity, cycle_quantity, evaluate
 from .measures import Answers
 from .rig import Rig
 from .sweep_plan import SweepPlan
-from .sweep_runs import REASONS_OF_RUNS, SweepBlock, check_drive
+from .sweep_runs import block_of, check_drive, measures
 from .sweep_table import SPEED
 
 if TYPE_CHECKING:
@@ -40,7 +43,12 @@ TITLE = "points of the sweep"
 _STATES, _STATES_OF_RATIOS, _RUNS = 12e6, 2e6, 64
 """Largest numbers of states of a batch, of states where the ratio of the gear is swept (each then has an angle of its
 own), and of transients of a batch."""
-_ELSE = "another value of the point is outside its bounds"
+
+
+class Beside(Enum):
+    """Why a point has no result, where no swept quantity is the reason; with its text."""
+
+    BOUNDS = "another value of the point is outside its bounds"
 
 
 @dataclass(frozen=True)
@@ -54,7 +62,7 @@ class SweepTask:
     crank_speed: float
     rig: Rig | None = None
     threads: int = 1
-    """number of threads of the native loops; the results do not depend on it"""
+    """number of threads of the native loop; the results do not depend on it"""
 
     @cached_property
     def quantities(self) -> list[CycleQuantity]:
@@ -62,20 +70,25 @@ class SweepTask:
         return [cycle_quantity(name, self.machine.model) for name in self.plan.quantities]
 
     @cached_property
-    def block(self) -> SweepBlock:
-        """The transients of the measures."""
+    def block(self) -> BlockRuns:
+        """The runs of the measures."""
         assert self.rig is not None
-        return SweepBlock(self.rig, self.plan)
+        return block_of(self.rig, self.plan)
 
     @cached_property
-    def reasons(self) -> list[str]:
+    def reasons(self) -> list[StateReason]:
         """The reasons for which a point has no result, by their codes."""
-        own = [str(each) for each in self.turns(self.plan.values(0, 1)).reason.attrs["reasons"]]
-        whole = len(self.machine.model.required) + 2
-        bounds = [
-            f"{each.name}: must be {each.variable.quantity.allowed_range}" for each in self.plan.parameters
-        ]
-        return [*own[:whole], *bounds, _ELSE, *(REASONS_OF_RUNS if self.plan.measures else ())]
+        bounds = (
+            StateReason(ReasonKind.BOUNDS, each.name, each.variable.quantity.allowed_range)
+            for each in self.plan.parameters
+        )
+        runs = (Cause.LEFT_BOUNDS, Cause.UNSETTLED) if self.plan.measures else ()
+        return [*reasons_of(self.machine.model), *bounds, *map(StateReason, (Beside.BOUNDS, *runs))]
+
+    @cached_property
+    def codes(self) -> dict[tuple[Enum, str], int]:
+        """The codes of the reasons by kind and subject."""
+        return {(reason.kind, reason.subject): code for code, reason in enumerate(self.reasons)}
 
     def turns(self, values: Mapping[str, Any]) -> xr.Dataset:
         """The quantities of a turn at points with these values by full name, each of shape (points,)."""
@@ -100,16 +113,14 @@ class SweepTask:
             workers=self.threads,
         )
 
-    def codes(self, local: Sequence[int], reasons: Sequence[str]) -> Any:
-        """The codes of the sweep for those of a batch, whose texts are its own, shape (points,)."""
-        known = {reason: code for code, reason in enumerate(self.reasons)}
-        short = {each.name.partition(".")[2]: each.name for each in self.plan.parameters}
-
-        def code(reason: str) -> int:
-            name, colon, rest = reason.partition(":")
-            return known.get(reason, known.get(f"{short.get(name, name)}{colon}{rest}", known[_ELSE]))
-
-        return np.array([code(each) for each in reasons], np.int16)[np.asarray(local)]
+    def codes_of_turns(self, table: xr.Dataset) -> Any:
+        """The codes of the sweep for those of `turns`, shape (points,)."""
+        known = len(reasons_of(self.machine.model))
+        names = {each.name.partition(".")[2]: each.name for each in self.plan.parameters}
+        other = self.codes[Beside.BOUNDS, ""]
+        outside = (names.get(x, x) for x in table.reason.attrs["subjects"][known:])
+        codes = [*range(known), *(self.codes.get((ReasonKind.BOUNDS, name), other) for name in outside)]
+        return np.array(codes, np.int16)[table.reason.values]
 
     def digest(self) -> str:
         """A digest of everything on which the results depend, in hexadecimal digits. The number of points of Sobol's
@@ -143,6 +154,8 @@ class SweepTask:
                 "empty_start": config.empty_start,
                 "ramp_end": config.ramp_end,
             }
+            if config.coupling is not None:
+                relevant["coupling"] = asdict(config.coupling)
         return hashlib.sha256(json.dumps(relevant, sort_keys=True).encode()).hexdigest()
 
 
@@ -161,7 +174,7 @@ def batch_of(plan: SweepPlan) -> int:
 def result_variables(task: SweepTask) -> list[ResultVariable]:
     """The results of a point: its parameters, its quantities and measures, and the reason why it has none."""
     plan, known = task.plan, {v.name: v for v in Layout(Answers).variables}
-    words = [re.sub(r"[^\w.+@-]+", "_", reason).strip("_") for reason in task.reasons]
+    words = [re.sub(r"[^\w.+@-]+", "_", str(reason)).strip("_") for reason in task.reasons]
     return [
         *(
             ResultVariable(plain_name(p.name), p.variable.unit, p.variable.description)
@@ -178,10 +191,10 @@ def make_points(task: SweepTask, begin: int, end: int) -> dict[str, Any]:
     plan = task.plan
     values = plan.values(begin, end)
     table = task.turns(values)
-    reason = task.codes(table.reason.values, table.reason.attrs["reasons"])
-    for k, each in enumerate(plan.parameters):
+    reason = task.codes_of_turns(table)
+    for each in plan.parameters:
         inside = each.variable.quantity.admits(values[each.name])
-        reason[~inside] = len(task.machine.model.required) + 2 + k
+        reason[~inside] = task.codes[ReasonKind.BOUNDS, each.name]
     results = {plain_name(name): x for name, x in values.items()}
     for name in plan.quantities:
         results[plain_name(name)] = np.where(
@@ -192,11 +205,10 @@ def make_points(task: SweepTask, begin: int, end: int) -> dict[str, Any]:
         sound = np.flatnonzero(reason == 0)
         if len(sound):
             own = {name: x[sound] for name, x in values.items()}
-            measures, codes = task.block.measures(own, task.threads)
-            for name, x in measures.items():
+            measured, causes = measures(task.block, plan, own)
+            for name, x in measured.items():
                 results[name][sound] = x
-            first = len(task.reasons) - len(REASONS_OF_RUNS)
-            reason[sound] = np.where(codes == 0, 0, first - 1 + codes)
+            reason[sound] = [task.codes[cause, ""] if cause else 0 for cause in causes]
     return results | {"reason": reason.astype(np.int16)}
 
 
@@ -261,7 +273,7 @@ class SweepFindings:
         plan = self.plan
         names = {plain_name(name): name for name in (*(p.name for p in plan.parameters), *self.results)}
         dataset = self.outcome.dataset.rename(names)
-        dataset["reason"].attrs["reasons"] = self.task.reasons
+        dataset["reason"].attrs["reasons"] = [str(reason) for reason in self.task.reasons]
         return dataset.set_coords([each.name for each in plan.parameters])
 
     @cached_property

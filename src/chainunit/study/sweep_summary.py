@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import __version__
+from ..batch.evaluate import StateReason
 from ..core.quantities import Layout, Quantity, Variable
 from ..reading.text import entry, shown_in
 from ..work.store import made_anew
@@ -112,10 +113,10 @@ class SweepSummary:
         return counts, extremes, [k for _, k in best]
 
     @property
-    def counts(self) -> dict[str, int]:
-        """Number of points by reason, those without points left out."""
+    def counts(self) -> dict[StateReason, int]:
+        """Number of points without a result by reason, reasons without points left out."""
         counts = zip(self.findings.task.reasons, self._passed[0], strict=True)
-        return {reason: int(count) for reason, count in counts if count}
+        return {reason: int(count) for reason, count in list(counts)[1:] if count}
 
     @property
     def feasible(self) -> int:
@@ -260,12 +261,11 @@ class SweepSummary:
             "feasible": entry(self.feasible, "1"),
             "reasons": [
                 {
-                    "reason": reason,
+                    "reason": str(reason),
                     "points": entry(count, "1"),
                     "share": entry(count / plan.points, "1", "percent"),
                 }
                 for reason, count in self.counts.items()
-                if reason != self.findings.task.reasons[0]
             ],
             "organs": [
                 {
