@@ -26,20 +26,20 @@ from typing import Any
 import numpy as np
 from figures import parser, save, table
 
+from chainunit.capabilities.identification.fit import fit
+from chainunit.capabilities.identification.plant import Plant
+from chainunit.capabilities.identification.posterior import posterior
+from chainunit.capabilities.identification.problem import Problem, RecordedRun, Sensor
+from chainunit.capabilities.identification.residuals import check_residuals, strained_priors, strains
+from chainunit.capabilities.identification.shaft import MeasuredShaft
+from chainunit.capabilities.identification.suspicion import suspicions
+from chainunit.capabilities.identification.synthetic import HiddenRun, Logger, synthetic
+from chainunit.capabilities.identification.unknown import Unknown
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
-from chainunit.study.identification.fit import fit
-from chainunit.study.identification.plant import Plant
-from chainunit.study.identification.posterior import posterior
-from chainunit.study.identification.problem import Problem, RecordedRun, Sensor
-from chainunit.study.identification.residuals import check_residuals, strained_priors, strains
-from chainunit.study.identification.shaft import MeasuredShaft
-from chainunit.study.identification.suspicion import suspicions
-from chainunit.study.identification.synthetic import HiddenRun, Logger, synthetic
-from chainunit.study.identification.unknown import Unknown
 from chainunit.study.sections import ChainOrgans
 
 RODS = [f"{side}.{rod}_mass" for side in ("left", "right") for rod in ("wall", "web")]

@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 from figures import parser, save
 
+from chainunit.capabilities.random_overloads import runs as monte_carlo
 from chainunit.drives.dc_motor import DcMotor
-from chainunit.study import monte_carlo
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 from chainunit.system.instance import Fmu, Instance
@@ -33,15 +33,15 @@ COSIMULATED, COMPILED, WORKERS = 320, 16384, 2
 MEASURES = ("crank_torque_peak", "motor_torque_peak", "current_peak", "rocker_torque_peak", "speed_least")
 
 
-def task_of(runs: int, folder: Path) -> monte_carlo.Task:
+def task_of(runs: int, folder: Path) -> monte_carlo.RandomTask:
     """The packaged study; its FMUs are written into the folder."""
     config = parse(STUDY.format(runs=runs))
     drive = Drive(DcMotor, config.motor, config.machine)
     files, _ = drive.export(folder)
-    return monte_carlo.Task(config, drive, files, 6.7)
+    return monte_carlo.RandomTask(config, drive, files, 6.7)
 
 
-def timed(task: monte_carlo.Task, folder: Path) -> tuple[monte_carlo.MonteCarloResult, float]:
+def timed(task: monte_carlo.RandomTask, folder: Path) -> tuple[monte_carlo.MonteCarloResult, float]:
     """The runs of a task, and their rate [runs/s] after the first finished batch."""
     times: list[tuple[float, float]] = []
 
@@ -54,7 +54,7 @@ def timed(task: monte_carlo.Task, folder: Path) -> tuple[monte_carlo.MonteCarloR
     return result, (end - begin) / (last - first)
 
 
-def loop_alone(task: monte_carlo.Task, runs: int = 256) -> float:
+def loop_alone(task: monte_carlo.RandomTask, runs: int = 256) -> float:
     """Seconds a run of the native loop, without what Python does before and after it."""
     block = task.block()
     points = [monte_carlo.point(block.rig, monte_carlo.draw(task.config, k)) for k in range(runs)]

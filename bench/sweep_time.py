@@ -17,7 +17,7 @@ from pathlib import Path
 from figures import parser, save
 
 from chainunit.batch.native import NativeKernel
-from chainunit.study import sweep
+from chainunit.capabilities.sweep import points as sweep
 from chainunit.study.config import parse
 
 POINTS, ANGLES = 131_072, 720

@@ -5,14 +5,14 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from chainunit.study import sweep
+from chainunit.capabilities.sweep import points as sweep
 from chainunit.study.config import load
 
 BATCH = 32
 
 
 def small_batches(plan):
-    """In place of `chainunit.study.sweep.batch_of`."""
+    """In place of `chainunit.capabilities.sweep.points.batch_of`."""
     return BATCH
 
 

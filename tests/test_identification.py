@@ -11,23 +11,23 @@ from scipy.optimize import nnls
 from scipy.stats import f
 
 from chainunit import InputError, RunError
+from chainunit.capabilities.identification import fit as fitting
+from chainunit.capabilities.identification import information as what_runs_tell
+from chainunit.capabilities.identification import residuals
+from chainunit.capabilities.identification.fit import fit, normal
+from chainunit.capabilities.identification.information import information
+from chainunit.capabilities.identification.plant import Plant
+from chainunit.capabilities.identification.posterior import posterior
+from chainunit.capabilities.identification.problem import Comparison, Problem, RecordedRun, Sensor, Unknown
+from chainunit.capabilities.identification.recording import Recording
+from chainunit.capabilities.identification.residuals import check_residuals, strains
+from chainunit.capabilities.identification.suspicion import suspicions
+from chainunit.capabilities.identification.synthetic import HiddenRun, Logger, synthetic
 from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
-from chainunit.study.identification import fit as fitting
-from chainunit.study.identification import information as what_runs_tell
-from chainunit.study.identification import residuals
-from chainunit.study.identification.fit import fit, normal
-from chainunit.study.identification.information import information
-from chainunit.study.identification.plant import Plant
-from chainunit.study.identification.posterior import posterior
-from chainunit.study.identification.problem import Comparison, Problem, RecordedRun, Sensor, Unknown
-from chainunit.study.identification.recording import Recording
-from chainunit.study.identification.residuals import check_residuals, strains
-from chainunit.study.identification.suspicion import suspicions
-from chainunit.study.identification.synthetic import HiddenRun, Logger, synthetic
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 TRUTH = {

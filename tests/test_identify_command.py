@@ -12,18 +12,18 @@ import pytest
 from command import chainunit
 
 from chainunit import InputError, Study
+from chainunit.capabilities.identification import identification
+from chainunit.capabilities.identification import page as report
+from chainunit.capabilities.identification.false_loads import false_loads
+from chainunit.capabilities.identification.measurands import MEASURANDS
+from chainunit.capabilities.identification.result import _number, identified_tables, sentences
+from chainunit.capabilities.identification.synthetic import HiddenRun, Logger, synthetic
+from chainunit.capabilities.identification.unknown import Unknown
 from chainunit.core.native.compilers import compiler
 from chainunit.machines.load_observer import LoadObserver
 from chainunit.report import blocks
-from chainunit.report import identification as report
 from chainunit.study import config as study_files
 from chainunit.study.choice import choose
-from chainunit.study.false_loads import false_loads
-from chainunit.study.identification import identification
-from chainunit.study.identification.measurands import MEASURANDS
-from chainunit.study.identification.result import _number, identified_tables, sentences
-from chainunit.study.identification.synthetic import HiddenRun, Logger, synthetic
-from chainunit.study.identification.unknown import Unknown
 from chainunit.system import Profile
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")

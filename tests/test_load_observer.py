@@ -15,6 +15,7 @@ from scipy.linalg import expm
 from scipy.stats import norm
 
 from chainunit import InputError
+from chainunit.capabilities.identification.false_loads import ANGLES, false_loads
 from chainunit.core.engines import MATH, numpy_
 from chainunit.core.native.compilers import compiler
 from chainunit.fmu.native.export import export
@@ -31,7 +32,6 @@ from chainunit.machines.load_observer import (
     sizes,
 )
 from chainunit.models import MODELS
-from chainunit.study.false_loads import ANGLES, false_loads
 
 native = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 LOADS = ("left.material_mass", "right.material_mass", "left.processing_force", "right.processing_force")

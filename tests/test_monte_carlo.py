@@ -24,6 +24,7 @@ import xarray as xr
 from chainunit.study.random_remarks import remark_on_random_overloads
 from command import chainunit
 
+from chainunit.capabilities.random_overloads import runs as monte_carlo
 from chainunit.core.errors import RunError
 from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
@@ -31,7 +32,7 @@ from chainunit.reading.text import number as shown
 from chainunit.report import runs as report_runs
 from chainunit.report.blocks import Source
 from chainunit.report.terminal import plain_line
-from chainunit.study import block_runs, monte_carlo, quantiles
+from chainunit.study import block_runs, quantiles
 from chainunit.study.block_runs import BlockRuns, Cause, EventSimulation
 from chainunit.study.choice import choose
 from chainunit.study.config import parse

@@ -15,28 +15,28 @@ from command import chainunit
 from linkage_files import pressed_both_ways
 
 from chainunit import ChainUnitMachine, Study
+from chainunit.capabilities.optimize import checks
+from chainunit.capabilities.optimize import kernel as kernels
+from chainunit.capabilities.optimize.best import find_best, machine_at
+from chainunit.capabilities.optimize.conflict import Conflict, nearest
+from chainunit.capabilities.optimize.extremes import TurnValues, grid
+from chainunit.capabilities.optimize.kernel import Kernel, pieces, symbols_of
+from chainunit.capabilities.optimize.page import optimum_report
+from chainunit.capabilities.optimize.program import AngleProgram
+from chainunit.capabilities.optimize.requirements import Requirements
+from chainunit.capabilities.optimize.result import as_dict, units_of
+from chainunit.capabilities.optimize.search import Search
+from chainunit.capabilities.optimize.table import wishes_of
+from chainunit.capabilities.optimize.wishes import TurnLimit
+from chainunit.capabilities.optimize.words import bindings, conflict_sentences
 from chainunit.core import ledger
 from chainunit.core.native.compilers import compiler
 from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
-from chainunit.report.optimum import optimum_report
 from chainunit.report.terminal import plain
 from chainunit.study import config as study_files
 from chainunit.study.cycle_quantities import cycle_quantity, evaluate
-from chainunit.study.optimum import checks
-from chainunit.study.optimum import kernel as kernels
-from chainunit.study.optimum.best import find_best, machine_at
-from chainunit.study.optimum.conflict import Conflict, nearest
-from chainunit.study.optimum.extremes import TurnValues, grid
-from chainunit.study.optimum.kernel import Kernel, pieces, symbols_of
-from chainunit.study.optimum.program import AngleProgram
-from chainunit.study.optimum.requirements import Requirements
-from chainunit.study.optimum.result import as_dict, units_of
-from chainunit.study.optimum.search import Search
-from chainunit.study.optimum.table import wishes_of
-from chainunit.study.optimum.wishes import TurnLimit
-from chainunit.study.optimum.words import bindings, conflict_sentences
 from chainunit.study.parts import EXAMPLES, example
 from chainunit.study.study_file import toml_text
 from chainunit.study.verdict import ROCKER_GOOD

@@ -10,16 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from chainunit.capabilities.identification.fit import fit
+from chainunit.capabilities.identification.plant import Plant
+from chainunit.capabilities.identification.problem import Problem, RecordedRun, Sensor, Unknown
+from chainunit.capabilities.identification.recording import read_recording
+from chainunit.capabilities.identification.residuals import check_residuals
 from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
-from chainunit.study.identification.fit import fit
-from chainunit.study.identification.plant import Plant
-from chainunit.study.identification.problem import Problem, RecordedRun, Sensor, Unknown
-from chainunit.study.identification.recording import read_recording
-from chainunit.study.identification.residuals import check_residuals
 
 FOLDER = Path(__file__).parents[1] / "examples" / "identification"
 TRUTH = json.loads((FOLDER / "truth.json").read_text("utf-8"))

@@ -9,17 +9,22 @@ import numpy as np
 import pytest
 
 from chainunit import InputError
-from chainunit.study.config import parse
-from chainunit.study.identification.identification import read_runs
-from chainunit.study.identification.inspection import (
+from chainunit.capabilities.identification.identification import read_runs
+from chainunit.capabilities.identification.inspection import (
     Expectation,
     inspect_columns,
     inspect_motion,
     inspect_steadiness,
 )
-from chainunit.study.identification.reading import PlannedRun
-from chainunit.study.identification.recording import Recording, read_part, read_recording, write_recording
-from chainunit.study.identification.watch import watch
+from chainunit.capabilities.identification.reading import PlannedRun
+from chainunit.capabilities.identification.recording import (
+    Recording,
+    read_part,
+    read_recording,
+    write_recording,
+)
+from chainunit.capabilities.identification.watch import watch
+from chainunit.study.config import parse
 
 SPEED, RATIO, RATE = 3.0, 50.0, 0.83
 EXPECTED = {

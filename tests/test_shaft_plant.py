@@ -9,16 +9,16 @@ import pytest
 from derivatives import check_derivatives
 
 from chainunit import InputError
+from chainunit.capabilities.identification.fit import fit
+from chainunit.capabilities.identification.identification import inspect_runs
+from chainunit.capabilities.identification.problem import Problem, RecordedRun, Sensor, Unknown
+from chainunit.capabilities.identification.residuals import check_residuals
+from chainunit.capabilities.identification.shaft import WAVES, MeasuredShaft
+from chainunit.capabilities.identification.synthetic import HiddenRun, Logger, synthetic
 from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
-from chainunit.study.identification.fit import fit
-from chainunit.study.identification.identification import inspect_runs
-from chainunit.study.identification.problem import Problem, RecordedRun, Sensor, Unknown
-from chainunit.study.identification.residuals import check_residuals
-from chainunit.study.identification.shaft import WAVES, MeasuredShaft
-from chainunit.study.identification.synthetic import HiddenRun, Logger, synthetic
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 CONFIG = parse("")

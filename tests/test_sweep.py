@@ -23,19 +23,20 @@ from scipy.stats import qmc, spearmanr
 
 from chainunit import GeometryError, InputError, Study
 from chainunit.batch.evaluate import ReasonKind
+from chainunit.capabilities.sweep import figures as sweep_figures
+from chainunit.capabilities.sweep import page as sweep_page
+from chainunit.capabilities.sweep import points as sweep
+from chainunit.capabilities.sweep import runs as sweep_runs
+from chainunit.capabilities.sweep.summary import _correlation, _explained
 from chainunit.core.errors import InputError as Refusal
 from chainunit.core.ledger import Ledger
 from chainunit.core.native.compilers import compiler
-from chainunit.report import sweep as sweep_page
-from chainunit.report import sweep_figures
 from chainunit.report.figure import Hatch, hatch_lines
 from chainunit.report.terminal import plain
-from chainunit.study import sweep, sweep_runs
 from chainunit.study.block_runs import Cause
 from chainunit.study.choice import choose
 from chainunit.study.config import parse
 from chainunit.study.cycle import cycle
-from chainunit.study.sweep_summary import _correlation, _explained
 from chainunit.study.verdict import two_bars
 from chainunit.work.job import CHECKS
 from chainunit.work.store import made_anew

@@ -7,8 +7,8 @@ import pytest
 from scipy.stats import qmc
 
 from chainunit import InputError
+from chainunit.capabilities.sweep.plan import plan_values
 from chainunit.study.config import parse
-from chainunit.study.sweep_plan import plan_values
 
 R = "[[sweep.parameter]]\nname = 'machine.r'\nfrom = '130 mm'\nto = 0.17\n"
 L1 = "[[sweep.parameter]]\nname = 'machine.l1'\ntolerance = '3 mm'\n"

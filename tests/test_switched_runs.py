@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 from derivatives import check_derivatives
 
+from chainunit.capabilities.identification.fit import fit
+from chainunit.capabilities.identification.information import information
+from chainunit.capabilities.identification.plant import Plant
+from chainunit.capabilities.identification.problem import Problem, RecordedRun, Sensor, Unknown
+from chainunit.capabilities.identification.residuals import check_residuals
+from chainunit.capabilities.identification.shaft import MeasuredShaft
+from chainunit.capabilities.identification.synthetic import HiddenRun, Logger, synthetic
 from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
-from chainunit.study.identification.fit import fit
-from chainunit.study.identification.information import information
-from chainunit.study.identification.plant import Plant
-from chainunit.study.identification.problem import Problem, RecordedRun, Sensor, Unknown
-from chainunit.study.identification.residuals import check_residuals
-from chainunit.study.identification.shaft import MeasuredShaft
-from chainunit.study.identification.synthetic import HiddenRun, Logger, synthetic
 from chainunit.system import Profile
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
@@ -77,7 +77,7 @@ def problem_of(kind, *runs):
 @pytest.fixture
 def fine(monkeypatch):
     """Rows of a simulation so near to one another that the derivatives are not those of their interpolation."""
-    monkeypatch.setattr("chainunit.study.identification.problem.STEP", 4e-4)
+    monkeypatch.setattr("chainunit.capabilities.identification.problem.STEP", 4e-4)
 
 
 @pytest.mark.slow

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from chainunit import InputError
+from chainunit.capabilities.identification.measurands import COUNTS
+from chainunit.capabilities.identification.recording import read_recording, write_recording
+from chainunit.capabilities.identification.synthetic import HiddenRun, Logger, synthetic
 from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
-from chainunit.study.identification.measurands import COUNTS
-from chainunit.study.identification.recording import read_recording, write_recording
-from chainunit.study.identification.synthetic import HiddenRun, Logger, synthetic
 from chainunit.system import Profile
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")

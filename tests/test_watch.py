@@ -12,14 +12,14 @@ import pytest
 from command import chainunit
 
 from chainunit import InputError, Study
+from chainunit.capabilities.identification import watch as watching
+from chainunit.capabilities.identification.crank_motion import crank_motion
+from chainunit.capabilities.identification.recording import Recording, read_recording, write_recording
+from chainunit.capabilities.identification.synthetic import HiddenRun, Logger, synthetic
 from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
-from chainunit.study.identification import watch as watching
-from chainunit.study.identification.crank_motion import crank_motion
-from chainunit.study.identification.recording import Recording, read_recording, write_recording
-from chainunit.study.identification.synthetic import HiddenRun, Logger, synthetic
 from chainunit.system import Profile
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")

@@ -16,11 +16,11 @@ from pathlib import Path
 
 import numpy as np
 
+from chainunit.capabilities.identification.recording import write_recording
+from chainunit.capabilities.identification.synthetic import HiddenRun, Logger, synthetic
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
-from chainunit.study.identification.recording import write_recording
-from chainunit.study.identification.synthetic import HiddenRun, Logger, synthetic
 from chainunit.system import Profile
 
 folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent

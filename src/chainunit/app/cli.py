@@ -149,7 +149,7 @@ def optimize(
     Writes best.toml, report.html, result.json, result.md and pictures into the output folder.
     """
     question = study_file(config)
-    from ..report.optimum import TASK
+    from ..capabilities.optimize.page import TASK
 
     carry_out(TASK, question, output, backend=backend and backend.value)
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..report import identification, watch
+from ..capabilities.identification import page as identification
+from ..capabilities.identification import watch_page as watch
+from ..capabilities.identification.identification import IdentifiedMachine
+from ..capabilities.identification.watch import Alarm, WatchedRecording
 from ..study.config import Config
-from ..study.identification.identification import IdentifiedMachine
-from ..study.identification.watch import Alarm, WatchedRecording
 from .results import ReportedResult
 
 if TYPE_CHECKING:

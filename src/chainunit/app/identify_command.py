@@ -21,8 +21,8 @@ def identify(
     recordings.
     """
     question = study_file(config)
-    from ..report.identification import TASK
-    from ..study.identification.result import outlook
+    from ..capabilities.identification.page import TASK
+    from ..capabilities.identification.result import outlook
 
     errors = terminal_console(stderr=True)
     carry_out(

@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from ..core.errors import InputError, RemarkWarning, RunError, near_name, shown
+from ..core.errors import InputError, RemarkWarning, near_name, shown
 from ..core.quantities import Layout
 from ..fmu.backends import Backend
 from ..machines.machine import Machine
 from ..reading.tables import in_file
 from ..reading.text import number, shown_in
 from ..reading.toml_lines import lines_of
-from ..report import optimum, series, study_task
+from ..report import series, study_task
 from ..report import study as contents
 from ..report.blocks import Report
 from ..report.drawing import drawing
@@ -28,21 +28,20 @@ from ..study import config as study_files
 from ..study.config import Config
 from ..study.foreign_machine import ForeignMachine
 from ..study.measures import Answers, measures_of
-from ..study.optimum.best import Best
-from ..study.optimum.result import best_tables
-from ..study.optimum.words import conflict_sentences
 from ..study.parts import over_example, parts_of
 from ..study.record import INSUFFICIENT, StudyRecord
 from ..study.result import as_dict
 from ..study.window import Phase
 from ..work.progress import Report as Progress
-from .identifications import IdentificationResult, WatchResult
 from .results import ReportedResult
-from .sweeps import SweepResult
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+
+    from .best_result import BestResult
+    from .identifications import IdentificationResult, WatchResult
+    from .sweeps import SweepResult
 
 _TABLES, _TEXT = "tables in Python", "text in Python"
 
@@ -216,6 +215,8 @@ class Study:
         WriteError
             for a file that cannot be written; the others are written.
         """
+        from .best_result import BestResult
+
         return BestResult.made(self.config, folder, progress, backend=backend)
 
     def identify(
@@ -237,6 +238,8 @@ class Study:
         WriteError
             for a file that cannot be written; the others are written.
         """
+        from .identifications import IdentificationResult
+
         return IdentificationResult.made(self.config, folder, progress)
 
     def watch(self, folder: str | Path | None = None, progress: Progress | None = None) -> WatchResult:
@@ -244,6 +247,8 @@ class Study:
 
         Parameters and errors are those of `identify`, without RunError.
         """
+        from .identifications import WatchResult
+
         return WatchResult.made(self.config, folder, progress)
 
     def sweep(
@@ -272,6 +277,8 @@ class Study:
         WriteError
             for a file that cannot be written.
         """
+        from .sweeps import SweepResult
+
         return SweepResult.made(self.config, folder, progress, workers=workers, scheduler=scheduler)
 
     def __repr__(self) -> str:
@@ -366,47 +373,6 @@ class StudyResult(ReportedResult[Config, StudyRecord]):
     def notes(self) -> list[str]:
         """The assumptions behind the numbers, a text each."""
         return [note["text"] for note in self._numbers["notes"]]
-
-
-class BestResult(ReportedResult[Config, optimum.OptimizedStudy]):
-    """The result of a search for the best machine. Its `repr` shows the answer, the parameters and what binds."""
-
-    _task = optimum.TASK
-
-    @property
-    def config(self) -> Config:
-        """The configuration of the study."""
-        return self._outcome.config
-
-    @property
-    def best(self) -> Best:
-        """All that the search found."""
-        return self._outcome.best
-
-    @property
-    def met(self) -> bool:
-        """Whether a machine was found that meets all limits."""
-        return self.best.met
-
-    @property
-    def machine(self) -> Machine | None:
-        """The best machine; None where no machine meets all limits."""
-        return self.best.machine
-
-    @property
-    def study(self) -> Study:
-        """The study with the best machine.
-
-        Raises
-        ------
-        RunError
-            where no machine meets all limits.
-        """
-        if self.best.machine is None:
-            raise RunError("no machine meets all limits: " + " ".join(conflict_sentences(self.best)))
-        source = Path(self.config.source).parent / optimum.FILE
-        config = study_files.of_tables(best_tables(self.best, self.config, source.parent), str(source))
-        return Study.__new__(Study)._take(config, str(source))
 
 
 def _plain(value: Any) -> Any:

@@ -33,6 +33,6 @@ def sweep(
     was killed goes on from its store.
     """
     question = study_file(config)
-    from ..report.sweep import TASK
+    from ..capabilities.sweep.page import TASK
 
     carry_out(TASK, question, output, workers=workers, scheduler=scheduler)

@@ -6,9 +6,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..report import sweep
+from ..capabilities.sweep import page as sweep
+from ..capabilities.sweep.summary import SweepSummary
 from ..study.config import Config
-from ..study.sweep_summary import SweepSummary
 from .results import ReportedResult
 
 if TYPE_CHECKING:

@@ -19,6 +19,6 @@ def watch(
     Writes report.html, result.json, result.md and pictures into the output folder.
     """
     question = study_file(config)
-    from ..report.watch import TASK
+    from ..capabilities.identification.watch_page import TASK
 
     carry_out(TASK, question, output)

@@ -86,7 +86,7 @@ class Offset:
 
 @declaration
 class Uncertainty:
-    """False imbalance that errors of the machine's parameters make (`chainunit.study.false_loads`), and the imbalance
+    """False imbalance that errors of the machine's parameters make (see the load observer), and the imbalance
     that is an overload."""
 
     uncertainty: Value = quantity("kg", "standard deviation of the false imbalance", default=0.0, min=0.0)

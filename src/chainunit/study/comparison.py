@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from .. import __version__
+from ..capabilities.random_overloads.runs import Sample
 from ..core.errors import InputError, printable
 from ..core.quantities import variables
 from ..reading.text import entry
 from .measures import Answers
-from .monte_carlo import Sample
 from .sections import CHOICES, SECTIONS
 from .shaft import ShaftAnswers
 

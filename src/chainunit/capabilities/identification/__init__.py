@@ -16,9 +16,12 @@ from ...study.config import Config
 from ...study.drive import Drive
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
-from ...study.identification.measurands import MEASURANDS
-from ...study.identification.reading import IdentificationPlan, WatchPlan, read_identification, read_watch
-from ...study.identification.table import (
+from ...study.parts import named_table
+from ...study.rules import CHAINS, MACHINE_FMU, MOTOR_FMU, Rule, has_sides
+from .measurands import MEASURANDS
+from .observer_table import ObserverTable
+from .reading import IdentificationPlan, WatchPlan, read_identification, read_watch
+from .table import (
     FIELDS,
     FROM_RECORDING,
     MOST_SPEEDS,
@@ -29,9 +32,6 @@ from ...study.identification.table import (
     IdentifyTable,
     WatchTable,
 )
-from ...study.observer_table import ObserverTable
-from ...study.parts import named_table
-from ...study.rules import CHAINS, MACHINE_FMU, MOTOR_FMU, Rule, has_sides
 
 _VALUE = {"type": ["number", "string"]}
 
@@ -155,20 +155,20 @@ class IdentificationCapability(Capability):
 
     def beside(self, config: Config, drive: Drive) -> Drive:
         """The drive with its load observer."""
-        from ...study.observation import with_observer
+        from .observation import with_observer
 
         plans: RecordingPlans = config.plans[self.name]
         return drive if plans.observer is None else with_observer(config, plans.observer, drive)
 
     def analyses(self) -> Iterable[type[Analysis]]:
         """Who notices an event."""
-        from ...study.notices import ObserverAnalysis
+        from .notices import ObserverAnalysis
 
         return (ObserverAnalysis,)
 
     def contents(self) -> Mapping[str, Contents]:
         """Who notices an event."""
-        from ...report import notices
+        from . import notices_page as notices
 
         return {"observer": Contents("Who notices an overload", notices.blocks, notices.PICTURES.files)}
 

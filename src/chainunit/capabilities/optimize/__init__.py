@@ -7,9 +7,9 @@ from collections.abc import Iterable
 from ...report.capability import Capability
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
-from ...study.optimum.table import FIELDS, Optimize, read_wishes
-from ...study.optimum.wishes import Wishes
 from ...study.rules import CHAINS, MACHINE_FMU, NEEDS_MODEL, TWO_BARS, Rule
+from .table import FIELDS, Optimize, read_wishes
+from .wishes import Wishes
 
 
 class OptimizeCapability(Capability):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from pydantic import Field
@@ -23,22 +22,9 @@ from ...study.record import StudyRecord
 from ...study.rig import Rig
 from ...study.rules import MACHINE_FMU, NEEDS_MODEL, Rule, has_sides
 from ...work.runner import check_scheduler
-from .table import MonteCarlo
+from .table import MonteCarlo, RandomPlan, plan_of
 
 _EVENT = "monte_carlo.event"
-
-
-@dataclass(frozen=True)
-class RandomPlan:
-    """Number, duration and seed of the runs, and their event."""
-
-    table: MonteCarlo
-    event: RandomEvent
-
-    @property
-    def is_asked_for(self) -> bool:
-        """Whether there are runs."""
-        return bool(self.table.runs)
 
 
 class RandomOverloads(Capability):
@@ -85,16 +71,16 @@ class RandomOverloads(Capability):
 
     def random_events(self, config: Config) -> Mapping[str, RandomEvent]:
         """Their event."""
-        return {_EVENT: _plan(config).event}
+        return {_EVENT: plan_of(config).event}
 
     def longest_run(self, config: Config) -> float:
         """The time that is followed after an event; 0 without runs."""
-        plan = _plan(config)
+        plan = plan_of(config)
         return float(plan.table.duration) if plan.is_asked_for else 0.0
 
     def not_with_foreign_motor(self, config: Config) -> str:
         """They read the motor's current and torque."""
-        if not _plan(config).is_asked_for:
+        if not plan_of(config).is_asked_for:
             return ""
         return (
             "its current and torque are not known, of which random overloads tell the quantiles; leave "
@@ -103,7 +89,7 @@ class RandomOverloads(Capability):
 
     def check_scheduler(self, config: Config, scheduler: str) -> None:
         """The workers of a scheduler make these runs."""
-        if not _plan(config).is_asked_for:
+        if not plan_of(config).is_asked_for:
             raise InputError(
                 f"scheduler {printable(scheduler)}: is for random overloads, and this study has none "
                 "(monte_carlo.runs); leave it out"
@@ -112,7 +98,7 @@ class RandomOverloads(Capability):
 
     def check_runs(self, config: Config, rig: Rig) -> None:
         """Refuse an event for which the drive has no inputs."""
-        plan = _plan(config)
+        plan = plan_of(config)
         for event in plan.event.hardest() if plan.is_asked_for else ():
             if not rig.takes(event):
                 raise InputError(f'monte_carlo.event.type = "{event.kind}": {event.without}')
@@ -134,7 +120,7 @@ class RandomOverloads(Capability):
         if "monte_carlo" not in study.findings:
             return ()
         words = " Then come {=monte_carlo.runs} overloads at random, each by itself: {event}."
-        return s.line(words, event=_plan(study.config).event.title)
+        return s.line(words, event=plan_of(study.config).event.title)
 
     def answer(self, s: Source, study: StudyRecord) -> Iterator[Block]:
         """The largest quantile of the crank torque, and how often a run ends badly."""
@@ -142,11 +128,6 @@ class RandomOverloads(Capability):
             from . import page
 
             yield Text(page.summary(s, study))
-
-
-def _plan(config: Config) -> RandomPlan:
-    plan: RandomPlan = config.plans[RandomOverloads.name]
-    return plan
 
 
 CAPABILITY = RandomOverloads()

@@ -7,8 +7,8 @@ from dataclasses import replace
 from ...study.analysis import Analysis, Work
 from ...study.config import Config
 from ...study.drive import Drive
-from ...study.monte_carlo import MonteCarloResult, RandomTask, run
 from ...study.record import StudyRecord
+from .runs import MonteCarloResult, RandomTask, run
 
 
 class RandomAnalysis(Analysis):

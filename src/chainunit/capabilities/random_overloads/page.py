@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from ...core.quantities import Layout
 from ...report import blocks as b
 from ...report.lines import Line, join, line
-from ...study.monte_carlo import Sample
 from ...study.record import StudyRecord
+from .runs import Sample
 
 _LARGEST, _ENDS = (
     "crank_torque_peak",

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from ...core.quantities import Value, declaration, quantity
+from ...study.config import Config
+from ...study.event_table import RandomEvent
 
 
 @declaration
@@ -18,3 +22,22 @@ class MonteCarlo:
     seed: Value = quantity(
         "1", "seed of the random numbers", default=1, min=0, max=1_000_000_000, type="Integer"
     )
+
+
+@dataclass(frozen=True)
+class RandomPlan:
+    """Number, duration and seed of the runs, and their event."""
+
+    table: MonteCarlo
+    event: RandomEvent
+
+    @property
+    def is_asked_for(self) -> bool:
+        """Whether there are runs."""
+        return bool(self.table.runs)
+
+
+def plan_of(config: Config) -> RandomPlan:
+    """The plan of a study."""
+    plan: RandomPlan = config.plans["random_overloads"]
+    return plan

@@ -9,16 +9,9 @@ from ...study.conditions import given, has_entries, has_entry, is_one_of
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
 from ...study.rules import CHAINS, MACHINE_FMU, MOTOR_FMU, NEEDS_MODEL, TWO_BARS, Rule
-from ...study.sweep_plan import SweepPlan
-from ...study.sweep_reading import Sweepable, read_plan
-from ...study.sweep_table import (
-    FIELDS,
-    MEASURES_OF_SWEEP,
-    MOST_RESULTS,
-    MOST_VALUES,
-    SWEPT,
-    SweepTable,
-)
+from .plan import SweepPlan
+from .reading import Sweepable, read_plan
+from .table import FIELDS, MEASURES_OF_SWEEP, MOST_RESULTS, MOST_VALUES, SWEPT, SweepTable
 
 
 class SweepCapability(Capability):

@@ -1,0 +1,423 @@
+"""The identification of a machine: its recordings, the numbers that they can tell, the fit, and its checks."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ...core.errors import Faults, InputError, printable
+from ...core.temporary_folders import scratch
+from ...drives.induction_motor import InductionMotor
+from ...study.arrays import rms
+from ...study.choice import choose
+from ...study.config import Config
+from ...study.drive import Drive
+from ...system import Profile
+from ...work.progress import Report, quiet
+from .fit import MOST_ROUNDS, Fit, fit
+from .information import Combination, Information, information
+from .inspection import OF_SPEED, Expectation, inspect_columns, inspect_motion, inspect_steadiness
+from .measurands import MEASURANDS
+from .plant import AnyPlant, Plant
+from .posterior import Posterior, posterior
+from .problem import Comparison, Problem, RecordedRun, Sensor, likeness, mark_times
+from .reading import OFFSET_SHARE, WITH_OFFSET, IdentificationPlan, PlannedRun, WatchPlan
+from .recording import Recording, read_part, remedy
+from .residuals import ResidualCheck, Strain, check_residuals, strained_priors, strains
+from .shaft import MEASURED, MeasuredShaft
+from .suspicion import Suspicion, suspicions
+from .unknown import Unknown
+
+SIGNALS = ("motor.i", "motor.u", "motor.power", "crank.tau")
+"""Quantities of which a recording must have one: they tell the torque."""
+WIDE, NEAR = 5.0, 1.2
+"""Factors by which the RMS of a column may differ from the simulated one: of a current, power or torque, which depend
+on the sought numbers; and of a speed or a voltage under control."""
+CONTROL = ("speed_control.kp", "speed_control.ki", "current_control.kp", "current_control.ki")
+"""Gains of the control of a motor, of which the course of its current depends."""
+AT_BOUND = 0.02
+"""Distance from a bound, in parts of the standard deviation of an even distribution, within which a value lies at
+it."""
+
+
+@dataclass(frozen=True)
+class FittedNumber:
+    """A sought number: its value in the best fit, `fitted`, which has a meaning together with those of all others;
+    its mean `value` in the distribution that the recordings leave, its standard deviation, the ends of its interval
+    of 95 %, and whether the recordings tell it."""
+
+    unknown: Unknown
+    fitted: float
+    value: float
+    deviation: float
+    low: float
+    high: float
+    is_told: bool
+
+    @property
+    def at_bound(self) -> str:
+        """The bound at which the fit ended, "lower" or "upper"; such a number is not told."""
+        return _bound(self.unknown, self.fitted)
+
+
+@dataclass(frozen=True)
+class IdentifiedMachine:
+    """An identified machine.
+
+    `before` is what the runs can tell at the start values, with further runs in order; `after` the same at the fitted
+    values. `best` are the normal equations there, `posterior` is the distribution of the sought numbers around them,
+    `checks` are those of the residuals, and `suspicions` those of known numbers.
+    """
+
+    config: Config
+    plan: IdentificationPlan
+    problem: Problem
+    before: Information
+    best: Fit
+    posterior: Posterior
+    after: Information
+    checks: tuple[ResidualCheck, ...]
+    suspicions: tuple[Suspicion, ...]
+
+    @property
+    def estimates(self) -> dict[str, FittedNumber]:
+        """The sought numbers by the full names of the study file."""
+        told = {each.name: each.is_told for each in self.after.outlooks}
+        return {
+            own.name: FittedNumber(
+                own,
+                float(x),
+                each.value,
+                each.deviation,
+                each.low,
+                each.high,
+                told[each.name] and not _bound(own, float(x)),
+            )
+            for own, x, each in zip(
+                self.plan.sought,
+                self.best.z[: len(self.plan.sought)],
+                self.posterior.marginals,
+                strict=True,
+            )
+        }
+
+    @property
+    def covariance(self) -> Any:
+        """The covariance of the sought numbers, shape (sought, sought)."""
+        return self.posterior.covariance
+
+    @property
+    def is_described(self) -> bool:
+        """Whether the residuals may be noise, clocks, sensors and known numbers are as they are known, and no number
+        is held by a bound."""
+        doubts = self.strains or self.posterior.held or any(each.is_suspicious for each in self.suspicions)
+        return all(check.is_noise for check in self.checks) and not doubts
+
+    @property
+    def strains(self) -> list[Strain]:
+        """The numbers of clocks and sensors, and sought ones with a stated deviation, that are not as they are
+        known."""
+        return [*strains(self.problem, self.best), *strained_priors(self.plan.sought, self.best)]
+
+    def courses(self, comparison: Comparison) -> tuple[Any, Any, Any]:
+        """The times of the rows that are compared [s], a measured column, and the simulated one as its sensor would
+        show it, each of shape (n,)."""
+        recording = self._run(comparison.run).recording
+        measured = recording.columns[comparison.column][comparison.rows]
+        return recording.time[comparison.rows], measured, measured - comparison.residuals * comparison.size
+
+    def is_steady(self, name: str) -> bool:
+        """Whether the turns of a run are alike."""
+        run = self._run(name)
+        return run.off is None and not any(hasattr(x, "changes") for x in run.values.values())
+
+    def _run(self, name: str) -> RecordedRun:
+        return next(each for each in self.problem.runs if each.name == name)
+
+    def combined(self, combination: Combination) -> tuple[float, float]:
+        """The value of a sum of sought numbers, and its standard deviation."""
+        places = [self.problem.place[name] for name, _ in combination.terms]
+        sums = self.posterior.samples[:, places] @ [factor for _, factor in combination.terms]
+        return float(np.mean(sums)), float(np.std(sums))
+
+
+def _bound(own: Unknown, x: float) -> str:
+    """The bound at which a fitted value lies, "lower" or "upper"; empty between them."""
+    near = AT_BOUND * own.spread
+    return "lower" if x <= own.low + near else "upper" if x >= own.high - near else ""
+
+
+def system_name(name: str) -> str:
+    """The name that a number of the study file has in the simulated system: a feed is an input of the machine."""
+    return name.replace("feed.", "machine.", 1) if name.startswith("feed.") else name
+
+
+def identify(
+    config: Config,
+    report: Report = quiet,
+    told: Callable[[IdentificationPlan, Information], None] = lambda *_: None,
+) -> IdentifiedMachine:
+    """Identify the machine of a study from the recordings of its table [identify].
+
+    Parameters
+    ----------
+    told : gets what the recordings can tell, before anything is fitted
+
+    Raises
+    ------
+    InputError
+        for a study without that table, and with a line for each fault of the recordings.
+    RunError
+        where the fit does not end.
+    """
+    plan = plan_of(config)
+    workers = min(2, os.cpu_count() or 1)
+    report("reading recordings", 0.0, 1.0)
+    recordings = read_runs(plan.runs)
+    drive = drive_of(config, recordings)
+    report("simulating", 0.1, 1.0)
+    problem = _problem(config, plan, drive, recordings)
+    inspect_runs(problem, workers)
+    report("what the recordings can tell", 0.15, 1.0)
+    start = problem.started(workers)
+    before = information(problem, start, workers)
+    told(plan, before)
+    best = fit(
+        problem,
+        start,
+        workers,
+        report=lambda rounds, cost: report(
+            f"round {rounds}", 0.3 + 0.6 * min(1.0, rounds / MOST_ROUNDS), 1.0
+        ),
+        starts=plan.starts,
+        seed=plan.seed,
+    )
+    report("checks", 0.95, 1.0)
+    after = information(problem, best.z, workers, propose=False, at=best)
+    around = posterior(problem, best, workers, plan.seed)
+    checks, suspects = tuple(check_residuals(best)), tuple(suspicions(problem, best, workers))
+    return IdentifiedMachine(config, plan, problem, before, best, around, after, checks, suspects)
+
+
+def plan_of(config: Config) -> IdentificationPlan:
+    """The plan of a study.
+
+    Raises
+    ------
+    InputError
+        for a study without the table [identify].
+    """
+    plan: IdentificationPlan | None = config.plans["identification"].identify
+    if plan is None:
+        raise InputError(
+            "identify: is missing; add [[identify.run]] with the recordings, and [[identify.parameter]] with the "
+            "numbers that are sought",
+            key="identify",
+        )
+    return plan
+
+
+def read_signal(of: PlannedRun | WatchPlan) -> Recording:
+    """The part of a recording that counts.
+
+    Raises
+    ------
+    InputError
+        see `read_part`; and where no column tells the torque.
+    """
+    recording = read_part(of.file, of.columns, of.begin, of.end)
+    if not recording.columns.keys() & set(SIGNALS):
+        others = recording.others
+        more = (
+            f"; its other heads are: {printable(', '.join(others))}{remedy('motor.i', others)}"
+            if others
+            else ""
+        )
+        raise InputError(
+            f"{of.file}: has no column that tells the torque; must have one of {', '.join(SIGNALS)}{more}"
+        )
+    return recording
+
+
+def read_runs(runs: Sequence[PlannedRun]) -> dict[str, Recording]:
+    """The recordings by the names of the runs, each with the part that counts.
+
+    Raises
+    ------
+    InputError
+        with a line for each fault of a file.
+    """
+    faults, recordings = Faults(), dict[str, Recording]()
+    for run in runs:
+        with faults.collected():
+            recording = read_signal(run)
+            begin, end = recording.time[0], recording.time[-1]
+            if run.off is not None and not begin < run.off < end:
+                raise InputError(
+                    f"identify.run ({run.name}): switched_off = {run.off:.12g} s: {run.file} goes from "
+                    f"{begin:.12g} to {end:.12g} s; must lie within",
+                    "identify.run",
+                )
+            for name, other in recordings.items():
+                if _same_rows(recording, other):
+                    raise InputError(
+                        f"identify.run ({run.name}): {run.file} has rows of the run {name}; each run must have "
+                        "its own recording",
+                        "identify.run",
+                    )
+            recordings[run.name] = recording
+    faults.refuse()
+    return recordings
+
+
+def _same_rows(first: Recording, second: Recording) -> bool:
+    """Whether two recordings have rows of one file in common, or the same values in all signals that both have."""
+    ends = [(float(each.time[0]), float(each.time[-1])) for each in (first, second)]
+    if first.source == second.source and max(begin for begin, _ in ends) < min(end for _, end in ends):
+        return True
+    common = [name for name in SIGNALS if name in first.columns and name in second.columns]
+    return bool(common) and all(np.array_equal(first.columns[name], second.columns[name]) for name in common)
+
+
+def drive_of(config: Config, recordings: Mapping[str, Recording]) -> Drive:
+    """The drive of the study, tuned where the file does not give the gains of its control."""
+    of_motor = sorted({name for each in recordings.values() for name in each.columns if name in SIGNALS[:3]})
+    if of_motor and not (config.gives("motor") or config.plate is not None):
+        raise InputError(
+            f"motor: is missing, and the recordings have {', '.join(of_motor)}; add [motor] with its data, or "
+            "system.motor with a motor of the catalogue",
+            "motor",
+        )
+    with scratch() as folder:
+        return choose(config, folder, quiet).drive
+
+
+def _problem(
+    config: Config, plan: IdentificationPlan, drive: Drive, recordings: Mapping[str, Recording]
+) -> Problem:
+    sought = [replace(u, name=system_name(u.name)) for u in plan.sought]
+    measured = dict.fromkeys(name for each in recordings.values() for name in each.columns if name != "mark")
+    plant = plant_for(drive, measured, [u.name for u in sought])
+    of_shaft = is_of_shaft(measured)
+    runs = [_run(config, drive, run, recordings[run.name], of_shaft) for run in plan.runs]
+    return Problem(plant, runs, sought, _sensors(plan, measured, recordings))
+
+
+def is_of_shaft(columns: Collection[str]) -> bool:
+    """Whether the columns are those of a machine whose motor is not recorded."""
+    return all(name in (*MEASURED, "mark") for name in columns)
+
+
+def plant_for(drive: Drive, columns: Collection[str], by: list[str]) -> AnyPlant:
+    """The plant that has these columns, with derivatives by these parameters and inputs of the system."""
+    measured = [name for name in columns if name != "mark"]
+    return MeasuredShaft(drive.machine, measured, by) if is_of_shaft(columns) else Plant(drive, measured, by)
+
+
+def _run(config: Config, drive: Drive, run: PlannedRun, recording: Recording, of_shaft: bool) -> RecordedRun:
+    values: dict[str, Any] = {}
+    if not of_shaft:
+        reference = drive.reference(run.crank_speed)
+        values = {name: x for name, x in reference.items() if not name.startswith("model.")}
+    if run.speeds:
+        if "motor.w_ref" not in values:
+            raise InputError(
+                f"identify.run ({run.name}): speeds are those of a reference, which this motor does not follow; "
+                "leave them out",
+                "identify.run",
+            )
+        changes = ((begin, lasts, w * drive.ratio) for begin, lasts, w in run.speeds)
+        values["motor.w_ref"] = Profile(values["motor.w_ref"], tuple(changes))
+    feed = drive.loads(config.feed) if run.has_feed else dict.fromkeys(drive.loads(config.feed), 0.0)
+    sought = {system_name(u.name) for u in plan_of(config).sought}
+    # a sought feed of a loaded run is free
+    loads = {name: float(x) for name, x in feed.items() if not (run.has_feed and name in sought)}
+    added = {system_name(name): x for name, x in run.added.items()}
+    return RecordedRun(run.name, recording, run.crank_speed, values | loads, added, run.ambient, run.off)
+
+
+def _sensors(
+    plan: IdentificationPlan, measured: Mapping[str, Any], recordings: Mapping[str, Recording]
+) -> dict[str, Sensor]:
+    sensors = {}
+    for name in measured:
+        if not MEASURANDS[name].analog:
+            continue
+        own = plan.sensor(name)
+        size = max(rms(each.columns[name]) for each in recordings.values() if name in each.columns)
+        usual = OFFSET_SHARE * size if name in WITH_OFFSET else 0.0
+        sensors[name] = Sensor(
+            own.noise, own.resolution, own.gain, usual if own.offset is None else own.offset
+        )
+    return sensors
+
+
+def inspect_runs(problem: Problem, workers: int) -> None:
+    """Refuse recordings with faults; the sizes to expect are those of the drive at the start values. What needs no
+    simulation is told before it, as with a wrong unit of the time it has no end."""
+    faults, ratio = Faults(), problem.plant.ratio
+    for run in problem.runs:
+        reference = run.values.get("motor.w_ref")
+        speeds = [run.crank_speed, *(w / ratio for _, _, w in getattr(reference, "changes", ()))]
+        faults.add(inspect_motion(run.recording, (min(speeds), max(speeds)), ratio, run.off))
+    faults.refuse()
+    for run in problem.runs:
+        response = problem.simulated(run, problem.starts, workers)
+        expected, off = dict[str, Expectation](), np.inf if run.off is None else run.off
+        # of less than a turn the RMS is that of an angle
+        known = off - float(run.recording.time[0]) >= 2.0 * np.pi / run.crank_speed
+        has_angle = len(mark_times(run.recording)) > 0
+        for name in run.recording.columns if known else ():
+            rows = response.describes(name, response.time) & (response.time <= off)
+            if MEASURANDS[name].analog and rows.any():
+                size, factor = rms(response.values[name][rows]), NEAR if name in OF_SPEED else WIDE
+                words = f"{1.0 / factor:.2g} to {factor:g} times the simulated one"
+                like = likeness(run.recording, name, response) if has_angle else 0.0
+                expected[name] = Expectation(size / factor, size * factor, words, like)
+        faults.add(inspect_columns(run.recording, expected, run.off))
+    faults.refuse()
+    for run in problem.runs:
+        reference = run.values.get("motor.w_ref")
+        if not hasattr(reference, "changes"):
+            faults.add(inspect_steadiness(run.recording, ratio, run.off, reference is not None))
+    faults.refuse()
+
+
+def remarks(found: IdentifiedMachine) -> Iterator[str]:
+    """Sentences on data that are missing or assumed."""
+    runs, config = found.problem.runs, found.config
+    columns = {name for run in runs for name in run.recording.columns}
+    if (
+        issubclass(config.motor_type, InductionMotor)
+        and "motor.i" in columns
+        and "motor.power" not in columns
+    ):
+        of_current = next(each for each in found.best.comparisons if each.column == "motor.i")
+        time, _, current = found.courses(of_current)
+        speed = next(run.crank_speed for run in runs if run.name == of_current.run)
+        turn = current[time > time[-1] - 2.0 * np.pi / speed]
+        swing = np.ptp(turn) / np.mean(turn)
+        yield (
+            f"The recordings have no active power. The current of this induction motor changes by {100.0 * swing:.2g}"
+            " % within a turn, as most of it magnetises the motor: record the power, too, which tells far more"
+        )
+    for run in runs:
+        for name in sorted(
+            each for each in columns - run.recording.columns.keys() if MEASURANDS[each].analog
+        ):
+            yield f"{run.recording.source} has no {name}, which another recording has: it tells less without it"
+        if "mark" not in run.recording.columns:
+            yield (
+                f"{run.recording.source} has no mark: the angle of the crank follows from the course of the other "
+                "columns, and machines that are alike in both halves of a turn may be taken for each other"
+            )
+    has_motor = bool(columns & set(SIGNALS[:3]))
+    if has_motor and config.motor is not None and config.motor_type.follows(config.motor):
+        tuned = [f"motor.{name}" for name in CONTROL if f"motor.{name}" not in config.given]
+        if tuned:
+            names = ", ".join(tuned)
+            yield f"{names}: not in the file, and tuned as for a new drive; give those of the real converter"

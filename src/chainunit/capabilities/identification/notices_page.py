@@ -1,0 +1,118 @@
+"""The section on the load observer: who notices which event, and the estimates over time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+from ...machines.chain_unit import SIDES
+from ...report import blocks as b
+from ...report import figure as fig
+from ...report import run_names
+from ...report.pictures import Pictures
+from ...report.runs import by_side, over_runs
+from ...study.record import StudyRecord
+from .notices import DEVICES, Observed
+
+PICTURES = Pictures()
+
+
+def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+    """The table of the notices, the estimates in normal running, and a figure of each event."""
+    if s.result["observer"]["notices"]:
+        lead = (
+            "Times count from the event. Rocker torque: the largest from the event to the notice, in parts of the "
+            "{observer.steady.rocker_torque} of normal running; where a device does not notice the event, the "
+            "largest in the time followed."
+        )
+        yield b.Text(s.line(lead), "lead")
+        yield _who_notices(s, study)
+    yield b.Table(
+        s.rows(Observed, "observer.steady"), title="The load observer in normal running", form="long"
+    )
+    yield from PICTURES.figures(s, study)
+
+
+def _who_notices(s: b.Source, study: StudyRecord) -> b.Table:
+    notices, sides = s.result["observer"]["notices"], s.result["observer"]["sides"]
+    runs = by_side(study, notices)
+
+    def rows() -> Iterator[b.TableRow]:
+        for device, title in DEVICES.items():
+            if device in notices[runs[0]]:
+                paths = [f"observer.notices.{run}.{device}" for run in runs]
+                yield b.TableRow(
+                    (f"{title}, after", *(s.number(f"{path}.time", none="not") for path in paths))
+                )
+                yield b.TableRow(("rocker torque by then", *(s.number(f"{path}.carried") for path in paths)))
+        yield b.TableRow(("side that the observer names", *(_named(**sides[run]) for run in runs)))
+
+    return over_runs(study, runs, rows(), "Who notices")
+
+
+def _named(named: str | None, loaded: str | None) -> str:
+    """The side that the observer names, and whether it is the loaded one."""
+    if named is None:
+        return "none"
+    return named if loaded in (None, named) else f"{named} (wrong)"
+
+
+_MASS = fig.Axis("feed of a side", "kg")
+_FORCE = fig.Axis("processing force", "N")
+_SHARE = fig.Axis("imbalance over its threshold", low=-4.0, high=4.0)
+
+
+@PICTURES.declare(lambda study: study.findings["observer"].notices, "observer.png")
+def _print(s: b.Source, study: StudyRecord) -> fig.Figure:
+    """All events beside each other, for print."""
+    events = [_event(study, name) for name in study.findings["observer"].notices]
+    rows = zip(*(each.panels for each in events), strict=True)
+    panels = (
+        tuple(
+            panel and replace(panel, title="" if k else each.title)
+            for each, (panel,) in zip(events, row, strict=True)
+        )
+        for k, row in enumerate(rows)
+    )
+    words = "The load observer in every event"
+    return fig.Figure("observers", words, f"{words}: loads and imbalances.", tuple(panels), on_page=False)
+
+
+@PICTURES.declare(lambda study: study.findings["observer"].notices)
+def _events(s: b.Source, study: StudyRecord) -> Iterator[fig.Figure]:
+    return (_event(study, name) for name in study.findings["observer"].notices)
+
+
+def _event(study: StudyRecord, name: str) -> fig.Figure:
+    """The estimates of an event over time."""
+    run, notice = study.runs[name], study.findings["observer"].notices[name]["observer"]
+    time = run["time"].values - study.event[name]
+    low = max(float(time[0]), -0.5 * math.pi / study.config.run.crank_speed)
+
+    def loads(load: str) -> Iterator[fig.Item]:
+        for look, side in enumerate(SIDES):
+            yield fig.Curve(f"{side}, estimated", time, run[f"observer.{side}.{load}"].values, look)
+            yield fig.Curve("true", time, run[f"machine.{side}.{load}"].values, "path", in_legend=not look)
+
+    def shares() -> Iterator[fig.Item]:
+        for look, ground in enumerate(("feed", "force")):
+            yield fig.Curve(f"of the {ground}", time, run[f"observer.grounds.{ground}"].values, look + 2)
+        yield from (fig.Mark(at, axis="y", look="limit") for at in (-1.0, 1.0))
+
+    begin = fig.Mark(0.0, "event", look="thin")
+    marks = [begin] if notice.time is None else [begin, fig.Mark(notice.time, "alarm")]
+    panels = {_MASS: loads("material_mass"), _FORCE: loads("processing_force"), _SHARE: shares()}
+    words = run_names.title(study, name)
+    return fig.Figure(
+        f"observer-{name.replace('_', '-')}",
+        words[:1].upper() + words[1:],
+        f"Estimated and true feed and processing force of both sides over time, and the imbalances in parts of their "
+        f"thresholds: {words}.",
+        fig.stacked(
+            fig.Axis("time after the event", "s", low=low, high=float(time[-1])),
+            ((axis, (*items, *marks)) for axis, items in panels.items()),
+        ),
+        "An alarm comes where an imbalance passes 1 (left) or -1 (right) times its threshold.",
+        half=True,
+    )

@@ -1,0 +1,315 @@
+"""The result of an identification as data: the content of result.json, and of the study file with its values."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ... import __version__
+from ...core.messages import unit_behind
+from ...core.quantities import Layout
+from ...reading.text import array_entry, entry, shown_in
+from ...study.study_file import changed_tables
+from .fit import Normal
+from .identification import FittedNumber, IdentifiedMachine, remarks, system_name
+from .information import Combination, Information, short_name
+from .measurands import MEASURANDS
+from .observation import false_imbalance, usual_loads
+from .plant import ANGLE
+from .problem import MARK_ANGLE, Problem
+from .reading import IdentificationPlan
+from .residuals import LOUD, ResidualCheck
+from .unknown import Unknown
+
+RESULT = "result.json"
+"""Name of the file with the result."""
+CORRELATED = 0.8
+"""Correlation from which a pair of numbers is named."""
+MOST_PAIRS = 12
+MOST_CHANGES = 4
+"""Most numbers whose changes without a trace are told one by one."""
+CLASSES = 90
+"""Number of crank angles at which measured and simulated courses are shown."""
+CLASSES_OF_TIME = 600
+"""Number of times at which those of a run that is not steady are shown."""
+
+
+def as_dict(found: IdentifiedMachine) -> dict[str, Any]:
+    """All results, ready for JSON, each number with its unit."""
+    with shown_in(found.config.units):
+        return _as_dict(found)
+
+
+def _as_dict(found: IdentifiedMachine) -> dict[str, Any]:
+    config, best = found.config, found.best
+    estimates = found.estimates
+    told = sum(each.is_told for each in estimates.values())
+    return {
+        "chainunit": __version__,
+        "title": config.title,
+        "source": config.source,
+        "report": dict(config.labels),
+        "is_described": found.is_described,
+        "status": "complete" if found.is_described else "the model does not describe the recordings",
+        "sought": entry(float(len(estimates)), "1"),
+        "told": entry(float(told), "1"),
+        "runs": {run.name: _run(found, k) for k, run in enumerate(found.plan.runs)},
+        "numbers": {name: _number(found, each) for name, each in estimates.items()},
+        "covariance": {
+            "names": list(estimates),
+            "units": [each.unknown.unit for each in estimates.values()],
+            "matrix": found.covariance.tolist(),
+        },
+        "correlations": list(_correlations(found)),
+        "combinations": [_combination(found, each) for each in found.after.combinations],
+        "blind": [_blind(found, each) for each in found.after.blind],
+        "told_at_start": entry(float(sum(each.is_told for each in found.before.outlooks)), "1"),
+        "proposals": [
+            {"text": each.words, "factor": entry(each.factor, "1"), "told": entry(float(each.told), "1")}
+            for each in found.before.proposals
+        ],
+        "residuals": [_check(found, each) for each in found.checks],
+        "sensors": {
+            unknown.name: each for unknown, each in fitted_entries(found.problem, best) if unknown.is_nuisance
+        },
+        "fit": {
+            "rounds": entry(float(best.rounds), "1"),
+            "starts": entry(float(best.starts), "1"),
+            "agreeing": entry(float(best.agreeing), "1"),
+        },
+        "remarks": list(remarks(found)),
+        "courses": {run.name: _courses(found, run.name) for run in found.plan.runs},
+    }
+
+
+def _run(found: IdentifiedMachine, k: int) -> dict[str, Any]:
+    run, recording = found.plan.runs[k], found.problem.runs[k].recording
+    return {
+        "file": str(run.file),
+        "columns": list(recording.columns),
+        "rows": entry(float(len(recording.time)), "1"),
+        "duration": entry(float(recording.time[-1] - recording.time[0]), "s"),
+        "rate": entry(1.0 / recording.step, "1"),
+        "crank_speed": entry(run.crank_speed, "rad/s", "speed"),
+        "ambient": entry(run.ambient, "K", "temperature"),
+        "feed": "that of all loaded runs" if run.has_feed else "none",
+        "added": {name: entry(x, found.plan.variables[name].unit) for name, x in run.added.items()},
+    }
+
+
+def _number(found: IdentifiedMachine, each: FittedNumber) -> dict[str, Any]:
+    """A sought number: with its value only where the recordings tell it."""
+    variable = found.plan.variables[each.unknown.name]
+    before = next(one for one in found.before.outlooks if one.name == system_name(each.unknown.name))
+    own, unit, kind = each.unknown, variable.unit, variable.kind
+    return {
+        "title": variable.description,
+        "told": each.is_told,
+        "value": entry(each.value if each.is_told else None, unit, kind),
+        "fitted": entry(each.fitted if each.is_told else None, unit, kind),
+        "deviation": _difference(each.deviation, unit),
+        "from": entry(each.low, unit, kind),
+        "to": entry(each.high, unit, kind),
+        "given": entry(own.start, unit, kind),
+        "given_deviation": _difference(own.spread, unit),
+        "least": entry(own.low, unit, kind),
+        "most": entry(own.high, unit, kind),
+        "expected": _difference(before.by_both, unit),
+        "by_runs": _difference(before.by_runs, unit),
+    }
+
+
+def _difference(x: float, unit: str) -> dict[str, Any]:
+    """The entry of a number that is no temperature itself, such as a standard deviation."""
+    return entry(x, unit, "difference" if unit == "K" else "")
+
+
+def _correlations(found: IdentifiedMachine) -> Iterator[dict[str, Any]]:
+    """The pairs of numbers with the largest correlations."""
+    names = [each.name for each in found.plan.sought]
+    scale = 1.0 / np.sqrt(np.diag(found.covariance))
+    matrix = found.covariance * np.outer(scale, scale)
+    pairs = sorted(((i, k) for i in range(len(names)) for k in range(i)), key=lambda pair: -abs(matrix[pair]))
+    for i, k in pairs[:MOST_PAIRS]:
+        if abs(matrix[i, k]) >= CORRELATED:
+            yield {"first": names[k], "second": names[i], "correlation": entry(float(matrix[i, k]), "1")}
+
+
+def _combination(found: IdentifiedMachine, each: Combination) -> dict[str, Any]:
+    value, deviation = found.combined(each)
+    return {
+        "text": str(each),
+        "terms": dict(each.terms),
+        # of temperatures, a sum is no temperature
+        "value": _difference(value, each.unit),
+        "deviation": _difference(deviation, each.unit),
+    }
+
+
+def _blind(found: IdentifiedMachine, each: Combination) -> dict[str, Any]:
+    """A change of numbers together that leaves no trace."""
+    units = {system_name(u.name): u.unit for u in found.plan.sought}
+    changes = [
+        f"{short_name(name)} {'up' if factor > 0.0 else 'down'} by {abs(factor):.3g}{unit_behind(units[name])}"
+        for name, factor in each.terms
+    ]
+    words = " with ".join(changes)
+    if len(changes) > MOST_CHANGES:
+        names = ", ".join(short_name(name) for name, _ in each.terms)
+        words = f"a change of {len(changes)} numbers together ({names})"
+    return {"text": words, "terms": dict(each.terms)}
+
+
+def _check(found: IdentifiedMachine, each: ResidualCheck) -> dict[str, Any]:
+    unit = MEASURANDS[each.column].unit
+    return {
+        "run": each.run,
+        "column": each.column,
+        "is_noise": each.is_noise,
+        "reason": each.reason,
+        "statistic": entry(each.statistic, "1"),
+        "limit": entry(each.limit, "1"),
+        "noise": entry(each.noise, "1"),
+        "slow": entry(each.slow, "1"),
+        "slow_limit": entry(each.slow_limit if math.isfinite(each.slow_limit) else None, "1"),
+        "changes": entry(each.changes, unit),
+        "orders": [
+            {"order": entry(float(order), "1"), "amplitude": entry(size, unit)} for order, size in each.orders
+        ],
+    }
+
+
+def fitted_entries(problem: Problem, best: Normal) -> Iterator[tuple[Unknown, dict[str, Any]]]:
+    """Each unknown of a fit with its value and standard deviation as entries of a result. The angle of a run is
+    within a turn; that of the mark lies on both sides of 0."""
+    for unknown, x, s in zip(problem.unknowns, best.z, best.deviations, strict=True):
+        value, unit = float(x), unknown.unit
+        if unknown.is_nuisance and unknown.name.endswith(f".{ANGLE}") and unknown.name != MARK_ANGLE:
+            value %= 2.0 * math.pi
+        yield (
+            unknown,
+            {
+                "value": entry(value, unit, "temperature" if unit == "K" else ""),
+                "deviation": _difference(float(s), unit),
+            },
+        )
+
+
+def _courses(found: IdentifiedMachine, run: str) -> dict[str, Any]:
+    """By analog column, the mean measured and simulated values in classes: of the crank angle over all turns of a
+    steady run, of the time of another one."""
+    courses: dict[str, Any] = {}
+    steady = found.is_steady(run)
+    for each in found.best.comparisons:
+        if each.run != run or not MEASURANDS[each.column].analog:
+            continue
+        time, measured, simulated = found.courses(each)
+        x = np.mod(each.angle, 2.0 * math.pi) if steady else time
+        ends = (0.0, 2.0 * math.pi) if steady else (time[0], time[-1])
+        edges = np.linspace(ends[0], ends[1], (CLASSES if steady else CLASSES_OF_TIME) + 1)
+        place, size = np.digitize(x, edges[1:-1]), len(edges) - 1
+        count = np.bincount(place, minlength=size)
+        some = count > 0
+        means = [np.bincount(place, y, size)[some] / count[some] for y in (measured, simulated)]
+        unit = MEASURANDS[each.column].unit
+        middle = 0.5 * (edges[1:] + edges[:-1])[some]
+        courses[each.column] = {
+            "angle" if steady else "time": array_entry(middle, "rad" if steady else "s"),
+            "measured": array_entry(means[0], unit),
+            "simulated": array_entry(means[1], unit),
+        }
+    return courses
+
+
+def outlook(plan: IdentificationPlan, before: Information) -> str:
+    """What the recordings can tell, in words: with the standard deviations to expect."""
+    names = {system_name(u.name): u.name for u in plan.sought}
+    told = [each for each in before.outlooks if each.is_told]
+    words = f"Before the fit: these recordings can determine {len(told)} of {len(before.outlooks)} numbers"
+    if told:
+        listed = (f"{names[each.name]} to {each.by_both:.2g}{unit_behind(each.unit)}" for each in told)
+        words += f" ({', '.join(listed)})"
+    if before.proposals and len(told) < len(before.outlooks):
+        best = before.proposals[0]
+        words += f". Of further runs, this one would tell most: {best.words} (then {best.told} numbers)"
+    return f"{words}."
+
+
+def sentences(found: IdentifiedMachine) -> list[str]:
+    """Sentences that judge an identification."""
+    words = [
+        f"{each}: the model does not describe the recordings; check the gear ratio, the units of the columns and the "
+        "data of the sensors"
+        for each in found.strains
+    ]
+    words += [
+        f"{name} = {each.fitted:.4g}{unit_behind(each.unknown.unit)} lies at its {each.at_bound} bound"
+        + (", and the recordings contradict this bound" if system_name(name) in found.posterior.held else "")
+        + ": widen it, or check what else is held for known"
+        for name, each in found.estimates.items()
+        if each.at_bound
+    ]
+    words += [str(each) for each in found.suspicions if each.is_suspicious]
+    for check in found.checks:
+        unit = MEASURANDS[check.column].unit
+        place = f"{check.column} of the run {check.run}"
+        if check.reason == "orders":
+            order, size = check.orders[0]
+            words.append(
+                f"{place}: the model does not describe it. Order {order} of the crank remains, with {size:.2g} "
+                f"{unit}; check the dimensions, the gear ratio, and the control"
+            )
+        elif check.reason == "slow":
+            words.append(
+                f"{place}: the model does not describe it. Slow changes remain, with a standard deviation of "
+                f"{check.changes:.2g} {unit}: the speed, the feed or the supply was not steady; state the changes of "
+                "the speed (speeds), or name a steady part (begin, end)"
+            )
+        elif check.noise > LOUD:
+            words.append(
+                f"{place}: its noise is {check.noise:.2g} times the stated one; state "
+                "its own (identify.sensor.noise), as all deviations grow with it"
+            )
+    return words
+
+
+def identified_tables(found: IdentifiedMachine, folder: Path) -> dict[str, Any]:
+    """The tables of the study with the fitted values, as a file in `folder` has them, beside the result of the
+    identification, by which a recording is watched. A number that the recordings do
+    not tell has its fitted value, too: only all of them together give the measured courses. A table [observer] has
+    the false imbalance that errors of the machine make."""
+    values = {name: float(f"{each.fitted:.6g}") for name, each in found.estimates.items()}
+    tables = changed_tables(found.config, values, "identified", folder)
+    tables.pop("identify", None)
+    if "watch" in tables:
+        tables["watch"]["identification"] = RESULT
+    if "observer" in tables:
+        false = _false_imbalance(found, values)
+        tables["observer"] |= {name: float(f"{x:.4g}") for name, x in false.items()}
+    return tables
+
+
+def _false_imbalance(found: IdentifiedMachine, values: Mapping[str, float]) -> dict[str, float]:
+    """The false imbalance of an observer of the machine with the fitted `values`, by its key in [observer]."""
+    config = found.config
+    loads = {name.removeprefix("feed."): x for name, x in values.items() if name.startswith("feed.")}
+    feed = Layout(type(config.feed)).from_names(loads, config.feed)
+    own = {name.removeprefix("machine."): x for name, x in values.items()}
+    names = [name.removeprefix("machine.") for name in found.estimates]
+    known = config.machine.by_name | own | usual_loads(feed)
+    return false_imbalance(known, names, found.covariance, config.run.crank_speed)
+
+
+def identified_notes(found: IdentifiedMachine) -> dict[str, str]:
+    """By full name, a sentence on each number of the study file that the recordings do not determine."""
+    notes = {}
+    for name, each in found.estimates.items():
+        if not each.is_told:
+            unit = unit_behind(each.unknown.unit)
+            ends = f"95 % from {each.low:.4g} to {each.high:.4g}{unit}"
+            notes[name] = f"not determined, {ends}; it holds only together with the other fitted values"
+    return notes

@@ -1,0 +1,225 @@
+"""The table [identify] of a study file and its entries: declarations only."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+from pydantic import Field
+
+from ...core.quantities import Value, declaration, quantity
+from ...reading.lists import TableList
+from ...study.entry_values import entered, filled_text
+
+FEEDS = ("same", "none")
+"""The feed of a run: that of all loaded runs, or none."""
+MOST_SPEEDS = 200
+
+
+@declaration
+class IdentifyTable:
+    """The identification of a machine from recordings of its motor."""
+
+    noise: Value = quantity(
+        "1",
+        "standard deviation of the noise of a sensor, in parts of the RMS of its column; of sensors without a table",
+        default=0.01,
+        min=1e-6,
+        max=1.0,
+        kind="percent",
+    )
+    gain: Value = quantity(
+        "1",
+        "standard deviation of the gain of a sensor; of sensors without a table",
+        default=0.01,
+        min=0.0,
+        max=1.0,
+        kind="percent",
+    )
+    starts: Value = quantity(
+        "1", "number of starts of the fit, spread over the bounds", default=1, min=1, max=100, type="Integer"
+    )
+    seed: Value = quantity("1", "seed of the starts", default=1, min=0, max=1_000_000_000, type="Integer")
+
+
+@declaration
+class RecordingTable:
+    """A recording."""
+
+    crank_speed: Value = quantity(
+        "rad/s", "speed of the crank in this run", default=3.0, min=0.01, max=1000.0, kind="speed"
+    )
+    begin: Value = quantity("s", "time of the recording from which it counts", default=0.0, min=-1e9, max=1e9)
+    end: Value = quantity("s", "time of the recording up to which it counts", default=0.0, min=-1e9, max=1e9)
+    ambient: Value = quantity("K", "temperature of the surroundings", default=293.15, min=230.0, max=340.0)
+
+
+@declaration
+class RunTable(RecordingTable):
+    """A recorded run."""
+
+    switched_off: Value = quantity(
+        "s", "time of the recording at which the motor is switched off", default=0.0, min=-1e9, max=1e9
+    )
+
+
+@declaration
+class WatchTable(RecordingTable):
+    """The recording that is watched."""
+
+    learning: Value = quantity(
+        "s",
+        "time from its begin in which the angle of the crank, the zero of the signal and the forces are learned",
+        default=20.0,
+        above=0.0,
+        max=1e5,
+    )
+    feed_deviation: Value = quantity(
+        "1",
+        "standard deviation of the study's feed from that at the begin, as a share",
+        default=0.05,
+        above=0.0,
+        max=1.0,
+        kind="percent",
+    )
+    noise: Value = quantity(
+        "1",
+        "standard deviation of the noise of a sensor, in parts of the RMS of its column",
+        default=0.01,
+        min=1e-6,
+        max=1.0,
+        kind="percent",
+    )
+    gain: Value = quantity(
+        "1", "standard deviation of the gain of a sensor", default=0.01, min=0.0, max=1.0, kind="percent"
+    )
+
+
+@declaration
+class SensorTable:
+    """The knowledge of a sensor."""
+
+    noise: Value = quantity(
+        "1",
+        "standard deviation of its noise, in parts of the RMS of its column",
+        default=0.01,
+        min=1e-6,
+        max=1.0,
+        kind="percent",
+    )
+    gain: Value = quantity(
+        "1", "standard deviation of its gain", default=0.01, min=0.0, max=1.0, kind="percent"
+    )
+
+
+_FILE: Any = filled_text("recording (CSV, or CSV.gz), relative to the study file")
+_COLUMNS: Any = (
+    dict[str, Any],
+    Field({}, description="by quantity, the head of its column, where that is not the quantity's name"),
+)
+WATCH_KEYS: Mapping[str, Any] = {
+    "file": _FILE,
+    "columns": _COLUMNS,
+    "identification": (
+        str,
+        Field(
+            "",
+            description="result.json of chainunit identify, whose covariance widens the thresholds; relative to the "
+            "study file",
+        ),
+    ),
+}
+"""Keys of the table [watch] that are no quantities."""
+
+FROM_RECORDING: Mapping[str, str] = {
+    "crank_speed": "run.crank_speed",
+    "begin": "the first row",
+    "end": "the last row",
+}
+"""By key of a recording, the source of its value if the file leaves the key out."""
+SOUGHT = TableList(
+    "identify.parameter",
+    title="Number that is sought",
+    description="numbers that are sought",
+    most=40,
+    must_be="the full name of a number of the machine (machine.left.web_mass), of its feed (feed. ..), or of the "
+    "motor (motor. ..)",
+    example="machine.left.web_mass",
+    least=1,
+    conditions={
+        "required": ["name"],
+        "anyOf": [{"required": ["from", "to"]}, {"required": ["deviation"]}],
+    },
+    keys={
+        "name": filled_text(
+            'full name of a quantity, such as "machine.left.web_mass", "feed.left.material_mass", '
+            '"motor.rotor.J"'
+        ),
+        "from": entered("least value"),
+        "to": entered("largest value"),
+        "deviation": entered(
+            "standard deviation of the value of the study from the true one, as of a weighing or a "
+            'drawing; a number in the unit of the quantity, or a share of the value, such as "5 %"'
+        ),
+    },
+)
+RUNS = TableList(
+    "identify.run",
+    title="Recorded run",
+    description="recordings",
+    most=12,
+    declared=RunTable,
+    is_twice="is the name of another run; give it another",
+    least=1,
+    conditions={"required": ["file"]},
+    follows={**FROM_RECORDING, "name": "run_1, run_2, ..", "switched_off": "never"},
+    keys={
+        "name": filled_text("name of the run, in small letters, digits and _"),
+        "file": _FILE,
+        "feed": (
+            Literal[FEEDS],
+            Field(
+                "same", description="feed of the machine: the one that is sought in all loaded runs, or none"
+            ),
+        ),
+        "speeds": (
+            list[list[Any]],
+            Field(
+                [],
+                max_length=MOST_SPEEDS,
+                description="smooth changes of the speed reference, each a list of its time in the recording, its "
+                "duration, and the crank speed after it",
+            ),
+        ),
+        "columns": _COLUMNS,
+        "added": (
+            dict[str, Any],
+            Field(
+                {},
+                description="what was added to a sought number for this run, by its full name: a known mass",
+            ),
+        ),
+    },
+)
+SENSORS = TableList(
+    "identify.sensor",
+    title="Sensor of a recording",
+    description="knowledge of sensors",
+    most=12,
+    declared=SensorTable,
+    named_by="column",
+    conditions={"required": ["column"]},
+    follows={
+        "noise": "identify.noise",
+        "gain": "identify.gain",
+        "offset": "5 % of the RMS of a current or torque, 0 of others",
+        "resolution": "0",
+    },
+    keys={
+        "column": filled_text('quantity that it measures, such as "motor.i"'),
+        "offset": entered("standard deviation of its offset, in the unit of the quantity"),
+        "resolution": entered("step of its converter, in the unit of the quantity"),
+    },
+)
+FIELDS: Mapping[str, Any] = {"parameter": SOUGHT.field, "run": RUNS.field, "sensor": SENSORS.field}
+"""Keys of the table that are no quantities, as pydantic fields."""

@@ -1,0 +1,190 @@
+"""Checks of an answer by other routes: machines near it, computed as a batch, and an FMU of the best machine."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ...fmu.backends import Backend, export
+from ...machines.machine import Machine
+from ...study.cycle_quantities import CycleQuantity, evaluate
+from ...system.instance import Fmu, Instance
+from ...work.interrupts import stoppable
+from .extremes import grid
+from .search import FINE, Search
+from .wishes import TurnLimit, Wishes
+
+STEPS = (1e-3, 1e-2)
+"""Distances of the neighbours, as shares of the distance between the bounds."""
+_RANDOM = 64
+_TOLERANCE, _ROUNDING = 1e-7, 1e-11
+_STEP = 1e-3
+"""Step of the FMU at each angle [s]: its outputs follow from its inputs alone."""
+
+
+@dataclass(frozen=True)
+class Neighbours:
+    """Machines near the best one: how many were computed, how many of them meet all limits, and how many meet them
+    and are better."""
+
+    number: int
+    feasible: int
+    better: int
+
+
+def around(search: Search, x: Any) -> Any:
+    """Free parameters around `x`, shape (neighbours, free): each one alone to both sides, and random directions."""
+    space, n = search.space, search.space.n
+    rng = np.random.default_rng(search.wishes.seed)
+    directions = rng.normal(size=(_RANDOM, n))
+    directions /= np.max(np.abs(directions), axis=1, keepdims=True)
+    directions = np.concatenate([np.eye(n), -np.eye(n), directions])
+    points = np.concatenate([x + step * space.span * directions for step in STEPS])
+    return np.clip(points, space.low, space.low + space.span)
+
+
+def neighbours(
+    search: Search, x: Any, objective: CycleQuantity, limits: Sequence[TurnLimit], value: float
+) -> Neighbours:
+    """A sweep of the machines `around` x."""
+    points = around(search, x)
+    quantities = list({q.name: q for q in (objective, *(limit.quantity for limit in limits))}.values())
+    machine = search.wishes.machine.replace(dict(zip(search.wishes.names, map(float, x), strict=True)))
+    values = {
+        name: xr.DataArray(column, dims="neighbour")
+        for name, column in zip(search.wishes.names, points.T, strict=True)
+    }
+    # so few states take less time than a compiler
+    arguments = search.wishes.crank_speed, search.wishes.feed, values, search.wishes.basis, FINE
+    table = evaluate(machine, quantities, *arguments, engine="numpy")
+    turns = (table.reason.values == 0) & np.array([_clear(search, point) for point in points])
+    met = turns
+    for limit in limits:
+        met &= _meets(limit, table[limit.name].values)
+    if search.wishes.slack_free_speed:
+        met[met] = [search.least_pull(point) >= 0.0 for point in points[met]]
+    better = met & (table[objective.name].values < value * (1.0 - math.copysign(_TOLERANCE, value)))
+    # the values at the angles of a grid are a little too small: the candidates are computed exactly
+    candidates = np.flatnonzero(better)
+    # and a limit may be exceeded no more than at the best machine: a steep objective gains from any share
+    own = [_widened(limit, search.value(limit.quantity, x)) for limit in limits] if len(candidates) else []
+    exact = [k for k in candidates if _is_better(search, points[k], objective, own, value)]
+    return Neighbours(len(points), int(np.sum(met)), len(exact))
+
+
+def _clear(search: Search, x: Any) -> bool:
+    today = search.space.requirements.values(search.base)
+    return bool(np.all(search.space.requirements.values(x) >= search.wishes.clearance * today * (1.0 - 1e-9)))
+
+
+def _widened(limit: TurnLimit, value: float) -> TurnLimit:
+    """The limit, or the value where it is beyond."""
+    low = None if limit.low is None else min(limit.low, value)
+    high = None if limit.high is None else max(limit.high, value)
+    return TurnLimit(limit.quantity, low, high)
+
+
+def _meets(limit: TurnLimit, values: Any, tolerance: float = _TOLERANCE) -> Any:
+    met = np.isfinite(values)
+    for bound, sign in ((limit.low, 1.0), (limit.high, -1.0)):
+        if bound is not None:
+            met &= sign * (values - bound) >= -tolerance * max(abs(bound), 1e-12)
+    return met
+
+
+def _is_better(
+    search: Search, x: Any, objective: CycleQuantity, limits: Sequence[TurnLimit], value: float
+) -> bool:
+    if not all(_meets(limit, np.array(search.value(limit.quantity, x)), _ROUNDING) for limit in limits):
+        return False
+    return search.value(objective, x) < value * (1.0 - math.copysign(_TOLERANCE, value))
+
+
+# -- the FMU
+
+
+@dataclass(frozen=True)
+class FmuValue:
+    """A quantity by the FMU over the turn, and by the search at the same machine."""
+
+    fmu: float
+    search: float
+
+    @property
+    def deviation(self) -> float:
+        """Difference of both, as a share."""
+        return abs(self.fmu - self.search) / max(abs(self.search), 1e-12)
+
+
+def by_fmu(
+    wishes: Wishes,
+    machine: Machine,
+    quantities: Mapping[str, CycleQuantity],
+    values: Mapping[str, float],
+    angles: Sequence[float],
+    folder: Path,
+    backend: Backend | None = None,
+) -> dict[str, FmuValue]:
+    """Quantities of the best machine from its FMU, exported to `folder` and run by fmpy over the turn; `angles` are
+    further crank angles, at which the extremes lie. Quantities that need the places of pins are left out: the FMU
+    of a packaged machine has none."""
+    model = machine.model
+    file = folder / f"{model.name}.fmu"
+    export(model, file, machine.by_name, backend=backend)
+    columns = {i.column for q in quantities.values() for i in q.integrands}
+    with stoppable():  # an interrupt would be a fatal error inside the FMU
+        series = _run(file, machine, wishes, np.array([*grid(FINE), *angles]), columns)
+    results = {}
+    for name, q in quantities.items():
+        if not all(i.column in series for i in q.integrands):
+            continue
+        parts = []
+        for each in q.integrands:
+            y = series[each.column]
+            parts.append(
+                {
+                    "max": np.max(y),
+                    "min": np.min(y),
+                    "peak": np.max(np.abs(y)),
+                    "mean": np.mean(y[:FINE]),
+                    "rms": np.sqrt(np.mean(y[:FINE] ** 2)),
+                }[each.reduction]
+            )
+        value = float(q.combine(parts, wishes.crank_speed * machine.ratio, wishes.basis))
+        results[name] = FmuValue(value, values[name])
+    return results
+
+
+def _run(file: Path, machine: Machine, wishes: Wishes, q: Any, columns: set[str]) -> dict[str, Any]:
+    """The columns over crank angles, as far as the FMU gives them."""
+    fmu = Fmu(file)
+    try:
+        outputs = fmu.outputs()
+        instance = Instance(fmu, "best")
+        w = wishes.crank_speed * machine.ratio
+        try:
+            inputs = machine.model.feed_layout.by_name(wishes.feed) | {"phi": 0.0, "w": w, "a": 0.0}
+            instance.initialize(inputs, 0.0)
+            instance.finish_initialization()
+            rows = []
+            for k, angle in enumerate(q):
+                instance.set(["phi"], [float(angle) * machine.ratio])
+                instance.step(k * _STEP, _STEP)
+                rows.append(instance.get(outputs))
+        finally:
+            instance.close()
+    finally:
+        fmu.close()
+    by_name = dict(zip(outputs, np.array(rows).T, strict=True))
+    by_name["crank_torque"] = by_name["tau"] * machine.ratio
+    for name in list(by_name):
+        pin, _, axis = name.rpartition(".")
+        if axis == "fx" and f"{pin}.fy" in by_name:
+            by_name[f"force({pin})"] = np.hypot(by_name[name], by_name[f"{pin}.fy"])
+    return {name: y for name, y in by_name.items() if name in columns}

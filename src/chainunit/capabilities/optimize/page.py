@@ -1,0 +1,258 @@
+"""The report on a search for the best machine: its values beside today's, what binds, the starts, and the checks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...core.files import whole
+from ...fmu.backends import Backend
+from ...report import blocks as b
+from ...report import figure as fig
+from ...report.lines import Line, Name, line
+from ...report.task import Task, Writer
+from ...study.config import Config
+from ...study.study_file import toml_text
+from ...work.progress import Report as Progress
+from .best import Best, find_best
+from .result import as_dict, best_tables, units_of
+from .table import wishes_of
+
+PICTURES = ("torque.png", "front.png")
+FILE = "best.toml"
+"""The study file with the best machine."""
+
+
+def optimum_report(best: Best, config: Config) -> b.Report:
+    """The report on a search."""
+    result = as_dict(best, config)
+    s = b.Source(result)
+    sections = [b.Section("parameters", "Parameters and limits", tuple(_machine(s, best)))]
+    if best.met:
+        sections.append(b.Section("binding", "What binds", tuple(_binding(s))))
+    if best.front:
+        sections.append(b.Section("front", "Two objectives", tuple(_front(s, best))))
+    sections.append(b.Section("checks", "Starts and checks", tuple(_checks(s, best))))
+    return b.Report(
+        _title(best, config),
+        "Search for the best machine",
+        result,
+        tuple(_opening(s, best)),
+        tuple(sections),
+        source=s.line("Study file: {source} · chainunit {chainunit}"),
+        units=units_of(best, config),
+        opening_title="The answer",
+        status="complete" if best.met else "no machine found",
+    )
+
+
+def _title(best: Best, config: Config) -> str:
+    if best.met:
+        return config.title or "The best machine"
+    return f"{config.title}: no machine found" if config.title else "No machine found"
+
+
+class OptimizedStudy(NamedTuple):
+    """A study, and what the search for its best machine found."""
+
+    config: Config
+    best: Best
+
+
+def _compute(
+    config: Config, folder: Path | None, progress: Progress, *, backend: Backend | None = None
+) -> OptimizedStudy:
+    """Search for the best machine of a study. A refusal begins with the name of the study file, if there is one."""
+    with config.of_file():
+        return OptimizedStudy(config, find_best(wishes_of(config), progress, backend))
+
+
+def _accept(config: Config, **options: Any) -> None:
+    with config.of_file():
+        wishes_of(config)
+
+
+def _writers(outcome: OptimizedStudy, folder: Path, of_report: list[Writer]) -> list[Writer]:
+    """With the study file of the best machine, where there is one."""
+    config, best = outcome
+
+    def study_file() -> list[Path]:
+        text = toml_text(best_tables(best, config, folder))
+        with whole(folder / FILE) as part:
+            part.write_text(text, "utf-8")
+        return [folder / FILE]
+
+    return [*([study_file] if best.met else []), *of_report]
+
+
+TASK: Task[Config, OptimizedStudy] = Task(
+    "optimize",
+    _compute,
+    lambda outcome: optimum_report(outcome.best, outcome.config),
+    files=(*PICTURES, FILE),
+    accept=_accept,
+    writers=_writers,
+    shortfall=lambda outcome: None if outcome.best.met else "",
+)
+
+
+def _opening(s: b.Source, best: Best) -> Iterator[b.Block]:
+    if not best.met:
+        sentences = s.lines("conflict.sentences")
+        yield b.Judgement("bad", sentences[0], items=())
+        for each in sentences[1:]:
+            yield b.Text(each)
+        return
+    for k, name in enumerate(s.result["objectives"]):
+        path = f"quantities.{name}"
+        words = line(
+            f"{name}: ", s.number(f"{path}.best"), ", today ", s.number(f"{path}.today"), _share(s, path), "."
+        )
+        yield b.Judgement("good", words) if k == 0 else b.Text(words)
+    for i in range(len(s.result["organs"])):
+        path = f"organs.{i}"
+        words = s.line(f"{{{path}.text}}: the crank turns at {{speed}}")
+        yield b.Judgement(
+            "warning", line(words, s.line(f", and the limit of the best machine is {{{path}.limit}}."))
+        )
+    yield _turns(best)
+
+
+def _share(s: b.Source, path: str) -> Line:
+    today, value = s.value(f"{path}.today"), s.value(f"{path}.best")
+    if not today or value is None:
+        return ()
+    change = 100.0 * (value - today) / abs(today)
+    return f" ({change:+.1f} %)".replace("-", "\u2212")
+
+
+def _turns(best: Best) -> fig.Figure:
+    angle = fig.Axis("crank angle", "rad", step=45.0)
+    curves = tuple(
+        fig.Curve(name, best.turns["angle"], best.turns[key], look)
+        for look, (name, key) in enumerate((("best", "best"), ("today", "today")))
+    )
+    torque = fig.Axis(f"torque at the {best.wishes.machine.model.turning}", "N.m")
+    return fig.Figure(
+        "best-torque",
+        "Torque over the turn, today and best",
+        "The torque over a turn at constant speed of today's machine and of the best one.",
+        ((fig.Panel(angle, torque, curves),),),
+        file=PICTURES[0],
+    )
+
+
+def _machine(s: b.Source, best: Best) -> Iterator[b.Block]:
+    head = "best" if best.met else "nearest"
+    rows = [
+        b.TableRow((Name(name), *(s.number(f"parameters.{name}.{key}", digits=5) for key in ("today", "best")),
+                    *(s.number(f"parameters.{name}.{key}", as_given=True) for key in ("min", "max"))))
+        for name in s.result["parameters"]
+    ]  # fmt: skip
+    yield b.Table(
+        tuple(rows), b.heads("parameter", "today", head, "least", "largest"), title="Free parameters"
+    )
+    if best.idle:
+        yield b.Text(s.words("without_effect_words"))
+    limited: list[tuple[Line, str]] = [(Name(name), f"quantities.{name}") for name in s.result["quantities"]]
+    if s.result["least_pull"] is not None:
+        limited.append(("web mean pull, least", "least_pull"))
+    # where no machine meets all limits, a column marks those that the nearest one misses
+    marks = () if best.met else ("limit",)
+    rows = [
+        b.TableRow((words, *(s.number(f"{path}.{key}", digits=4) for key in ("today", "best")),
+                    *(s.number(f"{path}.{key}", as_given=True) for key in ("min", "max")),
+                    *("missed" if b.at(s.result, path)["missed"] else "" for _ in marks)))
+        for words, path in limited
+    ]  # fmt: skip
+    yield b.Table(
+        tuple(rows),
+        b.heads("quantity", "today", head, "least", "largest", *marks),
+        title=s.line("Objectives and limits, of a turn at {=speed:4}"),
+    )
+    if s.result["least_pull"] is not None:
+        yield b.Text(s.line("The web mean pull is the least at crank speeds up to {=slack_free_speed:4}."))
+
+
+def _binding(s: b.Source) -> Iterator[b.Block]:
+    if not s.result["bindings"]:
+        yield b.Text("No limit and no bound holds the best machine back.")
+    for each in s.lines("bindings"):
+        yield b.Text(line(each, "."))
+    for words in s.lines("clearances"):
+        yield b.Text(
+            line("It is as near as the clearance allows to a limit within which it turns: ", words, ".")
+        )
+
+
+def _front(s: b.Source, best: Best) -> Iterator[b.Block]:
+    first, second = best.wishes.objectives
+    names = best.wishes.names
+    rows = [
+        b.TableRow(
+            (
+                s.number(f"front.{k}.values.{first.name}", digits=4),
+                s.number(f"front.{k}.values.{second.name}", digits=4),
+                *(s.number(f"front.{k}.parameters.{name}", digits=4) for name in names),
+                FILE if s.result["front"][k]["chosen"] else "",
+            )
+        )
+        for k in range(len(best.front))
+    ]
+    yield b.Text(
+        "No machine is better than one of the front in one objective without being worse in the other. The best "
+        "machine of this report is the one nearest to the least values of both.",
+        "lead",
+    )
+    yield b.Table(
+        tuple(rows),
+        b.heads(*map(Name, (first.name, second.name, *names)), "file"),
+        title="Front of the two objectives",
+    )
+    values = np.array([point.values for point in best.front])
+    chosen = [[best.found[q.name]] for q in (first, second)]
+    items: tuple[Any, ...] = (
+        fig.Curve("front", values[:, 0], values[:, 1], marker="o"),
+        fig.Curve("best of this report", chosen[0], chosen[1], 1, marker="s", has_line=False),
+    )
+    yield fig.Figure(
+        "front",
+        "Front of the two objectives",
+        "The values of both objectives along the front.",
+        ((fig.Panel(fig.Axis(first.name, first.unit), fig.Axis(second.name, second.unit), items),),),
+        file=PICTURES[1],
+    )
+
+
+def _checks(s: b.Source, best: Best) -> Iterator[b.Block]:
+    yield b.Text(s.words("starts.text"))
+    yield b.Text(
+        s.line(
+            "{=starts.programs} programs, {=starts.iterations} iterations, {=starts.evaluations} turns computed."
+        ),
+        "fine",
+        form="long",
+    )
+    if best.neighbours is not None:
+        severity: b.Severity = "warning" if best.neighbours.better else "good"
+        yield b.Judgement(severity, s.words("neighbours.text"))
+    if best.fmu:
+        rows = (
+            b.TableRow(
+                (
+                    Name(name),
+                    s.number(f"quantities.{name}.best", digits=7),
+                    s.number(f"quantities.{name}.fmu", digits=7),
+                )
+            )
+            for name in best.fmu
+        )
+        yield b.Table(
+            tuple(rows),
+            b.heads("quantity", "search", "FMU"),
+            title="The best machine's FMU over the turn",
+            form="long",
+        )

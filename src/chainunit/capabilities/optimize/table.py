@@ -1,0 +1,198 @@
+"""The table [optimize] of a study file: its numbers, and the wishes that it states."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from typing import Any
+
+from pydantic import Field
+
+from ...core.errors import Faults, InputError, near_name, refusal_prefix
+from ...core.messages import unit_behind
+from ...core.quantities import Quantity, Value, Variable, declaration, quantity
+from ...machines.machine import Machine
+from ...mechanism.models import MachineModel
+from ...reading.lists import Entry, leaves, read_entries
+from ...study.cycle_quantities import CycleBasis, CycleQuantity, cycle_quantity
+from .wishes import SLACK, TurnLimit, Wishes
+
+USUAL_OBJECTIVE = "peak(crank_torque)"
+_ENDS = ("min", "max")
+
+
+@declaration
+class Optimize(CycleBasis):
+    """The search for the best machine."""
+
+    clearance: Value = quantity(
+        "1",
+        "least distance from the limits within which the machine turns, as a share of the distance of today",
+        default=0.02,
+        min=1e-6,
+        max=1.0,
+        kind="percent",
+    )
+    slack_free_speed: Value = quantity(
+        "rad/s",
+        "crank speed up to which no web goes slack: its mean pull stays above 0; with 0 there is no such limit",
+        default=0.0,
+        min=0.0,
+        max=1000.0,
+        kind="speed",
+    )
+    starts: Value = quantity(
+        "1", "number of starts, spread over the bounds", default=20, min=1, max=10_000, type="Integer"
+    )
+    seed: Value = quantity("1", "seed of the starts", default=1, min=0, max=1_000_000_000, type="Integer")
+    pareto_points: Value = quantity(
+        "1", "number of points of the front of two objectives", default=9, min=2, max=200, type="Integer"
+    )
+
+
+FIELDS: Mapping[str, Any] = {
+    "objectives": (
+        list[str],
+        Field(
+            [],
+            max_length=2,
+            description=f"one or two quantities of the turn that are to be least; without it {USUAL_OBJECTIVE}",
+        ),
+    ),
+    "free": (
+        dict[str, Any],
+        Field({}, description="parameters of the machine that may change, each with { min, max }"),
+    ),
+    "limits": (
+        dict[str, Any],
+        Field({}, description="limits of quantities of the turn, each with { min }, { max } or both"),
+    ),
+}
+"""Keys of the table that are no quantities, as pydantic fields."""
+
+
+def read_wishes(
+    table: Optimize,
+    form: Any,
+    model: type[MachineModel],
+    machine: Machine | None,
+    feed: Any,
+    crank_speed: float,
+    of_catalogue: bool,
+) -> Wishes | None:
+    """The wishes of a checked table [optimize]: its declared values `table`, and its `form` with what the file
+    gives; None for a machine that was refused. `of_catalogue` tells whether the motor, and so the ratio, is of the
+    catalogue.
+
+    Raises
+    ------
+    InputError
+        with a line for each fault: the key, its value and the allowed range.
+    """
+    faults = Faults()
+    objectives: list[CycleQuantity] = []
+    for name in form.objectives or [USUAL_OBJECTIVE]:
+        with faults.collected(), refusal_prefix("optimize.objectives: ", "optimize.objectives"):
+            objectives.append(cycle_quantity(name, model))
+    free = _free(form.free, model, of_catalogue, faults)
+    limits = read_entries(
+        form.limits.items(), "optimize.limits", faults, lambda entry, name: _limit(entry, name, model)
+    )
+    if table.slack_free_speed and machine is not None and not machine.loaded_sides(feed):
+        words = "needs webs with mass or load, which this machine has not; leave it out"
+        faults.add([InputError(f"optimize.{SLACK}: {words}", f"optimize.{SLACK}")])
+    faults.refuse()
+    if machine is None:
+        return None
+    return Wishes(
+        machine=machine,
+        feed=feed,
+        crank_speed=float(crank_speed),
+        objectives=tuple(objectives),
+        free=free,
+        limits=tuple(limits),
+        clearance=float(table.clearance),
+        slack_free_speed=float(table.slack_free_speed),
+        basis=table,
+        starts=int(table.starts),
+        seed=int(table.seed),
+        pareto_points=int(table.pareto_points),
+    )
+
+
+def wishes_of(config: Any) -> Wishes:
+    """The wishes of a study.
+
+    Raises
+    ------
+    InputError
+        for a study without the table [optimize].
+    """
+    wishes: Wishes | None = config.plans.get("optimize")
+    if wishes is None:
+        raise InputError(
+            "optimize: is missing; add [optimize] with objectives, and [optimize.free] with the parameters that may "
+            "change, such as r = { min = 0.1, max = 0.2 }",
+            key="optimize",
+        )
+    return wishes
+
+
+def _free(
+    tables: Mapping[str, Any], model: type[MachineModel], of_catalogue: bool, faults: Faults
+) -> dict[str, tuple[float, float]]:
+    variables = {v.name: v for v in model.parameter_layout.variables}
+
+    def read(entry: Entry, name: str) -> tuple[str, tuple[float, float]]:
+        if name not in variables:
+            entry.fault("", f"no such parameter of the machine{_hint(name, variables)}")
+            entry.refuse()
+        low, high, unit = _ends(entry, variables[name], "min and max")
+        if math.isinf(low) or math.isinf(high):
+            entry.wrong("", entry.given, "must have min and max")
+        elif high <= low:
+            entry.fault("", f"max = {high:g}{unit} must be > min = {low:g}{unit}")
+        elif name == "ratio" and of_catalogue:
+            entry.fault("", "follows from the motor of the catalogue; leave it out")
+        return name, (low, high)
+
+    def is_nested(name: str, inner: Mapping[str, Any]) -> bool:
+        return bool(inner) and not set(inner) & set(_ENDS) and name not in variables
+
+    if not tables:
+        line = "optimize.free: must name at least one parameter, such as r = { min = 0.1, max = 0.2 }"
+        faults.add([InputError(line, "optimize.free")])
+    return dict(read_entries(leaves(tables, is_nested), "optimize.free", faults, read))
+
+
+def _hint(name: str, known: Collection[str]) -> str:
+    """Words on the parameter that was meant, or on all of them."""
+    own = name.removeprefix("machine.")
+    if own in known:
+        return f"; write optimize.free.{own}"
+    return near_name(own, known) or f"; there are {', '.join(known)}"
+
+
+def _ends(entry: Entry, variable: Variable, needed: str) -> tuple[float, float, str]:
+    """The values of min and max in the declared unit, infinite where they are not given, and words on the unit."""
+    if not isinstance(entry.raw, Mapping) or not entry.raw:
+        entry.wrong("", entry.raw, f"must be a table with {needed}")
+        entry.refuse()
+    entry.keys("", entry.given, _ENDS)
+    low, high = (
+        entry.quantity(end, variable, entry.given[end]) if end in entry.given else missing
+        for end, missing in zip(_ENDS, (-math.inf, math.inf), strict=True)
+    )
+    return low, high, unit_behind(variable.unit)
+
+
+def _limit(entry: Entry, name: str, model: type[MachineModel]) -> TurnLimit:
+    with refusal_prefix("optimize.limits: ", entry.place):
+        q = cycle_quantity(name, model)
+    variable = Variable(name, q.description, Quantity(q.unit, q.description))
+    low, high, unit = _ends(entry, variable, "min, max, or both")
+    if low > high:
+        entry.fault("", f"max = {high:g}{unit} must be >= min = {low:g}{unit}")
+    elif "min" in entry.given and name == "installed_power":
+        entry.fault("min", "installed_power has an upper limit only; leave it out")
+    return TurnLimit(q, low if "min" in entry.given else None, high if "max" in entry.given else None)

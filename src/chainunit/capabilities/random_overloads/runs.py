@@ -1,0 +1,439 @@
+"""Overloads at random sides, crank angles, times and sizes, in batches of runs (see `chainunit.work.runner`).
+
+Each run branches from the same steady state and is determined by the study and its own number alone. The runs
+are a Zarr store, ``monte_carlo_<study>.zarr``, where <study> is a digest of everything on which they depend. A
+study that was killed goes on from it, and never uses the runs of another study.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ... import __version__
+from ...core.native.compilers import compiler
+from ...core.quantities import Layout, Value, declaration, quantity, variables
+from ...core.temporary_folders import remove_folder, temporary_folder
+from ...machines.chain_unit import SIDES, SideName
+from ...reading.text import entry
+from ...study.analysis import Findings
+from ...study.block_runs import BlockRuns, EventRun, EventSimulation, RunPoint
+from ...study.config import Config
+from ...study.drive import Drive
+from ...study.event import AnySide, Event
+from ...study.event_table import RandomEvent
+from ...study.limits import limit_reached
+from ...study.measures import MEASURES, read_measure, same_measure
+from ...study.quantiles import CONFIDENCE, Estimate, quantile, runs_needed, share
+from ...study.record import StudyRecord
+from ...study.rig import Rig
+from ...study.window import Phase, Window
+from ...work.job import Job, ResultVariable, texts
+from ...work.progress import Report
+from ...work.runner import run as run_job
+from ...work.store import made_anew
+from .table import plan_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+@declaration
+class Sample:
+    """One run: its event and its results."""
+
+    crank_angle: Value = quantity("rad", "crank angle at which the event begins")
+    event: Value = quantity("s", "time at which the event begins")
+    trip_torque: Value = quantity("N.m", "crank torque at which the safety coupling opens in this run")
+    crank_torque_peak: Value = same_measure("crank_torque_peak")
+    motor_torque_peak: Value = same_measure("motor_torque_peak")
+    current_peak: Value = same_measure("current_peak")
+    rocker_torque_peak: Value = same_measure("rocker_torque_peak")
+    speed_least: Value = same_measure("speed_least")
+    stalls: Value = quantity("1", "1 where the crank stands at the end of the run")
+    trips: Value = quantity("1", "1 where the safety coupling opens")
+
+
+BATCH, COSIMULATED_BATCH = 512, 16
+"""Numbers of runs in a batch, on the compiled system and by co-simulation: a second or two of work, which a kill
+loses."""
+_IN_PROCESS = 8
+"""Most batches on the compiled system that are made without other processes, whose start takes longer."""
+_LETTERS = 300
+_NO_SIDE = "none"
+QUANTILES = (0.05, 0.5, 0.95, 0.99)
+
+
+@dataclass(frozen=True)
+class RandomTask:
+    """The data that a worker needs: the study, its drive, the FMUs, the time of the steady state [s].
+
+    The runs are made on the compiled system; without a C compiler, or if they are to be `cosimulated`, by the
+    co-simulation of the FMUs.
+    """
+
+    config: Config
+    drive: Drive
+    files: Mapping[str, Path]
+    steady: float
+    fed_from: float | None = None
+    """time at which a machine that starts empty was fed [s]"""
+    cosimulated: bool = False
+
+    @property
+    def is_compiled(self) -> bool:
+        """Whether the runs are made on the compiled system."""
+        return not self.cosimulated and compiler() is not None
+
+    @property
+    def rig(self) -> Rig:
+        """The drive, with its FMUs."""
+        return Rig(self.config, self.drive, self.files, fed_from=self.fed_from)
+
+    @property
+    def method(self) -> str:
+        """How the runs are made: "compiled", on the compiled system, or by the FMUs as the key `simulation` says."""
+        return "compiled" if self.is_compiled else self.config.simulation
+
+    def digest(self, block: BlockRuns | None = None) -> str:
+        """A digest of everything on which the results depend: every parameter, and the code of the compiled system or
+        the content of the FMUs. The compiled system is built unless its `block` is given."""
+        config, drive = self.config, self.drive
+        relevant = {
+            "chainunit": __version__,
+            "simulation": config.simulation,
+            "connections": drive.graph.connections,
+            "start": drive.graph.values,
+            "feed": asdict(config.feed),
+            "run": asdict(config.run),
+            "event": plan_of(config).event.as_dict(),
+            "monte_carlo": {k: v for k, v in asdict(plan_of(config).table).items() if k != "runs"},
+            "coupling": asdict(config.coupling) if config.coupling else None,
+            "steady": self.steady,
+            "fed_from": self.fed_from,
+        }
+        content = hashlib.sha256(json.dumps(relevant, sort_keys=True).encode())
+        if self.is_compiled:
+            content.update((block or self.block()).loop.digest.encode())
+        for name in () if self.is_compiled else sorted(self.files):
+            content.update(Path(self.files[name]).read_bytes())
+        return content.hexdigest()[:12]
+
+    def block(self, states: Any = None) -> BlockRuns:
+        """The compiled system in its steady state, with these `states` if they are known."""
+        return BlockRuns(self.rig, plan_of(self.config).event.hardest(), start=self.steady, states=states)
+
+
+def result_variables(event: RandomEvent) -> list[ResultVariable]:
+    """The results of a run: its side, the drawn quantities of its event, the sample, and the reason why the run
+    failed. The numbers of the sample are NaN where the run failed, where the machine has no such quantity, and,
+    of the trip torque, without a coupling."""
+    units = {v.name: v for v in variables(event.of.Parameters)}
+    return [
+        ResultVariable("side", "1", "side of the event", "int8", flags=(_NO_SIDE, *SIDES)),
+        *(
+            ResultVariable(f"drawn_{name}", units[name].unit, f"drawn: {units[name].description}")
+            for name in event.ranges
+        ),
+        *(ResultVariable(v.name, v.unit, v.description) for v in Layout(Sample).variables),
+        ResultVariable("failed", "1", "reason why the run failed; empty where it did not", letters=_LETTERS),
+    ]
+
+
+@dataclass(frozen=True)
+class Parcel:
+    """A task as it goes to a worker, which may be on another machine: with the steady states of the compiled system,
+    or with the content of its FMUs by their names."""
+
+    task: RandomTask
+    digest: str
+    content: Mapping[str, bytes]
+    states: Any = None
+
+    @classmethod
+    def of(cls, task: RandomTask) -> Parcel:
+        """The parcel of a task whose FMUs are files."""
+        if task.is_compiled:
+            block = task.block()
+            return cls(replace(task, files={}), task.digest(block), {}, block.states)
+        return cls(task, task.digest(), {name: Path(file).read_bytes() for name, file in task.files.items()})
+
+    def start(self) -> BlockRuns | EventSimulation:
+        """The system of the task in its steady state.
+
+        Raises
+        ------
+        InputError
+            where a worker has no C compiler for the compiled system.
+        """
+        if self.states is not None:
+            return self.task.block(self.states)
+        folder = temporary_folder("chainunit_runs")
+        try:
+            files = {name: Path(folder, f"{name}.fmu") for name in self.content}
+            for name, file in files.items():
+                file.write_bytes(self.content[name])
+            # it unpacks the FMUs
+            return EventSimulation(replace(self.task, files=files).rig, self.task.steady)
+        finally:
+            remove_folder(folder)
+
+
+_systems: dict[str, BlockRuns | EventSimulation] = {}
+"""The system of this process, by the digest of its task."""
+
+
+def _system_of(parcel: Parcel) -> BlockRuns | EventSimulation:
+    if parcel.digest not in _systems:
+        close_system()
+        _systems[parcel.digest] = parcel.start()
+    return _systems[parcel.digest]
+
+
+def close_system() -> None:
+    """Close the system that `make_runs` keeps in this process."""
+    while _systems:
+        _systems.popitem()[1].close()
+
+
+@dataclass(frozen=True)
+class Draw:
+    """The random quantities of one run."""
+
+    event: Event
+    values: dict[str, float]
+    """values of the drawn quantities of the event, by name"""
+    offset: float
+    """time from the saved state to the event [s]"""
+    trip_torque: float
+    """trip torque at the crank [N m]; infinite without a coupling"""
+
+
+def draw(config: Config, number: int) -> Draw:
+    """The event of the run with that number. It is the same in every process, and in whatever order the runs
+    are made."""
+    random = np.random.default_rng([int(plan_of(config).table.seed), number])
+    offset = random.uniform(0.0, config.turn)
+    values = plan_of(config).event.draw(random)
+    spread = random.standard_normal()
+    trip = (
+        config.coupling.trip_torque * max(0.1, 1.0 + config.coupling.scatter * spread)
+        if config.coupling
+        else math.inf
+    )
+    side: AnySide = plan_of(config).event.side
+    if plan_of(config).event.of.has_side and not side:
+        side = SIDES[random.integers(len(SIDES))]
+    return Draw(plan_of(config).event.event(side, values), values, offset, trip)
+
+
+def point(rig: Rig, chance: Draw) -> RunPoint:
+    """The run of a rig with these random quantities."""
+    duration, limit = (
+        plan_of(rig.config).table.duration,
+        chance.trip_torque / rig.drive.ratio,
+    )
+    return RunPoint(rig, chance.event, duration, chance.offset, limit)
+
+
+def sample(task: RandomTask, chance: Draw, run: EventRun) -> Sample:
+    """The results of a run that did not fail."""
+    assert run.series is not None
+    config, drive, begin = task.config, task.drive, task.steady + chance.offset
+    angle = float(np.interp(begin, run.series["time"].values, drive.crank_motion(run.series)[0]))
+    # from the saved state on, as the event may begin inside a step
+    window = Window(Phase.EVENT, run.series, drive, (), config.run.crank_speed)
+    stalls = not run.ended and read_measure("stall_time", window) is not None
+    return Sample(
+        crank_angle=angle % (2.0 * math.pi),
+        event=begin,
+        trip_torque=chance.trip_torque if config.coupling else None,
+        **{each.name: read_measure(each.name, window) for each in fields(Sample) if each.name in MEASURES},
+        stalls=float(stalls),
+        trips=float(run.ended),
+    )
+
+
+def make_runs(parcel: Parcel, begin: int, end: int) -> dict[str, Any]:
+    """The results of the runs from number `begin` to `end` - 1, by the names of `result_variables`."""
+    task = parcel.task
+    chances = [draw(task.config, number) for number in range(begin, end)]
+    system = _system_of(parcel)
+    runs = system.runs([point(system.rig, chance) for chance in chances])
+    results = [_result_of(task, chance, run) for chance, run in zip(chances, runs, strict=True)]
+    return {name: [result[name] for result in results] for name in results[0]}
+
+
+def _result_of(task: RandomTask, chance: Draw, run: EventRun) -> dict[str, Any]:
+    """The results of a run by name; one that fails is a result, too."""
+    numbers = dict.fromkeys(Layout(Sample).names)
+    if run.fault is None:
+        numbers = Layout(Sample).by_name(sample(task, chance, run))
+    return {
+        "side": np.int8((_NO_SIDE, *SIDES).index(chance.event.side or _NO_SIDE)),
+        **{f"drawn_{name}": value for name, value in chance.values.items()},
+        **{name: math.nan if value is None else float(value) for name, value in numbers.items()},
+        "failed": "" if run.fault is None else str(run.fault),
+    }
+
+
+_OUTCOMES = {
+    "trips": "in {share} of them the safety coupling opens",
+    "stalls": "in {share} of them the crank stands at the end",
+}
+"""By quantity of a random run, the words on the share of the runs that end so."""
+
+
+@dataclass(frozen=True)
+class MonteCarloResult(Findings):
+    """The results of the runs, by the names of `result_variables`, over the dimension ``run``; and their store."""
+
+    dataset: xr.Dataset
+    file: Path
+    method: str
+    """see `RandomTask.method`"""
+    earlier_runs: int = 0
+    """number of runs that the store had before"""
+    damaged_batches: int = 0
+    """number of batches that were damaged in the store; their runs were computed anew"""
+
+    @property
+    def store(self) -> Path:
+        """The store of the runs."""
+        return self.file
+
+    @property
+    def runs(self) -> int:
+        """Number of runs."""
+        return int(self.dataset.sizes["run"])
+
+    def values(self, name: str) -> Sequence[float]:
+        """The values of a result in the runs that have it."""
+        values = self.dataset[name].values
+        return [float(x) for x in values[~np.isnan(values)]]
+
+    def quantiles(self) -> dict[str, dict[str, Estimate]]:
+        """Quantiles of every answer, and shares of the runs that stall or trip, each with its interval. A
+        quantile is left out where there are too few runs for its interval."""
+        estimates_of: dict[str, dict[str, Estimate]] = {}
+        for v in Layout(Sample).variables:
+            values = self.values(v.name)
+            if not values or v.name in ("event", "crank_angle"):
+                continue
+            if v.name in ("stalls", "trips"):
+                estimates_of[v.name] = {"share": share(sum(x > 0.5 for x in values), len(values))}
+                continue
+            estimates = {f"q{100 * q:.0f}": quantile(values, q) for q in QUANTILES}
+            estimates_of[v.name] = {name: each for name, each in estimates.items() if each is not None}
+        return estimates_of
+
+    def remark(self, study: StudyRecord) -> None:
+        """Warn of runs that end badly, and note what limits the numbers."""
+        note, shares = study.note, self.quantiles()
+        for name, words in _OUTCOMES.items():
+            share = shares.get(name, {}).get("share")
+            if share is not None and share.value > 0.0:
+                study.warn(
+                    f"random overload {name}",
+                    f"overloads at random: {words}.",
+                    share=(share.value, "1", "percent"),
+                )
+        if self.shortage:
+            note("too few runs", "overloads at random: {text}", text=self.shortage)
+        currents = [each.value for each in shares.get("current_peak", {}).values()]
+        limit = limit_reached(study.drive, currents)
+        if limit is not None:
+            note(
+                "random overloads at current limit",
+                "overloads at random: the largest currents are at their limit of {limit}; a harder overload does not "
+                "raise them.",
+                limit=(limit, "A"),
+            )
+        if self.damaged_batches:
+            note(
+                "runs made anew",
+                "overloads at random: {text}.",
+                text=made_anew(self.damaged_batches, "runs", self.file.name),
+            )
+
+    @property
+    def shortage(self) -> str:
+        """Words on the quantiles for which there are too few runs; empty where there are enough."""
+        count = self.runs - self.failures
+        omissions = [q for q in QUANTILES if count < runs_needed(q)]
+        if not omissions:
+            return ""
+        each = ", ".join(f"the {100 * q:.0f} % quantile takes {runs_needed(q)}" for q in omissions)
+        return f"{count} runs are too few for some quantiles: {each} (monte_carlo.runs)."
+
+    @property
+    def sides(self) -> dict[SideName, int]:
+        """Number of runs by the side of the event; empty for an event without a side."""
+        sides = self.dataset["side"].values
+        return {side: int(np.sum(sides == k)) for k, side in enumerate(SIDES, 1) if np.any(sides)}
+
+    @cached_property
+    def reasons(self) -> dict[int, str]:
+        """Why a run failed, by its number."""
+        return {k: words for k, words in enumerate(texts(self.dataset["failed"])) if words}
+
+    @property
+    def failures(self) -> int:
+        """Number of runs that failed."""
+        return len(self.reasons)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Ready for JSON, each number with its unit."""
+        units, kinds = {v.name: v.unit for v in Layout(Sample).variables}, {"share": ("1", "percent")}
+        return {
+            "runs": entry(self.runs, "1"),
+            "sides": {side: entry(runs, "1") for side, runs in self.sides.items()},
+            "failed": entry(self.failures, "1"),
+            "method": self.method,
+            "damaged_batches": entry(self.damaged_batches, "1"),
+            "file": self.file.name,
+            "quantiles": {
+                name: {k: each.as_dict(*kinds.get(k, (units[name],))) for k, each in sizes.items()}
+                for name, sizes in self.quantiles().items()
+            },
+            "confidence": entry(CONFIDENCE, "1", "percent"),
+        }
+
+
+def job_of(task: RandomTask) -> Job:
+    """The random overloads of a task, as work in batches."""
+    parcel = Parcel.of(task)
+    return Job(
+        name="monte_carlo",
+        title="overloads at random",
+        points=int(plan_of(task.config).table.runs),
+        batch=BATCH if task.is_compiled else COSIMULATED_BATCH,
+        variables=result_variables(plan_of(task.config).event),
+        work=make_runs,
+        task=parcel,
+        digest=parcel.digest,
+        dimension="run",
+        close=close_system,
+    )
+
+
+def run(
+    task: RandomTask, folder: Path, report: Report, workers: int | None = None, scheduler: str | None = None
+) -> MonteCarloResult:
+    """Make the missing runs of the task and write them to the store in `folder`; the other arguments and the errors
+    are those of `chainunit.work.runner.run`."""
+    job = job_of(task)
+    if workers is None and scheduler is None and task.is_compiled and job.points <= _IN_PROCESS * BATCH:
+        workers = 1
+    outcome = run_job(job, folder, report, workers, scheduler)
+    return MonteCarloResult(
+        outcome.dataset, outcome.file, task.method, outcome.earlier_points, outcome.damaged_batches
+    )

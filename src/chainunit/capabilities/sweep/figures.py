@@ -1,0 +1,225 @@
+"""The figures of a sweep: maps over two parameters, curves over one, influences, and the spread."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Iterable, Iterator
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from ...core.quantities import Variable
+from ...reading.text import number
+from ...report import figure as fig
+from ...report.style import WIDE
+from .points import plain_name
+from .summary import SweepSummary
+
+_CLASSES = 7
+_MOST_VALUES = 0.9  # share of the values that one class of a map may hide
+_MOST_ROWS, _MOST_PANELS = 6, 8
+_MOST_OF_AXIS = 400
+"""Largest numbers of panels of a figure, of rows and of both columns, and of values on an axis of a map."""
+_NARROW = 80
+"""Letters of a reason in a legend."""
+
+
+def _pieces(items: Iterable[Any], size: int) -> Iterator[list[Any]]:
+    """The items in lists of this size; the last one may be shorter."""
+    whole = list(items)
+    return (whole[k : k + size] for k in range(0, len(whole), size))
+
+
+def _axis(v: Variable, **more: Any) -> fig.Axis:
+    return fig.Axis(v.name, v.unit, v.kind, **more)
+
+
+def over_parameters(summary: SweepSummary) -> Iterator[fig.Figure]:
+    """Maps of a grid over two parameters, curves over one parameter; none over more."""
+    plan = summary.findings.plan
+    if len(plan.parameters) == 1:
+        yield from _curves(summary)
+    elif plan.is_grid and len(plan.parameters) == 2:
+        for name in summary.findings.results:
+            if name in summary.extremes:
+                yield _map(summary, name)
+
+
+def _levels(z: Any) -> tuple[float, ...]:
+    """Even levels around the finite values, in rounded steps, at most `_CLASSES` + 1; levels that grow where values
+    reach over decades, or where most of them would stand in one even class."""
+    low, most, high = (float(each) for each in np.nanquantile(z, (0.0, _MOST_VALUES, 1.0)))
+    if not high - low > 1e-9 * max(abs(low), abs(high)):
+        wide = max(abs(low), 1e-9)
+        return (low - wide, low, low + wide)
+    raw = (high - low) / _CLASSES
+    if low > 0.0 and (high > WIDE * low or (most < low + raw and high > 4.0 * low)):
+        return _wide_levels(low, high)
+    size = 10.0 ** np.floor(np.log10(raw))
+    for factor in (1.0, 2.0, 2.5, 5.0, 10.0, 20.0, 25.0, 50.0):
+        step = factor * size
+        first, last = np.floor(low / step + 1e-9), np.ceil(high / step - 1e-9)
+        if last - first <= _CLASSES:
+            break
+    return tuple(float(step * k) for k in np.arange(first, max(last, first + 2) + 1))
+
+
+def _wide_levels(low: float, high: float) -> tuple[float, ...]:
+    """Levels around values of several decades: 1, 2, 5, 10, .., or the powers of 10, or some of these."""
+    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    for steps in ((1.0, 2.0, 5.0), (1.0, 3.0), (1.0,)):
+        levels = [step * 10.0**k for k in decades for step in steps]
+        first = max(k for k, x in enumerate(levels) if x <= low)
+        last = min(k for k, x in enumerate(levels) if x >= high)
+        if last - first <= _CLASSES:
+            return tuple(levels[first : last + 1])
+    some = {*levels[first : last : -(-(last - first) // _CLASSES)], levels[last]}
+    return tuple(sorted(some))
+
+
+def _map(summary: SweepSummary, name: str) -> fig.Figure:
+    plan, dataset = summary.findings.plan, summary.findings.dataset
+    across, up = plan.parameters
+    order = {
+        each.name: np.argsort(each.values)[:: -(-len(each.values) // _MOST_OF_AXIS)]
+        for each in plan.parameters
+    }
+    part = dataset.isel(order).transpose(up.name, across.name)
+    x, y, z = part[across.name].values, part[up.name].values, part[name].values
+    v, levels = summary.variables[name], _levels(part[name].values)
+    names = tuple(
+        f"{number(low, v.unit, v.kind, full=False, beside=False)} to "
+        f"{number(high, v.unit, v.kind, full=False, beside=False)}"
+        for low, high in pairwise(levels)
+    )
+    items: list[fig.Item] = [fig.Field(x, y, z, levels, names)]
+    items += _infeasible(summary, x, y, part["reason"].values)
+    items.append(fig.Curve("the study", [across.centre], [up.centre], 1, "o", has_line=False))
+    if summary.best and name == plan.best:
+        k = np.unravel_index(summary.best[0], plan.shape)
+        at = [float(each.values[int(i)]) for each, i in zip(plan.parameters, k, strict=True)]
+        items.append(fig.Curve(plan.best_is, [at[0]], [at[1]], 3, "s", has_line=False))
+    ends = [{"low": float(axis[0]), "high": float(axis[-1])} for axis in (x, y)]
+    panel = fig.Panel(_axis(across.variable, **ends[0]), _axis(up.variable, **ends[1]), tuple(items))
+    return fig.Figure(
+        f"map-{plain_name(name)}",
+        f"Map of {name}: {v.description}",
+        f"Map of {name} over {across.name} and {up.name}; points without a result are hatched.",
+        ((panel,),),
+        file=f"sweep_{plain_name(name)}.png",
+        heights=(1.7,),
+    )
+
+
+def _infeasible(summary: SweepSummary, x: Any, y: Any, reason: Any) -> Iterator[fig.Hatch]:
+    """The cells of a map with a corner that has no result, by their reasons."""
+    corners = np.stack([reason[:-1, :-1], reason[1:, :-1], reason[:-1, 1:], reason[1:, 1:]])
+    worst = np.max(corners, axis=0)
+    for look, code in enumerate(np.unique(worst[worst > 0])):
+        words = textwrap.shorten(str(summary.findings.task.reasons[int(code)]), _NARROW, placeholder=" ...")
+        yield fig.Hatch(words, x, y, worst == code, look)
+
+
+def _curves(summary: SweepSummary) -> Iterator[fig.Figure]:
+    plan, points = summary.findings.plan, summary.findings.points
+    (parameter,) = plan.parameters
+    part = points.isel(point=slice(None, None, -(-points.sizes["point"] // 20_000)))
+    order = np.argsort(part[parameter.name].values, kind="stable")
+    x, reason = part[parameter.name].values[order], part["reason"].values[order]
+    marks: list[fig.Item] = [fig.Mark(parameter.centre, "the study", look="mark"), *_gaps(summary, x, reason)]
+    names = [name for name in summary.findings.results if name in summary.extremes]
+    for k, some in enumerate(_pieces(names, _MOST_ROWS)):
+        rows = (
+            (
+                _axis(summary.variables[name]),
+                [
+                    fig.Curve(
+                        name, x, part[name].values[order], 0, "o" if len(x) <= 40 else "", in_legend=False
+                    ),
+                    *marks,
+                ],
+            )
+            for name in some
+        )
+        yield fig.Figure(
+            f"curves-{k}" if k else "curves",
+            f"Results over {parameter.name}: {parameter.variable.description}",
+            f"Results over {parameter.name}; ranges without a result are shaded.",
+            fig.stacked(_axis(parameter.variable), rows),
+            file=f"sweep_curves{f'_{k + 1}' if k else ''}.png",
+        )
+
+
+def _gaps(summary: SweepSummary, x: Any, reason: Any) -> Iterator[fig.Shade]:
+    """The ranges of a parameter without a result."""
+    edges = np.flatnonzero(np.diff(reason)) + 1
+    for part in np.split(np.arange(len(x)), edges):
+        if reason[part[0]]:
+            low, high = x[max(0, part[0] - 1)], x[min(len(x) - 1, part[-1] + 1)]
+            words = textwrap.shorten(
+                str(summary.findings.task.reasons[int(reason[part[0]])]), _NARROW, placeholder=" ..."
+            )
+            look = ("dark", "pale", "band")[int(reason[part[0]]) % 3]
+            yield fig.Shade(0.5 * (x[part[0]] + low), 0.5 * (x[part[-1]] + high), words, look=look)
+
+
+def _in_pairs(panels: list[fig.Panel]) -> tuple[tuple[fig.Panel | None, ...], ...]:
+    """Panels in rows of two, or below each other where there is one."""
+    if len(panels) == 1:
+        return ((panels[0],),)
+    filled = [*panels, *([None] if len(panels) % 2 else [])]
+    return tuple((filled[k], filled[k + 1]) for k in range(0, len(filled), 2))
+
+
+def tornado(summary: SweepSummary) -> Iterator[fig.Figure]:
+    """Bars of the rank correlation of each result with each parameter, the largest share of the variance first."""
+    for k, some in enumerate(_pieces(summary.influences.items(), _MOST_PANELS)):
+        panels = []
+        for name, table in some:
+            size = {each: (of.share or 0.0, abs(of.rank)) for each, of in table.items()}
+            order = sorted(table, key=size.__getitem__, reverse=True)
+            shares = [table[each].share for each in order]
+            words = tuple("" if x is None else f"{100.0 * x:.0f} %" for x in shares)
+            ranks = [table[each].rank for each in order]
+            bars = fig.Bars("rank correlation", np.arange(len(order)), ranks, 0.7, 1, words=words)
+            # beside the longest bars there is room for the words
+            x = fig.Axis("rank correlation", low=-1.3, high=1.3, ticks=(-1.0, -0.5, 0.0, 0.5, 1.0))
+            panels.append(
+                fig.Panel(x, fig.Axis("parameter", names=tuple(order)), (bars, fig.Mark(0.0)), name)
+            )
+        rows = _in_pairs(panels)
+        yield fig.Figure(
+            f"tornado-{k}" if k else "tornado",
+            "Which parameter moves what; beside the bars shares of the variance that they explain alone",
+            "Bars of the rank correlation between each result and each parameter.",
+            rows,
+            file=f"sweep_tornado{f'_{k + 1}' if k else ''}.png",
+            heights=(max(0.6, 0.16 * len(summary.findings.plan.parameters)),) * len(rows),
+        )
+
+
+def distribution(summary: SweepSummary) -> Iterator[fig.Figure]:
+    """The share of the points below each value of each result."""
+    shares = np.linspace(0.0, 1.0, 201)
+    names = [name for name in summary.influences if len(summary.sample[name])]
+    for k, some in enumerate(_pieces(names, _MOST_PANELS)):
+        panels = []
+        for name in some:
+            values = summary.sample[name][np.isfinite(summary.sample[name])]
+            x = np.quantile(values, shares)
+            items: list[fig.Item] = [fig.Curve("share of the points below", x, shares, in_legend=False)]
+            items += [fig.Mark(q, "5 %, 95 %", axis="y", look="thin") for q in (0.05, 0.95)]
+            if name in summary.nominal:
+                items.append(fig.Mark(summary.nominal[name], "at the values of the study"))
+            y = fig.Axis("share below", "1", "percent", low=0.0, high=1.0)
+            panels.append(fig.Panel(_axis(summary.variables[name]), y, tuple(items)))
+        rows = _in_pairs(panels)
+        yield fig.Figure(
+            f"spread-{k}" if k else "spread",
+            "Distribution of the results",
+            "The share of the points below each value of each result.",
+            rows,
+            file=f"sweep_spread{f'_{k + 1}' if k else ''}.png",
+        )

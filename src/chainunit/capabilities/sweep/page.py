@@ -1,0 +1,305 @@
+"""The report on a sweep: best points, extremes, influences, spread, and maps or curves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from numbers import Integral
+from pathlib import Path
+
+from ...core.errors import InputError, shown
+from ...reading.text import shown_in
+from ...report import blocks as b
+from ...report.lines import Line, Name, Number, capital, join, line
+from ...report.task import Task
+from ...study.config import Config
+from ...work.progress import Report as Progress
+from . import figures as sweep_figures
+from .points import run_sweep
+from .summary import SweepSummary
+
+_MOST_COLUMNS = 8
+"""Columns of a table on the terminal."""
+
+
+def report(summary: SweepSummary) -> b.Report:
+    """The report on a sweep."""
+    s = b.Source(summary.as_dict())
+    findings = summary.findings
+    with shown_in(findings.config.units):
+        sections = (
+            b.Section("influences", "Which parameter moves what", tuple(_influences(s, summary))),
+            b.Section("best", "Points in order", tuple(_best(s, summary))),
+            b.Section("extremes", "Extremes", tuple(_extremes(s, summary))),
+            b.Section("maps", "Results over the parameters", tuple(sweep_figures.over_parameters(summary))),
+            b.Section("spread", _spread_heading(summary), tuple(_spread(s, summary))),
+            b.Section("basis", "Basis of the numbers", tuple(_basis(s, summary))),
+        )
+        entries = [s.line(f"{capital(name)}: {{report.{name}}} · ") for name in s.result["report"]]
+        return b.Report(
+            findings.config.title,
+            "Sweep",
+            s.result,
+            tuple(_opening(s)),
+            sections,
+            source=line(*entries, s.line("Study file: {source} · chainunit {chainunit}")),
+            units=findings.config.units,
+            opening_title="The sweep",
+        )
+
+
+def _compute(
+    config: Config,
+    folder: Path,
+    progress: Progress,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+) -> SweepSummary:
+    """Run the sweep of a study; a store in the folder that fits is continued. Errors are those of `run_sweep`, and an
+    InputError for a number of workers that is none."""
+    if workers is not None and (
+        isinstance(workers, bool) or not isinstance(workers, Integral) or workers < 1
+    ):
+        raise InputError(f"workers = {shown(workers)}: must be a whole number >= 1")
+    return SweepSummary(run_sweep(config, folder, progress, workers, scheduler))
+
+
+def _store_in(summary: SweepSummary, folder: Path) -> Path:
+    """The store of all points, which is written while the sweep runs."""
+    return folder / summary.findings.outcome.file.name
+
+
+def _opening(s: b.Source) -> Iterator[b.Block]:
+    names = list(s.result["parameters"])
+    yield b.Text(
+        line(
+            s.line("{=points} points, {method}, over "),
+            join(_range(s, name) for name in names),
+            s.line("; {=feasible} of them have results."),
+        )
+    )
+    for i, each in enumerate(s.result["reasons"]):
+        if each["points"]["value"]:
+            path = f"reasons.{i}"
+            yield b.Judgement(
+                "warning", s.line(f"No result at {{{path}.share}} of the points: {{{path}.reason}}.")
+            )
+    for i in range(len(s.result["organs"])):
+        path = f"organs.{i}"
+        words = s.line(
+            f"{{{path}.text}}: {{{path}.share}} of the points. The limit of the study's machine and feed "
+        )
+        yield b.Judgement("warning", line(words, s.line(f"is {{{path}.limit}}.")))
+    if not s.result["feasible"]["value"]:
+        yield b.Judgement("bad", "No point of the sweep has a result; take other ranges.", form="both")
+
+
+def _range(s: b.Source, name: str) -> Line:
+    path, words = f"parameters.{name}", Name(name)
+    if s.result["parameters"][name]["tolerance"]["value"] is None:
+        return line(words, s.line(f" {{={path}.from}} to {{={path}.to}}"))
+    return line(words, s.line(f" {{={path}.study}} ± {{={path}.tolerance}}"))
+
+
+def _columns(names: list[str]) -> tuple[b.Column, ...]:
+    """Columns of parameters or results."""
+    return tuple(
+        b.Column(Name(name), form="both" if k < _MOST_COLUMNS else "long") for k, name in enumerate(names)
+    )
+
+
+def _value(s: b.Source, summary: SweepSummary, path: str, name: str) -> Number:
+    """A value of a parameter or result, with so many digits that points differ."""
+    return s.number(f"{path}.{name}", digits=summary.digits(name))
+
+
+def _best(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
+    names = [*s.result["parameters"], *s.result["results"]]
+    rows = [
+        b.TableRow(
+            (
+                s.number(f"best.{i}.point", as_given=True),
+                *(_value(s, summary, f"best.{i}", name) for name in names),
+            ),
+            form="both" if i < 5 else "long",
+        )
+        for i in range(len(s.result["best"]))
+    ]
+    if rows:
+        heads = (b.Column("point"), *_columns(names))
+        some = len(s.result["parameters"])
+        groups = (tuple(range(1, 1 + some)), tuple(range(1 + some, 1 + len(names))))
+        title = s.line("Points with the {best_by} first")
+        yield b.Table(tuple(rows), heads, title=title, groups=groups)
+
+
+def _extremes(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
+    parameters = list(s.result["parameters"])
+    rows = []
+    for name in s.result["extremes"]:
+        for end in ("least", "largest"):
+            path = f"extremes.{name}.{end}"
+            cells = (_value(s, summary, path, each) for each in (name, *parameters))
+            rows.append(b.TableRow((line(Name(name), f", {end}"), *cells)))
+    if rows:
+        heads = (b.Column("result"), b.Column("value"), *_columns(parameters))
+        yield b.Table(
+            tuple(rows), heads, title="Least and largest values, and the points at which they stand"
+        )
+
+
+def _influences(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
+    parameters, table = list(s.result["parameters"]), s.result["influences"]
+    if not table or len(parameters) < 2:
+        return
+    for name, of in table.items():
+        most = max(of, key=lambda each: of[each]["share"]["value"] or 0.0)
+        if of[most]["share"]["value"] is None:
+            continue
+        path = f"influences.{name}.{most}"
+        words = f"{{name}}: {{most}} moves it most; alone it explains {{{path}.share}} of the variance."
+        yield b.Text(s.line(words, name=Name(name), most=Name(most)), form="long")
+
+    def cell(name: str, each: str) -> Line:
+        if each not in table[name]:
+            return "-"
+        path = f"influences.{name}.{each}"
+        if table[name][each]["share"]["value"] is None:
+            return s.line(f"{{{path}.rank:2}}")
+        return s.line(f"{{{path}.rank:2}} ({{{path}.share:2}})")
+
+    rows = (b.TableRow((Name(each), *(cell(name, each) for name in table))) for each in parameters)
+    shares = [each["share"]["value"] is not None for of in table.values() for each in of.values()]
+    title = "Rank correlation"
+    if any(shares):
+        title += "; in brackets the share of the variance that the parameter explains alone"
+    yield b.Table(tuple(rows), (b.Column("parameter"), *_columns(list(table))), title=title)
+    wide = [name for name, gap in summary.undefined.items() if gap]
+    if wide:
+        worst = max(wide, key=lambda name: s.value(f"gaps.{name}") or 0.0)
+        words = "No shares of the variance: up to {gap} of the points have no value, and the parameters of the others"
+        yield b.Text(s.line(f"{words} are not independent.", gap=s.number(f"gaps.{worst}")), "note")
+    elif not all(shares):
+        yield b.Text("Shares of the variance that are within their error are left out.", "fine")
+    yield b.Text(
+        "A rank correlation of 1 or -1: the result only rises or only falls with the parameter. Near 0 with a large "
+        "share: it rises and falls. Shares that add up to less than 100 %: the parameters act together.",
+        "fine",
+        "long",
+    )
+    if len(parameters) > 2:
+        yield from sweep_figures.tornado(summary)
+
+
+def _spread_heading(summary: SweepSummary) -> str:
+    return "Spread by tolerances and ranges" if summary.evenly else "Spread by tolerances"
+
+
+def _spread(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
+    spread = s.result["spread"]
+    if not spread:
+        return
+    quantiles = list(dict.fromkeys(key for of in spread.values() for key in of if key.startswith("q")))
+
+    def cell(name: str, key: str) -> Line:
+        return s.number(f"spread.{name}.{key}", digits=summary.digits(name)) if key in spread[name] else "-"
+
+    rows = (
+        b.TableRow(
+            (
+                Name(name),
+                _value(s, summary, "nominal", name) if name in s.result["nominal"] else "-",
+                cell(name, "mean"),
+                s.number(f"spread.{name}.deviation"),
+                *(cell(name, key) for key in quantiles),
+            )
+        )
+        for name in spread
+    )
+    of_study = (
+        b.Column("at the study's values", "study"),
+        b.Column("mean"),
+        b.Column("standard deviation", "deviation"),
+    )
+    columns = (b.Column("result"), *of_study, *(b.Column(f"{key.removeprefix('q')} %") for key in quantiles))
+    groups = ((1, 2, 3), tuple(range(4, len(columns))))
+    yield b.Table(tuple(rows), columns, title="Spread of the results and their quantiles", groups=groups)
+    if summary.evenly:
+        ranges = join(map(Name, summary.evenly))
+        words = " has no tolerance" if len(summary.evenly) == 1 else " have no tolerance"
+        yield b.Text(
+            line(ranges, words, ": the spread counts each of their values as equally frequent."), "note"
+        )
+    yield b.Text(
+        s.line(
+            "result.json has the interval of {=confidence} confidence of each quantile, as for points that are drawn "
+            "independently; points that fill the space evenly are more exact."
+        ),
+        "fine",
+        "long",
+    )
+    yield from sweep_figures.distribution(summary)
+
+
+def _basis(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
+    columns = b.heads("parameter", "meaning", "in the study", "from", "to", "tolerance")
+    rows = (
+        b.TableRow(
+            (
+                Name(name),
+                s.words(f"parameters.{name}.description"),
+                *(
+                    s.number(f"parameters.{name}.{key}", as_given=True)
+                    for key in ("study", "from", "to", "tolerance")
+                ),
+            )
+        )
+        for name in s.result["parameters"]
+    )
+    yield b.Table(
+        tuple(rows), columns, title="Swept quantities; all others have their values of the study", form="long"
+    )
+    rows = (b.TableRow((Name(name), s.words(f"results.{name}.description"))) for name in s.result["results"])
+    yield b.Table(tuple(rows), b.heads("result", "meaning"), title="Results", numeric=False, form="long")
+    if summary.findings.plan.quantities:
+        yield b.Text(
+            s.line(
+                "Quantities of a turn are those at constant speed of the crank with the feed of normal running, at "
+                "{=angles} crank angles; extremes are those at these angles."
+            ),
+            "note",
+            "long",
+        )
+    named = {"installed_power", "energy_per_year"} & set(summary.findings.plan.quantities)
+    if named:
+        yield b.Text(
+            s.line(
+                "Assumed: {=basis.operating_hours} operating hours in a year, permitted overload {=basis.overload}."
+            ),
+            "note",
+        )
+    if summary.findings.plan.measures:
+        yield b.Text(
+            s.line(
+                "Measures are of a run in which {event}: from rest to steady running, then the event, each point by "
+                "itself, with the control as tuned for the values of the study."
+            ),
+            "note",
+        )
+    if s.value("current_limit") is not None:
+        words = "The current is at its limit, {=current_limit}, at the points with the largest current_peak."
+        yield b.Text(s.line(words), "note")
+    if s.result["made_anew"]:
+        yield b.Text(s.line("{made_anew}."), "note")
+    yield b.Text(s.line("All points: {store} (Zarr)."), "fine", "long")
+
+
+TASK: Task[Config, SweepSummary] = Task(
+    "sweep",
+    _compute,
+    report,
+    files=("sweep_*.png",),
+    writers=lambda summary, folder, of_report: [*of_report, lambda: [_store_in(summary, folder)]],
+    kept=lambda summary, folder: [_store_in(summary, folder)],
+    shortfall=lambda summary: None if summary.feasible else "",
+)

@@ -1,0 +1,308 @@
+"""Runs a sweep: its points as batches of the runner (see `chainunit.work.runner`), and its results as a dataset."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from enum import Enum
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ... import __version__
+from ...batch.evaluate import ReasonKind, StateReason, reasons_of
+from ...core.composition import reference
+from ...core.errors import InputError
+from ...core.quantities import Layout
+from ...machines.machine import Machine
+from ...study.block_runs import BlockRuns, Cause
+from ...study.choice import choose
+from ...study.config import Config
+from ...study.cycle_quantities import CycleQuantity, cycle_quantity, evaluate
+from ...study.measures import Answers
+from ...study.rig import Rig
+from ...work.job import Job, ResultVariable
+from ...work.progress import Report
+from ...work.runner import Outcome, check_scheduler
+from ...work.runner import run as run_job
+from .plan import SweepPlan
+from .runs import block_of, check_drive, measures
+from .table import SPEED
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+TITLE = "points of the sweep"
+_STATES, _STATES_OF_RATIOS, _RUNS = 12e6, 2e6, 64
+"""Largest numbers of states of a batch, of states where the ratio of the gear is swept (each then has an angle of its
+own), and of transients of a batch."""
+
+
+class Beside(Enum):
+    """Why a point has no result, where no swept quantity is the reason; with its text."""
+
+    BOUNDS = "another value of the point is outside its bounds"
+
+
+@dataclass(frozen=True)
+class SweepTask:
+    """The data that a worker needs: the plan, the machine with its feed and crank speed [rad/s], and for measures the
+    drive."""
+
+    plan: SweepPlan
+    machine: Machine
+    feed: Any
+    crank_speed: float
+    rig: Rig | None = None
+    threads: int = 1
+    """number of threads of the native loop; the results do not depend on it"""
+
+    @cached_property
+    def quantities(self) -> list[CycleQuantity]:
+        """The quantities of a turn."""
+        return [cycle_quantity(name, self.machine.model) for name in self.plan.quantities]
+
+    @cached_property
+    def block(self) -> BlockRuns:
+        """The runs of the measures."""
+        assert self.rig is not None
+        return block_of(self.rig, self.plan)
+
+    @cached_property
+    def reasons(self) -> list[StateReason]:
+        """The reasons for which a point has no result, by their codes."""
+        bounds = (
+            StateReason(ReasonKind.BOUNDS, each.name, each.variable.quantity.allowed_range)
+            for each in self.plan.parameters
+        )
+        runs = (Cause.LEFT_BOUNDS, Cause.UNSETTLED) if self.plan.measures else ()
+        return [*reasons_of(self.machine.model), *bounds, *map(StateReason, (Beside.BOUNDS, *runs))]
+
+    @cached_property
+    def codes(self) -> dict[tuple[Enum, str], int]:
+        """The codes of the reasons by kind and subject."""
+        return {(reason.kind, reason.subject): code for code, reason in enumerate(self.reasons)}
+
+    def turns(self, values: Mapping[str, Any]) -> xr.Dataset:
+        """The quantities of a turn at points with these values by full name, each of shape (points,)."""
+        import xarray as xr
+
+        arrays = {name: xr.DataArray(x, dims="point") for name, x in values.items()}
+        own = {
+            name.partition(".")[2]: x for name, x in arrays.items() if name.startswith(("machine.", "feed."))
+        }
+        if not own:
+            # the shape of the results
+            name, value = next(iter(self.machine.by_name.items()))
+            own = {name: xr.DataArray(np.full(len(next(iter(values.values()))), value), dims="point")}
+        return evaluate(
+            self.machine,
+            self.quantities or [cycle_quantity("peak(crank_torque)", self.machine.model)],
+            arrays.get(SPEED, self.crank_speed),
+            self.feed,
+            own,
+            self.plan.basis,
+            self.plan.angles,
+            workers=self.threads,
+        )
+
+    def codes_of_turns(self, table: xr.Dataset) -> Any:
+        """The codes of the sweep for those of `turns`, shape (points,)."""
+        known = len(reasons_of(self.machine.model))
+        names = {each.name.partition(".")[2]: each.name for each in self.plan.parameters}
+        other = self.codes[Beside.BOUNDS, ""]
+        outside = (names.get(x, x) for x in table.reason.attrs["subjects"][known:])
+        codes = [*range(known), *(self.codes.get((ReasonKind.BOUNDS, name), other) for name in outside)]
+        return np.array(codes, np.int16)[table.reason.values]
+
+    def digest(self) -> str:
+        """A digest of everything on which the results depend, in hexadecimal digits. The number of points of Sobol's
+        sequence is not of it: such a sweep may grow."""
+        plan = self.plan
+        relevant: dict[str, Any] = {
+            "chainunit": __version__,
+            "model": reference(self.machine.model),
+            "machine": self.machine.by_name,
+            "feed": Layout(type(self.feed)).by_name(self.feed),
+            "crank_speed": self.crank_speed,
+            "plan": [plan.method, plan.seed, plan.quantities, plan.measures, plan.event, plan.angles],
+            "points": None if plan.method == "sobol" else plan.points,
+            "basis": asdict(plan.basis),
+            "parameters": [
+                [p.name, p.centre, p.values, repr(p.ends), p.tolerance, p.distribution]
+                for p in plan.parameters
+            ],
+            # other versions of scipy may have other points
+            "first": [list(map(float, x)) for x in plan.values(0, min(8, plan.points)).values()],
+            "batch": batch_of(plan),
+        }
+        if self.rig is not None:
+            config, drive = self.rig.config, self.rig.drive
+            event = config.events[plan.event]
+            relevant |= {
+                "run": asdict(config.run),
+                "event": [event.kind, event.side, Layout(type(event.p)).by_name(event.p)],
+                "connections": drive.graph.connections,
+                "start": drive.graph.values,
+                "empty_start": config.empty_start,
+                "ramp_end": config.ramp_end,
+            }
+            if config.coupling is not None:
+                relevant["coupling"] = asdict(config.coupling)
+        return hashlib.sha256(json.dumps(relevant, sort_keys=True).encode()).hexdigest()
+
+
+def plain_name(name: str) -> str:
+    """The name of a result or parameter in the store: ``peak(crank_torque)`` -> peak_crank_torque."""
+    return re.sub(r"\W+", "_", name).strip("_")
+
+
+def batch_of(plan: SweepPlan) -> int:
+    """The number of points of a batch, a power of 2: some tenths of a second of work, and some 100 MB."""
+    has_ratio = any(each.name == "machine.ratio" for each in plan.parameters)
+    states = (_STATES_OF_RATIOS if has_ratio else _STATES) / plan.angles
+    return _RUNS if plan.measures else 1 << max(4, int(math.log2(states)))
+
+
+def result_variables(task: SweepTask) -> list[ResultVariable]:
+    """The results of a point: its parameters, its quantities and measures, and the reason why it has none."""
+    plan, known = task.plan, {v.name: v for v in Layout(Answers).variables}
+    words = [re.sub(r"[^\w.+@-]+", "_", str(reason)).strip("_") for reason in task.reasons]
+    return [
+        *(
+            ResultVariable(plain_name(p.name), p.variable.unit, p.variable.description)
+            for p in plan.parameters
+        ),
+        *(ResultVariable(plain_name(q.name), q.unit, q.description) for q in task.quantities),
+        *(ResultVariable(name, known[name].unit, known[name].description) for name in plan.measures),
+        ResultVariable("reason", "1", "reason for which there is no result", "int16", flags=tuple(words)),
+    ]
+
+
+def make_points(task: SweepTask, begin: int, end: int) -> dict[str, Any]:
+    """The results of the points from `begin` to `end` - 1, by the names of `result_variables`."""
+    plan = task.plan
+    values = plan.values(begin, end)
+    table = task.turns(values)
+    reason = task.codes_of_turns(table)
+    for each in plan.parameters:
+        inside = each.variable.quantity.admits(values[each.name])
+        reason[~inside] = task.codes[ReasonKind.BOUNDS, each.name]
+    results = {plain_name(name): x for name, x in values.items()}
+    for name in plan.quantities:
+        results[plain_name(name)] = np.where(
+            reason == 0, np.broadcast_to(table[name].values, reason.shape), np.nan
+        )
+    if plan.measures:
+        results |= {name: np.full(end - begin, np.nan) for name in plan.measures}
+        sound = np.flatnonzero(reason == 0)
+        if len(sound):
+            own = {name: x[sound] for name, x in values.items()}
+            measured, causes = measures(task.block, plan, own)
+            for name, x in measured.items():
+                results[name][sound] = x
+            reason[sound] = [task.codes[cause, ""] if cause else 0 for cause in causes]
+    return results | {"reason": reason.astype(np.int16)}
+
+
+def task_of(config: Config) -> SweepTask:
+    """The task of the sweep of a study.
+
+    Raises
+    ------
+    InputError
+        for a study without a sweep or without swept parameters; of measures see `chainunit.capabilities.sweep.runs`.
+    """
+    plan: SweepPlan | None = config.plans["sweep"]
+    if plan is None or not plan.parameters:
+        raise InputError(
+            "sweep.parameter: the study has none; add a table [[sweep.parameter]] with name, from and to "
+            "(chainunit keys sweep.parameter)",
+            "sweep.parameter",
+        )
+    drive = choose(config, Path(), lambda *said: None).drive
+    rig = Rig(config, drive, {}) if plan.measures else None
+    if rig is not None:
+        check_drive(rig, plan)
+    return SweepTask(plan, drive.machine, config.feed, float(config.run.crank_speed), rig)
+
+
+def job_of(task: SweepTask) -> Job:
+    """The points of a sweep, as work in batches."""
+    return Job(
+        name="sweep",
+        title=TITLE,
+        points=task.plan.points,
+        batch=batch_of(task.plan),
+        variables=result_variables(task),
+        work=make_points,
+        task=task,
+        digest=task.digest(),
+    )
+
+
+@dataclass(frozen=True)
+class SweepFindings:
+    """The results of a sweep, in the store of `outcome`."""
+
+    config: Config
+    task: SweepTask
+    outcome: Outcome
+
+    @property
+    def plan(self) -> SweepPlan:
+        """Its plan."""
+        return self.task.plan
+
+    @property
+    def results(self) -> tuple[str, ...]:
+        """The names of all quantities and measures."""
+        return (*self.plan.quantities, *self.plan.measures)
+
+    @cached_property
+    def points(self) -> xr.Dataset:
+        """All points over the dimension ``point``, by the names of the study: parameters, results and ``reason``. The
+        values are read when they are used."""
+        plan = self.plan
+        names = {plain_name(name): name for name in (*(p.name for p in plan.parameters), *self.results)}
+        dataset = self.outcome.dataset.rename(names)
+        dataset["reason"].attrs["reasons"] = [str(reason) for reason in self.task.reasons]
+        return dataset.set_coords([each.name for each in plan.parameters])
+
+    @cached_property
+    def dataset(self) -> xr.Dataset:
+        """The results by the names of the study: over the parameters of a grid, else over ``point``, with the
+        parameters as coordinates."""
+        import xarray as xr
+
+        plan, points = self.plan, self.points
+        if not plan.is_grid:
+            return points
+        about = {each.name: points[each.name].attrs for each in plan.parameters}
+        axes = {each.name: (each.name, list(each.values), about[each.name]) for each in plan.parameters}
+        variables = {
+            name: (plan.dims, x.values.reshape(plan.shape), x.attrs) for name, x in points.data_vars.items()
+        }
+        return xr.Dataset(variables, axes, points.attrs)
+
+
+def run_sweep(
+    config: Config, folder: Path, report: Report, workers: int | None = None, scheduler: str | None = None
+) -> SweepFindings:
+    """Make the points of the sweep of a study that its store in `folder` does not have; the other arguments and the
+    errors are those of `task_of` and `chainunit.work.runner.run`."""
+    task = task_of(config)
+    if scheduler is not None:
+        # before there is a store, which a refusal would leave behind
+        check_scheduler(scheduler)
+    if scheduler is None and not task.plan.measures:
+        # the native loop leaves so little to Python that threads do; processes take longer to start
+        task, workers = replace(task, threads=workers or os.cpu_count() or 1), 1
+    return SweepFindings(config, task, run_job(job_of(task), folder, report, workers, scheduler))

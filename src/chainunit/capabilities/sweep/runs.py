@@ -1,0 +1,120 @@
+"""The runs of a sweep: each point starts its own drive from rest, and meets the event once it is steady."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ...core.errors import Faults, InputError
+from ...core.native.compilers import compiler
+from ...core.quantities import Layout
+from ...study.block_runs import BlockRuns, Cause, EventRun, RunPoint
+from ...study.measures import read_measure
+from ...study.rig import Rig
+from ...study.window import Phase, Trip, Window
+from .plan import SweepPlan
+from .table import SPEED
+
+_RATIO = "machine.ratio"
+
+
+def check_drive(rig: Rig, plan: SweepPlan) -> None:
+    """Refuse what the transients of a drive cannot have.
+
+    Raises
+    ------
+    InputError
+        for an event that the drive cannot have, for a swept quantity that changes no run or is not one number of the
+        drive, and where there is no C compiler.
+    """
+    event, faults = rig.config.events[plan.event], Faults()
+    if not rig.takes(event):
+        faults.add([InputError(f"sweep.event = {plan.event}: {event.without}", "sweep.event")])
+    known = rig.drive.load_model()[0].parameter_layout.names
+    for name in (each.name for each in plan.parameters):
+        words = ""
+        if name == SPEED and not rig.drive.follows:
+            words = "changes no run, as the motor has the speed of its supply"
+        elif name.startswith("machine.") and name.partition(".")[2] not in known:
+            words = "is not of the drive"
+        elif name == _RATIO and (rig.drive.line is not None or rig.drive.gear != 1.0):
+            words = "is not one number of the drive"
+        if words:
+            line = f"sweep.parameter: {name} {words}; leave it out, or sweep it without measures"
+            faults.add([InputError(line, "sweep.parameter")])
+    if compiler() is None:
+        faults.add(
+            [
+                InputError(
+                    "sweep.measures: need a C compiler, and there is none; leave them out", "sweep.measures"
+                )
+            ]
+        )
+    faults.refuse()
+
+
+def block_of(rig: Rig, plan: SweepPlan) -> BlockRuns:
+    """The compiled system of a rig whose values a sweep varies; see `check_drive`."""
+    varying = [full for each in plan.parameters for full in _of_system(each.name)]
+    return BlockRuns(rig, [rig.config.events[plan.event]], varying)
+
+
+def measures(
+    block: BlockRuns, plan: SweepPlan, values: Mapping[str, Any]
+) -> tuple[dict[str, Any], list[Cause | None]]:
+    """The measures of the plan by name, and the causes for which there are none, of points with these values by full
+    name, each of shape (points,)."""
+    count = len(next(iter(values.values())))
+    points = [
+        _point(block.rig, plan, {name: float(x[k]) for name, x in values.items()}) for k in range(count)
+    ]
+    results = {name: np.full(count, np.nan) for name in plan.measures}
+    causes: list[Cause | None] = []
+    for k, (point, run) in enumerate(zip(points, block.runs(points), strict=True)):
+        causes.append(run.fault.cause if run.fault else None)
+        if run.fault is None:
+            window = _window(point, run)
+            for name in plan.measures:
+                value = read_measure(name, window)
+                results[name][k] = np.nan if value is None else value
+    return results, causes
+
+
+def _of_system(name: str) -> list[str]:
+    """The parameters of the compiled system that a swept quantity sets, by full name."""
+    part, _, short = name.partition(".")
+    # the machine of the feed-forward has the same parameters
+    return [name, f"model.{short}"] if part == "machine" else []
+
+
+def _point(rig: Rig, plan: SweepPlan, values: Mapping[str, float]) -> RunPoint:
+    """The run with these values by full name."""
+    config, event = rig.config, rig.config.events[plan.event]
+    feed = {name.removeprefix("feed."): x for name, x in values.items() if name.startswith("feed.")}
+    begin = f"event.{event.name}."
+    of_event = {name.removeprefix(begin): x for name, x in values.items() if name.startswith(begin)}
+    event = replace(event, p=replace(event.p, **of_event))
+    if _RATIO in values:
+        machine = rig.drive.machine.replace(ratio=values[_RATIO])
+        rig = replace(rig, drive=replace(rig.drive, machine=machine))
+    if feed or SPEED in values:
+        loads = Layout(type(config.feed)).from_names(feed, config.feed)
+        speed = values.get(SPEED, config.run.crank_speed)
+        rig = replace(rig, config=replace(config, feed=loads, run=replace(config.run, crank_speed=speed)))
+    limit = rig.guards.get(rig.drive.motor_torque, math.inf)
+    of_system = {full: x for name, x in values.items() for full in _of_system(name)}
+    return RunPoint(rig, event, event.follow(rig.config.turn), limit=limit, values=of_system)
+
+
+def _window(point: RunPoint, run: EventRun) -> Window:
+    """The rows of a run from its event on."""
+    assert run.series is not None and run.steady is not None
+    drive, speed = point.rig.drive, float(point.rig.config.run.crank_speed)
+    steady = Window(Phase.STEADY, run.steady, drive, (), speed)
+    # the energy behind a coupling that opens is not followed
+    trip = Trip(float(run.series["time"][-1]), math.nan, None) if run.ended else None
+    return Window(Phase.EVENT, run.series, drive, (), speed, 0.0, steady, trip)

@@ -1,1 +1,0 @@
-"""Identification of a real machine from recordings of its motor."""
