@@ -25,9 +25,8 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
-    from .app.best_result import BestResult
     from .app.identifications import IdentificationResult, WatchResult
-    from .app.studies import Study, StudyResult
+    from .app.studies import BestResult, Study, StudyResult
     from .app.sweeps import SweepResult
     from .core.errors import GeometryError, InputError, RunError
     from .machines.api import EMPTY, ChainUnitMachine
@@ -38,7 +37,7 @@ else:
     # numpy and scipy take longer to import than a command takes to answer: import them when they are needed; a
     # signal during the import of anything ends with the words of Python
     _HOMES = {
-        "BestResult": ".app.best_result",
+        "BestResult": ".app.studies",
         "EMPTY": ".machines.api",
         "ChainUnitMachine": ".machines.api",
         "ChamberForces": ".machines.chain_unit",

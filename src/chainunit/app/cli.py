@@ -149,9 +149,9 @@ def optimize(
     Writes best.toml, report.html, result.json, result.md and pictures into the output folder.
     """
     question = study_file(config)
-    from ..capabilities.optimize.page import TASK
+    from ..report.tasks import task_named
 
-    carry_out(TASK, question, output, backend=backend and backend.value)
+    carry_out(task_named("optimize"), question, output, backend=backend and backend.value)
 
 
 app.command()(sweep)

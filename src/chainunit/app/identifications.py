@@ -4,22 +4,21 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..capabilities.identification import page as identification
-from ..capabilities.identification import watch_page as watch
-from ..capabilities.identification.identification import IdentifiedMachine
-from ..capabilities.identification.watch import Alarm, WatchedRecording
 from ..study.config import Config
 from .results import ReportedResult
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from ..capabilities.identification.identification import IdentifiedMachine
+    from ..capabilities.identification.watch import Alarm, WatchedRecording
 
-class IdentificationResult(ReportedResult[Config, IdentifiedMachine]):
+
+class IdentificationResult(ReportedResult[Config, "IdentifiedMachine"]):
     """An identified machine. Its `repr` shows the numbers and the limits of the recordings; `found` is all that the
     fit found."""
 
-    _task = identification.TASK
+    _command = "identify"
 
     @property
     def found(self) -> IdentifiedMachine:
@@ -51,10 +50,10 @@ class IdentificationResult(ReportedResult[Config, IdentifiedMachine]):
         return pd.DataFrame.from_dict(rows, orient="index")
 
 
-class WatchResult(ReportedResult[Config, WatchedRecording]):
+class WatchResult(ReportedResult[Config, "WatchedRecording"]):
     """A watched recording. Its `repr` shows the alarms; `watched` has the outputs of the observer at all rows."""
 
-    _task = watch.TASK
+    _command = "watch"
 
     @property
     def watched(self) -> WatchedRecording:

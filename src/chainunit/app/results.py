@@ -13,6 +13,7 @@ from ..core.temporary_folders import in_temporary_folder
 from ..report import files, html, terminal
 from ..report.blocks import Report
 from ..report.task import Outcome, Question, Task
+from ..report.tasks import task_named
 from ..work.progress import Report as Progress
 from ..work.progress import quiet
 
@@ -20,7 +21,8 @@ from ..work.progress import quiet
 class ReportedResult(Generic[Question, Outcome]):
     """The result of a task. Its `repr` shows the report as text."""
 
-    _task: ClassVar[Task[Any, Any]]
+    _command: ClassVar[str]
+    """name of the task"""
 
     def __init__(self, question: Question, outcome: Outcome, folder: Path | None) -> None:
         self._question, self._outcome, self._folder = question, outcome, folder
@@ -40,7 +42,7 @@ class ReportedResult(Generic[Question, Outcome]):
         WriteError
             for a file that cannot be written; the others are written.
         """
-        task = cls._task
+        task = task_named(cls._command)
         compute = partial(task.outcome, question, progress=progress or quiet, **options)
         if folder is not None:
             with task.claimed(question, Path(folder)) as place:
@@ -55,6 +57,10 @@ class ReportedResult(Generic[Question, Outcome]):
             failure.partial = result
             raise failure
         return result
+
+    @property
+    def _task(self) -> Task[Any, Any]:
+        return task_named(self._command)
 
     @cached_property
     def _report(self) -> Report:

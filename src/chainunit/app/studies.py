@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from ..core.errors import InputError, RemarkWarning, near_name, shown
+from ..core.errors import InputError, RemarkWarning, RunError, near_name, shown
 from ..core.quantities import Layout
 from ..fmu.backends import Backend
 from ..machines.machine import Machine
 from ..reading.tables import in_file
 from ..reading.text import number, shown_in
 from ..reading.toml_lines import lines_of
-from ..report import series, study_task
+from ..report import series
 from ..report import study as contents
 from ..report.blocks import Report
 from ..report.drawing import drawing
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-    from .best_result import BestResult
+    from ..capabilities.optimize.best import Best
     from .identifications import IdentificationResult, WatchResult
     from .sweeps import SweepResult
 
@@ -215,8 +215,6 @@ class Study:
         WriteError
             for a file that cannot be written; the others are written.
         """
-        from .best_result import BestResult
-
         return BestResult.made(self.config, folder, progress, backend=backend)
 
     def identify(
@@ -304,7 +302,7 @@ class Study:
 class StudyResult(ReportedResult[Config, StudyRecord]):
     """The result of a study. Its `repr` shows the title, the verdicts and the main answers of every run."""
 
-    _task = study_task.TASK
+    _command = "study"
 
     @property
     def record(self) -> StudyRecord:
@@ -373,6 +371,47 @@ class StudyResult(ReportedResult[Config, StudyRecord]):
     def notes(self) -> list[str]:
         """The assumptions behind the numbers, a text each."""
         return [note["text"] for note in self._numbers["notes"]]
+
+
+class BestResult(ReportedResult[Config, Any]):
+    """The result of a search for the best machine. Its `repr` shows the answer, the parameters and what binds."""
+
+    _command = "optimize"
+
+    @property
+    def config(self) -> Config:
+        """The configuration of the study."""
+        return self._question
+
+    @property
+    def best(self) -> Best:
+        """All that the search found."""
+        best: Best = self._outcome.best
+        return best
+
+    @property
+    def met(self) -> bool:
+        """Whether a machine was found that meets all limits."""
+        return self.best.met
+
+    @property
+    def machine(self) -> Machine | None:
+        """The best machine; None where no machine meets all limits."""
+        return self.best.machine
+
+    @property
+    def study(self) -> Study:
+        """The study with the best machine.
+
+        Raises
+        ------
+        RunError
+            where no machine meets all limits.
+        """
+        if self.best.machine is None:
+            raise RunError(f"no machine meets all limits: {self._outcome.conflict}")
+        source, tables = self._outcome.as_file()
+        return Study.__new__(Study)._take(study_files.of_tables(tables, str(source)), str(source))
 
 
 def _plain(value: Any) -> Any:

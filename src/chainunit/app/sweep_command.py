@@ -33,6 +33,6 @@ def sweep(
     was killed goes on from its store.
     """
     question = study_file(config)
-    from ..capabilities.sweep.page import TASK
+    from ..report.tasks import task_named
 
-    carry_out(TASK, question, output, workers=workers, scheduler=scheduler)
+    carry_out(task_named("sweep"), question, output, workers=workers, scheduler=scheduler)

@@ -6,8 +6,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..capabilities.sweep import page as sweep
-from ..capabilities.sweep.summary import SweepSummary
 from ..study.config import Config
 from .results import ReportedResult
 
@@ -15,11 +13,13 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
+    from ..capabilities.sweep.summary import SweepSummary
 
-class SweepResult(ReportedResult[Config, SweepSummary]):
+
+class SweepResult(ReportedResult[Config, "SweepSummary"]):
     """The results of a sweep. Its `repr` shows the size of the sweep, the best points and the extremes."""
 
-    _task = sweep.TASK
+    _command = "sweep"
 
     @property
     def summary(self) -> SweepSummary:

@@ -19,6 +19,6 @@ def watch(
     Writes report.html, result.json, result.md and pictures into the output folder.
     """
     question = study_file(config)
-    from ..capabilities.identification.watch_page import TASK
+    from ..report.tasks import task_named
 
-    carry_out(TASK, question, output)
+    carry_out(task_named("watch"), question, output)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from ..study.capability import StudyCapability
 from ..study.record import StudyRecord
@@ -11,6 +12,7 @@ from ..study.registry import registered
 from .blocks import Block, Source
 from .lines import Line
 from .supplement import Supplement
+from .task import Task
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,10 @@ class Capability(StudyCapability):
     def answer(self, s: Source, study: StudyRecord) -> Iterator[Block]:
         """Its blocks in the answer of a study."""
         return iter(())
+
+    def tasks(self) -> Mapping[str, Task[Any, Any]]:
+        """Its commands, by name."""
+        return {}
 
     def supplement(self, study: StudyRecord) -> Supplement | None:
         """Its additions to the machine in motion."""

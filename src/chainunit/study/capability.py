@@ -111,6 +111,10 @@ class StudyCapability:
             for the keys that ask for them.
         """
 
+    def words(self) -> Mapping[str, str]:
+        """By name, the words on the numbers of its results, for a comparison of two."""
+        return {}
+
     def analyses(self) -> Iterable[type[Analysis]]:
         """Its analyses of a study."""
         return ()

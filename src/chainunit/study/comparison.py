@@ -8,22 +8,31 @@ import re
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from .. import __version__
-from ..capabilities.random_overloads.runs import Sample
 from ..core.errors import InputError, printable
 from ..core.quantities import variables
 from ..reading.text import entry
 from .measures import Answers
+from .registry import registered
 from .sections import CHOICES, SECTIONS
 from .shaft import ShaftAnswers
 
 FILE = "result.json"
 _ROUNDING = 1e-12
 """Relative difference up to which two given values are the same: that of a unit's factor."""
-_WORDS = {v.name: v.description for of in (Sample, ShaftAnswers, Answers) for v in variables(of)}
+
+
+@cache
+def _words() -> dict[str, str]:
+    """By name, the words on the numbers of a result."""
+    words = {name: text for part in registered() for name, text in part.words().items()}
+    return words | {v.name: v.description for of in (ShaftAnswers, Answers) for v in variables(of)}
+
+
 _TITLES = {"steady": "steady running", "start_up": "start-up", "settling": "settling"}
 _SIDES = ("a", "b")
 
@@ -268,7 +277,7 @@ def _spoken(name: str) -> str:
     """The name of a number in words: ``crank_torque_peak.q95`` -> crank torque, peak, 95 %."""
     first, _, rest = name.partition(".")
     rest = f"{rest[1:]} % of runs below" if rest[1:].isdigit() and rest[0] == "q" else rest.replace(".", ", ")
-    return ", ".join(filter(None, (_WORDS.get(first, first.replace("_", " ")), rest)))
+    return ", ".join(filter(None, (_words().get(first, first.replace("_", " ")), rest)))
 
 
 def _measures(a: _Group, b: _Group) -> dict[str, Any]:

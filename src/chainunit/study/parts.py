@@ -93,7 +93,9 @@ class Parts:
     def example(self) -> dict[str, Any]:
         """The tables of the example, empty where there is none."""
         name = _examples_of_machines().get(self.machine.name)
-        return toml(example(name)) if name else {}
+        tables = toml(example(name)) if name else {}
+        # the examples have tables of capabilities, too
+        return {name: table for name, table in tables.items() if name in self.form.model_fields}
 
 
 @lru_cache(maxsize=32)

@@ -9,6 +9,7 @@ from typing import Any
 
 from ...core.errors import Faults, InputError
 from ...report.capability import Capability, Contents
+from ...report.task import Task
 from ...study.analysis import Analysis
 from ...study.capability import FileReference
 from ...study.conditions import given
@@ -171,6 +172,12 @@ class IdentificationCapability(Capability):
         from . import notices_page as notices
 
         return {"observer": Contents("Who notices an overload", notices.blocks, notices.PICTURES.files)}
+
+    def tasks(self) -> Mapping[str, Task[Any, Any]]:
+        """Its commands."""
+        from . import page, watch_page
+
+        return {"identify": page.TASK, "watch": watch_page.TASK}
 
 
 def _identification(reading: FileReading) -> IdentificationPlan | None:

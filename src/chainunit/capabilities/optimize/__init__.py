@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 from ...report.capability import Capability
+from ...report.task import Task
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
 from ...study.rules import CHAINS, MACHINE_FMU, NEEDS_MODEL, TWO_BARS, Rule
@@ -44,6 +46,12 @@ class OptimizeCapability(Capability):
         return read_wishes(
             table, form, reading.parts.machine, reading.machine, loads, run.crank_speed, by_motor
         )
+
+    def tasks(self) -> Mapping[str, Task[Any, Any]]:
+        """Its command."""
+        from . import page
+
+        return {"optimize": page.TASK}
 
 
 CAPABILITY = OptimizeCapability()

@@ -20,6 +20,7 @@ from ...work.progress import Report as Progress
 from .best import Best, find_best
 from .result import as_dict, best_tables, units_of
 from .table import wishes_of
+from .words import conflict_sentences
 
 PICTURES = ("torque.png", "front.png")
 FILE = "best.toml"
@@ -60,6 +61,16 @@ class OptimizedStudy(NamedTuple):
 
     config: Config
     best: Best
+
+    @property
+    def conflict(self) -> str:
+        """Why no machine meets all limits."""
+        return " ".join(conflict_sentences(self.best))
+
+    def as_file(self) -> tuple[Path, dict[str, Any]]:
+        """The study file with the best machine, beside that of the study: its name, and its tables."""
+        source = Path(self.config.source).parent / FILE
+        return source, best_tables(self.best, self.config, source.parent)
 
 
 def _compute(

@@ -8,6 +8,7 @@ from typing import Any
 from pydantic import Field
 
 from ...core.errors import InputError, printable, refusal_prefix
+from ...core.quantities import variables
 from ...report.blocks import Block, Source, Text
 from ...report.capability import Capability, Contents
 from ...report.lines import Line
@@ -102,6 +103,12 @@ class RandomOverloads(Capability):
         for event in plan.event.hardest() if plan.is_asked_for else ():
             if not rig.takes(event):
                 raise InputError(f'monte_carlo.event.type = "{event.kind}": {event.without}')
+
+    def words(self) -> Mapping[str, str]:
+        """Those of a run."""
+        from .runs import Sample
+
+        return {v.name: v.description for v in variables(Sample)}
 
     def analyses(self) -> Iterable[type[Analysis]]:
         """The runs."""
