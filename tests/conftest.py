@@ -35,18 +35,16 @@ from chainunit.fmu.export import export
 from chainunit.fmu.native.export import export as export_native
 from chainunit.models import MODELS
 
-FIRST, SECOND = "not slow and not second", "second and not slow"
-"""What `pytest` runs without ``-m`` and files, and what ``.ci/run`` adds."""
+FIRST = "not slow and not second"
+"""What `pytest` runs without ``-m`` and files."""
 
 
 def pytest_ignore_collect(collection_path, config):
-    """A file that has no test of the stage is not imported: that alone takes a part of a minute."""
-    marks = config.option.markexpr
-    if marks not in (FIRST, SECOND) or not collection_path.match("test_*.py"):
+    """The first stage does not import a file that is of the second as a whole: that alone takes seconds."""
+    if config.option.markexpr != FIRST or not collection_path.match("test_*.py"):
         return None
     text = collection_path.read_text("utf-8")
-    of_second = re.search(r"^pytestmark = .*mark[.]second", text, re.MULTILINE)
-    return (of_second is not None if marks == FIRST else "mark.second" not in text) or None
+    return True if re.search(r"^pytestmark = .*mark[.]second", text, re.MULTILINE) else None
 
 
 @pytest.hookimpl(tryfirst=True)
