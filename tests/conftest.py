@@ -61,6 +61,12 @@ def pytest_cmdline_main(config):
         options.dist = "loadfile"
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_configure_node(node):
+    """A worker reads its options anew: it is told the stage."""
+    node.workerinput["marks"] = node.config.option.markexpr
+
+
 def _store(config):
     """A folder of compiled code that only this user can change, which later runs of the tests use again; one of this
     run alone where there is none. It lies in the user's cache, so that also the tests of a fresh clone use it."""
@@ -84,7 +90,9 @@ def pytest_configure(config):
     do; and the folder of compiled code for all of them, workers included."""
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.default_int_handler)
-    if not hasattr(config, "workerinput"):
+    if hasattr(config, "workerinput"):
+        config.option.markexpr = config.workerinput["marks"]
+    else:
         os.environ[VARIABLE] = str(_store(config))
         # the matrices are small: beside the workers, threads of a BLAS only wait for each other
         for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):

@@ -537,6 +537,7 @@ def german(tmp_path_factory):
     return folder
 
 
+@pytest.mark.second
 @both
 def test_messages_do_not_follow_the_hosts_locale(native_fmus, german, fmi):
     script = textwrap.dedent(

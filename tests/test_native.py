@@ -646,6 +646,7 @@ def assert_met(name, got, wanted):
         np.testing.assert_allclose(got[n], wanted[n], rtol=0.0, atol=tolerance * size + 1e-12, err_msg=n)
 
 
+@pytest.mark.second
 @pytest.mark.parametrize("name", list(MODELS))
 def test_a_master_meets_both_reference_results(native, fmus, tmp_path, name):
     """Set, read, step, read: by native code and by pythonfmu; every input moves."""
@@ -668,6 +669,7 @@ def test_a_master_meets_both_reference_results(native, fmus, tmp_path, name):
         fmu.close()
 
 
+@pytest.mark.second
 @pytest.mark.parametrize(
     ("name", "fmi", "kind"),
     [
