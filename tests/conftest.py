@@ -1,7 +1,11 @@
-"""Fixtures that the tests share. A run without named files is parallel, a file at a time for each worker.
+"""Fixtures that the tests share, and their stages. A run without named files is parallel.
 
-An FMU costs a test little: what exports compile is kept in a folder of the session, whichever worker, test or
-process asks (see `chainunit.core.native.cache`). Beyond that,
+A run without named files and without ``-m`` is the first stage. It leaves out the second, which is marked `second`
+and compares with other programs: their engines, importers, platforms; the pages, the papers, the tables of the
+standard. ``.ci/run`` runs both. A named file runs with all of its tests, except the slow ones.
+
+An FMU costs a test little: what exports compile is kept by its content, whichever worker, test or process asks, and
+for later runs of the tests, too (see `chainunit.core.native.cache`). Beyond that,
 
 - `fmus` has the Python FMU of every model, `native_fmus` the native ones: take them where start values do not matter;
 - `once` fills a folder once a session, for all workers: take it for a study that tests of several files read, or for
@@ -15,6 +19,7 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -24,10 +29,22 @@ import threading
 import fmpy
 import pytest
 
+from chainunit.core.native import cache
 from chainunit.core.native.cache import VARIABLE
 from chainunit.fmu.export import export
 from chainunit.fmu.native.export import export as export_native
 from chainunit.models import MODELS
+
+FIRST = "not slow and not second"
+"""What `pytest` runs without ``-m`` and files."""
+
+
+def pytest_ignore_collect(collection_path, config):
+    """The first stage does not import a file that is of the second as a whole: that alone takes seconds."""
+    if config.option.markexpr != FIRST or not collection_path.match("test_*.py"):
+        return None
+    text = collection_path.read_text("utf-8")
+    return True if re.search(r"^pytestmark = .*mark[.]second", text, re.MULTILINE) else None
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -37,9 +54,35 @@ def pytest_cmdline_main(config):
     whole = config.args_source is pytest.Config.ArgsSource.TESTPATHS
     worker = hasattr(config, "workerinput")  # a worker comes here, too: it must not start workers of its own
     one = worker or options.usepdb or options.collectonly or not config.pluginmanager.hasplugin("xdist")
+    if whole and not worker and options.markexpr == "not slow":
+        options.markexpr = FIRST
     if whole and not one and options.numprocesses is None:
         options.numprocesses = config.hook.pytest_xdist_auto_num_workers(config=config)
         options.dist = "loadfile"
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_configure_node(node):
+    """A worker reads its options anew: it is told the stage."""
+    node.workerinput["marks"] = node.config.option.markexpr
+
+
+def _store(config):
+    """A folder of compiled code that only this user can change, which later runs of the tests use again; one of this
+    run alone where there is none. It lies in the user's cache, so that also the tests of a fresh clone use it."""
+    os.environ.pop(VARIABLE, None)
+    usual = cache.folder()
+    store = usual / "tests" if usual else None
+    try:
+        if store:
+            store.mkdir(parents=True, exist_ok=True, mode=0o700)
+        if store and not any(cache._trouble(each.stat()) for each in (store, store.parent)):
+            return store
+    except OSError:  # a home that takes nothing
+        pass
+    store = tempfile.mkdtemp(prefix="chainunit_tests_")
+    config.add_cleanup(lambda: shutil.rmtree(store, ignore_errors=True))
+    return store
 
 
 def pytest_configure(config):
@@ -47,13 +90,13 @@ def pytest_configure(config):
     do; and the folder of compiled code for all of them, workers included."""
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.default_int_handler)
-    if not hasattr(config, "workerinput"):
-        store = tempfile.mkdtemp(prefix="chainunit_tests_")
-        os.environ[VARIABLE] = store
+    if hasattr(config, "workerinput"):
+        config.option.markexpr = config.workerinput["marks"]
+    else:
+        os.environ[VARIABLE] = str(_store(config))
         # the matrices are small: beside the workers, threads of a BLAS only wait for each other
         for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
             os.environ.setdefault(threads, "1")
-        config.add_cleanup(lambda: shutil.rmtree(store, ignore_errors=True))
 
 
 @pytest.fixture(autouse=True)

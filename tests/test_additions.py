@@ -16,6 +16,8 @@ import xarray as xr
 
 import chainunit
 
+pytestmark = pytest.mark.second
+
 HERE = Path(__file__).parent / "additions"
 EVENT = '''
 

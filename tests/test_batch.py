@@ -117,7 +117,7 @@ def columns(values):
     return {k: column(*x) if np.ndim(x) else x for k, x in values.items()}
 
 
-@pytest.mark.parametrize("engine", ["native", "numpy", "jax"])
+@pytest.mark.parametrize("engine", ["native", "numpy", pytest.param("jax", marks=pytest.mark.second)])
 def test_many_states_agree_with_the_machine(engine):
     if engine == "native" and compiler() is None:
         pytest.skip("no C compiler")

@@ -27,7 +27,7 @@ from chainunit.models import MODELS
 from chainunit.system import CoSimulation, compiled
 from chainunit.system.instance import Fmu, Instance
 
-pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
+pytestmark = [pytest.mark.second, pytest.mark.skipif(compiler() is None, reason="no C compiler")]
 
 # what runs alone: its start values and what is read. From rest at 0.4 rad the chain unit falls and swings
 ALONE = {

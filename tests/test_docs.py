@@ -120,6 +120,7 @@ class Walk:
         return printout.getvalue()
 
 
+@pytest.mark.second
 @pytest.mark.parametrize("page", _walks())
 def test_a_page_prints_what_stands_there(page, tmp_path):
     walk, printout = Walk(tmp_path), None
@@ -185,6 +186,7 @@ class _Fetched(HTMLParser):
             self.places.append(own.get("src") or "")
 
 
+@pytest.mark.second
 def test_the_site_builds_without_a_broken_link_and_fetches_nothing(tmp_path):
     pytest.importorskip("mkdocs")
     pytest.importorskip("material")
@@ -202,6 +204,7 @@ def test_the_site_builds_without_a_broken_link_and_fetches_nothing(tmp_path):
         assert not re.search(r"(?:@import|url\()\s*[\"']?(?:https?:)?//", style.read_text("utf-8")), style
 
 
+@pytest.mark.second
 def test_the_readme_is_short_and_what_it_claims_is_computed(tmp_path):
     """Its numbers on an overload that an ammeter hides, from the series of the packaged study over its last turn."""
     text = README.read_text("utf-8")

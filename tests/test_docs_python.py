@@ -13,6 +13,8 @@ import pytest
 from chainunit import ChainUnitMachine, ChamberForces
 from chainunit.fmu.backends import export
 
+pytestmark = pytest.mark.second
+
 README = Path(__file__).parents[1] / "README.md"
 PAGE = Path(__file__).parents[1] / "docs" / "python.md"
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)

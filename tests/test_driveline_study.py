@@ -324,6 +324,7 @@ def test_stiffness_from_geometry(table, constant):
     assert soft == pytest.approx(2.6e10 * constant / 2.0, rel=1e-5)
 
 
+@pytest.mark.second
 @pytest.mark.skipif(
     importlib.util.find_spec("sectionproperties") is None, reason="extra sections is not installed"
 )

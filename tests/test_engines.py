@@ -77,6 +77,7 @@ def test_broadcasting_over_states_and_parameters():
     assert tau[3, 2, 1] == pytest.approx(MODEL.evaluate(engines.MATH, p, one)[0].tau, rel=1e-12)
 
 
+@pytest.mark.second
 def test_jax():
     jax = pytest.importorskip("jax", reason="needs the extra `jax`")
     jax.config.update("jax_enable_x64", True)

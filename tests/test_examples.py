@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 from command import chainunit
 
+pytestmark = pytest.mark.second
+
 EXAMPLES = Path(__file__).parents[1] / "examples"
 RUNS = {}
 

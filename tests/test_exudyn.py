@@ -31,6 +31,8 @@ from chainunit.core.engines import MATH, numpy_
 from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.mechanism.machine import Mechanism
 
+pytestmark = pytest.mark.second
+
 exudyn = pytest.importorskip("exudyn")
 item = pytest.importorskip("exudyn.itemInterface")
 

@@ -19,6 +19,8 @@ from linkage_files import MACHINES, model
 
 from chainunit.machines.machine import Machine
 
+pytestmark = pytest.mark.second
+
 exudyn = pytest.importorskip("exudyn")
 item = pytest.importorskip("exudyn.itemInterface")
 

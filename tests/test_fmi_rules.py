@@ -537,6 +537,7 @@ def german(tmp_path_factory):
     return folder
 
 
+@pytest.mark.second
 @both
 def test_messages_do_not_follow_the_hosts_locale(native_fmus, german, fmi):
     script = textwrap.dedent(
@@ -573,6 +574,7 @@ def test_libraries_run_with_an_old_glibc(native_fmus):
         assert versions and max(versions) <= (2, 17), name
 
 
+@pytest.mark.second
 @pytest.mark.skipif(sys.platform != "linux" or shutil.which("nm") is None, reason="no nm")
 def test_several_fmus_are_linked_into_one_program(native_fmus, tmp_path):
     """Two models, each by both versions of FMI, with the prefixes of the standard's headers."""

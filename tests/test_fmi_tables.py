@@ -373,7 +373,7 @@ def wrong_cells(folder, fmi, kind):
     return wrong, calls
 
 
-pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
+pytestmark = [pytest.mark.second, pytest.mark.skipif(compiler() is None, reason="no C compiler")]
 
 
 @pytest.mark.parametrize(("fmi", "kind"), KINDS)

@@ -17,6 +17,8 @@ from chainunit.study.config import load
 from chainunit.study.package import start_of
 from chainunit.system import ModelComponent, System, monolithic, shaft_joints
 
+pytestmark = pytest.mark.second
+
 PAGE = Path(__file__).parents[1] / "docs" / "how-to" / "fmpy-loop.md"
 
 

@@ -83,6 +83,7 @@ def test_reference_points(chamber, point):
     assert max(worst.values()) < 1e-9, max(worst.items(), key=lambda kv: kv[1])
 
 
+@pytest.mark.second
 def test_fmpy_validate_is_silent(fmus):
     """All by the command of fmpy, in one process: it says nothing but that there is nothing."""
     script = textwrap.dedent(
@@ -227,6 +228,7 @@ def test_many_instances_in_one_process(chamber):
             assert math.isfinite(unit.get(["tau"])[0])
 
 
+@pytest.mark.second
 def test_process_ends_cleanly(fmus):
     """pythonfmu 0.7 releases its interpreter handle twice at exit; now and then that aborted the host."""
     script = textwrap.dedent(

@@ -19,7 +19,7 @@ from chainunit.fmu.native.export import export
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
 
-pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
+pytestmark = [pytest.mark.second, pytest.mark.skipif(compiler() is None, reason="no C compiler")]
 GALLERY = sorted((Path(__file__).parents[1] / "examples" / "linkages").glob("*.toml"))
 OFTEN = ("blake_jaw_crusher", "cylinder_lift")
 FILES = [

@@ -115,6 +115,7 @@ def motulator_start(p, u):
     return machine.tau_M, np.abs(machine.i_ss) / math.sqrt(2.0), shaft.state.w_M.real
 
 
+@pytest.mark.second
 @pytest.mark.parametrize("beta", [{}, SATURATED], ids=["linear", "saturated"])
 def test_start_is_motulators(beta):
     """Torque, current and speed at every half millisecond of a start direct on line, in parts of their peaks."""

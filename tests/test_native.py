@@ -527,6 +527,7 @@ def test_a_wrong_guid_is_refused(native):
     fmu.close()
 
 
+@pytest.mark.second
 @pytest.mark.parametrize(
     "name", [n if n not in LARGE else pytest.param(n, marks=pytest.mark.slow) for n in MODELS]
 )
@@ -568,23 +569,24 @@ def test_a_plain_c_host(native, fmi, tmp_path):
 def random_calls(folder, fmi, calls, tmp_path):
     """As many random calls of the unpacked FMU in `folder`, compiled with sanitizers."""
     sources = folder / "sources"
-    fuzz = tmp_path / "fuzz"
-    command = [
-        shutil.which("cc"), "-std=c99", "-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all",
-        "-Wall", "-Wextra", "-Werror", "-Wno-unused-parameter",
-        "-o", str(fuzz), str(HERE / f"fuzz{fmi}.c"),
-        *(str(sources / n) for n in ("model.c", f"fmi{fmi}.c")), "-I", str(sources),
-        "-Wl,--wrap=malloc,--wrap=calloc", "-lm",
-    ]  # fmt: skip
     # what CasADi wrote is compiled apart, once for both versions of FMI: its warnings are not ours
-    files = {file: (sources / file).read_bytes() for file in ("kernels.c", "model.h")}
+    files = {name: (sources / name).read_bytes() for name in ("kernels.c", "model.h")}
     kernels = compile_code(compiler(), ("-O1", "-c", "kernels.c", "-o", "kernels.o"), files, "kernels.o")
-    (tmp_path / "kernels.o").write_bytes(kernels)
-    subprocess.run([*command, str(tmp_path / "kernels.o")], check=True)
+    files = {file.name: file.read_bytes() for file in sources.iterdir() if file.is_file()}
+    files |= {name: (HERE / name).read_bytes() for name in (f"fuzz{fmi}.c", "fuzz.h")}
+    arguments = (
+        "-std=c99", "-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all",
+        "-Wall", "-Wextra", "-Werror", "-Wno-unused-parameter", "-I", ".", "-o", "fuzz",
+        f"fuzz{fmi}.c", "model.c", f"fmi{fmi}.c", "-Wl,--wrap=malloc,--wrap=calloc", "-lm", "kernels.o",
+    )  # fmt: skip
+    fuzz = tmp_path / "fuzz"
+    fuzz.write_bytes(compile_code(compiler(), arguments, files | {"kernels.o": kernels}, "fuzz"))
+    fuzz.chmod(0o700)
     process = subprocess.run([fuzz, str(calls)], capture_output=True, text=True)
     assert process.returncode == 0, process.stdout + process.stderr[-3000:]
 
 
+@pytest.mark.second
 @pytest.mark.parametrize("share", [0.03, pytest.param(1.0, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize("name", list(MODELS))
@@ -644,6 +646,7 @@ def assert_met(name, got, wanted):
         np.testing.assert_allclose(got[n], wanted[n], rtol=0.0, atol=tolerance * size + 1e-12, err_msg=n)
 
 
+@pytest.mark.second
 @pytest.mark.parametrize("name", list(MODELS))
 def test_a_master_meets_both_reference_results(native, fmus, tmp_path, name):
     """Set, read, step, read: by native code and by pythonfmu; every input moves."""
@@ -666,6 +669,7 @@ def test_a_master_meets_both_reference_results(native, fmus, tmp_path, name):
         fmu.close()
 
 
+@pytest.mark.second
 @pytest.mark.parametrize(
     ("name", "fmi", "kind"),
     [

@@ -146,6 +146,7 @@ def test_the_rods_of_other_engines_are_those_of_the_machine(bench):
     np.testing.assert_allclose(other.MACHINE.p.g * height, ours, rtol=1e-12)
 
 
+@pytest.mark.second
 @pytest.mark.parametrize(("name", "torque", "loop"), [("exudyn", 1e-5, 1e-5), ("mujoco", 1e-4, 1e-7)])
 def test_another_engine_finds_the_torque(name, torque, loop, bench, tmp_path, monkeypatch):
     """The packaged machine over a turn; the engine shares nothing with ours but the masses, lengths and start."""

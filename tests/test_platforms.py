@@ -25,6 +25,8 @@ from chainunit.fmu.native.export import export
 from chainunit.fmu.native.platforms import PLATFORMS
 from chainunit.models import MODELS
 
+pytestmark = pytest.mark.second
+
 here = pytest.mark.skipif(platforms.host() != "linux64", reason="run on 64-bit Linux")
 zig = pytest.mark.skipif(importlib.util.find_spec("ziglang") is None, reason="ziglang is not installed")
 

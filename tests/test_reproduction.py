@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import re
 import types
@@ -16,11 +17,17 @@ from chainunit.papers.output import markdown
 from chainunit.papers.table import _row
 from chainunit.reading.tables import packaged, toml
 
-ROWS = reproduce()
+pytestmark = pytest.mark.second
+
+
+@functools.cache
+def every():
+    """The rows; they take seconds, which a run that leaves them out has not to spend."""
+    return reproduce()
 
 
 def shown(paper, item, quantity):
-    (row,) = [r for r in ROWS if (r.paper, r.item, r.quantity) == (paper, item, quantity)]
+    (row,) = [r for r in every() if (r.paper, r.item, r.quantity) == (paper, item, quantity)]
     return row.text
 
 
@@ -133,7 +140,7 @@ def test_the_verdict_follows_from_the_print():
 
 
 def test_what_the_authors_computed_explains_the_print():
-    rebuilt = {r.quantity: r.rebuilt_text for r in ROWS if r.rebuilt is not None}
+    rebuilt = {r.quantity: r.rebuilt_text for r in every() if r.rebuilt is not None}
     for quantity, text in {
         "R_t left organ, left extreme, 10 rad/s": "-12.47",
         "R_t left organ, left extreme, 50 rad/s": "-313.40",
@@ -151,11 +158,12 @@ def test_what_the_authors_computed_explains_the_print():
 
 def test_exact_identities():
     assert (
-        abs(float(next(r for r in ROWS if r.quantity.startswith("largest |theta between")).computed)) < 1e-13
+        abs(float(next(r for r in every() if r.quantity.startswith("largest |theta between")).computed))
+        < 1e-13
     )
-    assert next(r for r in ROWS if r.quantity == "regrouped: error against the model").computed < 1e-12
-    assert next(r for r in ROWS if r.quantity == "|b2 printed + b2|, in G1").computed < 1e-13
-    assert next(r for r in ROWS if r.quantity == "error of X with the corrected braces").computed < 1e-13
+    assert next(r for r in every() if r.quantity == "regrouped: error against the model").computed < 1e-12
+    assert next(r for r in every() if r.quantity == "|b2 printed + b2|, in G1").computed < 1e-13
+    assert next(r for r in every() if r.quantity == "error of X with the corrected braces").computed < 1e-13
 
 
 def test_the_corrected_scheme_is_the_model():
@@ -191,7 +199,7 @@ def test_command_line(tmp_path):
     process = chainunit("reproduce", "-o", "out", cwd=tmp_path)
     assert process.returncode == 0, process.stderr
     rows = json.loads((tmp_path / "out" / "reproduction.json").read_text())["rows"]
-    assert len(rows) == len(ROWS)
+    assert len(rows) == len(every())
     assert {r["verdict"] for r in rows} == {"agrees", "corrected", "not stated"}
     for r in rows:
         assert r["reason"] and r["unit"] and r["shown"]
@@ -210,7 +218,7 @@ def test_the_documentation_shows_these_rows():
     for paper in PAPERS:
         (block,) = re.findall(rf"<!-- rows of paper {paper} -->\n(.*?)<!-- end -->", text, re.S)
         # the last digit of a rounding error is the machine's own
-        reference = markdown([r for r in ROWS if r.paper == paper])
+        reference = markdown([r for r in every() if r.paper == paper])
         assert re.sub(r"\d\.\de-\d\d", "tiny", block) == re.sub(r"\d\.\de-\d\d", "tiny", reference)
 
 
@@ -229,7 +237,7 @@ def test_the_scheme_of_paper_003_is_the_model_once_corrected():
 
 
 def test_paper_003_shows_what_each_slip_does():
-    results = {r.quantity: r for r in ROWS if r.paper == "003"}
+    results = {r.quantity: r for r in every() if r.paper == "003"}
     metres = results["largest error of R_C, R_D, R_E in a turn, lengths in m"].computed
     assert metres == pytest.approx(0.4386, abs=1e-4)
     assert results["largest error in a turn, lengths in mm"].computed == pytest.approx(

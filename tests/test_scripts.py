@@ -19,6 +19,8 @@ from lxml import etree
 from chainunit.core.native.compilers import host
 from chainunit.models import MODELS
 
+pytestmark = pytest.mark.second
+
 FOLDER = Path(__file__).parents[1] / "fmu"
 OPTIONS = ("--handle-state", "--serialize-state")
 OTHER_START = {"ChamberForces": {"r": 0.14}, "DcMotor": {"rotor.J": 0.5}}

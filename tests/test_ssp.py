@@ -76,6 +76,7 @@ def test_schemas(package):
         assert read_ssv(str(package), name).name == ssp.PARAMETER_SET
 
 
+@pytest.mark.second
 @here("pyssp_standard")
 def test_pyssp_finds_nothing(package):
     from pyssp_standard.ssp import SSP
@@ -203,8 +204,8 @@ ECOS = """
     os._exit(0)
 """
 TOOLS = [
-    pytest.param(LIBCOSIM, id="libcosim", marks=here("libcosimpy")),
-    pytest.param(ECOS, id="ecos", marks=here("ecospy")),
+    pytest.param(LIBCOSIM, id="libcosim", marks=[here("libcosimpy"), pytest.mark.second]),
+    pytest.param(ECOS, id="ecos", marks=[here("ecospy"), pytest.mark.second]),
 ]
 
 

@@ -195,6 +195,12 @@ def _registry() -> Any:
     return pint.UnitRegistry()
 
 
+@cache
+def _unit(pint_text: str) -> Any:
+    """A unit of pint, which takes longer to read than to convert a number."""
+    return _registry().Unit(pint_text)
+
+
 def convert(number: float, unit_text: str, unit: str, kind: str = "") -> float:
     """The `number` in the unit that is `unit_text` behind it, in the declared `unit`.
 
@@ -208,9 +214,8 @@ def convert(number: float, unit_text: str, unit: str, kind: str = "") -> float:
     base = base_units(unit)
     factors = _of_temperature(_of_angle(_factors(_ascii(unit_text)), base), base, kind)
     try:
-        return float(
-            _registry().Quantity(number, _pint_text(factors)).to(_pint_text(_factors(_ascii(unit)))).magnitude
-        )
+        there = _unit(_pint_text(_factors(_ascii(unit))))
+        return float(_registry().Quantity(number, _unit(_pint_text(factors))).to(there).magnitude)
     except (pint.PintError, TypeError, AttributeError, AssertionError) as error:
         raise ValueError(f"{unit_text}: is no unit of {unit}") from error
 
