@@ -75,6 +75,7 @@ def test_nothing_outside_a_folder_imports_from_it():
     assert outside == OUTSIDE
 
 
+@pytest.mark.second
 @pytest.mark.parametrize("name", NAMES)
 def test_the_rest_works_without(name, tmp_path):
     """A study, an export and the schema; a table of the capability is refused as an unknown key."""
