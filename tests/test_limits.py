@@ -65,7 +65,7 @@ def test_a_motor_that_burns_in_steady_running_is_no_good(tmp_path):
     assert warnings["no reserve"].quantities["over"][0] == -steady.torque_reserve > 0.1
     # steady running comes in each turn, a dip for a moment: one sentence, of the verdict as of the warning
     for when, where in (("in each turn", warnings["no reserve"].text), ("for a moment", verdict["text"])):
-        assert re.search(rf"overloaded {when}: .* above its largest steady torque", where)
+        assert re.search(rf"overloaded {when}: .* above its breakdown torque", where)
         assert "a moment the motor gives" not in where
     assert "; a heavier load or a dip of the voltage stalls it; " in warnings["no reserve"].text
 
@@ -94,7 +94,7 @@ def test_a_motor_below_its_breakdown_speed_stalls_under_the_load(tmp_path):
     T, w = float(study.steady["motor.stator.T"].mean()), below * study.drive.ratio
     slower, there, faster = (induction.steady(MATH, motor, w * x, T=T).tau for x in (0.9, 1.0, 1.1))
     assert there > max(slower, faster)
-    said = "overloaded in each turn: 100 % or more above its largest steady torque"
+    said = "overloaded in each turn: 100 % or more above its breakdown torque"
     assert said in verdict["text"]
     # it is stalled already
     assert warnings["no reserve"].text.endswith(f"{said}; take a larger motor or a heavier flywheel.")
