@@ -59,7 +59,7 @@ def test_the_full_example_has_every_event():
     own = {name for name, of in TYPES.items() if of.__module__ == Jam.__module__}
     assert {event.kind for event in full.events.values()} == own - {"cut", "overload"}
     assert (
-        not full.slips and full.plate and full.driveline and full.coupling and full.values["monte_carlo"].runs
+        not full.slips and full.plate and full.driveline and full.coupling and full.table("monte_carlo").runs
     )
 
 
@@ -87,7 +87,7 @@ def test_the_form_that_a_refusal_shows_is_taken(name):
 )
 def test_units(text, section, name, value):
     config = parse(text)
-    holder = config.machine.p if section == "machine" else config.values[section]
+    holder = config.machine.p if section == "machine" else getattr(config, section)
     assert getattr(holder, name) == pytest.approx(value, rel=1e-12)
 
 

@@ -23,6 +23,7 @@ from chainunit.capabilities.torsion import page as torsion_report
 from chainunit.capabilities.torsion.analysis import TorsionAnalysis, as_dict
 from chainunit.capabilities.torsion.line import Rotation, analyse
 from chainunit.capabilities.torsion.page import PICTURES
+from chainunit.capabilities.torsion.table import TorsionTable
 from chainunit.core.engines import MATH, numpy_
 from chainunit.core.quantities import Layout
 from chainunit.drives import shafts, torsion
@@ -35,7 +36,6 @@ from chainunit.study.analysis import Work
 from chainunit.study.choice import choose
 from chainunit.study.record import StudyRecord
 from chainunit.study.rig import Rig
-from chainunit.study.sections import TorsionTable
 from chainunit.study.shaft import UNEVEN, remedies, two_masses
 from chainunit.study.statics import statics
 from chainunit.system import CoSimulation

@@ -192,10 +192,10 @@ def test_groups_are_by_the_side_that_carries():
 
 def test_random_overloads_draw_what_the_event_declares():
     """Without a word of the file the force of a jam; with one, the quantities that it gives as ranges."""
-    random = config.load().random
+    random = config.load().plans["random_overloads"].event
     assert random.of.kind == "jam" and dict(random.ranges) == dict(random.of.draws)
     text = '[monte_carlo]\nevent = { type = "lumps", side = "right", number = 2, pause = ["0.1 s", 0.2], force = 9 }'
-    random = config.parse(text).random
+    random = config.parse(text).plans["random_overloads"].event
     assert dict(random.ranges) == {"pause": (0.1, 0.2)} and random.p.number == 2.0
     values = [random.draw(np.random.default_rng(k))["pause"] for k in range(200)]
     assert 0.1 <= min(values) < 0.11 and 0.19 < max(values) <= 0.2
@@ -357,7 +357,11 @@ def test_a_new_type_of_event_is_one_class(swell, tmp_path):
     assert numbers["certificate"]["swell_right"]["energy_residual_share"]["value"] < 2e-3
     assert "swell right" in process.stdout
     assert "more material comes to the right" in (tmp_path / "out" / "report.html").read_text().lower()
-    random = config.parse('[monte_carlo]\nevent = { type = "swell", added = ["1 kg", "9 kg"] }').random
+    random = (
+        config.parse('[monte_carlo]\nevent = { type = "swell", added = ["1 kg", "9 kg"] }')
+        .plans["random_overloads"]
+        .event
+    )
     event = random.event("left", random.draw(np.random.default_rng(1)))
     assert isinstance(event, swell) and 1.0 <= event.p.added <= 9.0
     with pytest.raises(InputError, match=r"event\.swell_left\.added = -1 kg: must be >= 0 kg"):

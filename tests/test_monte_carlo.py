@@ -21,15 +21,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
-from chainunit.study.random_remarks import remark_on_random_overloads
 from command import chainunit
 
+from chainunit.capabilities.random_overloads import page
 from chainunit.capabilities.random_overloads import runs as monte_carlo
 from chainunit.core.errors import RunError
 from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.reading.text import number as shown
-from chainunit.report import runs as report_runs
 from chainunit.report.blocks import Source
 from chainunit.report.terminal import plain_line
 from chainunit.study import block_runs, quantiles
@@ -63,7 +62,8 @@ SCRIPT = """
     from pathlib import Path
     from chainunit.study.config import parse
     from chainunit.drives.dc_motor import DcMotor
-    from chainunit.study import monte_carlo, quantiles
+    from chainunit.capabilities.random_overloads import runs as monte_carlo
+    from chainunit.study import quantiles
     from chainunit.study.drive import Drive
 
     if __name__ == "__main__":
@@ -222,8 +222,8 @@ def test_quantiles_have_intervals_or_are_left_out(killed):
             assert each.low < each.value < each.high
         entry = result.as_dict()["quantiles"]["crank_torque_peak"][entries[-1]]
         assert entry["low"] == {"value": sizes[entries[-1]].low, "unit": "N.m"}
-        assert bool(result.remark) == (number < 368)
-    remark = monte_carlo.MonteCarloResult(few.isel(run=slice(0, 30)), killed[0], "cs").remark
+        assert bool(result.shortage) == (number < 368)
+    remark = monte_carlo.MonteCarloResult(few.isel(run=slice(0, 30)), killed[0], "cs").shortage
     assert "30 runs are too few" in remark and "the 99 % quantile takes 368" in remark
 
 
@@ -384,13 +384,11 @@ def test_a_current_at_its_limit_and_damaged_batches_are_noted(current, told):
     assert drive.parameters.limit.i == 4.4
     quantiles = {"current_peak": {"q50": Estimate(2.0, 1.0, 3.0), "q95": Estimate(current, 4.0, 4.4)}}
     random = SimpleNamespace(
-        quantiles=lambda: quantiles, remark="", damaged_batches=1, file=Path("out/runs.zarr")
+        quantiles=lambda: quantiles, shortage="", damaged_batches=1, file=Path("out/runs.zarr")
     )
     notes = {}
-    study = SimpleNamespace(
-        monte_carlo=random, drive=drive, note=lambda kind, words, **of: notes.update({kind: of})
-    )
-    remark_on_random_overloads(study)
+    study = SimpleNamespace(drive=drive, note=lambda kind, words, **of: notes.update({kind: of}))
+    monte_carlo.MonteCarloResult.remark(random, study)
     at = notes.get("random overloads at current limit")
     assert at == ({"limit": (4.4, "A")} if told else None)
     words = "1 batch of runs in runs.zarr was damaged, and was computed anew"
@@ -435,7 +433,7 @@ def test_runs_of_the_fmus_are_told_as_such(key, words, monkeypatch):
     # without quantiles there is no table, and the line stands alone
     entries = {"runs": {"value": 4, "unit": "1"}, "confidence": {"value": 0.95, "unit": "1"}}
     entries |= {"quantiles": {}, "sides": {}, "method": task.method}
-    (block,) = report_runs._random(Source({"monte_carlo": entries}))
+    (block,) = page.blocks(Source({"monte_carlo": entries}), None)
     assert plain_line(block.line) == f"The random overloads were run {words}."
 
 

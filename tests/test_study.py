@@ -62,7 +62,7 @@ def test_study_writes_numbers_series_plots_and_fmus(done):
         "fmu",
         "result.md",
         NAME,
-        *study_report.PICTURES,
+        *study_report.pictures(),
     } - {
         "driveline.png",
         "chain_sweep.png",

@@ -16,7 +16,7 @@ SPEED = "[[sweep.parameter]]\nname = 'run.crank_speed'\nvalues = ['30 rev/min', 
 
 
 def plan_of(*parts, head=""):
-    return parse(f"[sweep]\n{head}\n" + "".join(parts)).sweep
+    return parse(f"[sweep]\n{head}\n" + "".join(parts)).plans["sweep"]
 
 
 def test_a_grid_has_all_combinations_in_order():
@@ -80,7 +80,7 @@ def test_values_of_the_study_and_the_results():
     force = "[[sweep.parameter]]\nname = 'event.jam_left.force'\nfrom = 100\nto = '2 kN'\n"
     plan = plan_of(force, head="measures = ['current_peak', 'crank_torque_peak']\nbest = 'crank_torque_peak'")
     assert plan.event == "jam_left" and plan.quantities == () and plan.best == "crank_torque_peak"
-    assert parse("").sweep is None
+    assert parse("").plans["sweep"] is None
 
 
 @pytest.mark.parametrize(

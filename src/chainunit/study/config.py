@@ -105,7 +105,8 @@ class Config:
     lines: Mapping[str, int] = dataclasses.field(default_factory=dict)
     """the line of each key in the file"""
     values: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-    """by table, the values of its declared quantities; None for an optional table that the file does not have"""
+    """by table of a capability, the values of its declared quantities; None for an optional table that the file does
+    not have"""
     plans: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     """by capability, the plan that its tables state, or None"""
 
@@ -148,6 +149,11 @@ class Config:
     def of_catalogue(self) -> bool:
         """Whether the motor is one of the catalogue."""
         return self.plate is not None or self.sizing is not None
+
+    def table(self, name: str) -> Any:
+        """The values of a table of the base or of a capability; None for an optional table that the file does not
+        have."""
+        return getattr(self, name) if name in _OWN_TABLES else self.values[name]
 
     def gives(self, section: str) -> bool:
         """Whether the file sets anything in that table."""
@@ -341,7 +347,7 @@ def _config(
         slips=unusual,
         units=chosen_units(checked.report.units),
         labels=checked.report.labels,
-        values=of_study,
+        values={name: x for name, x in of_study.items() if name not in _OWN_TABLES},
         plans=plans,
         **{name: of_study[name] for name in _OWN_TABLES},
     )

@@ -26,6 +26,8 @@ class FileSection:
     """title of the table in a report"""
     is_used: Callable[[Any], bool] = lambda config: True
     """whether a study uses the table, by its configuration"""
+    with_findings: bool = False
+    """whether a study uses the table only where the analysis of the same name has findings"""
     apart: bool = False
     """whether the result has other things of the same names"""
     form: Callable[..., type[BaseModel]] = schema

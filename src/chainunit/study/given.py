@@ -9,7 +9,6 @@ from typing import Any
 from ..core.quantities import variables
 from ..drives.line_table import Damping
 from ..reading.text import entries, entry
-from .analyses import all_analyses
 from .config import Config
 from .record import StudyRecord
 from .registry import registered
@@ -105,11 +104,12 @@ def _system(config: Config) -> dict[str, Any]:
 
 
 def _tables(study: StudyRecord) -> Iterator[GivenSection]:
-    config, analyses = study.config, {analysis.name for analysis in all_analyses()}
+    config = study.config
     randoms = {key: each for part in registered() for key, each in part.random_events(config).items()}
     for name, section in all_sections().items():
-        values = config.values[name]
-        if values is None or not section.is_used(config) or (name in analyses and name not in study.findings):
+        values = config.table(name)
+        is_idle = section.with_findings and name not in study.findings
+        if values is None or not section.is_used(config) or is_idle:
             continue
         prefix = f"{name}."
         keys = {full.removeprefix(prefix): x for full, x in config.choices.items() if full.startswith(prefix)}

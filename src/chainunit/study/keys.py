@@ -192,7 +192,7 @@ def _of_motor(name: str) -> Iterator[Key]:
 
 
 def _of_section(name: str, section: FileSection) -> Iterator[Key]:
-    values = _study().values[name]
+    values = _study().table(name)
     if values is None:
         values = section.default or section.declaration()
     yield from _numbers(section.declaration, values, sources=section.follows)

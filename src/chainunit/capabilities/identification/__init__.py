@@ -83,7 +83,9 @@ class IdentificationCapability(Capability):
             follows=FROM_RECORDING,
             forms={"file": {"minLength": 1}},
         ),
-        "observer": FileSection(ObserverTable, optional=True, title="Load observer", apart=True),
+        "observer": FileSection(
+            ObserverTable, optional=True, title="Load observer", with_findings=True, apart=True
+        ),
     }
 
     def rules(self) -> Iterable[Rule]:

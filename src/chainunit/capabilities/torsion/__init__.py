@@ -36,6 +36,7 @@ class TorsionCapability(Capability):
                 ),
             },
             title="Torsion of the driveline",
+            with_findings=True,
             order=(("slowest", ">", "fastest"), ("bend_low", ">", "bend_high")),
         )
     }
