@@ -19,6 +19,7 @@ from figures import parser, save
 
 from chainunit.study.choice import choose
 from chainunit.study.config import load
+from chainunit.study.drive_fmus import export_drive, with_files
 from chainunit.system import CoSimulation
 
 CHOSEN = ("motor.w", "motor.tau", "machine.tau")
@@ -40,7 +41,7 @@ def one(way: str, folder: Path, seconds: float) -> dict[str, float | str]:
         options["file"] = folder / options["file"]
     signals = {**drive.loads(config.feed), **drive.reference(config.run.crank_speed, config.run.ramp)}
     began = time.perf_counter()
-    with CoSimulation(drive.system(files), signals) as simulation:
+    with CoSimulation(with_files(drive, files), signals) as simulation:
         run = simulation.run(1.0 if way == "a second" else seconds, 1e-3, **options)
     rows, variables = run.sizes["time"], len(run.data_vars)
     run.close()
@@ -61,7 +62,7 @@ def main() -> None:
         return
     with tempfile.TemporaryDirectory() as folder:
         config = load()
-        choose(config, Path(folder), lambda *_: None).drive.export(Path(folder))
+        export_drive(choose(config, Path(folder), lambda *_: None).drive, Path(folder))
         for way in WAYS:
             file = Path(folder) / "figures.json"
             command = [sys.executable, __file__, "--way", way, "--folder", folder, "--json", str(file)]

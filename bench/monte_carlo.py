@@ -26,6 +26,7 @@ from chainunit.capabilities.random_overloads import runs as monte_carlo
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
+from chainunit.study.drive_fmus import export_drive
 from chainunit.system.instance import Fmu, Instance
 
 STUDY = "[monte_carlo]\nruns = {runs}\nduration = 2\n[coupling]\ntrip_torque = 1000\n"
@@ -37,7 +38,7 @@ def task_of(runs: int, folder: Path) -> monte_carlo.RandomTask:
     """The packaged study; its FMUs are written into the folder."""
     config = parse(STUDY.format(runs=runs))
     drive = Drive(DcMotor, config.motor, config.machine)
-    files, _ = drive.export(folder)
+    files, _ = export_drive(drive, folder)
     return monte_carlo.RandomTask(config, drive, files, 6.7)
 
 

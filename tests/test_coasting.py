@@ -8,6 +8,8 @@ from scipy.integrate import cumulative_simpson
 
 from chainunit.report.study import report
 from chainunit.study import config
+from chainunit.study.drive_fmus import coasting_model, coasting_parameters
+from chainunit.study.readings import crank_speed
 from chainunit.study.rig import Rig
 from chainunit.study.run import Runner, run_study
 from chainunit.system import System, monolithic
@@ -66,9 +68,9 @@ def test_it_goes_on_as_the_same_machine(organ, more, trip, tmp_path, monkeypatch
     if organ == "chain":
         return
     # the equations of the direct model, without its FMU
-    model = study.drive.coasting_model
+    model = coasting_model(study.drive)
     start = model.start_from({"phi0": float(run["machine.phi0"][-1]), "w0": w})
-    p = model.parameter_layout.from_names(study.drive.coasting_parameters() | start)
+    p = model.parameter_layout.from_names(coasting_parameters(study.drive) | start)
     loads = study.drive.loads(study.config.feed)
     rig = Rig(study.config, study.drive, {})
     (event,) = Runner(study, rig, print).events
@@ -86,7 +88,7 @@ def test_the_axis_of_time_ends_where_the_crank_stands(tmp_path, monkeypatch):
     assert study.failure is None
     figure = next(each for each in report(study).figures if each.name == "time-jam-left")
     event, coasting = study.event["jam_left"], study.runs["jam_left_coasting"]
-    time, speed = coasting["time"].values - event, abs(study.drive.crank_motion(coasting)[1])
+    time, speed = coasting["time"].values - event, abs(crank_speed(study.drive, coasting))
     stands = time[np.flatnonzero(speed > 0.02 * 4.0)[-1]]
     axis = figure.panels[0][0].x
     assert stands < axis.high < 2.0 * stands < 0.5 * time[-1]

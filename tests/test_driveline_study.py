@@ -34,6 +34,7 @@ from chainunit.report import blocks, figure
 from chainunit.study import config, parts, remarks
 from chainunit.study.analysis import Work
 from chainunit.study.choice import choose
+from chainunit.study.drive_fmus import export_drive, with_files
 from chainunit.study.record import StudyRecord
 from chainunit.study.rig import Rig
 from chainunit.study.shaft import UNEVEN, remedies, two_masses
@@ -654,10 +655,10 @@ def test_the_co_simulation_finds_the_steady_motion_of_the_analysis(tmp_path):
     )
     line = dataclasses.replace(drive.line, w_start=w)
     drive = dataclasses.replace(drive, parameters=motor, line=line)
-    files, _ = drive.export(tmp_path)
+    files, _ = export_drive(drive, tmp_path)
     load = found.analysis.rotation.load
     signals = {"motor.w_ref": w, "motor.tau_ff": 0.0, "machine.load": study.config.feed.load}
-    with CoSimulation(drive.system(files), signals | {"motor.tau_ff": load}) as simulation:
+    with CoSimulation(with_files(drive, files), signals | {"motor.tau_ff": load}) as simulation:
         run = simulation.run(2.5, 2.5e-4).sel(time=slice(2.2, None))
     assert float(run["motor.w"].mean()) == pytest.approx(w, rel=0.01)
     reached = float(run["motor.w"].mean())

@@ -18,6 +18,7 @@ from chainunit.study.catalogue_drive import catalogue_drive
 from chainunit.study.cycle import cycle
 from chainunit.study.drive import Drive
 from chainunit.study.event import TYPES, Event, Role, Timing, angle_of_begin, in_groups
+from chainunit.study.readings import crank_angle, only_whole_turns
 from chainunit.study.result import as_dict
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
@@ -273,14 +274,14 @@ def test_an_event_begins_at_its_angle_however_uneven_the_turn_is():
     values = rig.config
     with rig.from_rest() as simulation:
         run = rig.start_up(simulation, values.stop, lambda time: None, {}).run
-        saved, angle = simulation.save(), float(rig.drive.crank_motion(run)[0][-1])
-        turns = rig.drive.whole_turns(run.sel(time=slice(saved - 1.1 * values.turn, None)), 1)
+        saved, angle = simulation.save(), float(crank_angle(rig.drive, run)[-1])
+        turns = only_whole_turns(rig.drive, run.sel(time=slice(saved - 1.1 * values.turn, None)), 1)
         speed = 2.0 * math.pi / np.ptp(turns["time"].values)
         events = list(values.events.values())
         errors, of_mean_speed = [], []
         for event, lead in zip(events, rig.leads(simulation, events, angle, speed), strict=True):
             branch = rig.follow(simulation, event, saved + lead, saved + lead + 0.5).run
-            time, phi = branch["time"].values, rig.drive.crank_motion(branch)[0]
+            time, phi = branch["time"].values, crank_angle(rig.drive, branch)
             errors.append(
                 math.remainder(np.interp(saved + lead, time, phi) - event.p.crank_angle, 2.0 * math.pi)
             )

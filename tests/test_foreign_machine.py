@@ -28,8 +28,10 @@ from chainunit.reading.text import number as text_of
 from chainunit.study import config
 from chainunit.study.choice import choose
 from chainunit.study.cycle import cycle
+from chainunit.study.drive_fmus import export_drive, with_files
 from chainunit.study.event import TYPES, Event, Role, Timing
 from chainunit.study.package import study_system
+from chainunit.study.readings import crank_torque
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
 from chainunit.study.sizing import size
@@ -210,7 +212,7 @@ def test_motor_and_machine_of_somebody_else(folder, burst):
         accelerated = np.gradient(speed, run["time"].values) / RATIO
         whole = torque + inertia * accelerated
         inside = slice(5, -5)
-        error = np.abs(study.drive.crank_torque(run) - whole)[inside]
+        error = np.abs(crank_torque(study.drive, run) - whole)[inside]
         assert np.max(error) < 0.02 * np.max(np.abs(whole))
     steady = study.answers["steady"]
     turns = (
@@ -245,7 +247,7 @@ def test_the_step_is_of_second_order(folder):
         drive = choose(
             parse(at, f"{STUDY}{MACHINE}motor = 'ForeignMotor.fmu'\n{OTHER_NAMES}"), at, None
         ).drive
-        files, _ = drive.export(at)
+        files, _ = export_drive(drive, at)
         rig = Rig(parse(at, STUDY + MACHINE), drive, files)
         w_ref = Profile(0.0, ((0.0, 0.3, SPEED * RATIO),))
         exact = together(0.6, w_ref, lambda t: PRESSURE)
@@ -387,8 +389,10 @@ def test_a_package_holds_their_files_as_they_are(tool, folder, tmp_path):
     got = run_in(tool, tmp_path / "both.ssp", ["motor.rotor_speed"], 0.3, 1e-3)
     study = parse(folder, (folder / "both.toml").read_text())
     drive = choose(study, tmp_path, None).drive
-    files, _ = drive.export(tmp_path)
-    with CoSimulation(replace(drive.system(files), start=study_system(study, drive).start)) as simulation:
+    files, _ = export_drive(drive, tmp_path)
+    with CoSimulation(
+        replace(with_files(drive, files), start=study_system(study, drive).start)
+    ) as simulation:
         reference = simulation.run(0.3, 1e-3)["motor.w"].values[1:]
     assert np.max(np.abs(got[:, 0] - reference)) < 2e-4 * np.max(reference)
 

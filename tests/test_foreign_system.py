@@ -24,6 +24,8 @@ from chainunit.drives.motor import Motor
 from chainunit.study import config, run
 from chainunit.study.choice import with_motor
 from chainunit.study.drive import Drive
+from chainunit.study.drive_fmus import export_drive, with_files
+from chainunit.study.readings import crank_motion, crank_torque, largest_torque, pull_out_torque
 from chainunit.system import (
     CoSimulation,
     ModelExchange,
@@ -321,11 +323,11 @@ def test_a_drive_with_a_motor_of_somebody_else(file, tmp_path):
     given = config.load()
     drive = Drive(Motor, None, given.machine, foreign=foreign_component(file, "motor"))
     assert drive.follows
-    fmus, made = drive.export(tmp_path, "python")
+    fmus, made = export_drive(drive, tmp_path, "python")
     assert set(made) == {"machine"} and fmus["motor"] == file
     speed = given.run.crank_speed
     with CoSimulation(
-        drive.system(fmus), {**drive.loads(given.feed), **drive.reference(speed, 0.3)}
+        with_files(drive, fmus), {**drive.loads(given.feed), **drive.reference(speed, 0.3)}
     ) as simulation:
         start = simulation.run(1.0, 0.002)
         simulation.save()
@@ -335,15 +337,15 @@ def test_a_drive_with_a_motor_of_somebody_else(file, tmp_path):
             simulation.restore()
             simulation.signals = {**drive.loads(given.feed), **drive.reference(speed), **more}
             runs.append(simulation.run(1.2, 0.002))
-    _, turning = drive.crank_motion(start)
+    _, turning = crank_motion(drive, start)
     assert turning[-1] == pytest.approx(speed, rel=0.02)
-    plain, jammed = (np.max(np.abs(drive.crank_torque(run))) for run in runs)
+    plain, jammed = (np.max(np.abs(crank_torque(drive, run))) for run in runs)
     assert jammed > 1.5 * plain
     assert certify(runs[1], drive.graph)["machine"][1] < 1e-2
     for unknown in (
         lambda: drive.rotor_inertia,
-        lambda: drive.largest_torque(start, 300.0),
-        lambda: drive.pull_out(start, 300.0),
+        lambda: largest_torque(drive, start, 300.0),
+        lambda: pull_out_torque(drive, start, 300.0),
     ):
         with pytest.raises(
             InputError, match=r"ForeignMotor\.fmu: .* is not known, as the motor is an FMU of somebody else"

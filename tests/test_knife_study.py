@@ -33,6 +33,7 @@ from chainunit.study.drive import Drive
 from chainunit.study.limits import given_motor
 from chainunit.study.measures import read_answers
 from chainunit.study.parts import example
+from chainunit.study.readings import only_whole_turns
 from chainunit.study.record import StudyRecord
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
@@ -103,8 +104,8 @@ def steady_turns(rig):
     """The steady turns of a rig, and their answers."""
     with rig.from_rest() as simulation:
         started = rig.start_up(simulation, rig.config.stop, lambda time: None, {})
-    turns = rig.drive.whole_turns(
-        started.run.sel(time=slice(started.steady_from, None)), rig.config.run.turns
+    turns = only_whole_turns(
+        rig.drive, started.run.sel(time=slice(started.steady_from, None)), rig.config.run.turns
     )
     return turns, read_answers(Window(Phase.STEADY, turns, rig.drive, (), rig.config.run.crank_speed))
 

@@ -14,6 +14,8 @@ from chainunit.core.engines import MATH
 from chainunit.core.quantities import Layout
 from chainunit.report.study import report
 from chainunit.study.config import parse
+from chainunit.study.drive_fmus import coasting_model, coasting_parameters
+from chainunit.study.readings import crank_speed
 from chainunit.study.run import run_study
 
 HEAD = 'event = []\n[system]\nmachine = "KnifeDrive"\n'
@@ -124,8 +126,8 @@ def test_a_coupling_opens_in_a_hard_cut_and_the_machine_comes_to_rest(tmp_path):
     losses = cumulative_trapezoid(coasting["machine.dissipated_power"].values[1:], time[1:], initial=0.0)
     assert np.max(np.abs(energy[1:] + losses - energy[1])) < 1e-3
     # the same by another integrator, from where the coupling let go
-    model = study.drive.coasting_model
-    p = model.prepared(MATH, model.parameter_layout.from_names(study.drive.coasting_parameters()))
+    model = coasting_model(study.drive)
+    p = model.prepared(MATH, model.parameter_layout.from_names(coasting_parameters(study.drive)))
     u = model.input_layout.from_names({"tau": 0.0, "cut_force": 6e4})
     states = Layout(model.States)
 
@@ -145,7 +147,7 @@ def test_a_cardan_line_on_the_crank(tmp_path):
     study = run(HEAD + "[flywheel]\nJ = 0.8\ncompare = []\nfluctuation = 0.045\n" + CARDAN, tmp_path)
     steady, rows = study.answers["steady"], study.steady
     # the line gives on what the motor puts in: of a turn the work of the cut
-    tau, w = rows["driveline.tau3"].values, study.drive.crank_motion(rows)[1]
+    tau, w = rows["driveline.tau3"].values, crank_speed(study.drive, rows)
     work = np.trapezoid(tau * w, rows["time"].values)
     assert work == pytest.approx(cut_work(study), rel=0.01)
     assert steady.crank_torque_mean == pytest.approx(cut_work(study) / (2.0 * math.pi), rel=0.02)

@@ -14,6 +14,7 @@ from chainunit.drives import induction_motor as induction
 from chainunit.study.config import parse
 from chainunit.study.judgement import motor_limits, motor_verdict
 from chainunit.study.limits import SPEED_DEVIATION, heating
+from chainunit.study.readings import breakdown_speed
 from chainunit.study.run import run_study
 
 KNIFE = f"""{event_line("dip", turns=1)}
@@ -86,7 +87,7 @@ def test_a_motor_below_its_breakdown_speed_stalls_under_the_load(tmp_path):
     study, verdict, warnings = studied(STALLED.format(events="[]"), tmp_path)
     steady, motor = study.answers["steady"], study.drive.parameters
     missed = warnings["speed missed"].text
-    below = study.drive.breakdown_speed(study.steady)
+    below = breakdown_speed(study.drive, study.steady)
     assert steady.speed_mean < 0.5 * below and "the motor stalls under the load" in missed
     assert f"below {below:.2f} rad/s, the speed of its breakdown torque" in missed
     assert "slip" not in missed and "verload" not in missed

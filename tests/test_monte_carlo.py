@@ -36,6 +36,7 @@ from chainunit.study.block_runs import BlockRuns, Cause, EventSimulation
 from chainunit.study.choice import choose
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
+from chainunit.study.drive_fmus import export_drive, with_files
 from chainunit.study.quantiles import Estimate
 from chainunit.study.rig import Rig
 from chainunit.system import CoSimulation, monolithic
@@ -69,7 +70,7 @@ SCRIPT = """
     if __name__ == "__main__":
         config = parse(Path("study.toml").read_text())
         drive = Drive(DcMotor, config.motor, config.machine)
-        files, _ = drive.export(Path("."))
+        files, _ = export_drive(drive, Path("."))
         task = monte_carlo.RandomTask(config, drive, files, 1.0, cosimulated=True)
         result = monte_carlo.run(task, Path("."), lambda what, done, todo: print(done, todo, flush=True), workers=2)
         print("resumed", result.earlier_runs, result.damaged_batches, flush=True)
@@ -171,7 +172,7 @@ def test_a_run_is_what_its_number_says(killed):
     task, results = task_of(killed[0]), opened(killed[0]).dataset
     config, drive = task.config, task.drive
     signals = {**drive.loads(config.feed), **drive.reference(config.run.crank_speed, config.run.ramp)}
-    with CoSimulation(drive.system(task.files), signals) as simulation:
+    with CoSimulation(with_files(drive, task.files), signals) as simulation:
         simulation.run(1.0, config.run.step)
         simulation.save()
         for number in (7, 3, 20):
@@ -449,7 +450,7 @@ def compiled_task(text, folder=None, runs=6):
     """The task of a study on its compiled system; the FMUs are written where a `folder` is given."""
     config = parse(text.format(runs=runs).replace("step = 0.004", "step = 0.001"))
     drive = choose(config, Path("fmu"), lambda *said: None).drive
-    files = drive.export(folder)[0] if folder else {}
+    files = export_drive(drive, folder)[0] if folder else {}
     return monte_carlo.RandomTask(config, drive, files, 1.2)
 
 

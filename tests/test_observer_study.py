@@ -20,6 +20,7 @@ from chainunit.drives.terminal_signals import terminal_signals
 from chainunit.machines.load_observer import FARTHEST, Inputs, rotor_torque
 from chainunit.study import config
 from chainunit.study.choice import choose, with_parts_beside
+from chainunit.study.drive_fmus import with_files
 from chainunit.study.package import export_study, study_system
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
@@ -125,7 +126,7 @@ def test_the_compiled_system_estimates_the_same(study):
         whole = simulation.run(4.0, 0.004, names=full)
     errors = []
     for step in (0.004, 0.002, 0.001):
-        with CoSimulation(drive.system(files), signals) as simulation:
+        with CoSimulation(with_files(drive, files), signals) as simulation:
             run = simulation.run(4.0, step, every=round(0.004 / step), names=full)
         late = run["time"].values > 2.5
         errors.append([np.max(np.abs(run[name].values - whole[name].values)[late]) for name in full])

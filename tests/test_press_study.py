@@ -24,6 +24,7 @@ from chainunit.report.study_motion import machine_state
 from chainunit.study import config
 from chainunit.study.event_torques import effects
 from chainunit.study.protection import CouplingEffect, spares
+from chainunit.study.readings import crank_motion, crank_torque
 from chainunit.study.run import run_study
 
 PRESS = Path(__file__).parents[1] / "examples" / "linkages" / "slider_crank_press.toml"
@@ -120,7 +121,7 @@ def test_force_over_stroke(study, figures):
     steady = study.steady
     state = machine_state(study, steady)
     ((link, (way, force)),) = loads_on_slides(state).items()
-    angle, _ = study.drive.crank_motion(steady)
+    angle, _ = crank_motion(study.drive, steady)
     r, l, e = 0.08, 0.36, 0.025
     rod = np.sqrt(l * l - (e - r * np.cos(angle)) ** 2)
     y = r * np.sin(angle) - rod
@@ -144,8 +145,8 @@ def test_force_over_stroke(study, figures):
 def test_a_coupling_opens_too_late_for_a_press(study):
     """The force of the workpiece comes at once, so that the peak lies within the release time."""
     run = study.runs["surge_press_force"].sel(time=slice(study.event["surge_press_force"], None))
-    torque, time = np.abs(study.drive.crank_torque(run)), run["time"].values
-    setting = 1.25 * np.max(np.abs(study.drive.crank_torque(study.steady)))
+    torque, time = np.abs(crank_torque(study.drive, run)), run["time"].values
+    setting = 1.25 * np.max(np.abs(crank_torque(study.drive, study.steady)))
     (effect,) = effects(study, setting).values()
     trip = time[np.flatnonzero(np.abs(run["motor.tau"].values) * study.drive.ratio > setting)[0]]
     until = torque[(time <= trip + 0.005) & (time >= trip - 0.01)]
@@ -161,8 +162,8 @@ def test_power_over_the_turn_and_histogram(study, figures):
     crank = curves["crank"]
     assert np.all(np.diff(crank.x) > 0.0) and 0.0 <= crank.x[0] and crank.x[-1] < 2.0 * math.pi
     # energy of the turn by angle: torque over angle is power over speed
-    torque = study.drive.crank_torque(study.steady)
-    angle, speed = study.drive.crank_motion(study.steady)
+    torque = crank_torque(study.drive, study.steady)
+    angle, speed = crank_motion(study.drive, study.steady)
     k = len(angle) // 2
     at = angle[k] % (2.0 * math.pi)
     assert np.interp(at, crank.x, crank.y) == pytest.approx(torque[k] * speed[k], rel=1e-9)

@@ -34,11 +34,13 @@ from chainunit.study.coupling_alternatives import (
     slip_run,
 )
 from chainunit.study.drive import Drive
+from chainunit.study.drive_fmus import coasting_model, coasting_parameters
 from chainunit.study.event_torques import effects
 from chainunit.study.gear_loss import GearAnalysis
 from chainunit.study.judgement import motor_verdict
 from chainunit.study.measures import read_answers
 from chainunit.study.protection import CouplingEffect, Obstacle, Setting, Way, stall
+from chainunit.study.readings import crank_torque, largest_torque, pull_out_torque
 from chainunit.study.relay import CLASSES, MULTIPLE, relay_trip, start_class
 from chainunit.study.result import as_dict
 from chainunit.study.rig import Rig
@@ -298,7 +300,7 @@ def test_a_drive_whose_start_is_harder_than_its_shocks_has_no_coupling(on_line):
     ordered = f"gear with a rated output torque of at least {gear['rated_torque']['value']:.0f} N m"
     assert f"{ordered}, decided by a start, in which" in said
     # without a coupling the gear carries the whole overload, with one what passes it; a gear for it is ordered
-    block = float(np.max(np.abs(on_line.drive.crank_torque(on_line.runs["blocked"]))))
+    block = float(np.max(np.abs(crank_torque(on_line.drive, on_line.runs["blocked"]))))
     assert gear["overload"]["value"] == pytest.approx(block, rel=1e-3)
     quick = dataclasses.replace(on_line.config.gear, start_factor=1.0)
     given = on_line.config.given | {"gear.start_factor"}
@@ -516,8 +518,8 @@ def test_a_slip_clutch_slips_for_as_long_as_two_shafts_apart(on_line):
     times = np.linspace(0.0, 2.0 * clutch.numbers.slip_time, 4001)
     motor = ModelComponent(drive.motor, drive.fmu_parameters)
     speed = monolithic(System({"motor": motor}), {"motor.load.tau_bias": capacity}, times)["motor.w"].values
-    model = drive.coasting_model
-    p = model.parameter_layout.from_names(drive.coasting_parameters() | {"phi_start": angle})
+    model = coasting_model(drive)
+    p = model.parameter_layout.from_names(coasting_parameters(drive) | {"phi_start": angle})
     loads = {full: x for full, x in drive.loads(on_line.config.feed).items() if full.startswith("machine.")}
     machine = System({"machine": ModelComponent(model, p)})
     driven = monolithic(machine, {**loads, "machine.tau": capacity}, times)["machine.w"].values
@@ -713,7 +715,7 @@ def test_a_motor_at_its_voltage_limit_has_no_reserve(tmp_path):
     left = p.armature.k * (p.limit.v - p.armature.k * run["motor.w"].values) / warm
     limit = np.minimum(left, p.armature.k * p.limit.i)
     driving = run["motor.air_gap_tau"].values * run["motor.w"].values > 0.0
-    limits = study.drive.largest_torque(run, result.winding_temperature)
+    limits = largest_torque(study.drive, run, result.winding_temperature)
     assert limits[driving] == pytest.approx(limit[driving], rel=1e-6, abs=1e-6)
     assert np.min(limits) < 0.5 * p.armature.k * p.limit.i
 
@@ -732,15 +734,15 @@ def test_the_largest_torque_is_that_of_voltage_frequency_and_a_warm_winding():
         {"time": np.arange(4.0)},
     )
     drive = Drive(InductionMotor, p, config.load().machine)
-    result = drive.largest_torque(run, T)
+    result = largest_torque(drive, run, T)
     for k in range(3):
         w = 2.0 * math.pi * hertz[k] / p.pole_pairs * np.linspace(0.0, 1.0, 1001)
         torques = [steady(MATH, p, float(x), volts[k] / 400.0, float(hertz[k]), T).air_gap_tau for x in w]
         assert result[k] == pytest.approx(max(torques), rel=3e-3)
     assert result[3] == 0.0 and result[1] < 0.3 * result[0] and result[2] < 0.5 * result[0]
     # warm less than cold, and behind friction less than at the air gap
-    assert result[0] < drive.largest_torque(run, T_RATED)[0]
-    assert drive.pull_out(run.isel(time=[0]), T) < result[0] * drive.ratio
+    assert result[0] < largest_torque(drive, run, T_RATED)[0]
+    assert pull_out_torque(drive, run.isel(time=[0]), T) < result[0] * drive.ratio
 
 
 def test_behind_an_open_coupling_the_machine_has_its_chains(tmp_path):

@@ -15,6 +15,7 @@ from chainunit.study.config import parse
 from chainunit.study.cycle import cycle
 from chainunit.study.gear_loss import GearAnalysis
 from chainunit.study.measures import read_measure
+from chainunit.study.readings import only_whole_turns, shaft_power
 from chainunit.study.record import StudyRecord
 from chainunit.study.remarks import _on_steady_running
 from chainunit.study.rig import Rig
@@ -61,10 +62,10 @@ def mill():
     with rig.from_rest() as simulation:
         start = rig.start_up(simulation, config.stop, lambda time: None, {})
         later = simulation.run(simulation.time + 4.2 * config.turn, rig.step)
-    first = drive.whole_turns(start.run.sel(time=slice(9.5, None)), 1)
-    told = drive.whole_turns(start.run.sel(time=slice(start.steady_from, None)), 1)
+    first = only_whole_turns(drive, start.run.sel(time=slice(9.5, None)), 1)
+    told = only_whole_turns(drive, start.run.sel(time=slice(start.steady_from, None)), 1)
     last = later.sel(time=slice(later["time"][-1].item() - 1.1 * config.turn, None))
-    return rig, first, told, drive.whole_turns(last, 1)
+    return rig, first, told, only_whole_turns(drive, last, 1)
 
 
 def window(rig, turns, phase=Phase.STEADY):
@@ -107,10 +108,10 @@ def test_the_energy_that_is_held_grows_by_the_power_that_comes_in(mill):
     w, p = first["motor.w"].values, rig.drive.fmu_parameters
     to_rotor = over_turn((first["motor.air_gap_tau"].values - first["motor.tau"].values - p.rotor.d * w) * w)
     lost = first["machine.dissipated_power"].values
-    to_machine = over_turn(rig.drive.shaft_power(first) - lost)
+    to_machine = over_turn(shaft_power(rig.drive, first) - lost)
     assert behind[-1] - behind[0] == pytest.approx(to_machine, abs=0.05)
     assert held[-1] - held[0] == pytest.approx(to_rotor + to_machine, rel=0.01)
-    share = (to_rotor + to_machine) / over_turn(np.abs(rig.drive.shaft_power(first)))
+    share = (to_rotor + to_machine) / over_turn(np.abs(shaft_power(rig.drive, first)))
     assert energy_gap(rig.drive, first) == pytest.approx(share, rel=0.01)
 
 

@@ -21,7 +21,9 @@ from chainunit.report.study_motion import motion
 from chainunit.study import config
 from chainunit.study.choice import choose
 from chainunit.study.cycle import cycle
+from chainunit.study.drive_fmus import coasting_parameters
 from chainunit.study.package import export_study, start_of
+from chainunit.study.readings import crank_torque
 from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
 from chainunit.study.shaft import RIGID, Cycles, rainflow, shaft_answers, torsion
@@ -90,7 +92,7 @@ def test_a_rigid_drive_carries_what_the_machine_and_the_inertia_take(study, tmp_
     )
     plain = run_study(config.parse(f"{heavier}\n{motor}"), tmp_path)
     for name in ("start_up", "jam_left"):
-        reference = plain.drive.crank_torque(plain.runs[name])
+        reference = crank_torque(plain.drive, plain.runs[name])
         # the crank without the line is heavier by J4, so that this torque holds that of J4, too
         result = study.runs[name][RIGID].values
         if name == "start_up":
@@ -116,7 +118,7 @@ def test_before_or_behind_the_gear(tmp_path):
         np.testing.assert_allclose(a["motor.w"], b["motor.w"], rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(a["driveline.tau2"], 25.0 * b["driveline.tau2"], rtol=1e-7, atol=1e-6)
         np.testing.assert_allclose(
-            crank.drive.crank_torque(a), motor.drive.crank_torque(b), rtol=1e-7, atol=1e-6
+            crank_torque(crank.drive, a), crank_torque(motor.drive, b), rtol=1e-7, atol=1e-6
         )
     assert crank.statics.torsion.k_largest == pytest.approx(motor.statics.torsion.k_largest, rel=1e-12)
     assert crank.answers["jam_left"].speed_least == pytest.approx(
@@ -245,13 +247,13 @@ def test_a_coupling_that_opens_lets_line_and_machine_coast(tmp_path):
     coasting = study.runs["jam_left_coasting"]
     w = float(study.runs["jam_left"]["machine.w0"][-1])
     assert float(coasting["machine.w"][0]) == pytest.approx(w, rel=1e-12)
-    assert study.drive.coasting_parameters()["J_added"] == study.drive.line.J4
+    assert coasting_parameters(study.drive)["J_added"] == study.drive.line.J4
     # what stays behind is the energy of the machine before it opened, and of the line's end
     before = float(study.runs["jam_left"]["machine.kinetic_energy"][-1])
     assert jam.energy_behind == pytest.approx(before + 0.5 * study.drive.line.J4 * w * w, rel=1e-9)
     assert study.certificate["jam_left"]["driveline_energy_residual_share"] < 1e-3
     # nothing turns what is left alone
-    assert not np.any(study.drive.crank_torque(coasting))
+    assert not np.any(crank_torque(study.drive, coasting))
     assert "jam_left_coasting" in {clip.name for clip in motion(study).runs}
 
 

@@ -29,6 +29,7 @@ from chainunit.study.catalogue_drive import check_ratios
 from chainunit.study.config import parse
 from chainunit.study.cycle import cycle, energy_swing, needed_inertia
 from chainunit.study.drive import Drive
+from chainunit.study.drive_fmus import export_drive, with_files
 from chainunit.study.duty import duty_of, rms
 from chainunit.study.limits import Check
 from chainunit.study.measures import time_to_start
@@ -271,10 +272,10 @@ def test_peaks_are_of_both_sides(sized, tmp_path):
     assert np.mean(turns["left"] ** 2) > np.mean(turns["right"] ** 2)
 
     best = sized.chosen_candidate
-    files, _ = best.drive.export(tmp_path)
+    files, _ = export_drive(best.drive, tmp_path)
     rig = Rig(config, best.drive, files)
     signals = rig.signals(rig.event_signals(config.one_sided("right"), 2.0, {}))
-    with CoSimulation(best.drive.system(files), signals) as simulation:
+    with CoSimulation(with_files(best.drive, files), signals) as simulation:
         simulation.run(6.0, config.run.step)
         loaded = simulation.run(6.0 + 2.0 * math.pi / config.run.crank_speed, config.run.step)
     peak = float(np.max(np.abs(loaded["motor.air_gap_tau"])))
@@ -287,7 +288,7 @@ def test_the_crank_turns_as_asked(sized, tmp_path, series, tolerance):
     """With the exact ratio; with a preferred one nearly."""
     config = parse(f'{HEAVY}ratio_series = "{series}"\n')
     drive = sizing.proposal(config, sized.chosen_candidate.motor, sized.duty).drive
-    files, _ = drive.export(tmp_path)
+    files, _ = export_drive(drive, tmp_path)
     with Rig(config, drive, files).from_rest() as simulation:
         simulation.run(8.0, 1e-3)
         run = simulation.run(8.0 + 4.0 * math.pi / 3.0, 1e-3)

@@ -20,6 +20,7 @@ from chainunit.study.cycle import cycle
 from chainunit.study.limits import Check
 from chainunit.study.preference import rank
 from chainunit.study.ram_force import rams
+from chainunit.study.readings import crank_angle
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
 from chainunit.study.start_runs import START_ANGLES
@@ -68,7 +69,7 @@ def test_a_start_from_an_angle_by_the_compiled_system(pump):
     turned = dataclasses.replace(drive, parameters=p)
     with Rig(pump.config, turned, None).from_rest() as simulation:
         run = simulation.run(worst.start_time + 0.25, 1e-3)
-    assert float(drive.crank_motion(run)[0][0]) == pytest.approx(worst.angle)
+    assert float(crank_angle(drive, run)[0]) == pytest.approx(worst.angle)
     inertia, rotor = run["machine.J"].values, drive.fmu_parameters.rotor
     # J a + tau_bias of the machine, and what the motor gives less its own inertia and friction
     by_machine = inertia * run["motor.a"].values + run["machine.tau_bias"].values

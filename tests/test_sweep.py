@@ -37,6 +37,7 @@ from chainunit.study.block_runs import Cause
 from chainunit.study.choice import choose
 from chainunit.study.config import parse
 from chainunit.study.cycle import cycle
+from chainunit.study.readings import crank_angle
 from chainunit.study.verdict import two_bars
 from chainunit.work.job import CHECKS
 from chainunit.work.store import made_anew
@@ -412,7 +413,7 @@ def test_the_event_of_each_point_begins_at_its_own_crank_angle(monkeypatch):
 
     monkeypatch.setattr(sweep_runs, "read_measure", read)
     results = sweep.make_points(sweep.task_of(parse(gains() + text)), 0, 4)
-    begun = [window.drive.crank_motion(window.run)[0][0] for window in windows[:: len(windows) // 4]]
+    begun = [crank_angle(window.drive, window.run)[0] for window in windows[:: len(windows) // 4]]
     off = [
         math.remainder(x - asked, 2.0 * math.pi)
         for x, asked in zip(begun, results[sweep.plain_name("event.jam_left.crank_angle")], strict=True)

@@ -14,6 +14,7 @@ from ..reading.text import forms, number
 from ..study.bearings import hardest_run
 from ..study.cycle import Cycle
 from ..study.drive import Drive
+from ..study.readings import crank_speed, crank_torque
 from ..study.record import StudyRecord
 from . import blocks as b
 from . import figure as fig
@@ -224,9 +225,9 @@ def _transient(s: b.Source, study: StudyRecord, name: str) -> fig.Figure:
     run, drive, event = study.runs[name], study.drive, run_names.event_time(study, name)
     time = run["time"].values - (event or 0.0)
     low, high = float(time[0]), float(time[-1])
-    speed: list[fig.Item] = [fig.Curve(_SPEED.label, time, drive.crank_motion(run)[1], in_legend=False)]
+    speed: list[fig.Item] = [fig.Curve(_SPEED.label, time, crank_speed(drive, run), in_legend=False)]
     items: dict[fig.Axis, list[fig.Item]] = {
-        _TORQUE: [fig.Curve(_TORQUE.label, time, drive.crank_torque(run), in_legend=False)],
+        _TORQUE: [fig.Curve(_TORQUE.label, time, crank_torque(drive, run), in_legend=False)],
         _SPEED: speed,
         **_current(drive, run, time),
     }
@@ -237,7 +238,7 @@ def _transient(s: b.Source, study: StudyRecord, name: str) -> fig.Figure:
     coasting = study.runs.get(name + run_names.COASTING)
     if coasting is not None:
         after = coasting["time"].values - (event or 0.0)
-        of_crank = drive.crank_motion(coasting)[1]
+        of_crank = crank_speed(drive, coasting)
         speed.append(fig.Curve("crank behind the open coupling", after, of_crank, 1))
         # until the crank stands: the rest of the run shows nothing
         turning = np.flatnonzero(np.abs(of_crank) > 0.02 * study.config.run.crank_speed)

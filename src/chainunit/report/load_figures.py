@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from ..study.drive import Drive
+from ..study.readings import crank_motion, crank_torque, only_whole_turns, shaft_power
 from ..study.window import mean
 from . import figure as fig
 
@@ -18,16 +19,16 @@ _CLASSES = 40
 
 def has_turn(drive: Drive, steady: xr.Dataset) -> bool:
     """Whether a run has a whole turn of the crank."""
-    return drive.whole_turns(steady) is not None
+    return only_whole_turns(drive, steady) is not None
 
 
 def power_over_turn(drive: Drive, steady: xr.Dataset, angle: fig.Axis) -> fig.Figure:
     """The power at crank and motor over the last turn of steady running."""
-    phi, speed = drive.crank_motion(steady)
+    phi, speed = crank_motion(drive, steady)
     last = phi > phi[-1] - 2.0 * math.pi
     turned = phi[last] % (2.0 * math.pi)
     order = np.argsort(turned)
-    powers = {"crank": drive.crank_torque(steady) * speed, "shaft of the motor": drive.shaft_power(steady)}
+    powers = {"crank": crank_torque(drive, steady) * speed, "shaft of the motor": shaft_power(drive, steady)}
     if "motor.supply_power" in steady:
         powers["supply of the motor"] = steady["motor.supply_power"].values
     curves = [
@@ -46,7 +47,7 @@ def power_over_turn(drive: Drive, steady: xr.Dataset, angle: fig.Axis) -> fig.Fi
 def load_histogram(drive: Drive, steady: xr.Dataset) -> fig.Figure:
     """The share of the time in which the torque lies in each class: at the crank and, where it is known, in the air
     gap of the motor, which the inertia of its rotor and a flywheel make smoother."""
-    torques = {"crank torque": drive.crank_torque(steady)}
+    torques = {"crank torque": crank_torque(drive, steady)}
     if "motor.air_gap_tau" in steady:
         torques["air-gap torque of the motor"] = steady["motor.air_gap_tau"].values
     panels = []

@@ -17,6 +17,7 @@ import xarray as xr
 
 from .. import __version__
 from ..core.files import netcdf, whole
+from ..study.readings import load_inertia, motor_shaft, only_whole_turns
 from ..study.record import LOAD_CYCLE, StudyRecord
 from ..work.interrupts import stoppable
 from .run_names import title
@@ -29,8 +30,8 @@ def _load_cycle(study: StudyRecord, turns: xr.Dataset, file: Path) -> Path:
     instant with time, speed, load torque and load inertia; the head has the units. The last row is the first instant
     of the next turn."""
     time, drive = turns["time"].values, study.drive
-    torque, speed = drive.motor_shaft(turns)
-    columns = time - time[0], speed, torque, drive.load_inertia(turns)
+    torque, speed = motor_shaft(drive, turns)
+    columns = time - time[0], speed, torque, load_inertia(drive, turns)
     with whole(file) as part, part.open("w", newline="", encoding="utf-8") as out:
         writer = csv.writer(out)
         writer.writerow(("time [s]", "speed [rad/s]", "torque [N.m]", "inertia [kg.m2]"))
@@ -52,7 +53,7 @@ def write(study: StudyRecord, folder: Path) -> list[Path]:
     ``result.nc`` is netCDF-4 with a group per run, the `tree`.
     """
     files = []
-    if "steady" in study.answers and study.drive.whole_turns(study.steady) is not None:
+    if "steady" in study.answers and only_whole_turns(study.drive, study.steady) is not None:
         files.append(_load_cycle(study, study.steady, folder / LOAD_CYCLE))
     if study.runs:
         file = folder / SERIES

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..mechanism.machine import MachineState
 from ..mechanism.models import CrankMotion, names_of
+from ..study.readings import crank_motion, crank_torque
 from ..study.record import StudyRecord
 from . import linkage, linkage_loads, run_names
 from .capability import capabilities
@@ -76,7 +77,7 @@ def _loads(study: StudyRecord, part: Any) -> dict[str, Any]:
 def machine_state(study: StudyRecord, part: Any) -> MachineState:
     """The machine in rows of a run, at the place and speed that the crank has there."""
     machine = study.drive.machine
-    angle, speed = study.drive.crank_motion(part)
+    angle, speed = crank_motion(study.drive, part)
     motion = {"phi": angle * machine.ratio, "w": speed * machine.ratio}
     return machine.state(machine.inputs({**motion, **_loads(study, part)}))
 
@@ -87,7 +88,7 @@ def _run(study: StudyRecord, name: str, interval: float, supplement: Supplement)
     time = run["time"].values
     instants = np.arange(time[0], time[-1] + 0.5 * interval, interval)
     part = run.isel(time=np.unique(np.minimum(np.searchsorted(time, instants), len(time) - 1)))
-    angle, speed = drive.crank_motion(part)
+    angle, speed = crank_motion(drive, part)
     loads = _loads(study, part)
     state = machine_state(study, part)
     details = supplement.details(part, state)
@@ -103,7 +104,7 @@ def _run(study: StudyRecord, name: str, interval: float, supplement: Supplement)
     readings = (
         Reading("Crank angle", angle % (2.0 * math.pi), "rad"),
         Reading("Crank speed", speed, "rad/s"),
-        *([Reading("Crank torque", drive.crank_torque(part), "N.m")] if has_motor else []),
+        *([Reading("Crank torque", crank_torque(drive, part), "N.m")] if has_motor else []),
         *(
             Reading(capital(v.description), loads[v.name], v.unit, v.kind)
             for v in model.feed_layout.variables

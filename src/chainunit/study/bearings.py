@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from .drive import Drive
+from .readings import machine_series
 from .window import mean, whole_turns
 
 
@@ -21,7 +22,7 @@ def pin_loads(drive: Drive, run: xr.Dataset) -> dict[str, dict[str, float | None
     table: dict[str, dict[str, float | None]] = {}
     turns = whole_turns(drive, run)
     machine = drive.simulated_machine
-    angles = machine.pin_turns(drive.machine_series(turns))
+    angles = machine.pin_turns(machine_series(turns))
     for title, name in machine.model.pins.items():
         forces, forces_of_turns = (
             np.hypot(of[f"machine.{name}.fx"].values, of[f"machine.{name}.fy"].values) for of in (run, turns)

@@ -24,6 +24,7 @@ from ..system import monolithic
 from ..system.compiled_simulation import LONGEST, CompiledSimulation, CompiledSystem, is_evaluated
 from ..system.signals import at_time
 from .event import Event, angle_of_begin
+from .readings import crank_angle, crank_speed
 from .rig import PATIENCE, Rig
 from .window import is_settled, mean, time_at, whole_turns
 
@@ -181,7 +182,7 @@ class BlockRuns:
             self.outputs,
             varying=self._varying,
             driven=list(self._driven),
-            guarded=[self.rig.drive.motor_torque, self.rig.drive.crank_angle[0]],
+            guarded=[self.rig.drive.motor_torque, self.rig.drive.crank_output("phi")[0]],
             changes=self._changes,
         )
 
@@ -339,11 +340,11 @@ class BlockRuns:
         targets, longest, ends = [], [], []
         for point, run in zip(points, steady, strict=True):
             drive, turns = point.rig.drive, _turns(point, run)
-            angle = float(drive.crank_motion(run)[0][-1])
+            angle = float(crank_angle(drive, run)[-1])
             targets.append(angle_of_begin(point.event, angle))
-            speed = mean(turns, drive.crank_motion(turns)[1])
+            speed = mean(turns, crank_speed(drive, turns))
             longest.append(point.rig.longest_lead(targets[-1] - angle, speed))
-            ends.append([math.inf, targets[-1] * drive.crank_angle[1]])
+            ends.append([math.inf, targets[-1] * drive.crank_output("phi")[1]])
         runs = self._run(points, states, 0.0, longest, limits=np.array(ends).T)
         times = [time_at(p.rig.drive, self._series(runs, k), targets[k]) for k, p in enumerate(points)]
         return [limit if time is None else time for time, limit in zip(times, longest, strict=True)]

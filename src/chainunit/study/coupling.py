@@ -15,6 +15,7 @@ from .event_torques import effects, peaks_in_events, running_peak, running_words
 from .judgement import wrong_runs
 from .protection import MARGIN, Alternative, CouplingEffect, Obstacle, Setting, Way, WayNumbers, spares
 from .ram_force import TIMES, rams
+from .readings import pull_out_torque
 from .record import StudyRecord
 from .sections import Coupling
 from .starts import StartAnalysis
@@ -82,7 +83,7 @@ def hardest_start(study: StudyRecord) -> StartPeak:
 
 def pull_out(study: StudyRecord) -> float:
     """Largest torque of the warm motor at the crank in steady running [N m]."""
-    return study.drive.pull_out(study.steady, study.window(Phase.STEADY, study.steady).warm)
+    return pull_out_torque(study.drive, study.steady, study.window(Phase.STEADY, study.steady).warm)
 
 
 def _torque(value: float) -> str:

@@ -26,6 +26,7 @@ from .inverter import boosts
 from .limits import starting
 from .measures import STARTED
 from .protection import MARGIN, Alternative, Setting, Way, WayNumbers
+from .readings import crank_motion
 from .record import StudyRecord
 from .rig import Rig, join
 from .start_runs import StartNumbers, from_angle, hardest, longest_start, start_from, starts_from_all
@@ -251,7 +252,7 @@ def _runs(study: StudyRecord, rig: Rig, of: PeakOf) -> tuple[float, dict[str, xr
         rig = start_up.rig
         steady = start_up.run.sel(time=slice(start_up.steady_from, None))
         begin = simulation.save()
-        angle, speed = rig.drive.crank_motion(steady)
+        angle, speed = crank_motion(rig.drive, steady)
         events = {
             name: event
             for name, event in config.events.items()

@@ -2,29 +2,22 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from pathlib import Path
-from typing import Any
-
-import numpy as np
-import xarray as xr
+from typing import Any, Literal
 
 from ..core.errors import InputError
 from ..core.quantities import Layout
 from ..drives.driveline import CardanDriveline
 from ..drives.gear import Gear
 from ..drives.motor import Motor
-from ..fmu.backends import Backend, Origin
-from ..fmu.backends import export as export_fmu
 from ..machines.api import ChainUnitMachine, machine_of
 from ..machines.chain_organs import OrganLaw
 from ..machines.flexible import flexible
 from ..machines.hanging import split
 from ..machines.machine import Machine
-from ..mechanism.models import DirectMachine, InverseMachine
+from ..mechanism.models import InverseMachine
 from ..system import (
     Bond,
     Component,
@@ -32,13 +25,9 @@ from ..system import (
     ModelComponent,
     Profile,
     System,
-    export,
     in_line,
-    shaft_torque,
-    through,
 )
 from ..system.graph import Connection
-from .arrays import peak
 from .foreign_machine import ForeignMachine
 
 
@@ -143,36 +132,6 @@ class Drive:
             return self.machine
         raise AbsentError("machine", f"{self.machine.model.name}: has no organs")
 
-    def series(self, run: xr.Dataset, name: str) -> Any:
-        """A variable of a run, shape (time,).
-
-        Raises
-        ------
-        AbsentError
-            where motor or machine do not have the variable.
-        """
-        if name not in run:
-            raise AbsentError(name.partition(".")[0], f"{name}: is not known of this motor or machine")
-        return run[name].values
-
-    def load_inertia(self, run: xr.Dataset) -> Any:
-        """Inertia at the motor's shaft beside the rotor [kg m2], shape (time,); with a driveline, as if its
-        ratio were even."""
-        J = run["machine.J"].values / self.gear**2
-        return J if self.line is None else (J + self.line.J4) / self.line.ratio**2
-
-    def shaft_power(self, run: xr.Dataset) -> Any:
-        """Power at the motor's shaft [W], shape (time,)."""
-        full = f"{self._first_bond.machine}.power"
-        if full in run:
-            return run[full].values
-        torque, speed = self.motor_shaft(run)
-        return torque * speed
-
-    def motor_shaft(self, run: xr.Dataset) -> tuple[Any, Any]:
-        """Torque of the load [N m] and speed [rad/s] of the motor's shaft, shape (time,)."""
-        return through(run, self._first_bond)
-
     @property
     def rods(self) -> tuple[int, int]:
         """Numbers of rods of wall and web, where the organs are chains."""
@@ -202,14 +161,6 @@ class Drive:
     def simulated_machine(self) -> Machine:
         """The machine as its FMU has it, with chains where the organs are chains."""
         return self.driven_machine if self.chain is None else machine_of(*self.load_model())
-
-    def machine_series(self, run: xr.Dataset) -> dict[str, Any]:
-        """The variables of the machine in a run by name, each of shape (time,)."""
-        return {
-            name.removeprefix("machine."): run[name].values
-            for name in map(str, run.data_vars)
-            if name.startswith("machine.")
-        }
 
     def organ(self) -> dict[str, float]:
         """The parameters that the model with chains has beside those of the model with two bars."""
@@ -253,109 +204,36 @@ class Drive:
         outsider = self.outsider
         return outsider.ratio if outsider and outsider.needs_gear else 1.0
 
-    @property
-    def _first_bond(self) -> Bond:
+    @cached_property
+    def motor_bond(self) -> Bond:
+        """The shaft of the motor."""
         return next(bond for bond in self.graph.bonds if bond.driver == "motor")
 
     @property
     def motor_speed(self) -> str:
         """Name of the speed of the motor's shaft in a run."""
-        return f"motor.{self._first_bond.flanges[0].members['w']}"
+        return f"motor.{self.motor_bond.flanges[0].members['w']}"
 
     @property
     def motor_torque(self) -> str:
         """Name of the torque that the motor gives to its shaft in a run."""
-        return f"motor.{self._first_bond.flanges[0].members.get('tau', 'tau')}"
+        return f"motor.{self.motor_bond.flanges[0].members.get('tau', 'tau')}"
 
-    @property
-    def _last_bond(self) -> Bond:
+    @cached_property
+    def machine_bond(self) -> Bond:
+        """The shaft that drives the machine."""
         return next(bond for bond in self.graph.bonds if bond.machine == "machine")
 
-    def crank_torque(self, run: xr.Dataset) -> Any:
-        """Torque at the crank in a run [N m], shape (time,), also for a machine without its motor."""
-        return shaft_torque(run, self._last_bond) * (self.driven_machine.ratio / self.gear)
-
     @property
-    def crank_speed(self) -> tuple[str, float]:
-        """Name of the speed output that turns the machine in a run, and the ratio of that speed to the
-        crank's."""
-        return self._turned_by("w")
+    def ratio_at_machine(self) -> float:
+        """Turns of the shaft that drives the machine's component per turn of the crank."""
+        return self.driven_machine.ratio / self.gear
 
-    @property
-    def crank_angle(self) -> tuple[str, float]:
-        """Name of the angle output that turns the machine in a run, and the ratio of that angle to the
-        crank's."""
-        return self._turned_by("phi")
-
-    def _turned_by(self, quantity: str) -> tuple[str, float]:
-        bond = self._last_bond
-        return f"{bond.driver}.{bond.flanges[0].members[quantity]}", self.driven_machine.ratio / self.gear
-
-    def crank_motion(self, run: xr.Dataset) -> tuple[Any, Any]:
-        """Angle [rad] and speed [rad/s] of the crank in a run, shape (time,), also for a machine without its
-        motor."""
-        bond, ratio = self._last_bond, self.driven_machine.ratio / self.gear
-        names = (f"{bond.driver}.{bond.flanges[0].members[x]}" for x in ("phi", "w"))
-        pairs = (("machine.phi0", "machine.w0"), ("machine.phi", "machine.w"), tuple(names))
-        phi, w = next(pair for pair in pairs if set(pair) <= set(run))
-        return run[phi].values / ratio, run[w].values / ratio
-
-    def turns(self, run: xr.Dataset) -> float:
-        """Turns that the crank makes from the first to the last row of a run."""
-        angle, _ = self.crank_motion(run)
-        return float(angle[-1] - angle[0]) / (2.0 * math.pi)
-
-    def whole_turns(self, run: xr.Dataset, most: float = math.inf) -> xr.Dataset | None:
-        """The part of the run from its first row until the crank has made the largest number of whole turns,
-        at most `most`, both ends included; None where it makes less than one turn.
-
-        The last row is interpolated linearly; in periodic running it equals the first.
-        """
-        angle, _ = self.crank_motion(run)
-        turns_made = (angle - angle[0]) / (2.0 * math.pi)
-        # a run that ends on a whole turn may miss it by rounding
-        rounding = 1e-9
-        turns = min(math.floor(float(np.max(turns_made)) + rounding), most)
-        if turns < 1:
-            return None
-        last = int(np.argmax(turns_made >= turns - rounding))
-        share = min(1.0, (turns - turns_made[last - 1]) / (turns_made[last] - turns_made[last - 1]))
-
-        def closed(x: Any) -> Any:
-            return np.append(x[:last], x[last - 1] + share * (x[last] - x[last - 1]))
-
-        return xr.Dataset(
-            {name: ("time", closed(x.values), x.attrs) for name, x in run.data_vars.items()},
-            {"time": ("time", closed(run["time"].values), run["time"].attrs)},
-            run.attrs,
-        )
-
-    def export(
-        self,
-        folder: Path,
-        backend: Backend | None = None,
-        report: Callable[[str], None] = lambda what: None,
-    ) -> tuple[dict[str, Path], dict[str, Origin]]:
-        """Write the FMUs, with the start values of the drive. Returns the files by component, and the origin
-        of each FMU. `report` is called with a text on the current task."""
-        system, origins = export(self.graph, folder, backend, report)
-        return {name: c.file for name, c in system.components.items() if c.file}, origins
-
-    def export_machine(self, folder: Path, backend: Backend | None = None) -> Path:
-        """Write only the machine's FMU, as `export` writes it."""
-        model, p = self.load_model()
-        file = folder / f"{model.name}.fmu"
-        export_fmu(model, file, model.parameter_layout.by_name(p), backend=backend)
-        return file
-
-    def system(self, files: Mapping[str, Path]) -> System:
-        """The system of the FMU `files` of these models; their start values may be different ones."""
-        # the machine in the feed-forward is the same FMU as the machine
-        known = {"model": files["machine"], **files}
-        components: dict[str, Component] = {
-            name: replace(c, file=known[name]) for name, c in self.graph.components.items()
-        }
-        return replace(self.graph, components=components)
+    def crank_output(self, quantity: Literal["phi", "w"]) -> tuple[str, float]:
+        """Name of the angle ("phi") or speed ("w") that turns the machine in a run, and its ratio to that of the
+        crank."""
+        bond = self.machine_bond
+        return f"{bond.driver}.{bond.flanges[0].members[quantity]}", self.ratio_at_machine
 
     def reference(self, crank_speed: float, ramp: float | None = None) -> dict[str, Any]:
         """The signal of the speed reference for this crank speed [rad/s], after a `ramp` from rest [s] if one
@@ -373,55 +251,3 @@ class Drive:
         values = Layout(type(feed)).by_name(feed)
         model = {f"model.{name}": value for name, value in values.items()} if self.feed_forward else {}
         return {f"machine.{name}": value for name, value in values.items()} | model
-
-    def largest_torque(self, run: xr.Dataset, T: float) -> Any:
-        """Largest air-gap torque that the motor can give at each instant of a run [N m], shape (time,), with its
-        winding at `T` [K]; see `Motor.largest_torque`."""
-        self.needs_own("the largest torque")
-        braking = run["motor.air_gap_tau"].values * run["motor.w"].values < 0.0
-        columns = []
-        for name, resolution in self.motor.limited_by.items():
-            x = run[f"motor.{name}"].values
-            if name == "w":
-                x = np.where(braking, -np.abs(x), np.abs(x))
-            unit = resolution * max(peak(x), 1e-9)
-            columns.append(np.round(x / unit) * unit)
-        instants, which = np.unique(np.stack(columns), axis=1, return_inverse=True)
-        limits = [self.motor.largest_torque(self.fmu_parameters, T, *map(float, at)) for at in instants.T]
-        return np.array(limits)[np.reshape(which, -1)]
-
-    def pull_out(self, run: xr.Dataset, T: float) -> float:
-        """Largest torque at the crank [N m] that the motor gives while a rising load slows it down from the
-        mean state of a run until it stalls, with the winding at `T` [K]; see `Motor.pull_out`."""
-        self.needs_own("the pull-out torque")
-        return self.motor.pull_out(self.fmu_parameters, T, *self._mean_supply(run)) * self.ratio
-
-    def breakdown_speed(self, run: xr.Dataset) -> float:
-        """Speed of the crank [rad/s] below which a load stalls the motor, at the mean supply and temperature
-        of a run; 0 where the motor has no such speed. See `Motor.breakdown_speed`."""
-        self.needs_own("the breakdown speed")
-        T = float(np.mean(run[f"motor.{self.motor.temperature}"].values))
-        return self.motor.breakdown_speed(self.fmu_parameters, T, *self._mean_supply(run)) / self.ratio
-
-    def _mean_supply(self, run: xr.Dataset) -> list[float]:
-        """The means over a run of the variables `Motor.limited_by`."""
-        return [float(np.mean(run[f"motor.{name}"].values)) for name in self.motor.limited_by]
-
-    @property
-    def coasting_model(self) -> type[DirectMachine]:
-        """The model of the machine that turns without its motor."""
-        return self.simulated_machine.model.direct()
-
-    def coasting(self, folder: Path, backend: Backend | None = None) -> Path | None:
-        """Write the FMU of the machine that turns without its motor, with the inertia on its shaft. None for
-        a machine that is a foreign FMU, as there is no such model of it."""
-        if self.outsider:
-            return None
-        file = folder / f"{self.coasting_model.name}.fmu"
-        export_fmu(self.coasting_model, file, self.coasting_parameters(), backend=backend)
-        return file
-
-    def coasting_parameters(self) -> dict[str, float]:
-        """Parameters of the `coasting_model` by name."""
-        additions = {} if self.line is None else {"J_added": self.line.J4}
-        return self.simulated_machine.by_name | additions

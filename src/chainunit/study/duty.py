@@ -23,6 +23,7 @@ from .chain import duty as chain_duty
 from .config import Config
 from .cycle import Cycle, cycle, energy_swing, needed_inertia
 from .drive import Drive
+from .drive_fmus import export_machine
 from .one_sided import all_on_one
 
 
@@ -80,7 +81,7 @@ def duty_of(config: Config, folder: Path, backend: Backend | None) -> Duty:
     heavier = min(sizes, key=lambda each: -each[0])[1] if sizes else None
     if config.chain is not None:
         drive = Drive(Motor, None, config.machine, chain=config.chain)
-        fmu = Fmu(drive.export_machine(folder, backend))
+        fmu = Fmu(export_machine(drive, folder, backend))
         try:
             normal = chain_duty(fmu, drive, w, feed)
             one_sided = {side: chain_duty(fmu, drive, w, case) for side, case in loads.items()}

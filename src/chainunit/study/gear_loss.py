@@ -12,6 +12,7 @@ from ..reading.text import entries, number
 from .analysis import Analysis, Findings, Work
 from .config import Config
 from .drive import Drive
+from .readings import shaft_power
 from .record import StudyRecord
 from .verdict import STEADY
 from .window import Phase
@@ -90,7 +91,7 @@ class GearAnalysis(Analysis):
             return None
         drive, gear = study.drive, study.config.gear
         window = study.window(Phase.STEADY, study.steady)
-        squared = window.mean(lambda run: run[drive.motor_speed].values ** 2)
+        squared = window.mean(lambda drive, run: run[drive.motor_speed].values ** 2)
         total, net = drive.gear_friction * squared, study.answers[STEADY].power_mean
         if net is None:
             return None
@@ -100,7 +101,7 @@ class GearAnalysis(Analysis):
                 by_load=total - without_load,
                 without_load=without_load,
                 net_power=net,
-                passed_power=window.mean(lambda run: np.abs(drive.shaft_power(run))),
+                passed_power=window.mean(lambda drive, run: np.abs(shaft_power(drive, run))),
                 share=total / net if net > 0.0 else None,
             ),
             float(gear.efficiency),

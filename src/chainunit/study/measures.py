@@ -12,9 +12,10 @@ import xarray as xr
 
 from ..core.quantities import Layout, Value, Variable, declaration, quantity
 from .arrays import peak
-from .drive import AbsentError
+from .drive import AbsentError, Drive
 from .limits import reaches
 from .protection import stall
+from .readings import crank_speed, crank_torque, largest_torque, shaft_power
 from .relay import relay_trip
 from .stored import energy_gap, energy_held, stored_shares
 from .verdict import CREEPS
@@ -50,7 +51,7 @@ def _reserve(w: Window) -> float:
     if w.drive.follows and (w.steady or w).speed_mean < 0.99 * w.requested_speed:
         # a controlled motor that falls behind gives all the torque that it can
         return 0.0
-    return torque_reserve(w.drive.largest_torque(w.run, w.warm), driving)
+    return torque_reserve(largest_torque(w.drive, w.run, w.warm), driving)
 
 
 def _recovery(w: Window) -> float | None:
@@ -85,7 +86,7 @@ def _slack_time(w: Window) -> float | None:
     if w.drive.chain is None:
         return None
 
-    def some_slack(run: xr.Dataset) -> Any:
+    def some_slack(drive: Drive, run: xr.Dataset) -> Any:
         shares = [run[f"machine.{side}.slack_share"].values for side in w.sides]
         return (np.max(shares, axis=0) > 0.0).astype(float) if shares else np.zeros(run.sizes["time"])
 
@@ -131,7 +132,7 @@ def _standstill(w: Window) -> float | None:
     run = w.coasting
     if run is None:
         return None
-    still = np.flatnonzero(np.abs(w.drive.crank_motion(run)[1]) < 0.01 * w.requested_speed)
+    still = np.flatnonzero(np.abs(crank_speed(w.drive, run)) < 0.01 * w.requested_speed)
     return float(run["time"][still[0]]) - w.begin if still.size else None
 
 
@@ -198,9 +199,9 @@ class Answers:
     crank_torque_peak: Value = measure(
         "N.m", "peak", lambda w: peak(w.crank_torque), during=_ALL, of="crank torque", card=True
     )
-    crank_torque_rms: Value = measure("N.m", "RMS", lambda w: w.rms(w.drive.crank_torque), of="crank torque")
+    crank_torque_rms: Value = measure("N.m", "RMS", lambda w: w.rms(crank_torque), of="crank torque")
     crank_torque_mean: Value = measure(
-        "N.m", "mean", lambda w: w.mean(w.drive.crank_torque), of="crank torque", minor=True
+        "N.m", "mean", lambda w: w.mean(crank_torque), of="crank torque", minor=True
     )
     motor_torque_peak: Value = measure(
         "N.m", "peak", lambda w: w.largest("motor.air_gap_tau"), during=_ALL, of="motor torque", card=True
@@ -209,14 +210,14 @@ class Answers:
     power_peak: Value = measure(
         "W",
         "peak",
-        lambda w: max(0.0, float(np.max(w.drive.shaft_power(w.run)))),
+        lambda w: max(0.0, float(np.max(shaft_power(w.drive, w.run)))),
         of="shaft power",
         card=True,
     )
     power_mean: Value = measure(
         "W",
         "mean",
-        lambda w: w.mean(w.drive.shaft_power) - w.taken_up[0] if w.lasts else None,
+        lambda w: w.mean(shaft_power) - w.taken_up[0] if w.lasts else None,
         of="shaft power",
         minor=True,
     )

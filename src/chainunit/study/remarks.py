@@ -17,6 +17,7 @@ from .event_torques import peaks_in_events
 from .events import Jam
 from .judgement import lasts, model_verdict, motor_limits, no_reserve
 from .measures import STARTED, Answers
+from .readings import breakdown_speed, crank_speed, only_whole_turns
 from .record import LOAD_CYCLE, Amount, StudyRecord
 from .sections import ChainOrgans
 from .shaft import AMPLIFIED, UNEVEN, remedies
@@ -110,7 +111,7 @@ def _on_start(study: StudyRecord) -> None:
     run, feed_time = study.runs["start_up"], study.fed_from
     if feed_time is None:
         return
-    speed = float(np.interp(feed_time, run["time"].values, study.drive.crank_motion(run)[1]))
+    speed = float(np.interp(feed_time, run["time"].values, crank_speed(study.drive, run)))
     requested = study.config.run.crank_speed
     # the row at which the speed is passed is the last of the start
     if speed < STARTED * requested:
@@ -179,7 +180,7 @@ def _stall_speed(study: StudyRecord, steady: Answers) -> float | None:
     not known for a foreign motor."""
     if study.reaches or study.drive.foreign is not None:
         return None
-    breakdown = study.drive.breakdown_speed(study.steady)
+    breakdown = breakdown_speed(study.drive, study.steady)
     return breakdown if steady.speed_mean < breakdown else None
 
 
@@ -212,7 +213,7 @@ def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
             why=why,
             branched=addition,
         )
-    if study.drive.whole_turns(study.steady) is None:
+    if only_whole_turns(study.drive, study.steady) is None:
         warn(
             "no whole turn",
             "steady running: the crank does not make a whole turn; means are over the whole run, and there is no "

@@ -31,8 +31,10 @@ from ..work.progress import Progress
 from .config import Config
 from .cycle import no_feed
 from .drive import Drive
+from .drive_fmus import coasting_model, coasting_parameters, with_files
 from .event import Event, OverTime, Signals, Values, angle_of_begin
 from .measures import STARTED
+from .readings import machine_series, only_whole_turns, turns_made
 from .window import is_settled, time_at, whole_turns
 
 _LONGEST_START = 30.0
@@ -99,7 +101,7 @@ class Rig:
     @property
     def system(self) -> System:
         """The FMUs and their connections."""
-        return self.graph if self.files is None else self._twin(self.drive.system(self.files))
+        return self.graph if self.files is None else self._twin(with_files(self.drive, self.files))
 
     @cached_property
     def graph(self) -> System:
@@ -206,7 +208,7 @@ class Rig:
             return []
         simulation.restore()
         simulation.signals = self.signals()
-        begin, (name, ratio) = simulation.time, self.drive.crank_angle
+        begin, (name, ratio) = simulation.time, self.drive.crank_output("phi")
         targets = [angle_of_begin(event, angle) for event in events]
         limits = [self.longest_lead(target - angle, speed) for target in targets]
         run = simulation.run(begin + max(limits), self.step, guards={name: max(targets) * ratio})
@@ -225,7 +227,7 @@ class Rig:
         guard ends it, or until it is clear that the machine speeds up too slowly; and the rig that is fed
         from then on."""
         # behind a shaft line the crank is not where the motor is
-        name, ratio = self.drive.crank_speed
+        name, ratio = self.drive.crank_output("w")
         goal = STARTED * self.config.run.crank_speed * ratio
         speed_limit = {**guards, name: goal}
         longest, piece = self.config.ramp_end + _LONGEST_RISE, max(self.config.turn, 1.0)
@@ -274,14 +276,14 @@ class Rig:
         if the motor has not settled."""
         turns_asked = self.config.run.turns
         since = run.sel(time=slice(steady_from, None))
-        turns = self.drive.whole_turns(since, turns_asked)
-        if turns is not None and self.drive.turns(turns) > turns_asked - 0.5:
+        turns = only_whole_turns(self.drive, since, turns_asked)
+        if turns is not None and turns_made(self.drive, turns) > turns_asked - 0.5:
             if self.drive.chain is not None or is_settled(self.drive, turns):
                 return None, steady_from
             # as if one turn more had been waited for
             steady_from = float(whole_turns(self.drive, since, 1)["time"][-1])
             since = run.sel(time=slice(steady_from, None))
-        return turns_asked + 0.1 - self.drive.turns(since), steady_from
+        return turns_asked + 0.1 - turns_made(self.drive, since), steady_from
 
     def follow(
         self,
@@ -316,9 +318,9 @@ class Rig:
         """The run of the machine (FMU `file`) behind the coupling that opened at the end of `run`, with the
         same loads. It ends a second after the time `stop` [s] to which the motor would have been followed."""
         begin = float(run["time"][-1])
-        model = self.drive.coasting_model
-        start = model.start_from({k: float(x[-1]) for k, x in self.drive.machine_series(run).items()})
-        p = model.parameter_layout.from_names(self.drive.coasting_parameters() | start)
+        model = coasting_model(self.drive)
+        start = model.start_from({k: float(x[-1]) for k, x in machine_series(run).items()})
+        p = model.parameter_layout.from_names(coasting_parameters(self.drive) | start)
         alone = System({"machine": ModelComponent(model, p, file)})
         loads = self.drive.loads(self.config.feed) | transient.signals
         loads = {full: x for full, x in loads.items() if full.startswith("machine.")}
@@ -339,7 +341,7 @@ class Rig:
         return shares
 
     def _held(self, per_unit: Callable[[Mapping[str, Any]], Any], run: xr.Dataset) -> Any:
-        return per_unit(self.drive.machine_series(run))
+        return per_unit(machine_series(run))
 
     def compare(
         self, run: xr.Dataset, transient: Transient | None = None, start: Mapping[str, float] | None = None

@@ -26,10 +26,12 @@ from .choice import as_chosen, choose, with_parts_beside
 from .config import Config
 from .coupling import recommended_setting
 from .coupling_alternatives import alternatives
+from .drive_fmus import export_coasting, export_drive
 from .event import Event
 from .event_torques import from_event_on
 from .measures import read_answers, read_measure
 from .pulls import least_pulls
+from .readings import crank_angle
 from .record import Spread, StudyRecord
 from .registry import registered
 from .relay import start_class
@@ -81,7 +83,7 @@ def run_study(
         for part in registered():
             part.check_runs(config, unmade)
         _analyse(study, Work(unmade, report), needs_runs=False)
-        files, study.fmus = drive.export(folder / "fmu", backend, lambda what: report(what, 0.0, 1.0))
+        files, study.fmus = export_drive(drive, folder / "fmu", backend, lambda what: report(what, 0.0, 1.0))
         if backend is None and "python" in {origin.backend for origin in study.fmus.values()}:
             study.note(
                 "no compiler",
@@ -90,7 +92,7 @@ def run_study(
             )
         runner = Runner(study, Rig(config, drive, files), report)
         try:
-            runner.run(check, lambda: drive.coasting(folder / "fmu", backend))
+            runner.run(check, lambda: export_coasting(drive, folder / "fmu", backend))
             _analyse(study, Work(runner.rig, report, folder, scheduler, runner.stop), needs_runs=True)
             study.setting = recommended_setting(study)
             study.alternatives = alternatives(study, runner.rig, report)
@@ -177,7 +179,7 @@ class Runner:
             simulation.check_states()
             self._start_up(simulation)
             begin, speed = simulation.save(), self.study.answers["steady"].speed_mean
-            angle = float(self.rig.drive.crank_motion(self.study.runs["start_up"])[0][-1])
+            angle = float(crank_angle(self.rig.drive, self.study.runs["start_up"])[-1])
             progress, transients = 0.0, []
             leads = self.rig.leads(simulation, self.events, angle, speed)
             for event, lead in zip(self.events, leads, strict=True):

@@ -19,6 +19,7 @@ from ..drives.torsion import largest_frequency
 from ..reading.text import number
 from .arrays import peak
 from .drive import Drive
+from .readings import turns_made
 
 LONGEST_STEP = 0.3
 """Largest product of communication step and natural frequency; above it the coupling excites the vibration
@@ -174,7 +175,7 @@ def shaft_answers(
     peak2, peak_rigid = peak(tau2), peak(rigid_torque(drive, rigid))
     steady = steady_damage_per_turn is None
     cycles = rainflow(from_peak(tau2) if steady else tau2).above(ROUNDING * peak2)
-    turns = max(drive.turns(run), 1e-9)
+    turns = max(turns_made(drive, run), 1e-9)
     damage = cycles.damage(exponent)
     twist = run["driveline.twist2"].values + run["driveline.twist3"].values
     return (

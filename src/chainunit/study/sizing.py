@@ -27,6 +27,7 @@ from .candidate import Candidate, Standing
 from .catalogue_drive import catalogue_drive, check_ratios, is_of_a_gear, with_wheel
 from .chain import HIGH
 from .config import Config
+from .drive_fmus import export_drive
 from .duty import CycleNumbers, Duty, duty_of
 from .inverter import inverter_needs, least_boost, misses_by_a_hair
 from .limits import SPEED_DEVIATION
@@ -214,7 +215,7 @@ def _search(
             if compiler() is not None and backend != "python" and not candidate.drive.outsiders:
                 files = None  # the candidates run on the compiled system
             elif not files:
-                files, _ = candidate.drive.export(folder, backend, partial(_exporting, report))
+                files, _ = export_drive(candidate.drive, folder, backend, partial(_exporting, report))
             candidates.append(_tried(config, candidate, duty, files))
             following = next(rest, None)
         _from_all_angles(config, candidates, duty, files)

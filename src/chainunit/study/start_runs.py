@@ -65,7 +65,7 @@ def start_from(
     It is followed until the crank has its speed and a little longer, at most to the time `longest` [s]; `start_time`
     is None where the crank comes to no lasting speed by then, by the rule of `time_to_start`."""
     rig = from_angle(rig, angle)
-    name, ratio = rig.drive.crank_speed
+    name, ratio = rig.drive.crank_output("w")
     goal = STARTED * rig.config.run.crank_speed * ratio
     step = min(rig.step, _STEP)
     with rig.from_rest(event) as simulation:

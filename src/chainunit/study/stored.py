@@ -9,6 +9,7 @@ import xarray as xr
 
 from .arrays import stretches
 from .drive import AbsentError, Drive
+from .readings import shaft_power
 
 
 def energy_behind(run: xr.Dataset) -> Any:
@@ -36,7 +37,7 @@ def energy_gap(drive: Drive, turns: xr.Dataset) -> float:
     """Energy that the moving masses take up between the ends of `turns`, relative to the energy that passes the
     motor's shaft to and fro: the integral of |power|. Negative where they give energy."""
     held = energy_held(drive, turns)
-    passed = float(np.trapezoid(np.abs(drive.shaft_power(turns)), turns["time"].values))
+    passed = float(np.trapezoid(np.abs(shaft_power(drive, turns)), turns["time"].values))
     return float(held[-1] - held[0]) / max(passed, 1e-9)
 
 

@@ -11,6 +11,7 @@ import xarray as xr
 
 from .arrays import peak
 from .drive import Drive
+from .readings import crank_torque
 
 PeakOf = Callable[[Drive, xr.Dataset], float]
 """The peak of a torque in a run, at the crank [N m]."""
@@ -26,7 +27,7 @@ def gear_torque(drive: Drive, run: xr.Dataset) -> Any:
     """Torque in a run at the output of the gear [N m], shape (time,): in the shaft behind the gear where the
     driveline is there, else at the crank."""
     behind_gear = drive.line is not None and drive.driven_machine.ratio == 1.0
-    return run["motor.tau"].values * drive.ratio if behind_gear else drive.crank_torque(run)
+    return run["motor.tau"].values * drive.ratio if behind_gear else crank_torque(drive, run)
 
 
 def at_gear(drive: Drive, run: xr.Dataset) -> float:

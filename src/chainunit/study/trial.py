@@ -25,6 +25,7 @@ from .drive import Drive
 from .duty import Duty, rms
 from .limits import Check, heating, keeping_speed, starting
 from .measures import time_to_start
+from .readings import crank_angle, load_inertia, only_whole_turns, turns_made
 from .relay import start_class
 from .rig import PATIENCE, Rig
 from .start_runs import (
@@ -82,9 +83,9 @@ class Trial:
     def stall_angle(self) -> float | None:
         """Crank angle at which the load stalls the motor [rad]; None for a motor that starts, or that only turns too
         slowly."""
-        if self.start_time is not None or self.drive.turns(self.steady) > _STANDS:
+        if self.start_time is not None or turns_made(self.drive, self.steady) > _STANDS:
             return None
-        return float(np.max(self.drive.crank_motion(self.steady)[0])) % (2.0 * math.pi)
+        return float(np.max(crank_angle(self.drive, self.steady))) % (2.0 * math.pi)
 
     @cached_property
     def start_class(self) -> int | None:
@@ -197,7 +198,7 @@ class Trial:
         starts = permitted_starts(p, running, start, self._cooling, self.config.sizing.temperature)
         if plate.starts and self.config.start == "direct":
             # the number of starts in the catalogue is that of the bare rotor
-            total = p.rotor.J + float(np.mean(self.drive.load_inertia(self.steady)))
+            total = p.rotor.J + float(np.mean(load_inertia(self.drive, self.steady)))
             starts = min(starts, plate.starts * plate.J / total)
         return starts
 
@@ -286,7 +287,7 @@ class Trial:
             "speed": check("speed fluctuation", self.fluctuation, demands.fluctuation, "1", "percent"),
         }
         if math.isfinite(demands.inertia_ratio):
-            inertia = float(np.max(self.drive.load_inertia(self.steady)))
+            inertia = float(np.max(load_inertia(self.drive, self.steady)))
             ratio = (inertia + p.rotor.J - plate.J) / plate.J
             checks["inertia"] = Check("inertia ratio", ratio, demands.inertia_ratio, "1")
         if "gear.torque_limit" in self.config.given:
@@ -354,7 +355,7 @@ def _until_settled(rig: Rig, simulation: Simulation, stop: float) -> list[xr.Dat
     turn, drive = rig.config.turn, rig.drive
     runs = [simulation.run(stop, rig.step)]
     while drive.chain is None and simulation.time < stop + PATIENCE * turn:
-        turns = drive.whole_turns(runs[-1])
+        turns = only_whole_turns(drive, runs[-1])
         if turns is None or is_settled(drive, turns):
             break
         runs.append(simulation.run(simulation.time + 2.0 * turn, rig.step))

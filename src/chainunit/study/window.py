@@ -15,6 +15,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from .arrays import peak
 from .drive import Drive
+from .readings import crank_motion, crank_speed, crank_torque, only_whole_turns, series
 from .relay import LIGHT
 from .stored import energy_behind, energy_gap, energy_held
 from .verdict import CREEPS
@@ -33,6 +34,9 @@ LASTING = 0.05
 """The same, up to which means of the turns stand for running that lasts, once what is taken up is left out."""
 _EVEN = 1e-4
 """Relative change of the speed over the steady turns that counts as none."""
+
+Reading = Callable[[Drive, xr.Dataset], Any]
+"""A value that is read from a run of a drive, shape (time,)."""
 
 
 class Phase(Enum):
@@ -76,7 +80,7 @@ class Window:
 
     def value(self, name: str) -> Any:
         """A variable of the run, shape (time,)."""
-        return self.drive.series(self.run, name)
+        return series(self.run, name)
 
     @cached_property
     def turns(self) -> xr.Dataset:
@@ -86,17 +90,17 @@ class Window:
     @cached_property
     def crank_torque(self) -> Any:
         """Torque at the crank [N m], shape (time,)."""
-        return self.drive.crank_torque(self.run)
+        return crank_torque(self.drive, self.run)
 
     @cached_property
     def speed(self) -> Any:
         """Speed of the crank [rad/s], shape (time,)."""
-        return self.drive.crank_motion(self.run)[1]
+        return crank_speed(self.drive, self.run)
 
     @cached_property
     def speed_mean(self) -> float:
         """Mean speed of the crank over whole turns [rad/s]."""
-        return self.mean(lambda run: self.drive.crank_motion(run)[1])
+        return self.mean(crank_speed)
 
     @property
     def coasting(self) -> xr.Dataset | None:
@@ -136,9 +140,9 @@ class Window:
         """Temperature of the winding in steady running [K], at most `BURNT`."""
         return min(BURNT, (self.steady or self).settled_temperature)
 
-    def mean(self, of: str | Callable[[xr.Dataset], Any]) -> float:
+    def mean(self, of: str | Reading) -> float:
         """Mean over the time of whole turns, of a variable or of a value read from them."""
-        return mean(self.turns, of(self.turns) if callable(of) else self.drive.series(self.turns, of))
+        return mean(self.turns, self._read(of))
 
     @cached_property
     def lasts(self) -> bool:
@@ -146,7 +150,7 @@ class Window:
         more than `LASTING`, or the crank turns and makes no whole turn. Chains never repeat a turn."""
         if self.phase is not Phase.STEADY or self.drive.chain is not None:
             return True
-        if self.drive.whole_turns(self.run) is None:
+        if only_whole_turns(self.drive, self.run) is None:
             return bool(abs(self.speed_mean) < CREEPS * self.requested_speed)
         return abs(energy_gap(self.drive, self.turns)) <= LASTING
 
@@ -154,18 +158,19 @@ class Window:
     def taken_up(self) -> tuple[float, float]:
         """Mean power [W] that the moving masses take up over the steady turns: those of the machine, and all of them
         with rotor and flywheel. 0 for a run that does not repeat its turns, and where the crank makes none."""
-        if self.phase is not Phase.STEADY or self.drive.whole_turns(self.run) is None:
+        if self.phase is not Phase.STEADY or only_whole_turns(self.drive, self.run) is None:
             return 0.0, 0.0
         time = self.turns["time"].values
         held = energy_behind(self.turns), energy_held(self.drive, self.turns)
         machine, whole = (float(x[-1] - x[0]) / float(time[-1] - time[0]) for x in held)
         return machine, whole
 
-    def rms(self, of: str | Callable[[xr.Dataset], Any]) -> float:
+    def rms(self, of: str | Reading) -> float:
         """RMS over the time of whole turns."""
-        return math.sqrt(
-            self.mean(lambda run: (of(run) if callable(of) else self.drive.series(run, of)) ** 2)
-        )
+        return math.sqrt(mean(self.turns, self._read(of) ** 2))
+
+    def _read(self, of: str | Reading) -> Any:
+        return of(self.drive, self.turns) if callable(of) else series(self.turns, of)
 
     def largest(self, name: str) -> float:
         """Largest size of a variable."""
@@ -191,15 +196,15 @@ def mean(run: xr.Dataset, x: Any) -> float:
 
 
 def whole_turns(drive: Drive, run: xr.Dataset, most: float = math.inf) -> xr.Dataset:
-    """Whole turns of a run, see `Drive.whole_turns`; all of it where the crank does not make one."""
-    turns = drive.whole_turns(run, most)
+    """Whole turns of a run, see `only_whole_turns`; all of it where the crank does not make one."""
+    turns = only_whole_turns(drive, run, most)
     return run if turns is None else turns
 
 
 def time_at(drive: Drive, run: xr.Dataset, angle: float) -> float | None:
     """Time [s] at which the crank passes the `angle` [rad] in a run, by a cubic between two rows; None where it does
     not get there."""
-    angles, speeds = drive.crank_motion(run)
+    angles, speeds = crank_motion(drive, run)
     row = int(np.argmax(angles >= angle))
     if row == 0:
         return None
@@ -213,15 +218,15 @@ def time_at(drive: Drive, run: xr.Dataset, angle: float) -> float | None:
 def end_gap(drive: Drive, turns: xr.Dataset) -> float:
     """Difference between the ends of `turns` over the largest value: the larger one of crank speed and
     torque."""
-    _, speed = drive.crank_motion(turns)
-    sizes = ((x[-1] - x[0]) / max(np.max(np.abs(x)), 1e-9) for x in (speed, drive.crank_torque(turns)))
+    _, speed = crank_motion(drive, turns)
+    sizes = ((x[-1] - x[0]) / max(np.max(np.abs(x)), 1e-9) for x in (speed, crank_torque(drive, turns)))
     return max(abs(float(size)) for size in sizes)
 
 
 def drift(drive: Drive, turns: xr.Dataset) -> float:
     """Change of the crank speed between the ends of `turns`, relative to its ripple: 0 where it hardly
     changes, positive where it rises, 1 or -1 where it only rises or falls."""
-    _, speed = drive.crank_motion(turns)
+    _, speed = crank_motion(drive, turns)
     change = float(speed[-1] - speed[0])
     return change / float(np.ptp(speed)) if abs(change) > _EVEN * float(np.max(np.abs(speed))) else 0.0
 

@@ -15,6 +15,7 @@ from ...report import figure as fig
 from ...report.lines import Line, line
 from ...report.style import LINES
 from ...report.turn import angle_axis
+from ...study.readings import crank_motion
 from ...study.record import StudyRecord
 from .analysis import FlywheelFindings
 from .wheel import FlywheelAnswers, Wheel
@@ -89,7 +90,7 @@ def _figure(study: StudyRecord, findings: FlywheelFindings, running: list[Wheel]
         items[current].append(fig.Mark(plate.nameplate.rated_current, "rated", axis="y", look="reference"))
     for look, wheel in enumerate(some):
         run = wheel.turns
-        angle, w = drive.crank_motion(run)
+        angle, w = crank_motion(drive, run)
         series = {
             speed: w,
             torque: run["motor.air_gap_tau"].values,

@@ -33,6 +33,7 @@ from ...study.event_table import RandomEvent
 from ...study.limits import limit_reached
 from ...study.measures import MEASURES, read_measure, same_measure
 from ...study.quantiles import CONFIDENCE, Estimate, quantile, runs_needed, share
+from ...study.readings import crank_angle
 from ...study.record import StudyRecord
 from ...study.rig import Rig
 from ...study.window import Phase, Window
@@ -248,7 +249,7 @@ def sample(task: RandomTask, chance: Draw, run: EventRun) -> Sample:
     """The results of a run that did not fail."""
     assert run.series is not None
     config, drive, begin = task.config, task.drive, task.steady + chance.offset
-    angle = float(np.interp(begin, run.series["time"].values, drive.crank_motion(run.series)[0]))
+    angle = float(np.interp(begin, run.series["time"].values, crank_angle(drive, run.series)))
     # from the saved state on, as the event may begin inside a step
     window = Window(Phase.EVENT, run.series, drive, (), config.run.crank_speed)
     stalls = not run.ended and read_measure("stall_time", window) is not None

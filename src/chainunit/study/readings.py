@@ -1,0 +1,152 @@
+"""Quantities that are read from a run of a drive: at the shaft of the motor, at the crank, over whole turns."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ..system import shaft_torque, through
+from .arrays import peak
+from .drive import AbsentError, Drive
+
+
+def series(run: xr.Dataset, name: str) -> Any:
+    """A variable of a run, shape (time,).
+
+    Raises
+    ------
+    AbsentError
+        where motor or machine do not have the variable.
+    """
+    if name not in run:
+        raise AbsentError(name.partition(".")[0], f"{name}: is not known of this motor or machine")
+    return run[name].values
+
+
+def machine_series(run: xr.Dataset) -> dict[str, Any]:
+    """The variables of the machine in a run by name, each of shape (time,)."""
+    return {
+        name.removeprefix("machine."): run[name].values
+        for name in map(str, run.data_vars)
+        if name.startswith("machine.")
+    }
+
+
+def load_inertia(drive: Drive, run: xr.Dataset) -> Any:
+    """Inertia at the motor's shaft beside the rotor [kg m2], shape (time,); with a driveline, as if its ratio were
+    even."""
+    J = run["machine.J"].values / drive.gear**2
+    return J if drive.line is None else (J + drive.line.J4) / drive.line.ratio**2
+
+
+def motor_shaft(drive: Drive, run: xr.Dataset) -> tuple[Any, Any]:
+    """Torque of the load [N m] and speed [rad/s] of the motor's shaft, shape (time,)."""
+    return through(run, drive.motor_bond)
+
+
+def shaft_power(drive: Drive, run: xr.Dataset) -> Any:
+    """Power at the motor's shaft [W], shape (time,)."""
+    full = f"{drive.motor_bond.machine}.power"
+    if full in run:
+        return run[full].values
+    torque, speed = motor_shaft(drive, run)
+    return torque * speed
+
+
+def crank_torque(drive: Drive, run: xr.Dataset) -> Any:
+    """Torque at the crank in a run [N m], shape (time,), also for a machine without its motor."""
+    return shaft_torque(run, drive.machine_bond) * drive.ratio_at_machine
+
+
+def crank_motion(drive: Drive, run: xr.Dataset) -> tuple[Any, Any]:
+    """Angle [rad] and speed [rad/s] of the crank in a run, shape (time,), also for a machine without its motor."""
+    ratio = drive.ratio_at_machine
+    pairs = (
+        ("machine.phi0", "machine.w0"),
+        ("machine.phi", "machine.w"),
+        (drive.crank_output("phi")[0], drive.crank_output("w")[0]),
+    )
+    phi, w = next(pair for pair in pairs if set(pair) <= set(run))
+    return run[phi].values / ratio, run[w].values / ratio
+
+
+def crank_angle(drive: Drive, run: xr.Dataset) -> Any:
+    """Angle of the crank in a run [rad], see `crank_motion`."""
+    return crank_motion(drive, run)[0]
+
+
+def crank_speed(drive: Drive, run: xr.Dataset) -> Any:
+    """Speed of the crank in a run [rad/s], see `crank_motion`."""
+    return crank_motion(drive, run)[1]
+
+
+def turns_made(drive: Drive, run: xr.Dataset) -> float:
+    """Turns that the crank makes from the first to the last row of a run."""
+    angle = crank_angle(drive, run)
+    return float(angle[-1] - angle[0]) / (2.0 * math.pi)
+
+
+def only_whole_turns(drive: Drive, run: xr.Dataset, most: float = math.inf) -> xr.Dataset | None:
+    """The part of the run from its first row until the crank has made the largest number of whole turns, at most
+    `most`, both ends included; None where it makes less than one turn.
+
+    The last row is interpolated linearly; in periodic running it equals the first.
+    """
+    angle = crank_angle(drive, run)
+    turned = (angle - angle[0]) / (2.0 * math.pi)
+    # a run that ends on a whole turn may miss it by rounding
+    rounding = 1e-9
+    turns = min(math.floor(float(np.max(turned)) + rounding), most)
+    if turns < 1:
+        return None
+    last = int(np.argmax(turned >= turns - rounding))
+    share = min(1.0, (turns - turned[last - 1]) / (turned[last] - turned[last - 1]))
+
+    def closed(x: Any) -> Any:
+        return np.append(x[:last], x[last - 1] + share * (x[last] - x[last - 1]))
+
+    return xr.Dataset(
+        {name: ("time", closed(x.values), x.attrs) for name, x in run.data_vars.items()},
+        {"time": ("time", closed(run["time"].values), run["time"].attrs)},
+        run.attrs,
+    )
+
+
+def largest_torque(drive: Drive, run: xr.Dataset, T: float) -> Any:
+    """Largest air-gap torque that the motor can give at each instant of a run [N m], shape (time,), with its winding
+    at `T` [K]; see `Motor.largest_torque`."""
+    drive.needs_own("the largest torque")
+    braking = run["motor.air_gap_tau"].values * run["motor.w"].values < 0.0
+    columns = []
+    for name, resolution in drive.motor.limited_by.items():
+        x = run[f"motor.{name}"].values
+        if name == "w":
+            x = np.where(braking, -np.abs(x), np.abs(x))
+        unit = resolution * max(peak(x), 1e-9)
+        columns.append(np.round(x / unit) * unit)
+    instants, which = np.unique(np.stack(columns), axis=1, return_inverse=True)
+    limits = [drive.motor.largest_torque(drive.fmu_parameters, T, *map(float, at)) for at in instants.T]
+    return np.array(limits)[np.reshape(which, -1)]
+
+
+def pull_out_torque(drive: Drive, run: xr.Dataset, T: float) -> float:
+    """Largest torque at the crank [N m] that the motor gives while a rising load slows it down from the mean state of
+    a run until it stalls, with the winding at `T` [K]; see `Motor.pull_out`."""
+    drive.needs_own("the pull-out torque")
+    return drive.motor.pull_out(drive.fmu_parameters, T, *_mean_supply(drive, run)) * drive.ratio
+
+
+def breakdown_speed(drive: Drive, run: xr.Dataset) -> float:
+    """Speed of the crank [rad/s] below which a load stalls the motor, at the mean supply and temperature of a run; 0
+    where the motor has no such speed. See `Motor.breakdown_speed`."""
+    drive.needs_own("the breakdown speed")
+    T = float(np.mean(run[f"motor.{drive.motor.temperature}"].values))
+    return drive.motor.breakdown_speed(drive.fmu_parameters, T, *_mean_supply(drive, run)) / drive.ratio
+
+
+def _mean_supply(drive: Drive, run: xr.Dataset) -> list[float]:
+    """The means over a run of the variables `Motor.limited_by`."""
+    return [float(np.mean(run[f"motor.{name}"].values)) for name in drive.motor.limited_by]
