@@ -80,6 +80,20 @@ settle_turns = 3
 type = "sticking"
 factor = 2
 """
+LINE = """
+title = "A planetary gear between motor and machine"
+
+[planetary]
+backlash = "1 deg"
+
+[run]
+settle_turns = 2
+step = 0.0005
+
+[[event]]
+type = "jam"
+side = "left"
+"""
 
 
 class House:
@@ -102,12 +116,12 @@ class House:
         path.write_text(whole.replace(before, text + before) if before else whole + text, "utf-8")
         self.touched.append(name)
 
-    def run(self, *command: str) -> str:
+    def run(self, *command: str, status: int = 0) -> str:
         env = os.environ | {"PYTHONPATH": str(self.package.parent)}
         call = [sys.executable, "-c", "from chainunit.app.cli import main; main()", *command]
         process = subprocess.run(call, cwd=self.folder, env=env, capture_output=True, text=True)
-        assert process.returncode == 0, process.stderr
-        return process.stdout
+        assert process.returncode == status, process.stderr
+        return process.stderr if status else process.stdout
 
 
 @pytest.fixture(scope="module")
@@ -191,3 +205,45 @@ def test_a_figure_is_a_function_and_is_drawn_on_the_page_and_in_print(house, res
     (house.folder / "other.toml").write_text("event = []\n[run]\nsettle_turns = 0\nramp = 0.2\n", "utf-8")
     house.run(*command)
     assert not (house.folder / "mine" / "output_angle.png").exists()
+
+
+def test_a_part_of_the_line_is_a_file_and_a_line(house):
+    """A planetary gear with stiffness, damping and backlash has its table, its FMU and its place between motor and
+    machine."""
+
+    def part():
+        house.add("study/line/planetary_gear.py", HERE / "planetary_gear.py")
+        path = house.package / "study" / "line" / "__init__.py"
+        names = 'NAMES = ("driveline",)'
+        whole = path.read_text("utf-8")
+        assert whole.count(names) == 1
+        path.write_text(whole.replace(names, 'NAMES = ("planetary_gear", "driveline")'), "utf-8")
+        house.touched.append("study/line/__init__.py")
+
+    assert files_of(house, part) == 2
+    (house.folder / "line.toml").write_text(LINE, "utf-8")
+    house.run("study", "line.toml", "-o", "line")
+    result = json.loads((house.folder / "line" / "result.json").read_text("utf-8"))
+    assert result["status"] == "complete" and result["planetary"]["backlash"]["value"] == pytest.approx(
+        np.pi / 180
+    )
+    assert list(result["fmus"]) == ["machine", "planetary", "motor"]
+    assert (house.folder / "line" / "fmu" / "PlanetaryGear.fmu").is_file()
+    for run in ("start_up", "jam_left"):
+        shares = result["certificate"][run]
+        assert {"energy_residual_share", "planetary_energy_residual_share"} <= set(shares)
+        assert all(share["value"] < 1e-3 for name, share in shares.items() if "residual" in name)
+    with xr.open_dataset(house.folder / "line" / "result.nc", group="start_up") as run:
+        # the teeth lose contact and come back where the torque changes its sign
+        twist, tau = run["planetary.twist"].values, run["planetary.driven.tau"].values
+        assert np.min(twist) < -0.5 * np.pi / 180 < 0.5 * np.pi / 180 < np.max(twist)
+        assert np.min(tau) < 0.0 < np.max(tau)
+        assert run["planetary.driven.w"].values[-1] == pytest.approx(
+            run["motor.w"].values[-1] / 5.0, rel=0.05
+        )
+    output = house.run("export", "PlanetaryGear", "-o", "PlanetaryGear.fmu", "--config", "line.toml")
+    assert output.startswith("PlanetaryGear.fmu: PlanetaryGear")
+    # the keys of the table are refused by its bounds and its rules
+    (house.folder / "wrong.toml").write_text("[planetary]\nratio = 1\n[sizing]\n", "utf-8")
+    refusal = house.run("study", "wrong.toml", status=2)
+    assert "planetary.ratio = 1: must be > 1" in refusal and "sizing does not know its stiffness" in refusal

@@ -13,6 +13,7 @@ from reports import said_of, write
 
 from chainunit.study.config import parse
 from chainunit.study.judgement import motor_verdict
+from chainunit.study.line.shaft_runs import shaft_findings
 from chainunit.study.measures import STARTED
 from chainunit.study.run import run_study
 
@@ -94,8 +95,11 @@ def test_the_driveline_has_its_start(done):
     steady = study.steady["time"].values[0]
     tau2 = np.abs(study.runs["start_up"]["driveline.tau2"].sel(time=slice(None, steady)).values)
     assert result["shaft"]["start_up"]["tau2_peak"]["value"] == np.max(tau2)
-    assert study.shaft["start_up"].tau2_peak > study.shaft["steady"].tau2_peak
-    assert study.shaft["start_up"].turns_of_steady > 0.0
+    assert (
+        shaft_findings(study).answers["start_up"].tau2_peak
+        > shaft_findings(study).answers["steady"].tau2_peak
+    )
+    assert shaft_findings(study).answers["start_up"].turns_of_steady > 0.0
     table = (folder / "result.md").read_text().partition("Torque in the driveline")[2]
     assert "start-up" in table[:200]
 

@@ -14,7 +14,7 @@ import pytest
 
 import chainunit
 from chainunit.capabilities import NAMES
-from chainunit.study.registry import registered
+from chainunit.study.registry import capabilities
 
 PACKAGE = Path(chainunit.__file__).parent
 STUDY = """
@@ -58,7 +58,7 @@ OUTSIDE = {"app/identifications.py", "app/identify_command.py", "app/studies.py"
 def test_the_list_names_the_folders():
     folders = {path.name for path in (PACKAGE / "capabilities").iterdir() if (path / "__init__.py").exists()}
     assert folders == set(NAMES) and len(NAMES) == len(folders)
-    assert [part.name for part in registered()] == list(NAMES)
+    assert [part.name for part in capabilities()] == list(NAMES)
 
 
 def test_nothing_outside_a_folder_imports_from_it():
@@ -88,7 +88,7 @@ def test_the_rest_works_without(name, tmp_path):
     file.write_text(text.replace(line, ""), "utf-8")
     shutil.copytree(Path(__file__).parents[1] / "fmu", tmp_path / "fmu")
     (tmp_path / "study.toml").write_text(STUDY)
-    tables = list(next(part for part in registered() if part.name == name).tables)
+    tables = list(next(part for part in capabilities() if part.name == name).tables)
     call = [sys.executable, "-c", SMOKE, str(tmp_path), *tables]
     env = os.environ | {"PYTHONPATH": str(copy.parent)}
     process = subprocess.run(call, env=env, capture_output=True, text=True, cwd=tmp_path)

@@ -35,9 +35,9 @@ from chainunit.study import config, parts, remarks
 from chainunit.study.analysis import Work
 from chainunit.study.choice import choose
 from chainunit.study.drive_fmus import export_drive, with_files
+from chainunit.study.line.shaft import UNEVEN, remedies, two_masses
 from chainunit.study.record import StudyRecord
 from chainunit.study.rig import Rig
-from chainunit.study.shaft import UNEVEN, remedies, two_masses
 from chainunit.study.statics import statics
 from chainunit.system import CoSimulation
 
@@ -653,8 +653,9 @@ def test_the_co_simulation_finds_the_steady_motion_of_the_analysis(tmp_path):
     motor = Layout(type(drive.parameters)).from_names(
         {"speed_control.kp": 1e-6, "speed_control.ki": 0.0, "w_start": w}, drive.parameters
     )
-    line = dataclasses.replace(drive.line, w_start=w)
-    drive = dataclasses.replace(drive, parameters=motor, line=line)
+    (part,) = drive.line
+    part = dataclasses.replace(part, parameters=dataclasses.replace(part.parameters, w_start=w))
+    drive = dataclasses.replace(drive, parameters=motor, line=(part,))
     files, _ = export_drive(drive, tmp_path)
     load = found.analysis.rotation.load
     signals = {"motor.w_ref": w, "motor.tau_ff": 0.0, "machine.load": study.config.feed.load}

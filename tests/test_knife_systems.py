@@ -15,6 +15,8 @@ from chainunit.core.quantities import Layout
 from chainunit.report.study import report
 from chainunit.study.config import parse
 from chainunit.study.drive_fmus import coasting_model, coasting_parameters
+from chainunit.study.line.shaft import driveline_of
+from chainunit.study.line.shaft_runs import shaft_findings
 from chainunit.study.readings import crank_speed
 from chainunit.study.run import run_study
 
@@ -151,11 +153,11 @@ def test_a_cardan_line_on_the_crank(tmp_path):
     work = np.trapezoid(tau * w, rows["time"].values)
     assert work == pytest.approx(cut_work(study), rel=0.01)
     assert steady.crank_torque_mean == pytest.approx(cut_work(study) / (2.0 * math.pi), rel=0.02)
-    shaft = study.shaft["steady"]
+    shaft = shaft_findings(study).answers["steady"]
     assert shaft.tau2_rigid == pytest.approx(steady.crank_torque_peak, rel=0.05)
     assert 1.0 < shaft.amplification < 1.5
     # least and largest frequency of the line, by the formula for two masses at their ends
-    line, turn = study.drive.line, study.findings["constant_speed"].numbers
+    line, turn = driveline_of(study.drive), study.findings["constant_speed"].numbers
     motor = study.drive.fmu_parameters.rotor.J * study.drive.ratio**2
     c = line.c2 * line.c3 / (line.c2 + line.c3)
     for J, k in (

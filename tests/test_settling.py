@@ -104,7 +104,7 @@ def test_the_energy_that_is_held_grows_by_the_power_that_comes_in(mill):
     def over_turn(power):
         return float(np.trapezoid(power, time))
 
-    held, behind = energy_held(rig.drive, first), energy_behind(first)
+    held, behind = energy_held(rig.drive, first), energy_behind(rig.drive, first)
     w, p = first["motor.w"].values, rig.drive.fmu_parameters
     to_rotor = over_turn((first["motor.air_gap_tau"].values - first["motor.tau"].values - p.rotor.d * w) * w)
     lost = first["machine.dissipated_power"].values

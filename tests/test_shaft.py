@@ -22,11 +22,12 @@ from chainunit.study import config
 from chainunit.study.choice import choose
 from chainunit.study.cycle import cycle
 from chainunit.study.drive_fmus import coasting_parameters
+from chainunit.study.line.shaft import RIGID, Cycles, driveline_of, rainflow, shaft_answers, torsion
+from chainunit.study.line.shaft_runs import ShaftFindings, shaft_findings
 from chainunit.study.package import export_study, start_of
 from chainunit.study.readings import crank_torque
 from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
-from chainunit.study.shaft import RIGID, Cycles, rainflow, shaft_answers, torsion
 
 JAM, BLOCKED = (event_line(name, turns=1) for name in ("jam_left", "blocked"))
 SHORT = f"""
@@ -64,7 +65,8 @@ def test_the_run_has_its_certificates(study):
 def test_the_line_amplifies_a_jam(study):
     """Peaks are those of the series; the rigid drive's torque is that of a study without a line but with its
     inertia."""
-    steady, jam = study.shaft["steady"], study.shaft["jam_left"]
+    shaft = shaft_findings(study).answers
+    steady, jam = shaft["steady"], shaft["jam_left"]
     run = study.runs["jam_left"].sel(time=slice(study.event["jam_left"], None))
     assert jam.tau2_peak == np.max(np.abs(run["driveline.tau2"])) > 2.0 * steady.tau2_peak
     assert jam.amplification == pytest.approx(jam.tau2_peak / np.max(np.abs(run[RIGID])))
@@ -78,7 +80,7 @@ def test_the_line_amplifies_a_jam(study):
 
 def test_a_rigid_drive_carries_what_the_machine_and_the_inertia_take(study, tmp_path):
     """The same study without a driveline, the crank heavier by J4: its crank torque is the rigid shaft's."""
-    J4, crank = study.drive.line.J4, study.drive.machine.p.crank
+    J4, crank = study.drive.line_inertia, study.drive.machine.p.crank
     heavier = f"{SHORT}crank = {{ I = {crank.I + J4} }}"
     gains = {
         n: v
@@ -112,7 +114,7 @@ def test_before_or_behind_the_gear(tmp_path):
         text = f'{SHORT}[driveline]\nplace = "{place}"\nalpha1 = 0\nalpha2 = 0\n{table}'
         runs.append(run_study(config.parse(text), tmp_path / place))
     crank, motor = runs
-    assert (crank.drive.line.ratio, motor.drive.line.ratio) == (25.0, 1.0)
+    assert (crank.drive.line[0].ratio, motor.drive.line[0].ratio) == (25.0, 1.0)
     for name in ("start_up", "jam_left"):
         a, b = crank.runs[name], motor.runs[name]
         np.testing.assert_allclose(a["motor.w"], b["motor.w"], rtol=1e-9, atol=1e-9)
@@ -129,7 +131,7 @@ def test_before_or_behind_the_gear(tmp_path):
 def test_the_frequency_is_that_of_rotor_gear_shafts_and_machine(study):
     """The eigenproblem in the angles of rotor (behind the gear) and driven shaft, the straight cardan condensed."""
     drive = study.drive
-    line, rotor, result = drive.line, drive.fmu_parameters.rotor.J, torsion(drive, [2e-3, 9e-3])
+    line, rotor, result = driveline_of(drive), drive.fmu_parameters.rotor.J, torsion(drive, [2e-3, 9e-3])
     for J, expected in zip((2e-3, 9e-3), (result.k_largest, result.k_least), strict=True):
         c = 1.0 / (1.0 / line.c2 + 1.0 / line.c3)
         # twist = phi_motor/ratio - phi_driven; both inertias where they turn
@@ -163,7 +165,7 @@ def test_damage_of_a_steady_swing(study, turns, phase):
         "driveline.tau2": swing, "driveline.tau3": swing, "driveline.twist2": zero, "driveline.twist3": zero,
         "machine.phi0": 2.0 * np.pi * angle * gear, "machine.w0": zero,
         # the torque of a rigid shaft twice as small
-        "machine.tau": 0.5 * swing / study.drive.line.ratio, "motor.a": zero,
+        "machine.tau": 0.5 * swing / study.drive.line[0].ratio, "motor.a": zero,
     }  # fmt: skip
     run = xr.Dataset({name: ("time", y) for name, y in series.items()}, {"time": angle})
     answers, cycles, damage = shaft_answers(study.drive, run, run, 5.0)
@@ -196,10 +198,14 @@ def test_rounding_is_no_cycle(study):
 
 def test_no_more_runs_are_drawn_beside_each_other_than_fit(study):
     names = [f"jam_{k}" for k in range(6)]
+    shaft = shaft_findings(study)
+    more = (
+        {"steady": each["steady"]} | dict.fromkeys(names, each["jam_left"])
+        for each in (shaft.answers, shaft.cycles)
+    )
     more = dataclasses.replace(
         study,
-        shaft={"steady": study.shaft["steady"]} | dict.fromkeys(names, study.shaft["jam_left"]),
-        cycles_of={"steady": study.cycles_of["steady"]} | dict.fromkeys(names, study.cycles_of["jam_left"]),
+        findings=study.findings | {"shaft": ShaftFindings(*more)},
         event=study.event | dict.fromkeys(names, study.event["jam_left"]),
         runs=study.runs | dict.fromkeys(names, study.runs["jam_left"]),
     )
@@ -209,7 +215,7 @@ def test_no_more_runs_are_drawn_beside_each_other_than_fit(study):
     # torque above cycles, each with the labels of its own axes
     assert all(drawn.sharing(r, c) == [r] for r, c, _ in panels)
     assert [panel.title for r, _, panel in panels if r % 2 == 0] == [
-        more.title_of(name) for name in more.shaft
+        more.title_of(name) for name in shaft_findings(more).answers
     ]
 
 
@@ -231,7 +237,7 @@ def test_the_report_shows_it(study, tmp_path):
     assert head == "time [s],speed [rad/s],torque [N.m],inertia [kg.m2]"
     # at the motor: J4 and the machine's inertia through the gear
     steady = study.runs["start_up"].sel(time=slice(study.steady_begin, None))
-    inertia = (float(steady["machine.J"][0]) + study.drive.line.J4) / 25.0**2
+    inertia = (float(steady["machine.J"][0]) + study.drive.line_inertia) / 25.0**2
     assert float(first.split(",")[3]) == pytest.approx(inertia, rel=1e-8)
     assert float(first.split(",")[2]) == pytest.approx(float(steady["driveline.tau"][0]), rel=1e-8)
     result = as_dict(study)["driveline"]
@@ -247,10 +253,10 @@ def test_a_coupling_that_opens_lets_line_and_machine_coast(tmp_path):
     coasting = study.runs["jam_left_coasting"]
     w = float(study.runs["jam_left"]["machine.w0"][-1])
     assert float(coasting["machine.w"][0]) == pytest.approx(w, rel=1e-12)
-    assert coasting_parameters(study.drive)["J_added"] == study.drive.line.J4
+    assert coasting_parameters(study.drive)["J_added"] == study.drive.line_inertia
     # what stays behind is the energy of the machine before it opened, and of the line's end
     before = float(study.runs["jam_left"]["machine.kinetic_energy"][-1])
-    assert jam.energy_behind == pytest.approx(before + 0.5 * study.drive.line.J4 * w * w, rel=1e-9)
+    assert jam.energy_behind == pytest.approx(before + 0.5 * study.drive.line_inertia * w * w, rel=1e-9)
     assert study.certificate["jam_left"]["driveline_energy_residual_share"] < 1e-3
     # nothing turns what is left alone
     assert not np.any(crank_torque(study.drive, coasting))
@@ -261,7 +267,7 @@ def test_the_rigid_drive_has_the_same_coupling(tmp_path):
     """Where it opens, both peak near the trip torque: what comes after it is in neither."""
     events = SHORT.replace(JAM, BLOCKED)
     study = run_study(config.parse(f"{events}{LINE}[coupling]\ntrip_torque = 150\n"), tmp_path)
-    blocked = study.shaft["blocked"]
+    blocked = shaft_findings(study).answers["blocked"]
     assert study.answers["blocked"].coupling_trip_time is not None
     assert 0.9 * 150.0 < blocked.tau2_rigid < 2.0 * 150.0 and 0.6 < blocked.amplification < 1.5
 
@@ -273,7 +279,10 @@ def test_without_a_motor_that_fits_the_shaft_is_that_of_the_nearest(tmp_path):
     study = run_study(config.parse(text), tmp_path)
     assert study.sizing.chosen_candidate is None and study.insufficient
     assert study.drive.ratio == study.sizing.best.drive.ratio
-    assert set(as_dict(study)["shaft"]) == {"start_up", *study.answers} and "steady" in study.shaft
+    assert (
+        set(as_dict(study)["shaft"]) == {"start_up", *study.answers}
+        and "steady" in shaft_findings(study).answers
+    )
     write(study, tmp_path)
 
 
@@ -315,7 +324,7 @@ c3 = 5e4
 damping_ratio = 0.04
 """
     drive = choose(config.parse(SHORT + table), tmp_path, lambda *_: None).drive
-    line = drive.line
+    line = driveline_of(drive)
     assert line.c2 == pytest.approx(stiffness(hollow(0.06, 0.04), 1.0)) and line.c3 == 5e4
     feed = config.parse(SHORT).feed
     J = cycle(drive.machine, 6.0, feed).outputs.J

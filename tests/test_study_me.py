@@ -7,6 +7,7 @@ import pytest
 
 from chainunit import InputError
 from chainunit.study import config
+from chainunit.study.line.shaft_runs import shaft_findings
 from chainunit.study.run import run_study
 
 TEXT = """
@@ -107,7 +108,7 @@ side = "right"
 turns = 1
 """
     study = run_study(config.parse(text), tmp_path, check=True)
-    assert study.failure is None and study.shaft["jam_right"].amplification > 0.0
+    assert study.failure is None and shaft_findings(study).answers["jam_right"].amplification > 0.0
     for run in ("start_up", "jam_right"):
         shares = study.certificate[run]
         assert shares["machine.tau_difference_to_monolithic"] < 1e-4

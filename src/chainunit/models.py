@@ -1,4 +1,5 @@
-"""The models that become FMUs, by name. A module of `machines` adds its own machine."""
+"""The models that become FMUs, by name. A module of `machines` adds its own machine, a part of the line its
+own model."""
 
 from importlib import import_module
 from pathlib import Path
@@ -7,7 +8,6 @@ from pkgutil import iter_modules
 from . import machines
 from .core.errors import InputError, near_name
 from .core.model import Model
-from .drives.driveline import CardanDriveline
 from .drives.motors import MOTORS
 from .machines.flexible import ChainUnitFlexible
 from .machines.linkages.file import read_linkage
@@ -17,12 +17,15 @@ from .mechanism.models import MACHINES as MACHINES
 for _module in iter_modules(machines.__path__):
     import_module(f"{machines.__name__}.{_module.name}")
 
+# the parts of the line stand above
+_REGISTRY = import_module(f"{__package__}.study.registry")
+
 _CHAIN_UNIT = MACHINES["ChamberForces"]
 _MODELS: tuple[type[Model], ...] = (
     _CHAIN_UNIT,
     _CHAIN_UNIT.direct(),
     *MOTORS.values(),
-    CardanDriveline,
+    *(part.model for part in _REGISTRY.parts_of_line()),
     *(machine for machine in MACHINES.values() if machine is not _CHAIN_UNIT),
     ChainUnitFlexible,
     LoadObserver,

@@ -8,7 +8,7 @@ from typing import Any
 
 from ..study.capability import StudyCapability
 from ..study.record import StudyRecord
-from ..study.registry import registered
+from ..study.registry import capabilities as registered
 from .blocks import Block, Source
 from .lines import Line
 from .supplement import Supplement

@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from typing import Any
 
 from ..core.quantities import Layout
+from ..study.line.shaft import CLASSES, RIGID, ShaftAnswers, Torsion
+from ..study.line.shaft_runs import shaft_findings
 from ..study.record import StudyRecord
-from ..study.shaft import CLASSES, RIGID, ShaftAnswers, Torsion
 from ..study.verdict import START, STEADY
 from . import blocks as b
 from . import figure as fig
@@ -22,7 +23,7 @@ _BESIDE = 3
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The tables and the figure of the driveline."""
-    if not study.shaft:
+    if not shaft_findings(study).answers:
         return
     yield _shaft(s, study)
     if "torsion" not in s.result:
@@ -40,12 +41,13 @@ def _shaft(s: b.Source, study: StudyRecord) -> b.Table:
     return over_runs(study, runs, rows, "Torque in the driveline")
 
 
-@PICTURES.declare(lambda study: study.shaft, "driveline.png")
+@PICTURES.declare(lambda study: shaft_findings(study).answers, "driveline.png")
 def _driveline(s: b.Source, study: StudyRecord) -> fig.Figure:
     """The torque in the driveline beside that in a rigid one, and its rainflow cycles."""
-    largest = max(answers.range_largest for answers in study.shaft.values())
+    shaft = shaft_findings(study)
+    largest = max(answers.range_largest for answers in shaft.answers.values())
     above, below = [], []
-    for name in study.shaft:
+    for name in shaft.answers:
         since = 0.0 if name == START else study.steady_begin if name == STEADY else study.event[name]
         until = study.steady_begin if name == START else None
         run = study.runs[START if name == STEADY else name].sel(time=slice(since, until))
@@ -53,7 +55,7 @@ def _driveline(s: b.Source, study: StudyRecord) -> fig.Figure:
         x = fig.Axis("time", "s", low=0.0, high=float(time[-1]))
         title = study.title_of(name)
         above.append(fig.Panel(x, TORQUE, tuple(shaft_torque(run, time)), title))
-        classes = study.cycles_of[name].classes(largest)
+        classes = shaft.cycles[name].classes(largest)
         middle = [0.5 * (row["from"] + row["to"]) for row in classes]
         wide = 0.9 * largest / CLASSES
         bars = fig.Bars("cycles", middle, [row["count"] for row in classes], wide, 1)

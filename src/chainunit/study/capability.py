@@ -9,17 +9,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..core.errors import InputError
-from .analysis import Analysis
-from .config import Config
-from .drive import Drive
-from .event_table import RandomEvent
-from .file_reading import FileReading
 from .file_section import FileSection
-from .rig import Rig
-from .rules import Rule
+
+if TYPE_CHECKING:
+    from .analysis import Analysis
+    from .config import Config
+    from .drive import Drive
+    from .event_table import RandomEvent
+    from .file_reading import FileReading
+    from .rig import Rig
+    from .rules import Rule
 
 
 @dataclass(frozen=True)

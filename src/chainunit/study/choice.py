@@ -10,12 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from ..core.errors import InputError, refusal_prefix
-from ..core.quantities import Layout
 from ..drives.catalogue import check_own
-from ..drives.driveline import CardanDriveline
 from ..drives.motor import Motor
 from ..drives.speed_control import Tuning
-from ..drives.torsion import with_damping_ratio
 from ..fmu.backends import Backend
 from ..system import foreign_component
 from ..work.progress import Report
@@ -23,8 +20,7 @@ from .catalogue_drive import catalogue_drive, gear_with, with_wheel
 from .config import Config
 from .cycle import cycle
 from .drive import Drive
-from .registry import registered
-from .shaft import two_masses
+from .registry import parts_of_line, registered
 from .sizing import SizingResult, size
 
 
@@ -121,8 +117,6 @@ def with_motor(config: Config, file: Path, names: Mapping[str, str] | None = Non
         where the FMU does not fit, or the study asks for a quantity that only a motor of this package has.
     """
     motor = foreign_component(file, "motor", names)
-    if config.driveline is not None:
-        raise InputError(f"{file}: the inertia of its rotor is not known; leave [driveline] out")
     for part in registered():
         if words := part.not_with_foreign_motor(config):
             raise InputError(f"{file}: {words}")
@@ -143,19 +137,11 @@ def with_motor(config: Config, file: Path, names: Mapping[str, str] | None = Non
 
 
 def with_line(config: Config, drive: Drive) -> Drive:
-    """The drive with the driveline of the study, if it has one: on the crank's shaft behind the gear, or on
-    the motor's shaft before it."""
-    if config.driveline is None:
-        return drive
-    values = Layout(type(config.driveline)).by_name(config.driveline)
-    values = {name: x for name, x in values.items() if name in CardanDriveline.parameter_layout.names}
-    values["ratio"] = drive.ratio if config.place == "crank" else 1.0
-    drive = replace(drive, line=CardanDriveline.parameter_layout.from_names(values))
-    if config.damping_ratio is None:
-        return drive
-    J = cycle(drive.machine, config.run.crank_speed, config.feed).outputs.J
-    line = with_damping_ratio(two_masses(drive, float(np.mean(J))), config.damping_ratio)
-    return replace(drive, line=replace(drive.line, d2=line.d2, d3=line.d3))
+    """The drive with the parts of the study between motor and machine."""
+    for part in parts_of_line():
+        placed = part.placed(config, drive)
+        drive = drive if placed is None else drive.with_part(placed)
+    return drive
 
 
 def tune(config: Config, drive: Drive) -> tuple[Drive, Tuning | None]:

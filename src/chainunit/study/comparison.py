@@ -16,10 +16,10 @@ from .. import __version__
 from ..core.errors import InputError, printable
 from ..core.quantities import variables
 from ..reading.text import entry
+from .line.shaft import ShaftAnswers
 from .measures import Answers
 from .registry import registered
 from .sections import CHOICES, SECTIONS
-from .shaft import ShaftAnswers
 
 FILE = "result.json"
 _ROUNDING = 1e-12

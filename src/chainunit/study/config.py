@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import Faults, GeometryError, InputError, each_refusal, refusal_prefix
-from ..core.quantities import Layout
-from ..drives.cardan import check
+from ..core.quantities import Layout, variables
 from ..drives.catalogue import CatalogueMotor
 from ..drives.gearing import Transmission
 from ..drives.motor import Motor
@@ -39,7 +38,6 @@ from .sections import (
     CHOICES,
     ChainOrgans,
     Coupling,
-    Driveline,
     ForeignMotor,
     Ratios,
     Run,
@@ -75,11 +73,6 @@ class Config:
     simulation: str
     """one of `SIMULATIONS`"""
     catalogue: Path | None
-    driveline: Driveline | None
-    place: str
-    """place of the driveline, one of `PLACES`"""
-    damping_ratio: float | None
-    """damping ratio of the driveline's torsion, in place of d2 and d3"""
     chain: ChainOrgans | None
     """the organs as chains, or None for two bars"""
     foreign: ForeignMotor | None
@@ -105,10 +98,10 @@ class Config:
     lines: Mapping[str, int] = dataclasses.field(default_factory=dict)
     """the line of each key in the file"""
     values: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-    """by table of a capability, the values of its declared quantities; None for an optional table that the file does
-    not have"""
+    """by table of a part of the line or of a capability, the values of its declared quantities; None for an optional
+    table that the file does not have"""
     plans: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-    """by capability, the plan that its tables state, or None"""
+    """by part of the line and capability, the plan that its tables state, or None"""
 
     def of_file(self) -> AbstractContextManager[None]:
         """A context in which an InputError begins with the name of the study file and the line of its key; with
@@ -151,7 +144,7 @@ class Config:
         return self.plate is not None or self.sizing is not None
 
     def table(self, name: str) -> Any:
-        """The values of a table of the base or of a capability; None for an optional table that the file does not
+        """The values of a table; None for an optional table that the file does not
         have."""
         return getattr(self, name) if name in _OWN_TABLES else self.values[name]
 
@@ -275,7 +268,7 @@ def _with_hints(fault: InputError, unusual: Iterable[Slip]) -> InputError:
 
 _OF_PARTS = ("machine", "ratios", "motor")
 """Tables whose values follow from others, too: `Config` has them as machine and motor."""
-_OWN_TABLES = ("feed", "run", "coupling", "sizing", "gear", "starter", "driveline", "chain")
+_OWN_TABLES = ("feed", "run", "coupling", "sizing", "gear", "starter", "chain")
 """Tables whose values are fields of a `Config`."""
 
 
@@ -308,9 +301,6 @@ def _config(
         machine = _machine(parts, tables["machine"], tables["ratios"])
     with faults.collected():
         plate = plate_of(parts.designation, own_motors)
-    with faults.collected(), refusal_prefix("driveline.", "driveline"):
-        if "driveline" in data:
-            check(values["driveline"])
     with faults.collected(), refusal_prefix("motor: ", "motor"):
         if parts.gives_motor:
             parts.motor.check(values["motor"])
@@ -336,8 +326,6 @@ def _config(
         start=checked.start,
         simulation=checked.simulation,
         catalogue=own_motors,
-        place=checked.driveline.place,
-        damping_ratio=checked.driveline.damping_ratio,
         foreign=ForeignMotor(beside(parts.file, source), given_values(checked.system.motor_names))
         if parts.file
         else None,
@@ -380,9 +368,11 @@ def _choices(checked: Any, parts: Parts) -> dict[str, Any]:
     """All values of a file that are no quantities of a table."""
     known = {name: getattr(checked, name) for name in CHOICES}
     for name, section in parts.sections.items():
-        known |= {f"{name}.{key}": getattr(getattr(checked, name), key) for key in section.keys}
-    if checked.driveline.damping_ratio is not None:
-        known["driveline.damping_ratio"] = checked.driveline.damping_ratio
+        table = getattr(checked, name)
+        known |= {f"{name}.{key}": getattr(table, key) for key in section.keys}
+        if section.instead is not None:
+            others = {v.name: getattr(table, v.name) for v in variables(section.instead)}
+            known |= {f"{name}.{key}": x for key, x in others.items() if x is not None}
     known |= {"system.machine": checked.system.machine, "system.motor": parts.named_motor}
     for table in ("machine_names", "motor_names"):
         names = given_values(getattr(checked.system, table))

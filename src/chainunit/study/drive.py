@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -9,7 +10,6 @@ from typing import Any, Literal
 
 from ..core.errors import InputError
 from ..core.quantities import Layout
-from ..drives.driveline import CardanDriveline
 from ..drives.gear import Gear
 from ..drives.motor import Motor
 from ..machines.api import ChainUnitMachine, machine_of
@@ -29,6 +29,7 @@ from ..system import (
 )
 from ..system.graph import Connection
 from .foreign_machine import ForeignMachine
+from .line.placed import PlacedPart
 
 
 class AbsentError(InputError):
@@ -58,9 +59,8 @@ class Drive:
     chain: Any = None
     """the organs as chains, a `sections.ChainOrgans`; None for two bars"""
 
-    line: Any = None
-    """parameters of the driveline between motor and machine, or None; its `ratio` is that of the gear before
-    it"""
+    line: tuple[PlacedPart, ...] = ()
+    """the parts between motor and machine, from the motor on"""
 
     flywheel: float = 0.0
     """inertia of a flywheel on the motor's shaft [kg m2]"""
@@ -85,8 +85,10 @@ class Drive:
 
     @cached_property
     def driven_machine(self) -> Machine:
-        """The machine as its FMU has it: with the gear ratio that remains behind the driveline."""
-        return self.machine if self.line is None else self.machine.replace(ratio=self.ratio / self.line.ratio)
+        """The machine as its FMU has it: with the gear ratio that remains behind the line."""
+        if not self.line:
+            return self.machine
+        return self.machine.replace(ratio=self.ratio / math.prod(part.ratio for part in self.line))
 
     @cached_property
     def fmu_parameters(self) -> Any:
@@ -99,11 +101,10 @@ class Drive:
 
     @property
     def rotor_inertia(self) -> float:
-        """Inertia that turns with the rotor, at the motor's shaft [kg m2]: of rotor, gear and flywheel, and
-        of the driveline where there is one."""
+        """Inertia that turns with the rotor, at the motor's shaft [kg m2]: of rotor, gear and flywheel, and of the
+        parts of the line."""
         self.needs_own("the inertia of its rotor")
-        line = 0.0 if self.line is None else self.line.J4 / self.line.ratio**2
-        return float(self.fmu_parameters.rotor.J + line)
+        return float(self.fmu_parameters.rotor.J + self.at_motor(0.0))
 
     def needs_own(self, quantity: str) -> None:
         """Refuse a `quantity`, named in words, that only a motor of this package has.
@@ -174,22 +175,17 @@ class Drive:
         """The system of the models, each before the part that drives it. With feed-forward it also has the
         second machine, `model`, that the control uses; and it has the `observer`, if the drive has one."""
         outsider = self.outsider
-        between: dict[str, Component] = {}
-        if self.gear != 1.0 or (outsider and self.line is not None and not outsider.model.has_gear()):
-            between["gear"] = ModelComponent(Gear, Gear.Parameters(ratio=self.gear))
-        if self.line is not None:
-            between["driveline"] = ModelComponent(CardanDriveline, self.line)
         system = in_line(
             {
                 "machine": outsider.component if outsider else ModelComponent(*self.load_model()),
-                **between,
+                **{part.name: part.component for part in reversed(self.parts)},
                 "motor": self.foreign or ModelComponent(self.motor, self.fmu_parameters),
             }
         )
         beside: dict[str, Component] = {}
         wires: list[Connection] = []
         if self.feed_forward:
-            # the second machine turns with the motor's shaft, before the driveline
+            # the second machine turns with the motor's shaft, before the line
             beside["model"] = ModelComponent(*self.load_model(self.machine))
             wires += [("motor.phi", "model.phi"), ("motor.w", "model.w"), ("model.tau", "motor.tau_ff")]
         if self.observer is not None:
@@ -203,6 +199,38 @@ class Drive:
         its gear."""
         outsider = self.outsider
         return outsider.ratio if outsider and outsider.needs_gear else 1.0
+
+    @cached_property
+    def parts(self) -> tuple[PlacedPart, ...]:
+        """All parts between motor and machine: those of the line, and a gear before a foreign machine without one.
+        Behind a line its ratio may be 1: the twin with a rigid shaft puts the ratio of the line there."""
+        outsider = self.outsider
+        if self.gear == 1.0 and not (outsider and self.line and not outsider.model.has_gear()):
+            return self.line
+        return (*self.line, PlacedPart("gear", Gear, Gear.Parameters(ratio=self.gear), self.gear))
+
+    def part(self, name: str) -> PlacedPart | None:
+        """The part of the line of that name; None where there is none."""
+        return next((part for part in self.line if part.name == name), None)
+
+    def with_part(self, part: PlacedPart) -> Drive:
+        """The drive with one more part in its line, behind the others."""
+        return replace(self, line=(*self.line, part))
+
+    def at_motor(self, inertia: Any) -> Any:
+        """An inertia on the shaft of the machine's component, and those of the parts, at the motor's shaft [kg m2];
+        a part counts as rigid, and as if its ratio were even."""
+        for part in reversed(self.parts):
+            inertia = (inertia + part.inertia) / part.ratio**2
+        return inertia
+
+    @property
+    def line_inertia(self) -> float:
+        """Inertia of the parts of the line, at the shaft of the machine [kg m2]."""
+        inertia = 0.0
+        for part in self.line:
+            inertia = inertia * part.ratio**2 + part.inertia
+        return inertia
 
     @cached_property
     def motor_bond(self) -> Bond:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -30,6 +30,10 @@ class FileSection:
     """whether a study uses the table only where the analysis of the same name has findings"""
     apart: bool = False
     """whether the result has other things of the same names"""
+    instead: type | None = None
+    """declaration of further quantities, each of which stands in place of others"""
+    further_keys: Callable[[], Iterable[Any]] = tuple
+    """keys of further tables in it, each a `chainunit.study.keys.Key`"""
     form: Callable[..., type[BaseModel]] = schema
     values: Callable[[Any], dict[str, Any]] = given_values
     """the values of a checked table, by the name of the quantity"""
@@ -41,6 +45,10 @@ class FileSection:
     """triples (low, relation, high) of keys: the value of `high` has to have this relation to that of `low`"""
     forms: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     """by key, also of entries, further conditions of the JSON Schema on its text or list"""
+    conditions: Callable[[], Mapping[str, Any]] | None = None
+    """further conditions of the JSON Schema on the table"""
+    displaced: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """by key, those keys of a file with which the value of the example has no meaning"""
     required: tuple[str, ...] = ()
     """keys that the table must have"""
     random_events: tuple[str, ...] = ()

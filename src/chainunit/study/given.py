@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..core.quantities import variables
-from ..drives.line_table import Damping
 from ..reading.text import entries, entry
 from .config import Config
 from .record import StudyRecord
@@ -135,8 +134,8 @@ def description(name: str) -> str:
     if table == "system":
         field = SystemTable.model_fields.get(key)
         return str(field.description) if field else "name of it in the FMU"
-    sections = all_sections()
-    keys = sections[table].keys if table in sections else {}
-    if key in keys:
-        return str(keys[key][1].description)
-    return next((v.description for v in variables(Damping) if v.name == key), "")
+    section = all_sections().get(table)
+    if section is not None and key in section.keys:
+        return str(section.keys[key][1].description)
+    others = variables(section.instead) if section is not None and section.instead else ()
+    return next((v.description for v in others if v.name == key), "")

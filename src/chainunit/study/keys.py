@@ -17,10 +17,7 @@ from ..core.quantities import Layout, Variable, variables, written
 from ..core.units import shortest_text
 from ..drives.catalogue import LAYOUT as CATALOGUE
 from ..drives.catalogue import TEXTS
-from ..drives.line_table import CORNER, SHAFTS, Damping
 from ..drives.motors import MOTORS
-from ..drives.shafts import SECTIONS as PROFILES
-from ..drives.shafts import Shaft
 from ..models import MACHINES
 from ..reading.lists import TableList
 from ..reading.text import CHOICES as UNITS
@@ -130,7 +127,7 @@ def key_tables() -> tuple[KeyTable, ...]:
             KeyTable("machine", of.noun.capitalize(), tuple(_of_machine(name, "machine")), name)
             for name, of in MACHINES.items()
         ),
-        KeyTable("ratios", "The papers' ratios", tuple(_numbers(Ratios, Ratios())), "ChamberForces"),
+        KeyTable("ratios", "The papers' ratios", tuple(quantity_keys(Ratios, Ratios())), "ChamberForces"),
         *(
             KeyTable("feed", "Feed in normal running", tuple(_of_machine(name, "feed")), name)
             for name in MACHINES
@@ -149,7 +146,7 @@ def key_tables() -> tuple[KeyTable, ...]:
 def catalogue_columns() -> KeyTable:
     """The columns of a catalogue of motors, and keys of its [[motor]] tables."""
     texts = (Key(name, description, sort="text") for name, description in TEXTS.items())
-    return KeyTable("motor", "Catalogue of motors", (*texts, *_numbers(CATALOGUE.cls)), "a catalogue")
+    return KeyTable("motor", "Catalogue of motors", (*texts, *quantity_keys(CATALOGUE.cls)), "a catalogue")
 
 
 @cache
@@ -159,7 +156,7 @@ def _study(machine: str = "ChamberForces", motor: str = "") -> Config:
     return parse("\n".join(["[system]", *names]))
 
 
-def _numbers(
+def quantity_keys(
     declared: type, values: Any = None, prefix: str = "", sources: Mapping[str, str] = NONE
 ) -> Iterator[Key]:
     """Keys of declared quantities. `values` are the values of a file that leaves them out, and `sources` says by key
@@ -183,34 +180,24 @@ def _numbers(
 def _of_machine(name: str, table: str) -> Iterator[Key]:
     config = _study(name)
     if table == "feed":
-        return _numbers(config.machine.model.Feed, config.feed)
-    return _numbers(config.machine.model.Parameters, config.machine.p)
+        return quantity_keys(config.machine.model.Feed, config.feed)
+    return quantity_keys(config.machine.model.Parameters, config.machine.p)
 
 
 def _of_motor(name: str) -> Iterator[Key]:
-    return _numbers(MOTORS[name].Parameters, _study(motor=name).motor, sources=_OF_MOTORS)
+    return quantity_keys(MOTORS[name].Parameters, _study(motor=name).motor, sources=_OF_MOTORS)
 
 
 def _of_section(name: str, section: FileSection) -> Iterator[Key]:
     values = _study().table(name)
     if values is None:
         values = section.default or section.declaration()
-    yield from _numbers(section.declaration, values, sources=section.follows)
+    yield from quantity_keys(section.declaration, values, sources=section.follows)
     for key in _of_fields(section.keys):
         yield dataclasses.replace(key, follows=section.follows.get(key.name, ""))
-    if name == "driveline":
-        yield from _numbers(Damping)
-        for shaft, stiffness in SHAFTS.items():
-            words = f"its profile, in place of {stiffness}"
-            yield Key(f"{shaft}.section", words, words=tuple(f'"{name}"' for name in PROFILES), sort="text")
-            yield from _numbers(Shaft, prefix=f"{shaft}.")
-            yield Key(
-                f"{shaft}.outline",
-                "corners of a profile of any form, as pairs [m]",
-                sort="list",
-                items=CORNER,
-            )
-            yield Key(f"{shaft}.holes", "outlines of the holes in it", sort="list", items=CORNER)
+    if section.instead is not None:
+        yield from quantity_keys(section.instead)
+    yield from section.further_keys()
 
 
 def _of_system() -> Iterator[Key]:
@@ -256,14 +243,14 @@ def _of_event(of: type[Event]) -> Iterator[Key]:
     if of.has_input:
         yield Key("input", "input of the machine that rises, as [feed] has it", sort="text")
     yield Key("name", "name of its run, in small letters, digits and _", sort="text", follows="type and side")
-    yield from _numbers(of.Parameters, of.Parameters())
+    yield from quantity_keys(of.Parameters, of.Parameters())
 
 
 def _of_entry(entry: TableList) -> Iterator[Key]:
     for key in _of_fields(entry.keys):
         yield dataclasses.replace(key, follows=entry.follows.get(key.name, ""))
     if entry.declared is not None:
-        yield from _numbers(entry.declared, entry.declared(), sources=entry.follows)
+        yield from quantity_keys(entry.declared, entry.declared(), sources=entry.follows)
 
 
 def _of_fields(fields: Mapping[str, Any], config: Config | None = None) -> Iterator[Key]:

@@ -10,7 +10,6 @@ from ..core.errors import InputError, RunError, printable
 from ..core.model import About, Model
 from ..core.quantities import Layout
 from ..core.temporary_folders import scratch
-from ..drives.driveline import CardanDriveline
 from ..drives.motor import Motor
 from ..fmu.backends import Backend
 from ..machines.chain_organs import LEAST, MOST
@@ -27,11 +26,12 @@ from ..system.ssp import export
 from .choice import choose, with_parts_beside
 from .config import Config
 from .drive import Drive
+from .registry import parts_of_line
 from .sections import ChainOrgans
 
 
 def study_system(config: Config, drive: Drive) -> System:
-    """Machine, driveline and motor of a study, from rest. The speed reference is the crank speed at the motor
+    """Machine, line and motor of a study, from rest. The speed reference is the crank speed at the motor
     from the start on; feed and processing forces are those of normal running. With feed-forward, the system
     has the second machine that the control uses."""
     start = drive.loads(config.feed) if drive.outsider else {}
@@ -58,15 +58,16 @@ def start_of(
     Raises
     ------
     InputError
-        where the study has another motor or machine, or no driveline.
+        where the study has another motor or machine, or lacks the part of the line.
     RunError
         where sizing finds no motor.
     """
     drive = _drive(config, backend, report)
-    if model is CardanDriveline:
-        if drive.line is None:
-            raise InputError("the study has no [driveline]; add the table, or export without --config")
-        return model.parameter_layout.by_name(drive.line)
+    for kind in parts_of_line():
+        if model is kind.model:
+            if (part := drive.part(kind.name)) is None:
+                raise InputError(f"the study has no [{kind.name}]; add the table, or export without --config")
+            return part.component.start
     if not issubclass(model, Motor):
         if not _is_of(model, drive):
             raise InputError(f"the study's machine is {drive.driven_machine.model.name}, not {model.name}")

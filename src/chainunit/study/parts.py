@@ -13,7 +13,6 @@ from typing import Annotated, Any
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from ..core.errors import Faults, InputError, near_name, refusal_prefix, shown
-from ..drives.line_table import SHAFTS
 from ..drives.motor import Motor
 from ..drives.motors import MOTORS
 from ..machines.linkages.file import read_linkage
@@ -22,7 +21,7 @@ from ..models import MACHINES
 from ..reading.tables import Title, file_form, given_values, merged, packaged, read_table, toml
 from .file_section import FileSection
 from .foreign_machine import foreign_model
-from .sections import CHOICES, SystemTable, sections_of
+from .sections import CHOICES, SystemTable, all_sections, sections_of
 
 
 def _as_text(value: Any) -> Any:
@@ -251,7 +250,7 @@ LENGTHS = ("r", "l", "h", "c", "hy", "e", "l1", "l2", "z")
 def over_example(data: Mapping[str, Any], parts: Parts) -> dict[str, Any]:
     """The tables of a study file, completed by the example of its machine: a value that the file leaves out
     is the example's. The example's ratios are dropped if the file gives lengths, its motor if the file names
-    another, its shafts and their damping if the file gives its own."""
+    another, and so on, see `FileSection.displaced`."""
     base = parts.example
     if any(name in named_table(data, "machine") for name in LENGTHS) and "ratios" not in data:
         base.pop("ratios", None)
@@ -261,11 +260,10 @@ def over_example(data: Mapping[str, Any], parts: Parts) -> dict[str, Any]:
         base.get("system", {}).pop("motor", None)
         for name in ("gear", "start", "starter"):
             base.pop(name, None)
-    line = named_table(data, "driveline")
-    for shaft, stiffness in SHAFTS.items():
-        if shaft in line or stiffness in line:
-            base.get("driveline", {}).pop(shaft, None)
-    if "d2" in line or "d3" in line:
-        base.get("driveline", {}).pop("damping_ratio", None)
+    for name, section in all_sections().items():
+        own = named_table(data, name)
+        for key, others in section.displaced.items():
+            if any(other in own for other in others):
+                base.get(name, {}).pop(key, None)
     base["title"] = ""
     return merged(base, data)

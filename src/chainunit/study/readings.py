@@ -36,10 +36,8 @@ def machine_series(run: xr.Dataset) -> dict[str, Any]:
 
 
 def load_inertia(drive: Drive, run: xr.Dataset) -> Any:
-    """Inertia at the motor's shaft beside the rotor [kg m2], shape (time,); with a driveline, as if its ratio were
-    even."""
-    J = run["machine.J"].values / drive.gear**2
-    return J if drive.line is None else (J + drive.line.J4) / drive.line.ratio**2
+    """Inertia at the motor's shaft beside the rotor [kg m2], shape (time,); see `Drive.at_motor`."""
+    return drive.at_motor(run["machine.J"].values)
 
 
 def motor_shaft(drive: Drive, run: xr.Dataset) -> tuple[Any, Any]:

@@ -24,7 +24,6 @@ from .parts import LENGTHS
 from .protection import Alternative, Setting
 from .pulls import LeastPull
 from .relay import LIGHT
-from .shaft import Cycles, ShaftAnswers
 from .sizing import SizingResult
 from .statics import DriveStatics
 from .verdict import STEADY, Verdict
@@ -129,10 +128,6 @@ class StudyRecord:
     pulls: dict[str, dict[RodName, LeastPull]] = field(default_factory=dict)
     """by run and kind of rod, the least pulls of two bars"""
     certificate: dict[str, dict[str, float]] = field(default_factory=dict)
-    shaft: dict[str, ShaftAnswers] = field(default_factory=dict)
-    """answers of the driveline in each run, where there is a driveline"""
-    cycles_of: dict[str, Cycles] = field(default_factory=dict)
-    """rainflow cycles of the torque in shaft 2, by run"""
     spreads: dict[str, Spread] = field(default_factory=dict)
     """the spread of each event that rests on an assumption"""
     setting: Setting | None = None

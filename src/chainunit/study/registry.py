@@ -1,4 +1,5 @@
-"""The registered capabilities, as the modules of a study find them: by their names, as they stand above the study."""
+"""The registered capabilities and parts of the line, as the modules of a study find them: by their names, as they
+stand above the study, or import from it."""
 
 from __future__ import annotations
 
@@ -6,11 +7,27 @@ from functools import cache
 from importlib import import_module
 from typing import Any
 
-_HOME = f"{__package__.rpartition('.')[0]}.capabilities"
+_PACKAGE = __package__.rpartition(".")[0]
+
+
+def _all_of(home: str, attribute: str) -> tuple[Any, ...]:
+    names = import_module(home).NAMES
+    return tuple(getattr(import_module(f"{home}.{name}"), attribute) for name in names)
+
+
+@cache
+def parts_of_line() -> tuple[Any, ...]:
+    """All parts of the line from the motor to the machine, each a `chainunit.study.line.part.PartOfLine`."""
+    return _all_of(f"{__package__}.line", "PART")
+
+
+@cache
+def capabilities() -> tuple[Any, ...]:
+    """All capabilities in their order, each a `chainunit.study.capability.StudyCapability`."""
+    return _all_of(f"{_PACKAGE}.capabilities", "CAPABILITY")
 
 
 @cache
 def registered() -> tuple[Any, ...]:
-    """All capabilities in their order, each a `chainunit.study.capability.StudyCapability`."""
-    names = import_module(_HOME).NAMES
-    return tuple(import_module(f"{_HOME}.{name}").CAPABILITY for name in names)
+    """The parts of the line, then the capabilities: all that has tables, rules, plans and analyses."""
+    return (*parts_of_line(), *capabilities())

@@ -8,8 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core.engines import numpy_
-from ..drives.cardan import two_joints
 from ..reading.text import number
 from .catalogue_drive import SLIP
 from .coupling import remark_on_coupling, remark_on_rams
@@ -19,8 +17,8 @@ from .judgement import lasts, model_verdict, motor_limits, no_reserve
 from .measures import STARTED, Answers
 from .readings import breakdown_speed, crank_speed, only_whole_turns
 from .record import LOAD_CYCLE, Amount, StudyRecord
+from .registry import parts_of_line
 from .sections import ChainOrgans
-from .shaft import AMPLIFIED, UNEVEN, remedies
 from .verdict import RESIDUAL, START, STEADY, shown_speed
 from .window import CLOSED, DRIFT, STORED
 
@@ -78,8 +76,8 @@ def conclude(study: StudyRecord) -> None:
     _on_runs(study)
     _on_inverter(study)
     _on_assumptions(study)
-    if study.statics.torsion is not None:
-        _on_shaft(study)
+    for part in parts_of_line():
+        part.remark(study)
     for findings in study.findings.values():
         findings.remark(study)
 
@@ -448,55 +446,4 @@ def _on_folding(study: StudyRecord) -> None:
                 run,
                 run=study.title_of(run),
                 angle=f'"{math.degrees((event.p.crank_angle + math.pi) % (2.0 * math.pi)):.4g} deg"',
-            )
-
-
-def _on_shaft(study: StudyRecord) -> None:
-    """The remarks on the driveline."""
-    line, modes = study.drive.line, study.statics.torsion
-    assert modes is not None
-    warn, note = study.warn, study.note
-    if study.sizing is not None:
-        rigid = "Sizing took the shafts as rigid and the driveline as massless; the runs include it."
-        note("sized without line", rigid)
-    if line.d2 == 0.0 and line.d3 == 0.0:
-        text = "The driveline has no damping: a vibration, once excited, does not decay; give d2 and d3."
-        note("undamped line", text)
-    ends: dict[str, Amount] = {
-        "k_least": (modes.k_least, "rad/s", "frequency"),
-        "k_largest": (modes.k_largest, "rad/s", "frequency"),
-    }
-    fastest = max((loop.crossover for loop in study.statics.loops.values()), default=0.0)
-    if fastest > modes.antiresonance / 3.0:
-        warn(
-            "control near line",
-            "The speed loop crosses over at {crossover}, near {antiresonance}, at which the machine swings on the "
-            "shafts against a standing motor: its margins are those of a rigid drive and do not hold here. A "
-            "stiffer line separates the two. Lower gains do so, too, but the control also damps the torsion: a run "
-            "shows the effect of lower gains on the peaks.",
-            crossover=(fastest, "rad/s"),
-            antiresonance=(modes.antiresonance, "rad/s"),
-            **ends,
-        )
-    _, i, _ = two_joints(numpy_(), line, np.linspace(0.0, np.pi, 361))
-    unevenness = float(np.ptp(i))
-    if unevenness > UNEVEN:
-        say = warn if "torsion" in study.findings else note
-        say(
-            "uneven joints",
-            "The joints turn unevenly: shaft 3 turns {least} to {largest} times as fast as shaft 2 (ratio i23), and "
-            "this varies by {unevenness} twice a turn; {remedies}.",
-            least=(float(np.min(i)), "1", "", 5),
-            largest=(float(np.max(i)), "1", "", 5),
-            unevenness=(unevenness, "1", "percent"),
-            remedies=", and ".join(remedies(line)),
-        )
-    for name, shaft in study.shaft.items():
-        if shaft.amplification is not None and shaft.amplification > AMPLIFIED:
-            warn(
-                "amplification",
-                "{title}: the line's torque peaks at {amplification} times that of a rigid drive.",
-                name,
-                title=study.title_of(name),
-                amplification=(shaft.amplification, "1"),
             )

@@ -13,6 +13,8 @@ from .coupling import coupling_sentence, way_words, why_none
 from .gear_order import gear_order
 from .given import given_sections
 from .judgement import motor_verdict
+from .line.shaft import driveline_of
+from .line.shaft_runs import shaft_findings
 from .measures import measures_of
 from .protection import CouplingEffect, Obstacle
 from .record import StudyRecord
@@ -297,16 +299,17 @@ def _relay(study: StudyRecord, rated: float) -> dict[str, Any]:
 
 def _driveline(study: StudyRecord) -> dict[str, Any]:
     units = {"from": "N.m", "to": "N.m", "count": "1"}
-    largest = max(answers.range_largest for answers in study.shaft.values()) if study.shaft else 0.0
+    shaft = shaft_findings(study)
+    largest = max((answers.range_largest for answers in shaft.answers.values()), default=0.0)
     return {
         "driveline": {
-            "damping_ratio": entry(study.config.damping_ratio, "1"),
-            **entries(study.drive.line),
+            "damping_ratio": entry(study.config.plans["driveline"].damping_ratio, "1"),
+            **entries(driveline_of(study.drive)),
             **entries(study.statics.torsion),
         },
-        "shaft": {name: entries(answers) for name, answers in study.shaft.items()},
+        "shaft": shaft.as_dict(),
         "torque_cycles": {
             name: [{k: entry(x, units[k]) for k, x in row.items()} for row in cycles.classes(largest)]
-            for name, cycles in study.cycles_of.items()
+            for name, cycles in shaft.cycles.items()
         },
     }

@@ -24,7 +24,6 @@ from ..system import (
     System,
     certify,
     monolithic,
-    rigid,
     without,
 )
 from ..work.progress import Progress
@@ -107,11 +106,6 @@ class Rig:
     def graph(self) -> System:
         """The models and their connections."""
         return self._twin(self.drive.graph)
-
-    @property
-    def rigid(self) -> Rig:
-        """The same rig without the elasticity and unevenness of the driveline."""
-        return replace(self, twin=partial(rigid, line="driveline"))
 
     @property
     def plain(self) -> Rig:

@@ -37,7 +37,6 @@ from .registry import registered
 from .relay import start_class
 from .remarks import conclude
 from .rig import Rig, Transient
-from .shaft import shaft_answers, with_rigid
 from .starts import StartAnalysis
 from .statics import statics
 from .torques import on_coupling
@@ -193,15 +192,6 @@ class Runner:
             self._without_feed_forward()
         for k, event in enumerate(self.starts):
             self._loaded_start(event, self.total - (len(self.starts) - k) * self.stop, check)
-        if "driveline" in self.rig.graph.components:
-            self.report("the same with a rigid shaft", self.total, self.total)
-            try:
-                rigid = self._rigid()
-            except RunError as error:
-                # the study's values are then those of the rigid drive, not of this one
-                error.partial = None
-                raise
-            self._line(rigid)
 
     def _progress(self, what: str, before: float) -> Progress:
         def progress(time: float) -> None:
@@ -387,41 +377,3 @@ class Runner:
             steady = simulation.run(self.stop, self.rig.step).sel(time=slice(study.steady_begin, None))
         steady = whole_turns(self.rig.drive, steady, run.turns)
         study.ripple_without = read_answers(study.window(Phase.STEADY, steady)).speed_ripple
-
-    def _rigid(self) -> dict[str, xr.Dataset]:
-        """Repeat every run without the elasticity and unevenness of the driveline, at the same times and with
-        the same coupling."""
-        rig, begins = self.rig.rigid, self.study.event
-        runs = {}
-        with rig.from_rest() as simulation:
-            runs["start_up"] = simulation.run(self.stop, rig.step)
-            simulation.save()
-            for event in self.events:
-                begin = begins[event.name]
-                stop = begin + event.follow(self.study.config.turn)
-                runs[event.name] = rig.follow(simulation, event, begin, stop, guards=rig.guards).run
-        for event in self.starts:
-            with rig.from_rest(event) as simulation:
-                runs[event.name] = simulation.run(self.stop, rig.step, guards=rig.guards)
-        return runs
-
-    def _line(self, rigid: dict[str, xr.Dataset]) -> None:
-        """Record the load of the driveline in each run."""
-        study, line = self.study, self.study.config.driveline
-        assert line is not None
-        for name, twin in rigid.items():
-            study.runs[name] = with_rigid(study.drive, study.runs[name], twin)
-        steady = study.steady
-        until = slice(None, steady["time"].values[0])
-        # the damage of steady running comes first, as that of the other runs is relative to it
-        parts = [("steady", steady, rigid["start_up"].sel(time=slice(study.steady_begin, None)))]
-        parts.append(("start_up", study.runs["start_up"].sel(time=until), rigid["start_up"].sel(time=until)))
-        for name, begin in study.event.items():
-            since = slice(begin, None)
-            parts.append((name, study.runs[name].sel(time=since), rigid[name].sel(time=since)))
-        per_turn = None
-        for name, run, twin in parts:
-            study.shaft[name], study.cycles_of[name], damage = shaft_answers(
-                study.drive, run, twin, line.exponent, per_turn
-            )
-            per_turn = damage if per_turn is None else per_turn

@@ -1,4 +1,4 @@
-"""The conditions of the JSON Schema of a study file: the keys that follow from its machine, its motor and its shafts,
+"""The conditions of the JSON Schema of a study file: the keys that follow from its machine and its motor,
 and the `rules` of keys that do not go together."""
 
 from __future__ import annotations
@@ -6,9 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..drives.catalogue import catalogue
-from ..drives.line_table import SHAFTS
 from ..drives.motors import MOTORS
-from ..drives.shafts import SECTIONS as PROFILES
 from ..models import MACHINES
 from .conditions import Condition, Schema, ends_with, given, is_one_of
 from .event import TYPES
@@ -38,7 +36,8 @@ def rules() -> Iterator[Schema]:
     for table, section in all_sections().items():
         for key in section.required:
             yield from _needs(given(table), given(f"{table}.{key}"))
-    yield _where(given("driveline"), {"properties": {"driveline": _of_driveline()}})
+        if section.conditions is not None:
+            yield _where(given(table), {"properties": {table: dict(section.conditions())}})
 
 
 def _where(condition: Condition, then: Schema) -> Schema:
@@ -58,20 +57,3 @@ def _of_machine(name: str) -> Schema:
     tables: Schema = {table: {"$ref": f"#/definitions/{table}.{name}"} for table in ("machine", "feed")}
     tables["event"] = {"items": {"properties": {"type": {"enum": events}}}}
     return {"properties": tables}
-
-
-def _of_driveline() -> Schema:
-    """The keys of the line that do not go together."""
-    pairs = [*SHAFTS.items(), ("damping_ratio", "d2"), ("damping_ratio", "d3")]
-    twice = [{"required": list(pair)} for pair in pairs]
-    shafts = {shaft: {"required": ["section"], "allOf": list(_of_shaft())} for shaft in SHAFTS}
-    return {"not": {"anyOf": twice}, "properties": shafts}
-
-
-def _of_shaft() -> Iterator[Schema]:
-    """The dimensions that go with a profile."""
-    for name, profile in PROFILES.items():
-        needed = [*profile.takes, "length"]
-        known = [*needed, *profile.also, "section", "shear_modulus"]
-        then = {"required": needed, "propertyNames": {"enum": known}}
-        yield _where(is_one_of("section", name), then)

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, create_model
 
 from ..core.quantities import Value, declaration, group, quantity
-from ..drives.driveline import Mounted
 from ..drives.gearing import KINDS, Transmission
 from ..drives.induction_motor import InverterControl, SoftStart
-from ..drives.line_table import form, line_values
 from ..drives.motor import Motor
 from ..machines.chain_organs import LEAST, MOST, OrganLaw
 from ..mechanism.models import MachineModel
@@ -110,20 +108,6 @@ class Starter:
 
 
 @declaration
-class Driveline(Mounted):
-    """A cardan driveline between motor and machine. The start values are those of this package, as the paper
-    prints no dimensions."""
-
-    exponent: Value = quantity(
-        "1",
-        "exponent of Woehler's line for the damage of torque cycles; assumed",
-        default=5.0,
-        min=1.0,
-        max=20.0,
-    )
-
-
-@declaration
 class ChainOrgans(OrganLaw):
     """The organs as chains, where `organ` is "chain", and the sweep over crank speeds with them."""
 
@@ -162,9 +146,6 @@ class ChainOrgans(OrganLaw):
 
 ORGANS = ("two-bar", "chain")
 """The models of the organs."""
-
-PLACES = ("crank", "motor")
-"""The places of a driveline: on the crank's shaft behind the gear, or on the motor's shaft before it."""
 
 SIMULATIONS = ("cs", "me")
 """The methods of simulation: as a co-simulation, or as one ODE of Model Exchange FMUs."""
@@ -294,22 +275,15 @@ SECTIONS: Mapping[str, FileSection] = {
         },
         order=(("sweep_lowest", ">", "sweep_highest"),),
     ),
-    "driveline": FileSection(
-        Driveline,
-        optional=True,
-        keys={"place": (Literal[PLACES], Field("crank", description="shaft that it is on"))},
-        form=form,
-        values=partial(line_values, prefix="driveline."),
-        title="Driveline",
-        follows={"d2": "from damping_ratio", "d3": "from damping_ratio"},
-    ),
 }
-"""The tables of every study file beside those of its machine, its feed, its motor, and of the capabilities."""
+"""The tables of every study file beside those of its machine, its feed, its motor, of the parts of the line, and of
+the capabilities."""
 
 
 @cache
 def all_sections() -> dict[str, FileSection]:
-    """The tables of a study file, those of the capabilities included, by name; without those of machine and motor."""
+    """The tables of a study file, those of parts of the line and of capabilities included, by name; without those of
+    machine and motor."""
     return dict(SECTIONS) | {name: each for part in registered() for name, each in part.tables.items()}
 
 

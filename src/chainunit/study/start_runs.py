@@ -52,8 +52,11 @@ def from_angle(rig: Rig, angle: float) -> Rig:
     """The rig whose crank stands at that angle [rad] at the start, without an observer."""
     drive, turned = rig.drive, angle * rig.drive.ratio
     parameters = replace(drive.parameters, phi_start=drive.parameters.phi_start + turned)
-    line = None if drive.line is None else replace(drive.line, phi_start=drive.line.phi_start + turned)
-    drive = replace(drive, parameters=parameters, line=line, observer=None, observed={})
+    line = []
+    for part in drive.line:
+        line.append(part.turned(turned))
+        turned /= part.ratio
+    drive = replace(drive, parameters=parameters, line=tuple(line), observer=None, observed={})
     return replace(rig, drive=drive, fed_from=None)
 
 

@@ -12,8 +12,8 @@ from ..drives.speed_control import Loop
 from .config import Config
 from .cycle import Cycle, cycle, no_feed
 from .drive import Drive
+from .line.shaft import Torsion, torsion
 from .one_sided import one_sided_feeds
-from .shaft import Torsion, torsion
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ def statics(config: Config, drive: Drive) -> DriveStatics:
     return DriveStatics(
         cycles=cycles,
         loops={} if drive.foreign else _loops(drive, normal.J),
-        torsion=None if drive.line is None else _torsion(config, drive, normal.J),
+        torsion=None if drive.part("driveline") is None else _torsion(config, drive, normal.J),
     )
 
 

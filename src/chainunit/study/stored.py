@@ -12,11 +12,11 @@ from .drive import AbsentError, Drive
 from .readings import shaft_power
 
 
-def energy_behind(run: xr.Dataset) -> Any:
-    """Kinetic and potential energy of the machine, and of a shaft line before it [J], shape (time,). The energy of a
-    part that does not tell it, as a foreign FMU may, is left out."""
+def energy_behind(drive: Drive, run: xr.Dataset) -> Any:
+    """Kinetic and potential energy of the machine, and of the line before it [J], shape (time,). The energy of a part
+    that does not tell it, as a foreign FMU may, is left out."""
     held = np.zeros(run.sizes["time"])
-    for part in ("machine", "driveline"):
+    for part in ("machine", *(part.name for part in drive.line)):
         names = [f"{part}.{kind}_energy" for kind in ("kinetic", "potential")]
         if set(names) <= set(run):
             held = held + run[names[0]].values + run[names[1]].values
@@ -29,8 +29,8 @@ def energy_held(drive: Drive, run: xr.Dataset) -> Any:
     try:
         drive.needs_own("the inertia of its rotor")
     except AbsentError:
-        return energy_behind(run)
-    return energy_behind(run) + 0.5 * drive.fmu_parameters.rotor.J * run[drive.motor_speed].values ** 2
+        return energy_behind(drive, run)
+    return energy_behind(drive, run) + 0.5 * drive.fmu_parameters.rotor.J * run[drive.motor_speed].values ** 2
 
 
 def energy_gap(drive: Drive, turns: xr.Dataset) -> float:

@@ -161,7 +161,7 @@ class Window:
         if self.phase is not Phase.STEADY or only_whole_turns(self.drive, self.run) is None:
             return 0.0, 0.0
         time = self.turns["time"].values
-        held = energy_behind(self.turns), energy_held(self.drive, self.turns)
+        held = energy_behind(self.drive, self.turns), energy_held(self.drive, self.turns)
         machine, whole = (float(x[-1] - x[0]) / float(time[-1] - time[0]) for x in held)
         return machine, whole
 

@@ -21,10 +21,10 @@ from ...study.config import Config
 from ...study.cycle import needed_inertia
 from ...study.drive import Drive
 from ...study.limits import given_motor
+from ...study.line.shaft import driveline_of, remedies
 from ...study.measures import Answers, read_answers
 from ...study.record import Amount, StudyRecord
 from ...study.rig import Rig, worst_residual
-from ...study.shaft import remedies
 from ...study.turn import Turn, TurnAnalysis
 from ...study.verdict import CREEPS, RESIDUAL, STEADY
 from ...study.window import Phase, Window, whole_turns
@@ -193,7 +193,7 @@ def _wheel(
     """A flywheel with its answers; a machine that stands or creeps has no answers of steady running."""
     turning = steady.speed_mean > CREEPS * study.config.run.crank_speed
     drive, motor_ripple = study.drive, None
-    if drive.line is not None and turning:
+    if drive.line and turning:
         motor_ripple = float(np.ptp(w := turns[drive.motor_speed].values) / np.mean(w))
     own = {
         "flywheel": flywheel,
@@ -411,7 +411,7 @@ def _on_line(findings: FlywheelFindings, study: StudyRecord) -> None:
     if not even:
         return
     best = min(even, key=lambda wheel: float(wheel.answers.speed_ripple))
-    causes = remedies(study.drive.line)
+    causes = remedies(driveline_of(study.drive))
     study.warn(
         "ripple behind flywheel",
         "with a flywheel of {flywheel} the motor's speed fluctuates by {motor_ripple}, the crank's by "

@@ -16,8 +16,9 @@ from ...reading.text import array_entry, entries
 from ...study.analysis import Analysis, Findings, Work
 from ...study.config import Config
 from ...study.drive import Drive
+from ...study.line.shaft import two_masses
+from ...study.line.shaft_runs import shaft_findings
 from ...study.record import Amount, Remark, StudyRecord
-from ...study.shaft import two_masses
 from ...study.verdict import STEADY
 from .line import DRIFT, LineAnalysis, Rotation, analyse
 from .table import TorsionPlan
@@ -43,7 +44,7 @@ class TorsionAnalysis(Analysis):
     @staticmethod
     def applies(config: Config, drive: Drive) -> bool:
         """Whether the driveline turns, so that its torsion is analysed."""
-        return drive.line is not None
+        return drive.part("driveline") is not None
 
     @staticmethod
     def find(study: StudyRecord, work: Work) -> TorsionFindings | None:
@@ -101,7 +102,7 @@ class TorsionFindings(Findings):
     def remark(self, study: StudyRecord) -> None:
         """Add the remarks and notes on the torsion to the study."""
         study.remarks += self.remarks()
-        steady = study.shaft.get(STEADY)
+        steady = shaft_findings(study).answers.get(STEADY)
         peak = float(self.analysis.operating.peak2[0])
         if steady is not None and not 1.0 / APART < steady.tau2_peak / peak < APART:
             study.note(

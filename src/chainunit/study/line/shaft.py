@@ -12,14 +12,15 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..core.engines import MATH
-from ..core.quantities import Value, declaration, quantity, variables
-from ..drives.cardan import Cardan, ShaftLine, frozen_frequency
-from ..drives.torsion import largest_frequency
-from ..reading.text import number
-from .arrays import peak
-from .drive import Drive
-from .readings import turns_made
+from ...core.engines import MATH
+from ...core.quantities import Value, declaration, quantity, variables
+from ...drives.cardan import Cardan, ShaftLine, frozen_frequency
+from ...drives.driveline import Parameters
+from ...drives.torsion import largest_frequency
+from ...reading.text import number
+from ..arrays import peak
+from ..drive import Drive
+from ..readings import turns_made
 
 LONGEST_STEP = 0.3
 """Largest product of communication step and natural frequency; above it the coupling excites the vibration
@@ -111,10 +112,18 @@ def from_peak(torque: Any) -> Any:
     return np.concatenate([torque[first:], torque[: first + 1]])
 
 
+def driveline_of(drive: Drive) -> Parameters:
+    """The driveline of a drive that has one."""
+    part = drive.part("driveline")
+    assert part is not None
+    parameters: Parameters = part.parameters
+    return parameters
+
+
 def two_masses(drive: Drive, inertia: float) -> Cardan:
     """The drive's line between its rotor and a machine with the `inertia` at the motor [kg m2]. Both inertias
     are reduced to the shafts of the line."""
-    line = drive.line
+    line = driveline_of(drive)
     shafts = {v.name: getattr(line, v.name) for v in variables(ShaftLine)}
     J1 = drive.fmu_parameters.rotor.J * line.ratio**2
     return Cardan(**shafts, J1=J1, J4=line.J4 + inertia * line.ratio**2)
@@ -145,7 +154,7 @@ def remedies(line: ShaftLine) -> list[str]:
 
 def rigid_torque(drive: Drive, rigid: xr.Dataset) -> Any:
     """Torque in shaft 2 [N m], shape (time,), in the run `rigid` of the rigid drive."""
-    line, gear = drive.line, "gear.tau" in rigid
+    line, gear = driveline_of(drive), "gear.tau" in rigid
     return (
         line.ratio * rigid["gear.tau" if gear else "machine.tau"].values
         + line.J4 / line.ratio * rigid["motor.a"].values

@@ -1,0 +1,164 @@
+"""The cardan driveline: a shaft line on the crank's shaft behind the gear, or on the motor's shaft before it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from ...core.errors import refusal_prefix
+from ...core.quantities import Layout, Value, declaration, quantity
+from ...drives.cardan import check
+from ...drives.driveline import CardanDriveline, Mounted
+from ...drives.line_table import CORNER, SHAFTS, Damping, form, line_values
+from ...drives.shafts import SECTIONS as PROFILES
+from ...drives.shafts import Shaft
+from ...drives.torsion import with_damping_ratio
+from ..conditions import Schema, is_one_of
+from ..file_section import FileSection
+from .part import PartOfLine
+
+if TYPE_CHECKING:
+    from ..analysis import Analysis
+    from ..config import Config
+    from ..drive import Drive
+    from ..file_reading import FileReading
+    from ..keys import Key
+    from ..record import StudyRecord
+    from .placed import PlacedPart
+
+PLACES = ("crank", "motor")
+"""The places of a driveline: on the crank's shaft behind the gear, or on the motor's shaft before it."""
+
+
+@declaration
+class Driveline(Mounted):
+    """A cardan driveline between motor and machine. The start values are those of this package, as the paper
+    prints no dimensions."""
+
+    exponent: Value = quantity(
+        "1",
+        "exponent of Woehler's line for the damage of torque cycles; assumed",
+        default=5.0,
+        min=1.0,
+        max=20.0,
+    )
+
+
+@dataclass(frozen=True)
+class DrivelinePlan:
+    """The driveline of a study, and its `place`, one of `PLACES`."""
+
+    table: Driveline
+    place: str
+    damping_ratio: float | None
+    """damping ratio of its torsion, in place of d2 and d3"""
+
+
+class DrivelinePart(PartOfLine):
+    """The part, with the table [driveline]."""
+
+    name = "driveline"
+    model = CardanDriveline
+
+    def plan(self, reading: FileReading) -> DrivelinePlan | None:
+        """The plan of the table."""
+        if self.name not in reading.data:
+            return None
+        table, read = reading.values[self.name], reading.form.driveline
+        with refusal_prefix("driveline.", self.name):
+            check(table)
+        return DrivelinePlan(table, read.place, read.damping_ratio)
+
+    def not_with_foreign_motor(self, config: Config) -> str:
+        """Its vibration follows from the inertia of the rotor."""
+        words = "the inertia of its rotor is not known; leave [driveline] out"
+        return "" if config.plans[self.name] is None else words
+
+    def placed(self, config: Config, drive: Drive) -> PlacedPart | None:
+        """The driveline, with the damping that its damping ratio asks for."""
+        from ..cycle import cycle
+        from .placed import PlacedPart
+        from .shaft import two_masses
+
+        plan: DrivelinePlan | None = config.plans[self.name]
+        if plan is None:
+            return None
+        values = Layout(Driveline).by_name(plan.table)
+        del values["exponent"]
+        ratio = drive.driven_machine.ratio if plan.place == "crank" else 1.0
+        p = self.model.parameter_layout.from_names(values | {"ratio": ratio})
+        part = PlacedPart(self.name, self.model, p, ratio, p.J4)
+        if plan.damping_ratio is None:
+            return part
+        J = cycle(drive.machine, config.run.crank_speed, config.feed).outputs.J
+        line = with_damping_ratio(two_masses(drive.with_part(part), float(np.mean(J))), plan.damping_ratio)
+        return replace(part, parameters=replace(p, d2=line.d2, d3=line.d3))
+
+    def analyses(self) -> Iterable[type[Analysis]]:
+        """The same runs with a rigid shaft."""
+        from .shaft_runs import ShaftAnalysis
+
+        return (ShaftAnalysis,)
+
+    def remark(self, study: StudyRecord) -> None:
+        """Its damping, its unevenness, its resonance with the control, its amplification."""
+        from .shaft_runs import remark
+
+        remark(study)
+
+    @staticmethod
+    def further_keys() -> Iterator[Key]:
+        """The keys of the profiles of its shafts."""
+        from ..keys import Key, quantity_keys
+
+        for shaft, stiffness in SHAFTS.items():
+            words = f"its profile, in place of {stiffness}"
+            yield Key(f"{shaft}.section", words, words=tuple(f'"{name}"' for name in PROFILES), sort="text")
+            yield from quantity_keys(Shaft, prefix=f"{shaft}.")
+            words = "corners of a profile of any form, as pairs [m]"
+            yield Key(f"{shaft}.outline", words, sort="list", items=CORNER)
+            yield Key(f"{shaft}.holes", "outlines of the holes in it", sort="list", items=CORNER)
+
+    @staticmethod
+    def conditions() -> Schema:
+        """The keys of the line that do not go together."""
+        pairs = [*SHAFTS.items(), ("damping_ratio", "d2"), ("damping_ratio", "d3")]
+        twice = [{"required": list(pair)} for pair in pairs]
+        shafts = {shaft: {"required": ["section"], "allOf": list(_of_shaft())} for shaft in SHAFTS}
+        return {"not": {"anyOf": twice}, "properties": shafts}
+
+    tables = {  # noqa: RUF012
+        "driveline": FileSection(
+            Driveline,
+            optional=True,
+            keys={"place": (Literal[PLACES], Field("crank", description="shaft that it is on"))},
+            instead=Damping,
+            further_keys=further_keys,
+            form=form,
+            values=partial(line_values, prefix="driveline."),
+            title="Driveline",
+            follows={"d2": "from damping_ratio", "d3": "from damping_ratio"},
+            conditions=conditions,
+            displaced={
+                "damping_ratio": ("d2", "d3"),
+                **{shaft: (shaft, stiffness) for shaft, stiffness in SHAFTS.items()},
+            },
+        )
+    }
+
+
+def _of_shaft() -> Iterator[Schema]:
+    """The dimensions that go with a profile."""
+    for name, profile in PROFILES.items():
+        needed = [*profile.takes, "length"]
+        known = [*needed, *profile.also, "section", "shear_modulus"]
+        then: dict[str, Any] = {"required": needed, "propertyNames": {"enum": known}}
+        yield {"if": is_one_of("section", name).schema(), "then": then}
+
+
+PART = DrivelinePart()

@@ -1,0 +1,29 @@
+"""Parts of the line, as a study knows them: each has a table of the study file and a component of the system."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+from ...core.model import Model
+from ..capability import StudyCapability
+
+if TYPE_CHECKING:
+    from ..config import Config
+    from ..drive import Drive
+    from ..record import StudyRecord
+    from .placed import PlacedPart
+
+
+class PartOfLine(StudyCapability):
+    """A part between motor and machine: the base of the one that each module of `chainunit.study.line` has by the
+    name ``PART``. Beside a component it may have what a capability has: rules, checks, analyses."""
+
+    model: ClassVar[type[Model]]
+    """its model, which becomes an FMU; with the terminals `driven` and `machine` on the side of the machine"""
+
+    def placed(self, config: Config, drive: Drive) -> PlacedPart | None:
+        """The part of a study behind the parts that the `drive` has already; None where the study has none."""
+        raise NotImplementedError
+
+    def remark(self, study: StudyRecord) -> None:
+        """Add to the study the remarks on the part."""

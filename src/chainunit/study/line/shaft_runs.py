@@ -1,0 +1,169 @@
+"""The load of the driveline in each run of a study, beside the same run with a rigid shaft, and the remarks on it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ...core.engines import numpy_
+from ...core.errors import RunError
+from ...drives.cardan import two_joints
+from ...reading.text import entries
+from ...system import rigid
+from ..analysis import Analysis, Findings, Work
+from ..config import Config
+from ..drive import Drive
+from ..record import Amount, StudyRecord
+from .shaft import (
+    AMPLIFIED,
+    UNEVEN,
+    Cycles,
+    ShaftAnswers,
+    driveline_of,
+    remedies,
+    shaft_answers,
+    with_rigid,
+)
+
+
+@dataclass(frozen=True)
+class ShaftFindings(Findings):
+    """By run, the load of the driveline, and the rainflow cycles of the torque in shaft 2."""
+
+    answers: Mapping[str, ShaftAnswers]
+    cycles: Mapping[str, Cycles]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Ready for JSON."""
+        return {name: entries(answers) for name, answers in self.answers.items()}
+
+    def remark(self, study: StudyRecord) -> None:
+        """None: the driveline has its remarks, see `remark`, before those of the findings."""
+
+
+def shaft_findings(study: StudyRecord) -> ShaftFindings:
+    """The load of the driveline; empty where the study has none, or failed before."""
+    findings: ShaftFindings = study.findings.get(ShaftAnalysis.name, ShaftFindings({}, {}))
+    return findings
+
+
+class ShaftAnalysis(Analysis):
+    """Every run once more, without the elasticity and unevenness of the driveline."""
+
+    name = "shaft"
+    needs_runs = True
+
+    @staticmethod
+    def applies(config: Config, drive: Drive) -> bool:
+        """Whether the drive has a driveline."""
+        return drive.part("driveline") is not None
+
+    @staticmethod
+    def find(study: StudyRecord, work: Work) -> ShaftFindings:
+        """The load in each run; the torque in the rigid shaft is added to the runs."""
+        work.report("the same with a rigid shaft", 1.0, 1.0)
+        try:
+            twins = _rigid_runs(study, work)
+        except RunError as error:
+            # the values of the error are those of the rigid drive, not of this one
+            error.partial = None
+            raise
+        for name, twin in twins.items():
+            study.runs[name] = with_rigid(study.drive, study.runs[name], twin)
+        return _findings(study, twins)
+
+
+def _rigid_runs(study: StudyRecord, work: Work) -> dict[str, xr.Dataset]:
+    """The runs of the rigid drive, at the same times and with the same coupling."""
+    rig = replace(work.rig, twin=partial(rigid, line="driveline"))
+    events = {name: study.config.events[name] for name in study.event}
+    runs = {}
+    with rig.from_rest() as simulation:
+        runs["start_up"] = simulation.run(work.steady, rig.step)
+        simulation.save()
+        for name, event in events.items():
+            if not event.from_rest:
+                begin = study.event[name]
+                stop = begin + event.follow(study.config.turn)
+                runs[name] = rig.follow(simulation, event, begin, stop, guards=rig.guards).run
+    for name, event in events.items():
+        if event.from_rest:
+            with rig.from_rest(event) as simulation:
+                runs[name] = simulation.run(work.steady, rig.step, guards=rig.guards)
+    return runs
+
+
+def _findings(study: StudyRecord, twins: Mapping[str, xr.Dataset]) -> ShaftFindings:
+    steady = study.steady
+    until = slice(None, steady["time"].values[0])
+    # the damage of steady running comes first, as that of the other runs is relative to it
+    parts = [("steady", steady, twins["start_up"].sel(time=slice(study.steady_begin, None)))]
+    parts.append(("start_up", study.runs["start_up"].sel(time=until), twins["start_up"].sel(time=until)))
+    for name, begin in study.event.items():
+        since = slice(begin, None)
+        parts.append((name, study.runs[name].sel(time=since), twins[name].sel(time=since)))
+    answers, cycles, per_turn = {}, {}, None
+    for name, run, twin in parts:
+        answers[name], cycles[name], damage = shaft_answers(
+            study.drive, run, twin, study.config.values["driveline"].exponent, per_turn
+        )
+        per_turn = damage if per_turn is None else per_turn
+    return ShaftFindings(answers, cycles)
+
+
+def remark(study: StudyRecord) -> None:
+    """Add to a study with a driveline the remarks on it."""
+    modes = study.statics.torsion
+    if modes is None:
+        return
+    line = driveline_of(study.drive)
+    warn, note = study.warn, study.note
+    if study.sizing is not None:
+        rigid = "Sizing took the shafts as rigid and the driveline as massless; the runs include it."
+        note("sized without line", rigid)
+    if line.d2 == 0.0 and line.d3 == 0.0:
+        text = "The driveline has no damping: a vibration, once excited, does not decay; give d2 and d3."
+        note("undamped line", text)
+    ends: dict[str, Amount] = {
+        "k_least": (modes.k_least, "rad/s", "frequency"),
+        "k_largest": (modes.k_largest, "rad/s", "frequency"),
+    }
+    fastest = max((loop.crossover for loop in study.statics.loops.values()), default=0.0)
+    if fastest > modes.antiresonance / 3.0:
+        warn(
+            "control near line",
+            "The speed loop crosses over at {crossover}, near {antiresonance}, at which the machine swings on the "
+            "shafts against a standing motor: its margins are those of a rigid drive and do not hold here. A "
+            "stiffer line separates the two. Lower gains do so, too, but the control also damps the torsion: a run "
+            "shows the effect of lower gains on the peaks.",
+            crossover=(fastest, "rad/s"),
+            antiresonance=(modes.antiresonance, "rad/s"),
+            **ends,
+        )
+    _, i, _ = two_joints(numpy_(), line, np.linspace(0.0, np.pi, 361))
+    unevenness = float(np.ptp(i))
+    if unevenness > UNEVEN:
+        say = warn if "torsion" in study.findings else note
+        say(
+            "uneven joints",
+            "The joints turn unevenly: shaft 3 turns {least} to {largest} times as fast as shaft 2 (ratio i23), and "
+            "this varies by {unevenness} twice a turn; {remedies}.",
+            least=(float(np.min(i)), "1", "", 5),
+            largest=(float(np.max(i)), "1", "", 5),
+            unevenness=(unevenness, "1", "percent"),
+            remedies=", and ".join(remedies(line)),
+        )
+    for name, shaft in shaft_findings(study).answers.items():
+        if shaft.amplification is not None and shaft.amplification > AMPLIFIED:
+            warn(
+                "amplification",
+                "{title}: the line's torque peaks at {amplification} times that of a rigid drive.",
+                name,
+                title=study.title_of(name),
+                amplification=(shaft.amplification, "1"),
+            )
