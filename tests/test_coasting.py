@@ -47,7 +47,7 @@ def test_it_goes_on_as_the_same_machine(organ, more, trip, tmp_path, monkeypatch
     study = run_study(config.parse(text), tmp_path)
     assert study.failure is None and study.answers["jam_left"].coupling_trip_time is not None
     run, coasting = study.runs["jam_left"], study.runs["jam_left_coasting"]
-    J4 = study.drive.line_inertia
+    J4 = study.drive.line.inertia
     own = {name for name in run if name.startswith("machine.")} & set(coasting)
     assert ("machine.left.theta_1" in own) == (organ == "chain")
     w = float(run["machine.w0"][-1])

@@ -35,6 +35,7 @@ from chainunit.study import config, parts, remarks
 from chainunit.study.analysis import Work
 from chainunit.study.choice import choose
 from chainunit.study.drive_fmus import export_drive, with_files
+from chainunit.study.line.placed import Line
 from chainunit.study.line.shaft import UNEVEN, remedies, two_masses
 from chainunit.study.record import StudyRecord
 from chainunit.study.rig import Rig
@@ -655,7 +656,7 @@ def test_the_co_simulation_finds_the_steady_motion_of_the_analysis(tmp_path):
     )
     (part,) = drive.line
     part = dataclasses.replace(part, parameters=dataclasses.replace(part.parameters, w_start=w))
-    drive = dataclasses.replace(drive, parameters=motor, line=(part,))
+    drive = dataclasses.replace(drive, parameters=motor, line=Line((part,)))
     files, _ = export_drive(drive, tmp_path)
     load = found.analysis.rotation.load
     signals = {"motor.w_ref": w, "motor.tau_ff": 0.0, "machine.load": study.config.feed.load}

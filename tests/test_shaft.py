@@ -80,7 +80,7 @@ def test_the_line_amplifies_a_jam(study):
 
 def test_a_rigid_drive_carries_what_the_machine_and_the_inertia_take(study, tmp_path):
     """The same study without a driveline, the crank heavier by J4: its crank torque is the rigid shaft's."""
-    J4, crank = study.drive.line_inertia, study.drive.machine.p.crank
+    J4, crank = study.drive.line.inertia, study.drive.machine.p.crank
     heavier = f"{SHORT}crank = {{ I = {crank.I + J4} }}"
     gains = {
         n: v
@@ -114,7 +114,7 @@ def test_before_or_behind_the_gear(tmp_path):
         text = f'{SHORT}[driveline]\nplace = "{place}"\nalpha1 = 0\nalpha2 = 0\n{table}'
         runs.append(run_study(config.parse(text), tmp_path / place))
     crank, motor = runs
-    assert (crank.drive.line[0].ratio, motor.drive.line[0].ratio) == (25.0, 1.0)
+    assert (crank.drive.line.ratio, motor.drive.line.ratio) == (25.0, 1.0)
     for name in ("start_up", "jam_left"):
         a, b = crank.runs[name], motor.runs[name]
         np.testing.assert_allclose(a["motor.w"], b["motor.w"], rtol=1e-9, atol=1e-9)
@@ -165,7 +165,7 @@ def test_damage_of_a_steady_swing(study, turns, phase):
         "driveline.tau2": swing, "driveline.tau3": swing, "driveline.twist2": zero, "driveline.twist3": zero,
         "machine.phi0": 2.0 * np.pi * angle * gear, "machine.w0": zero,
         # the torque of a rigid shaft twice as small
-        "machine.tau": 0.5 * swing / study.drive.line[0].ratio, "motor.a": zero,
+        "machine.tau": 0.5 * swing / study.drive.line.ratio, "motor.a": zero,
     }  # fmt: skip
     run = xr.Dataset({name: ("time", y) for name, y in series.items()}, {"time": angle})
     answers, cycles, damage = shaft_answers(study.drive, run, run, 5.0)
@@ -237,7 +237,7 @@ def test_the_report_shows_it(study, tmp_path):
     assert head == "time [s],speed [rad/s],torque [N.m],inertia [kg.m2]"
     # at the motor: J4 and the machine's inertia through the gear
     steady = study.runs["start_up"].sel(time=slice(study.steady_begin, None))
-    inertia = (float(steady["machine.J"][0]) + study.drive.line_inertia) / 25.0**2
+    inertia = (float(steady["machine.J"][0]) + study.drive.line.inertia) / 25.0**2
     assert float(first.split(",")[3]) == pytest.approx(inertia, rel=1e-8)
     assert float(first.split(",")[2]) == pytest.approx(float(steady["driveline.tau"][0]), rel=1e-8)
     result = as_dict(study)["driveline"]
@@ -253,10 +253,10 @@ def test_a_coupling_that_opens_lets_line_and_machine_coast(tmp_path):
     coasting = study.runs["jam_left_coasting"]
     w = float(study.runs["jam_left"]["machine.w0"][-1])
     assert float(coasting["machine.w"][0]) == pytest.approx(w, rel=1e-12)
-    assert coasting_parameters(study.drive)["J_added"] == study.drive.line_inertia
+    assert coasting_parameters(study.drive)["J_added"] == study.drive.line.inertia
     # what stays behind is the energy of the machine before it opened, and of the line's end
     before = float(study.runs["jam_left"]["machine.kinetic_energy"][-1])
-    assert jam.energy_behind == pytest.approx(before + 0.5 * study.drive.line_inertia * w * w, rel=1e-9)
+    assert jam.energy_behind == pytest.approx(before + 0.5 * study.drive.line.inertia * w * w, rel=1e-9)
     assert study.certificate["jam_left"]["driveline_energy_residual_share"] < 1e-3
     # nothing turns what is left alone
     assert not np.any(crank_torque(study.drive, coasting))

@@ -13,7 +13,7 @@ from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.driveline import CardanDriveline
 from chainunit.study import config
 from chainunit.study.drive import Drive
-from chainunit.study.line.placed import PlacedPart
+from chainunit.study.line.placed import Line, PlacedPart
 from chainunit.system import Jump, Profile, System, export, hold_loads, rigid, shaft_joints, without
 from chainunit.system.graph import direct_inputs, order
 from chainunit.system.signals import at_time, corners
@@ -23,7 +23,7 @@ def with_line():
     values = config.load()
     line = CardanDriveline.parameter_layout.from_names({"ratio": 25.0, "J4": 2.0})
     part = PlacedPart("driveline", CardanDriveline, line, line.ratio, line.J4)
-    return Drive(DcMotor, values.motor, values.machine, feed_forward=True, line=(part,))
+    return Drive(DcMotor, values.motor, values.machine, feed_forward=True, line=Line((part,)))
 
 
 def test_connections_follow_from_the_joints():

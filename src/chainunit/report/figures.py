@@ -231,7 +231,7 @@ def _transient(s: b.Source, study: StudyRecord, name: str) -> fig.Figure:
         _SPEED: speed,
         **_current(drive, run, time),
     }
-    if drive.part("driveline") is not None:
+    if drive.line.part("driveline") is not None:
         items[TORQUE] = shaft_torque(run, time)
     if event is None and drive.follows:
         speed.append(fig.Curve("speed asked for", time, run["motor.w_ref"].values / drive.ratio, 1))

@@ -140,7 +140,7 @@ def with_line(config: Config, drive: Drive) -> Drive:
     """The drive with the parts of the study between motor and machine."""
     for part in parts_of_line():
         placed = part.placed(config, drive)
-        drive = drive if placed is None else drive.with_part(placed)
+        drive = drive if placed is None else replace(drive, line=drive.line.behind(placed))
     return drive
 
 

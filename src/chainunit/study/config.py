@@ -371,7 +371,7 @@ def _choices(checked: Any, parts: Parts) -> dict[str, Any]:
         table = getattr(checked, name)
         known |= {f"{name}.{key}": getattr(table, key) for key in section.keys}
         if section.instead is not None:
-            others = {v.name: getattr(table, v.name) for v in variables(section.instead)}
+            others = {v.name: getattr(table, v.name) for v in variables(section.instead.quantities)}
             known |= {f"{name}.{key}": x for key, x in others.items() if x is not None}
     known |= {"system.machine": checked.system.machine, "system.motor": parts.named_motor}
     for table in ("machine_names", "motor_names"):

@@ -290,7 +290,9 @@ def slip_run(rig: Rig, start: StartNumbers, setting: float) -> xr.Dataset | None
     smooth = max(_SMOOTH * speed, capacity / (_FASTEST * inertia))
     p = SlipClutch.Parameters(phi_start=drive.parameters.phi_start, setting=capacity, w_smooth=smooth)
     parts = drive.graph.components
-    behind = {name: parts[name] for name in ("machine", *(part.name for part in reversed(drive.parts)))}
+    behind = {
+        name: parts[name] for name in ("machine", *(part.name for part in reversed(drive.whole_line.parts)))
+    }
     system = in_line({**behind, "clutch": ModelComponent(SlipClutch, p), "motor": parts["motor"]})
     signals = rig.signals(ramp=True)
     assert start.start_time is not None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -29,7 +28,7 @@ from ..system import (
 )
 from ..system.graph import Connection
 from .foreign_machine import ForeignMachine
-from .line.placed import PlacedPart
+from .line.placed import Line, PlacedPart
 
 
 class AbsentError(InputError):
@@ -59,8 +58,7 @@ class Drive:
     chain: Any = None
     """the organs as chains, a `sections.ChainOrgans`; None for two bars"""
 
-    line: tuple[PlacedPart, ...] = ()
-    """the parts between motor and machine, from the motor on"""
+    line: Line = field(default_factory=Line)
 
     flywheel: float = 0.0
     """inertia of a flywheel on the motor's shaft [kg m2]"""
@@ -88,7 +86,7 @@ class Drive:
         """The machine as its FMU has it: with the gear ratio that remains behind the line."""
         if not self.line:
             return self.machine
-        return self.machine.replace(ratio=self.ratio / math.prod(part.ratio for part in self.line))
+        return self.machine.replace(ratio=self.ratio / self.line.ratio)
 
     @cached_property
     def fmu_parameters(self) -> Any:
@@ -104,7 +102,7 @@ class Drive:
         """Inertia that turns with the rotor, at the motor's shaft [kg m2]: of rotor, gear and flywheel, and of the
         parts of the line."""
         self.needs_own("the inertia of its rotor")
-        return float(self.fmu_parameters.rotor.J + self.at_motor(0.0))
+        return float(self.fmu_parameters.rotor.J + self.line.at_motor(0.0))
 
     def needs_own(self, quantity: str) -> None:
         """Refuse a `quantity`, named in words, that only a motor of this package has.
@@ -178,7 +176,7 @@ class Drive:
         system = in_line(
             {
                 "machine": outsider.component if outsider else ModelComponent(*self.load_model()),
-                **{part.name: part.component for part in reversed(self.parts)},
+                **{part.name: part.component for part in reversed(self.whole_line.parts)},
                 "motor": self.foreign or ModelComponent(self.motor, self.fmu_parameters),
             }
         )
@@ -201,36 +199,13 @@ class Drive:
         return outsider.ratio if outsider and outsider.needs_gear else 1.0
 
     @cached_property
-    def parts(self) -> tuple[PlacedPart, ...]:
-        """All parts between motor and machine: those of the line, and a gear before a foreign machine without one.
-        Behind a line its ratio may be 1: the twin with a rigid shaft puts the ratio of the line there."""
+    def whole_line(self) -> Line:
+        """The line with the gear before a foreign machine that has none. Its ratio may be 1: the twin with a rigid
+        shaft puts that of the driveline there."""
         outsider = self.outsider
         if self.gear == 1.0 and not (outsider and self.line and not outsider.model.has_gear()):
             return self.line
-        return (*self.line, PlacedPart("gear", Gear, Gear.Parameters(ratio=self.gear), self.gear))
-
-    def part(self, name: str) -> PlacedPart | None:
-        """The part of the line of that name; None where there is none."""
-        return next((part for part in self.line if part.name == name), None)
-
-    def with_part(self, part: PlacedPart) -> Drive:
-        """The drive with one more part in its line, behind the others."""
-        return replace(self, line=(*self.line, part))
-
-    def at_motor(self, inertia: Any) -> Any:
-        """An inertia on the shaft of the machine's component, and those of the parts, at the motor's shaft [kg m2];
-        a part counts as rigid, and as if its ratio were even."""
-        for part in reversed(self.parts):
-            inertia = (inertia + part.inertia) / part.ratio**2
-        return inertia
-
-    @property
-    def line_inertia(self) -> float:
-        """Inertia of the parts of the line, at the shaft of the machine [kg m2]."""
-        inertia = 0.0
-        for part in self.line:
-            inertia = inertia * part.ratio**2 + part.inertia
-        return inertia
+        return self.line.behind(PlacedPart("gear", Gear, Gear.Parameters(ratio=self.gear), self.gear))
 
     @cached_property
     def motor_bond(self) -> Bond:

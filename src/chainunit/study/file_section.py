@@ -13,6 +13,20 @@ from ..reading.tables import given_values, schema
 
 
 @dataclass(frozen=True)
+class Instead:
+    """Keys of a table that stand in place of its declared quantities."""
+
+    quantities: type
+    """declaration of the numbers among them"""
+    keys: Callable[[], Iterable[Any]]
+    """the others, each a `chainunit.study.keys.Key`"""
+    conditions: Callable[[], Mapping[str, Any]]
+    """the JSON Schema of which keys go together"""
+    displaced: Mapping[str, tuple[str, ...]]
+    """by key, the keys of a file with which the value of the example has no meaning"""
+
+
+@dataclass(frozen=True)
 class FileSection:
     """A table of a study file. The study has its values, or None if the table is `optional` and the file does
     not have it; a value that the table does not name is that of `default`."""
@@ -30,10 +44,7 @@ class FileSection:
     """whether a study uses the table only where the analysis of the same name has findings"""
     apart: bool = False
     """whether the result has other things of the same names"""
-    instead: type | None = None
-    """declaration of further quantities, each of which stands in place of others"""
-    further_keys: Callable[[], Iterable[Any]] = tuple
-    """keys of further tables in it, each a `chainunit.study.keys.Key`"""
+    instead: Instead | None = None
     form: Callable[..., type[BaseModel]] = schema
     values: Callable[[Any], dict[str, Any]] = given_values
     """the values of a checked table, by the name of the quantity"""
@@ -45,10 +56,6 @@ class FileSection:
     """triples (low, relation, high) of keys: the value of `high` has to have this relation to that of `low`"""
     forms: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     """by key, also of entries, further conditions of the JSON Schema on its text or list"""
-    conditions: Callable[[], Mapping[str, Any]] | None = None
-    """further conditions of the JSON Schema on the table"""
-    displaced: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    """by key, those keys of a file with which the value of the example has no meaning"""
     required: tuple[str, ...] = ()
     """keys that the table must have"""
     random_events: tuple[str, ...] = ()

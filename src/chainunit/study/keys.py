@@ -196,8 +196,8 @@ def _of_section(name: str, section: FileSection) -> Iterator[Key]:
     for key in _of_fields(section.keys):
         yield dataclasses.replace(key, follows=section.follows.get(key.name, ""))
     if section.instead is not None:
-        yield from quantity_keys(section.instead)
-    yield from section.further_keys()
+        yield from quantity_keys(section.instead.quantities)
+        yield from section.instead.keys()
 
 
 def _of_system() -> Iterator[Key]:

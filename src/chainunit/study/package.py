@@ -65,7 +65,7 @@ def start_of(
     drive = _drive(config, backend, report)
     for kind in parts_of_line():
         if model is kind.model:
-            if (part := drive.part(kind.name)) is None:
+            if (part := drive.line.part(kind.name)) is None:
                 raise InputError(f"the study has no [{kind.name}]; add the table, or export without --config")
             return part.component.start
     if not issubclass(model, Motor):

@@ -250,7 +250,7 @@ LENGTHS = ("r", "l", "h", "c", "hy", "e", "l1", "l2", "z")
 def over_example(data: Mapping[str, Any], parts: Parts) -> dict[str, Any]:
     """The tables of a study file, completed by the example of its machine: a value that the file leaves out
     is the example's. The example's ratios are dropped if the file gives lengths, its motor if the file names
-    another, and so on, see `FileSection.displaced`."""
+    another, and so on, see `Instead.displaced`."""
     base = parts.example
     if any(name in named_table(data, "machine") for name in LENGTHS) and "ratios" not in data:
         base.pop("ratios", None)
@@ -261,9 +261,8 @@ def over_example(data: Mapping[str, Any], parts: Parts) -> dict[str, Any]:
         for name in ("gear", "start", "starter"):
             base.pop(name, None)
     for name, section in all_sections().items():
-        own = named_table(data, name)
-        for key, others in section.displaced.items():
-            if any(other in own for other in others):
+        for key, others in section.instead.displaced.items() if section.instead else ():
+            if not named_table(data, name).keys().isdisjoint(others):
                 base.get(name, {}).pop(key, None)
     base["title"] = ""
     return merged(base, data)

@@ -36,8 +36,8 @@ def machine_series(run: xr.Dataset) -> dict[str, Any]:
 
 
 def load_inertia(drive: Drive, run: xr.Dataset) -> Any:
-    """Inertia at the motor's shaft beside the rotor [kg m2], shape (time,); see `Drive.at_motor`."""
-    return drive.at_motor(run["machine.J"].values)
+    """Inertia at the motor's shaft beside the rotor [kg m2], shape (time,); see `Line.at_motor`."""
+    return drive.whole_line.at_motor(run["machine.J"].values)
 
 
 def motor_shaft(drive: Drive, run: xr.Dataset) -> tuple[Any, Any]:

@@ -52,11 +52,7 @@ def from_angle(rig: Rig, angle: float) -> Rig:
     """The rig whose crank stands at that angle [rad] at the start, without an observer."""
     drive, turned = rig.drive, angle * rig.drive.ratio
     parameters = replace(drive.parameters, phi_start=drive.parameters.phi_start + turned)
-    line = []
-    for part in drive.line:
-        line.append(part.turned(turned))
-        turned /= part.ratio
-    drive = replace(drive, parameters=parameters, line=tuple(line), observer=None, observed={})
+    drive = replace(drive, parameters=parameters, line=drive.line.turned(turned), observer=None, observed={})
     return replace(rig, drive=drive, fed_from=None)
 
 

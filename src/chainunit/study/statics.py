@@ -52,7 +52,7 @@ def statics(config: Config, drive: Drive) -> DriveStatics:
     return DriveStatics(
         cycles=cycles,
         loops={} if drive.foreign else _loops(drive, normal.J),
-        torsion=None if drive.part("driveline") is None else _torsion(config, drive, normal.J),
+        torsion=None if drive.line.part("driveline") is None else _torsion(config, drive, normal.J),
     )
 
 

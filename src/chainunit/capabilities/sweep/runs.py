@@ -41,7 +41,7 @@ def check_drive(rig: Rig, plan: SweepPlan) -> None:
             words = "changes no run, as the motor has the speed of its supply"
         elif name.startswith("machine.") and name.partition(".")[2] not in known:
             words = "is not of the drive"
-        elif name == _RATIO and rig.drive.parts:
+        elif name == _RATIO and rig.drive.whole_line:
             words = "is not one number of the drive"
         if words:
             line = f"sweep.parameter: {name} {words}; leave it out, or sweep it without measures"

@@ -44,7 +44,7 @@ class TorsionAnalysis(Analysis):
     @staticmethod
     def applies(config: Config, drive: Drive) -> bool:
         """Whether the driveline turns, so that its torsion is analysed."""
-        return drive.part("driveline") is not None
+        return drive.line.part("driveline") is not None
 
     @staticmethod
     def find(study: StudyRecord, work: Work) -> TorsionFindings | None:

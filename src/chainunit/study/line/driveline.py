@@ -19,7 +19,7 @@ from ...drives.shafts import SECTIONS as PROFILES
 from ...drives.shafts import Shaft
 from ...drives.torsion import with_damping_ratio
 from ..conditions import Schema, is_one_of
-from ..file_section import FileSection
+from ..file_section import FileSection, Instead
 from .part import PartOfLine
 
 if TYPE_CHECKING:
@@ -59,6 +59,36 @@ class DrivelinePlan:
     """damping ratio of its torsion, in place of d2 and d3"""
 
 
+def _shaft_keys() -> Iterator[Key]:
+    """The keys of the profiles of its shafts."""
+    from ..keys import Key, quantity_keys
+
+    for shaft, stiffness in SHAFTS.items():
+        words = f"its profile, in place of {stiffness}"
+        yield Key(f"{shaft}.section", words, words=tuple(f'"{name}"' for name in PROFILES), sort="text")
+        yield from quantity_keys(Shaft, prefix=f"{shaft}.")
+        words = "corners of a profile of any form, as pairs [m]"
+        yield Key(f"{shaft}.outline", words, sort="list", items=CORNER)
+        yield Key(f"{shaft}.holes", "outlines of the holes in it", sort="list", items=CORNER)
+
+
+def _conditions() -> Schema:
+    """The keys of the line that do not go together."""
+    pairs = [*SHAFTS.items(), ("damping_ratio", "d2"), ("damping_ratio", "d3")]
+    twice = [{"required": list(pair)} for pair in pairs]
+    shafts = {shaft: {"required": ["section"], "allOf": list(_of_shaft())} for shaft in SHAFTS}
+    return {"not": {"anyOf": twice}, "properties": shafts}
+
+
+def _of_shaft() -> Iterator[Schema]:
+    """The dimensions that go with a profile."""
+    for name, profile in PROFILES.items():
+        needed = [*profile.takes, "length"]
+        known = [*needed, *profile.also, "section", "shear_modulus"]
+        then: dict[str, Any] = {"required": needed, "propertyNames": {"enum": known}}
+        yield {"if": is_one_of("section", name).schema(), "then": then}
+
+
 class DrivelinePart(PartOfLine):
     """The part, with the table [driveline]."""
 
@@ -96,8 +126,9 @@ class DrivelinePart(PartOfLine):
         if plan.damping_ratio is None:
             return part
         J = cycle(drive.machine, config.run.crank_speed, config.feed).outputs.J
-        line = with_damping_ratio(two_masses(drive.with_part(part), float(np.mean(J))), plan.damping_ratio)
-        return replace(part, parameters=replace(p, d2=line.d2, d3=line.d3))
+        masses = two_masses(replace(drive, line=drive.line.behind(part)), float(np.mean(J)))
+        damped = with_damping_ratio(masses, plan.damping_ratio)
+        return replace(part, parameters=replace(p, d2=damped.d2, d3=damped.d3))
 
     def analyses(self) -> Iterable[type[Analysis]]:
         """The same runs with a rigid shaft."""
@@ -111,54 +142,23 @@ class DrivelinePart(PartOfLine):
 
         remark(study)
 
-    @staticmethod
-    def further_keys() -> Iterator[Key]:
-        """The keys of the profiles of its shafts."""
-        from ..keys import Key, quantity_keys
-
-        for shaft, stiffness in SHAFTS.items():
-            words = f"its profile, in place of {stiffness}"
-            yield Key(f"{shaft}.section", words, words=tuple(f'"{name}"' for name in PROFILES), sort="text")
-            yield from quantity_keys(Shaft, prefix=f"{shaft}.")
-            words = "corners of a profile of any form, as pairs [m]"
-            yield Key(f"{shaft}.outline", words, sort="list", items=CORNER)
-            yield Key(f"{shaft}.holes", "outlines of the holes in it", sort="list", items=CORNER)
-
-    @staticmethod
-    def conditions() -> Schema:
-        """The keys of the line that do not go together."""
-        pairs = [*SHAFTS.items(), ("damping_ratio", "d2"), ("damping_ratio", "d3")]
-        twice = [{"required": list(pair)} for pair in pairs]
-        shafts = {shaft: {"required": ["section"], "allOf": list(_of_shaft())} for shaft in SHAFTS}
-        return {"not": {"anyOf": twice}, "properties": shafts}
-
     tables = {  # noqa: RUF012
         "driveline": FileSection(
             Driveline,
             optional=True,
             keys={"place": (Literal[PLACES], Field("crank", description="shaft that it is on"))},
-            instead=Damping,
-            further_keys=further_keys,
+            instead=Instead(
+                Damping,
+                _shaft_keys,
+                _conditions,
+                {"damping_ratio": ("d2", "d3"), **{shaft: (shaft, c) for shaft, c in SHAFTS.items()}},
+            ),
             form=form,
             values=partial(line_values, prefix="driveline."),
             title="Driveline",
             follows={"d2": "from damping_ratio", "d3": "from damping_ratio"},
-            conditions=conditions,
-            displaced={
-                "damping_ratio": ("d2", "d3"),
-                **{shaft: (shaft, stiffness) for shaft, stiffness in SHAFTS.items()},
-            },
         )
     }
-
-
-def _of_shaft() -> Iterator[Schema]:
-    """The dimensions that go with a profile."""
-    for name, profile in PROFILES.items():
-        needed = [*profile.takes, "length"]
-        known = [*needed, *profile.also, "section", "shear_modulus"]
-        then: dict[str, Any] = {"required": needed, "propertyNames": {"enum": known}}
-        yield {"if": is_one_of("section", name).schema(), "then": then}
 
 
 PART = DrivelinePart()

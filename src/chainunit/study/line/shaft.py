@@ -114,7 +114,7 @@ def from_peak(torque: Any) -> Any:
 
 def driveline_of(drive: Drive) -> Parameters:
     """The driveline of a drive that has one."""
-    part = drive.part("driveline")
+    part = drive.line.part("driveline")
     assert part is not None
     parameters: Parameters = part.parameters
     return parameters

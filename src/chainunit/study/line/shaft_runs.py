@@ -61,7 +61,7 @@ class ShaftAnalysis(Analysis):
     @staticmethod
     def applies(config: Config, drive: Drive) -> bool:
         """Whether the drive has a driveline."""
-        return drive.part("driveline") is not None
+        return drive.line.part("driveline") is not None
 
     @staticmethod
     def find(study: StudyRecord, work: Work) -> ShaftFindings:
