@@ -172,7 +172,7 @@ def test_a_heavy_machine_is_waited_for_until_it_has_its_speed(tmp_path):
     speed that is small in itself takes power that is not of the load."""
     study = _heavy(10.0, tmp_path)
     steady, start = study.answers["steady"], study.start
-    assert start.start_time == pytest.approx(study.fed_from) and 35.0 < start.start_time < 45.0
+    assert start.start_time == pytest.approx(study.started.rig.fed_from) and 35.0 < start.start_time < 45.0
     warnings = {each.kind: each for each in study.warnings}
     assert not {"fed before speed", "speed drifts"} & set(warnings)
     # as long as that no rotor may be locked
@@ -196,6 +196,6 @@ def test_a_feed_that_comes_before_the_speed_is_told(tmp_path):
     """A machine that would take minutes to speed up is fed, and the study says with which speed."""
     study = _heavy(400.0, tmp_path)
     (remarks,) = [each for each in study.warnings if each.kind == "fed before speed"]
-    assert remarks.quantities["fed"][0] == study.fed_from and study.start.start_time is None
+    assert remarks.quantities["fed"][0] == study.started.rig.fed_from and study.start.start_time is None
     assert remarks.quantities["speed"][0] < 0.5 * study.config.run.crank_speed
     assert "larger motor" in remarks.text

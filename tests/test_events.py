@@ -22,6 +22,8 @@ from chainunit.study.readings import crank_angle, only_whole_turns
 from chainunit.study.result import as_dict
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
+from chainunit.study.start_up import start_up
+from chainunit.study.transients import follow, lead_times, longest_lead
 from chainunit.system import Profile
 
 QUICK = "[run]\nramp = 0.3\nsettle_turns = 1\nstep = 0.004\ncrank_speed = 6\n[machine]\nratio = 25\n"
@@ -273,14 +275,14 @@ def test_an_event_begins_at_its_angle_however_uneven_the_turn_is():
     rig = uneven()
     values = rig.config
     with rig.from_rest() as simulation:
-        run = rig.start_up(simulation, values.stop, lambda time: None, {}).run
+        run = start_up(rig, simulation, values.stop, lambda time: None, {}).run
         saved, angle = simulation.save(), float(crank_angle(rig.drive, run)[-1])
         turns = only_whole_turns(rig.drive, run.sel(time=slice(saved - 1.1 * values.turn, None)), 1)
         speed = 2.0 * math.pi / np.ptp(turns["time"].values)
         events = list(values.events.values())
         errors, of_mean_speed = [], []
-        for event, lead in zip(events, rig.leads(simulation, events, angle, speed), strict=True):
-            branch = rig.follow(simulation, event, saved + lead, saved + lead + 0.5).run
+        for event, lead in zip(events, lead_times(rig, simulation, events, angle, speed), strict=True):
+            branch = follow(rig, simulation, event, saved + lead, saved + lead + 0.5).run
             time, phi = branch["time"].values, crank_angle(rig.drive, branch)
             errors.append(
                 math.remainder(np.interp(saved + lead, time, phi) - event.p.crank_angle, 2.0 * math.pi)
@@ -303,16 +305,16 @@ def test_an_event_does_not_wait_for_a_crank_that_hardly_turns():
     rig = uneven()
     half = 0.5 * rig.config.run.crank_speed
     assert (
-        rig.longest_lead(math.pi, 0.0)
-        == rig.longest_lead(math.pi, half)
+        longest_lead(rig, math.pi, 0.0)
+        == longest_lead(rig, math.pi, half)
         == pytest.approx(2.0 * math.pi / half)
     )
     with rig.from_rest() as simulation:
         # at rest, and soon after: no angle is passed in so short a time
         simulation.run(0.001, 0.001)
         simulation.save()
-        (lead,) = rig.leads(simulation, list(rig.config.events.values())[:1], 0.0, 1e4)
-    assert lead == pytest.approx(rig.longest_lead(math.pi, 1e4))
+        (lead,) = lead_times(rig, simulation, list(rig.config.events.values())[:1], 0.0, 1e4)
+    assert lead == pytest.approx(longest_lead(rig, math.pi, 1e4))
 
 
 @pytest.fixture

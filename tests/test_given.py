@@ -6,6 +6,7 @@ import contextlib
 import dataclasses
 import json
 import math
+from functools import partial
 
 import pytest
 from test_foreign_machine import MACHINE, SCRIPT
@@ -22,6 +23,7 @@ from chainunit.study.choice import as_chosen, choose
 from chainunit.study.config import load, parse
 from chainunit.study.given import given_sections
 from chainunit.study.measures import Answers
+from chainunit.study.origins import origin_of
 from chainunit.study.parts import example
 from chainunit.study.record import StudyRecord
 from chainunit.study.remarks import conclude
@@ -56,20 +58,22 @@ def test_the_motor_is_shown_as_it_is_and_turns_with_gear_and_flywheel(tmp_path):
 
 
 def test_values_of_a_motor_of_the_catalogue_are_the_catalogues(tmp_path):
-    origin = study_of(parse(KNIFE), tmp_path).origin
+    origin = partial(origin_of, study_of(parse(KNIFE), tmp_path))
     assert origin("motor.rotor.J") == origin("motor.stator.R") == origin("machine.ratio") == "catalogue"
     assert origin("machine.r") == "file" and origin("motor.ambient.T") == "declared"
     assert origin("motor.w_start") == "declared"
     soft = KNIFE.replace("[system]", 'start = "inverter"\n[starter.inverter]\nramp = 2\n[system]')
     soft = soft.replace("[gear]\n", "[gear]\nratio = 25\n")
-    origin = study_of(parse(soft), tmp_path).origin
+    origin = partial(origin_of, study_of(parse(soft), tmp_path))
     assert origin("machine.ratio") == origin("motor.inverter.on") == "file"
     assert origin("motor.inverter.slip") == origin("starter.inverter.slip") == "catalogue"
     # the supply is what `start` says, and no other key
     with pytest.raises(InputError, match=r"starter\.inverter\.on"):
         parse(soft.replace("ramp = 2", "ramp = 2\non = 0"))
     # of the example, where the file leaves the system out
-    origin = study_of(parse("[system]\nmachine = 'KnifeDrive'\n[run]\ncrank_speed = 4"), tmp_path).origin
+    origin = partial(
+        origin_of, study_of(parse("[system]\nmachine = 'KnifeDrive'\n[run]\ncrank_speed = 4"), tmp_path)
+    )
     assert origin("motor.rotor.J") == "catalogue"
     assert origin("machine.r") == origin("flywheel.J") == "example" and origin("run.crank_speed") == "file"
 
@@ -93,7 +97,7 @@ def test_the_slip_compensation_that_is_used_is_shown(tmp_path):
         assert drive.parameters.inverter.slip == pytest.approx(used, rel=1e-12)
         assert result["motor"]["inverter.slip"]["value"] == drive.parameters.inverter.slip
         assert result["starter"]["inverter.slip"]["value"] == drive.parameters.inverter.slip
-        assert study.origin("starter.inverter.slip") == ("file" if given else "catalogue")
+        assert origin_of(study, "starter.inverter.slip") == ("file" if given else "catalogue")
         # a flywheel that a comparison adds has the setting of a drive with one
         wheel = with_wheel(config, drive, 0.1)
         assert wheel.flywheel == 0.1 and wheel.parameters.inverter.slip == (used if given else 0.0)
@@ -116,12 +120,12 @@ def test_the_ratio_is_shown_that_is_used(tmp_path):
 
 def test_what_no_example_gives_is_at_its_declared_start_value(tmp_path):
     study = study_of(parse("[run]\ncrank_speed = 2"), tmp_path)
-    assert study.origin("machine.r") == study.origin("motor.rotor.J") == "example"
+    assert origin_of(study, "machine.r") == origin_of(study, "motor.rotor.J") == "example"
     assert (
-        study.origin("event.jam_left.rise") == "declared"
-        and study.origin("event.jam_left.force") == "example"
+        origin_of(study, "event.jam_left.rise") == "declared"
+        and origin_of(study, "event.jam_left.force") == "example"
     )
-    assert study.origin("motor.speed_control.kp") == "tuned"
+    assert origin_of(study, "motor.speed_control.kp") == "tuned"
     (note,) = (str(each) for each in study.notes if each.kind == "assumed")
     assert "those of the packaged example" in note
     (packaged,) = (str(each) for each in study_of(load(), tmp_path).notes if each.kind == "assumed")
@@ -129,8 +133,8 @@ def test_what_no_example_gives_is_at_its_declared_start_value(tmp_path):
     # of a machine of somebody else there is no example
     build(tmp_path, script=SCRIPT)
     study = study_of(parse(PUMP + MACHINE, str(tmp_path / "x.toml")), tmp_path)
-    assert study.origin("machine.throw") == study.origin("motor.rotor.J") == "declared"
-    assert study.origin("machine.piston.mass") == "file"
+    assert origin_of(study, "machine.throw") == origin_of(study, "motor.rotor.J") == "declared"
+    assert origin_of(study, "machine.piston.mass") == "file"
     (note,) = (str(each) for each in study.notes if each.kind == "assumed")
     assert "example" not in note and "An eccentric pump" in note
     assert "machine.throw" not in as_dict(study)["origins"]

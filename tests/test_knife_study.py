@@ -37,6 +37,7 @@ from chainunit.study.readings import only_whole_turns
 from chainunit.study.record import StudyRecord
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
+from chainunit.study.start_up import start_up
 from chainunit.study.statics import statics
 from chainunit.study.stored import cutting_power
 from chainunit.study.turn import TurnAnalysis
@@ -103,7 +104,7 @@ def at_speed(rig, flywheel, **changes):
 def steady_turns(rig):
     """The steady turns of a rig, and their answers."""
     with rig.from_rest() as simulation:
-        started = rig.start_up(simulation, rig.config.stop, lambda time: None, {})
+        started = start_up(rig, simulation, rig.config.stop, lambda time: None, {})
     turns = only_whole_turns(
         rig.drive, started.run.sel(time=slice(started.steady_from, None)), rig.config.run.turns
     )

@@ -24,6 +24,7 @@ from chainunit.study.drive_fmus import with_files
 from chainunit.study.package import export_study, study_system
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
+from chainunit.study.transients import follow
 from chainunit.system import CompiledSimulation, CoSimulation
 
 native = pytest.mark.skipif(compiler() is None, reason="no C compiler")
@@ -143,7 +144,7 @@ def test_a_torque_that_no_load_explains_leaves_the_estimates_within_bounds(study
     with rig.from_rest() as simulation:
         simulation.run(4.0, rig.step)
         begin = simulation.save()
-        run = rig.follow(simulation, study.config.events["blocked"], begin + 0.5, begin + 3.5).run
+        run = follow(rig, simulation, study.config.events["blocked"], begin + 0.5, begin + 3.5).run
     assert np.max(np.abs(run["motor.armature.i"].values)) > 0.99 * LIMIT
     p = study.drive.observer.parameters
     for load, of in (("material_mass", p.feed), ("processing_force", p.force)):

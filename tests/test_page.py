@@ -368,7 +368,7 @@ def test_steady_running_begins_where_the_study_takes_it(study):
     """A soft starter that ramps for longer than the reference moves the mark and the still picture, too."""
     soft = SoftStart(voltage=0.5, time=0.7)
     config = dataclasses.replace(study.config, start="soft", starter=Starter(soft_start=soft))
-    slow = dataclasses.replace(study, config=config, steady_from=None)
+    slow = dataclasses.replace(study, config=config, started=None)
     start_up = next(each for each in study_report.report(slow).figures if each.name == "time-start-up")
     (mark,) = page_figures.figure(start_up, DEFAULT_UNITS).layout.annotations
     assert mark.text == "steady from here" and mark.x == slow.steady_begin == pytest.approx(

@@ -48,6 +48,7 @@ from chainunit.study.run import _with_class_of_all_starts, run_study
 from chainunit.study.sections import Coupling
 from chainunit.study.start_runs import from_angle
 from chainunit.study.starts import StartAnalysis
+from chainunit.study.transients import follow
 from chainunit.study.window import Phase
 from chainunit.system import ModelComponent, System, monolithic
 
@@ -136,7 +137,11 @@ def test_a_motor_is_not_judged_by_turns_that_are_not_steady(on_line):
         and "does NOT bring the crank to its speed from 135 deg" in verdict["text"]
     )
     early = dataclasses.replace(
-        on_line, steady_from=0.0, answers=dict(on_line.answers), findings={}, remarks=[]
+        on_line,
+        started=dataclasses.replace(on_line.started, steady_from=0.0),
+        answers=dict(on_line.answers),
+        findings={},
+        remarks=[],
     )
     window = early.window(Phase.STEADY, on_line.runs["start_up"].sel(time=slice(0.05, on_line.config.turn)))
     assert not window.lasts and on_line.window(Phase.STEADY, on_line.steady).lasts
@@ -453,7 +458,7 @@ def test_a_coupling_before_the_flywheel_carries_each_start_and_one_sided_feed(on
     with rig.from_rest() as simulation:
         simulation.run(4.0, 2e-3)
         begin = simulation.save()
-        moved = rig.follow(simulation, feed, begin, begin + feed.p.shift + 2.0 * study.config.turn).run
+        moved = follow(rig, simulation, feed, begin, begin + feed.p.shift + 2.0 * study.config.turn).run
     steady = on_motor_side(drive, run.sel(time=slice(0.6, None)))
     assert way.numbers.running == pytest.approx(on_motor_side(drive, moved), rel=0.02)
     assert way.numbers.running > 1.1 * steady
@@ -803,7 +808,7 @@ def test_the_coming_of_the_feed_belongs_to_the_start_of_a_coupling(tmp_path, mon
     sized = run_study(
         config.parse(empty + "[sizing]\ncandidates = 1\n[run]\nturns = 2\n"), tmp_path / "sized"
     )
-    first = largest(sized, "start_up", end=sized.fed_from)
-    fed = largest(sized, "start_up", sized.fed_from, sized.steady_begin)
+    first = largest(sized, "start_up", end=sized.started.rig.fed_from)
+    fed = largest(sized, "start_up", sized.started.rig.fed_from, sized.steady_begin)
     assert sized.failure is None and sized.setting.least_in_running < min(first, fed)
     assert sized.setting.start >= max(first, fed)

@@ -19,6 +19,7 @@ from chainunit.study.readings import only_whole_turns, shaft_power
 from chainunit.study.record import StudyRecord
 from chainunit.study.remarks import _on_steady_running
 from chainunit.study.rig import Rig
+from chainunit.study.start_up import StartUp, start_up
 from chainunit.study.statics import statics
 from chainunit.study.stored import energy_behind, energy_gap, energy_held
 from chainunit.study.window import CLOSED, DRIFT, STORED, Phase, Window, drift, end_gap, is_settled
@@ -60,7 +61,7 @@ def mill():
     drive = replace(drive, flywheel=config.values["flywheel"].J)
     rig = Rig(config, drive, None)
     with rig.from_rest() as simulation:
-        start = rig.start_up(simulation, config.stop, lambda time: None, {})
+        start = start_up(rig, simulation, config.stop, lambda time: None, {})
         later = simulation.run(simulation.time + 4.2 * config.turn, rig.step)
     first = only_whole_turns(drive, start.run.sel(time=slice(9.5, None)), 1)
     told = only_whole_turns(drive, start.run.sel(time=slice(start.steady_from, None)), 1)
@@ -140,7 +141,7 @@ def test_the_loss_of_the_gear_stands_beside_the_net_power(mill):
     study = StudyRecord(rig.config, rig.drive, statics(rig.config, rig.drive))
     assert GearAnalysis.applies(rig.config, rig.drive)
     assert GearAnalysis.find(study, Work(rig, lambda *_: None)) is None  # no steady running yet
-    study.runs["start_up"], study.steady_from = told, float(told["time"][0])
+    study.runs["start_up"], study.started = told, StartUp(told, float(told["time"][0]), 0.0, rig)
     study.answers["steady"] = SimpleNamespace(power_mean=read_measure("power_mean", window(rig, told)))
     findings = GearAnalysis.find(study, Work(rig, lambda *_: None))
     torque, w = study.statics.normal.crank_torque, read_measure("speed_mean", window(rig, told))

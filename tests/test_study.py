@@ -619,10 +619,10 @@ def test_the_study_waits_until_the_turns_close(tmp_path):
     ],
 )
 def test_a_cycle_that_does_not_close_is_told(text, told, there, tmp_path, monkeypatch):
-    from chainunit.study import rig
+    from chainunit.study import start_up
 
-    monkeypatch.setattr(rig, "PATIENCE", 0.0)
-    monkeypatch.setattr(rig, "_SETTLES", 0.0)
+    monkeypatch.setattr(start_up, "PATIENCE", 0.0)
+    monkeypatch.setattr(start_up, "_SETTLES", 0.0)
     study, _ = ran(text, tmp_path)
     assert any(warning.kind == told for warning in study.warnings)
     assert (tmp_path / "load_cycle.csv").exists() == there

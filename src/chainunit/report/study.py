@@ -13,7 +13,7 @@ from ..reading.text import shown_in
 from ..study.given import GivenSection, description, given_sections
 from ..study.record import StudyRecord
 from ..study.result import as_dict
-from ..study.rig import DIFFERENCE
+from ..study.transients import DIFFERENCE
 from . import answer, chains, figures, run_names, runs, shaft, sizing, wording
 from . import blocks as b
 from .analyses import analysis_sections

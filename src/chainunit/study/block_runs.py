@@ -25,7 +25,9 @@ from ..system.compiled_simulation import LONGEST, CompiledSimulation, CompiledSy
 from ..system.signals import at_time
 from .event import Event, angle_of_begin
 from .readings import crank_angle, crank_speed
-from .rig import PATIENCE, Rig
+from .rig import Rig
+from .start_up import PATIENCE
+from .transients import follow, longest_lead
 from .window import is_settled, mean, time_at, whole_turns
 
 BLOCK = 64
@@ -343,7 +345,7 @@ class BlockRuns:
             angle = float(crank_angle(drive, run)[-1])
             targets.append(angle_of_begin(point.event, angle))
             speed = mean(turns, crank_speed(drive, turns))
-            longest.append(point.rig.longest_lead(targets[-1] - angle, speed))
+            longest.append(longest_lead(point.rig, targets[-1] - angle, speed))
             ends.append([math.inf, targets[-1] * drive.crank_output("phi")[1]])
         runs = self._run(points, states, 0.0, longest, limits=np.array(ends).T)
         times = [time_at(p.rig.drive, self._series(runs, k), targets[k]) for k, p in enumerate(points)]
@@ -401,7 +403,7 @@ class EventSimulation:
             stop = begin + point.duration
             guards = {shaft: point.limit} if math.isfinite(point.limit) else None
             try:
-                run = self.rig.follow(self._simulation, point.event, begin, stop, guards=guards).run
+                run = follow(self.rig, self._simulation, point.event, begin, stop, guards=guards).run
             except InterruptedRunError:
                 raise
             except RunError as error:

@@ -30,8 +30,10 @@ from .readings import crank_motion
 from .record import StudyRecord
 from .rig import Rig, join
 from .start_runs import StartNumbers, from_angle, hardest, longest_start, start_from, starts_from_all
+from .start_up import start_up
 from .starts import StartAnalysis
 from .torques import PeakOf, all_feed_on, duty_peak, on_coupling
+from .transients import follow, lead_times
 from .verdict import STEADY
 
 SOFT_STARTERS = ((0.5, 1.0), (0.5, 3.0), (0.4, 2.0), (0.4, 5.0), (0.3, 5.0), (0.3, 10.0))
@@ -248,9 +250,9 @@ def _runs(study: StudyRecord, rig: Rig, of: PeakOf) -> tuple[float, dict[str, xr
     duty: list[tuple[str, xr.Dataset]] = []
     shocks: dict[str, xr.Dataset] = {}
     with rig.from_rest() as simulation:
-        start_up = rig.start_up(simulation, config.stop, lambda time: None, {})
-        rig = start_up.rig
-        steady = start_up.run.sel(time=slice(start_up.steady_from, None))
+        started = start_up(rig, simulation, config.stop, lambda time: None, {})
+        rig = started.rig
+        steady = started.run.sel(time=slice(started.steady_from, None))
         begin = simulation.save()
         angle, speed = crank_motion(rig.drive, steady)
         events = {
@@ -258,10 +260,10 @@ def _runs(study: StudyRecord, rig: Rig, of: PeakOf) -> tuple[float, dict[str, xr
             for name, event in config.events.items()
             if name in study.answers and not event.from_rest
         }
-        leads = rig.leads(simulation, [*events.values()], float(angle[-1]), float(np.mean(speed)))
+        leads = lead_times(rig, simulation, [*events.values()], float(angle[-1]), float(np.mean(speed)))
         for (name, event), lead in zip(events.items(), leads, strict=True):
             at = begin + lead
-            run = rig.follow(simulation, event, at, at + event.follow(config.turn)).run.sel(
+            run = follow(rig, simulation, event, at, at + event.follow(config.turn)).run.sel(
                 time=slice(at, None)
             )
             if event.role is Role.DUTY:
@@ -271,7 +273,7 @@ def _runs(study: StudyRecord, rig: Rig, of: PeakOf) -> tuple[float, dict[str, xr
         assert study.sizing is not None
         for side in study.sizing.duty.one_sided:
             event = config.one_sided(side)
-            run = rig.follow(simulation, event, begin, begin + event.p.shift + 2.0 * config.turn).run
+            run = follow(rig, simulation, event, begin, begin + event.p.shift + 2.0 * config.turn).run
             duty.append((all_feed_on(side), run))
     return duty_peak(rig.drive, [(STEADY, steady), *duty], of).torque, shocks
 

@@ -14,17 +14,16 @@ from ..fmu.backends import Origin
 from ..machines.chain_unit import RodName
 from ..reading.text import entry, number
 from . import verdict
-from .catalogue_drive import SLIP
 from .chain import ChainResult
 from .config import Config
 from .drive import Drive
 from .limits import reaches
 from .measures import Answers, not_known
-from .parts import LENGTHS
 from .protection import Alternative, Setting
 from .pulls import LeastPull
 from .relay import LIGHT
 from .sizing import SizingResult
+from .start_up import StartUp
 from .statics import DriveStatics
 from .verdict import STEADY, Verdict
 from .window import Phase, Trip, Window, whole_turns
@@ -42,13 +41,6 @@ Amount: TypeAlias = (
     tuple[float | None, str] | tuple[float | None, str, str] | tuple[float | None, str, str, int]
 )
 """A number and its unit; optionally the kind by which it is shown, and the number of digits."""
-
-
-_CHOSEN = ("gear.efficiency", "starter.inverter.boost", SLIP)
-"""Values that sizing chooses where the file leaves them out, see `chainunit.study.choice.as_chosen`."""
-
-Origins: TypeAlias = Literal["file", "example", "declared", "tuned", "catalogue", "sizing"]
-"""The origin of a value."""
 
 
 @dataclass(frozen=True)
@@ -112,10 +104,8 @@ class StudyRecord:
     fmus: dict[str, Origin] = field(default_factory=dict)
     """the origin of each FMU"""
     runs: dict[str, xr.Dataset] = field(default_factory=dict)
-    steady_from: float | None = None
-    """time at which running became steady [s], if that was later than the study planned"""
-    fed_from: float | None = None
-    """time at which the feed came to a machine that starts empty [s]"""
+    started: StartUp | None = None
+    """the start-up and steady running, once it is made"""
     event: dict[str, float] = field(default_factory=dict)
     """time at which each event began [s]"""
     answers: dict[str, Answers] = field(default_factory=dict)
@@ -177,50 +167,6 @@ class StudyRecord:
         """The title of a run for use in sentences."""
         return self.titles.get(run, run.replace("_", " "))
 
-    def origin(self, name: str) -> Origins:
-        """The origin of the value of a quantity, by its name in a study file ("motor.rotor.J"): the file, the
-        example, tuning, the catalogue (by the motor that the file names or that sizing chose), or its
-        declaration."""
-        section, _, parameter = name.partition(".")
-        if name in _CHOSEN and self.sizing is not None and self._of(name) == "declared":
-            return "sizing"
-        if name == SLIP and self.config.start == "inverter" and self._of(name) == "declared":
-            return "catalogue"
-        if section == "motor" and self.tuning is not None and parameter in self.tuning.parameters:
-            return "file" if name in self.config.given else "tuned"
-        if section == "machine" and parameter in LENGTHS and self.config.gives("ratios"):
-            return "file"
-        if section == "machine" and parameter in LENGTHS and "ratios.rho" in self.config.of_example:
-            return "example"
-        if self.config.of_catalogue and (name == "machine.ratio" or section == "motor"):
-            name_in_file = self._name_in_file(parameter)
-            if not name_in_file:
-                return "catalogue" if self.sizing is None else "sizing"
-            name = name_in_file
-        return self._of(name)
-
-    def _of(self, name: str) -> Origins:
-        """The origin of a value that only the study file or the example can give."""
-        if name in self.config.given:
-            return "file"
-        return "example" if name in self.config.of_example else "declared"
-
-    def _name_in_file(self, parameter: str) -> str:
-        """The name in a study file of a motor's `parameter`; empty for one that the catalogue sets."""
-        config = self.config
-        if parameter == "ratio":
-            return "gear.ratio" if self._of("gear.ratio") != "declared" else ""
-        group = parameter.partition(".")[0]
-        if parameter == "inverter.on":
-            return "start"
-        if parameter == "inverter.slip" and config.start == "inverter" and SLIP not in config.given:
-            return ""
-        if group in ("soft_start", "inverter"):
-            return f"starter.{parameter}"
-        if parameter in ("phi_start", "w_start") or group == "solver":
-            return f"motor.{parameter}"
-        return "sizing.ambient" if parameter == "ambient.T" else ""
-
     @property
     def kind(self) -> str:
         """The heading of a report on this kind of study."""
@@ -257,7 +203,7 @@ class StudyRecord:
     @property
     def steady_begin(self) -> float:
         """Time from which running counts as steady [s]."""
-        return self.config.steady_begin if self.steady_from is None else self.steady_from
+        return self.config.steady_begin if self.started is None else self.started.steady_from
 
     @property
     def insufficient(self) -> bool:

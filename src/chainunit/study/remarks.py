@@ -106,9 +106,10 @@ def _left_out(study: StudyRecord) -> Iterator[str]:
 
 def _on_start(study: StudyRecord) -> None:
     """Warn where the feed came to a machine that did not have its speed yet."""
-    run, feed_time = study.runs["start_up"], study.fed_from
+    feed_time = study.started.rig.fed_from if study.started else None
     if feed_time is None:
         return
+    run = study.runs["start_up"]
     speed = float(np.interp(feed_time, run["time"].values, crank_speed(study.drive, run)))
     requested = study.config.run.crank_speed
     # the row at which the speed is passed is the last of the start

@@ -16,6 +16,7 @@ from .judgement import motor_verdict
 from .line.shaft import driveline_of
 from .line.shaft_runs import shaft_findings
 from .measures import measures_of
+from .origins import origin_of
 from .protection import CouplingEffect, Obstacle
 from .record import StudyRecord
 from .relay import class_words
@@ -89,7 +90,7 @@ def _given_values(study: StudyRecord) -> dict[str, Any]:
     for section in sections:
         if section.name != "motor":
             _put(values, section.place, section.as_dict())
-    origins = {name: origin for name in names if (origin := study.origin(name)) != "declared"}
+    origins = {name: origin for name in names if (origin := origin_of(study, name)) != "declared"}
     return {"origins": origins} | values
 
 

@@ -3,77 +3,34 @@ open coupling."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import xarray as xr
 
 from ..core.errors import refusal_prefix
 from ..system import (
     CompiledSimulation,
     CoSimulation,
-    Jump,
-    ModelComponent,
     ModelExchange,
     Profile,
     Simulation,
     System,
     certify,
-    monolithic,
     without,
 )
-from ..work.progress import Progress
 from .config import Config
 from .cycle import no_feed
 from .drive import Drive
-from .drive_fmus import coasting_model, coasting_parameters, with_files
-from .event import Event, OverTime, Signals, Values, angle_of_begin
-from .measures import STARTED
-from .readings import machine_series, only_whole_turns, turns_made
-from .window import is_settled, time_at, whole_turns
+from .drive_fmus import with_files
+from .event import Event, OverTime, Signals, Values
+from .readings import machine_series
 
-_LONGEST_START = 30.0
-"""Time after the ramp at which an empty machine is fed, unless it would reach its speed in `_LONGEST_RISE`
-[s]."""
-_LONGEST_RISE = 600.0
-"""Time after the ramp at which an empty machine is fed, however slowly it turns [s]."""
 FEED_RISE = 0.1
 """Share of a turn in which the feed comes to a machine that starts empty."""
-PATIENCE = 20.0
-"""Number of turns, at the requested speed, for which a study runs on until the motor has settled and made its
-turns; for a fast machine at least the time `_SETTLES`."""
-_UNEVEN = 2.0
-"""Ratio of the time that a crank takes to an angle over the time at its mean speed, up to which an event waits."""
-_SETTLES = 5.0
-"""Time in which every drive settles, whatever the speed of its crank [s]."""
-
-
-@dataclass(frozen=True)
-class Transient:
-    """A run with an event that began at `begin` [s]. `signals` are its signals from there on. `jumps` are
-    those among them that the event sets to a number at its begin; `lead` is then the run up to the begin."""
-
-    event: Event
-    begin: float
-    run: xr.Dataset
-    signals: Signals
-    jumps: dict[str, Jump]
-    lead: xr.Dataset | None = None
-
-
-@dataclass(frozen=True)
-class StartUp:
-    """Start-up and steady running: the run, the time from which it is steady and the time to which it should
-    have run [s], and the `rig` with which the study goes on."""
-
-    run: xr.Dataset
-    steady_from: float
-    stop: float
-    rig: Rig
 
 
 @dataclass(frozen=True)
@@ -120,7 +77,7 @@ class Rig:
         return {self.drive.motor_torque: coupling.trip_torque / self.drive.ratio} if coupling else {}
 
     @cached_property
-    def _inputs(self) -> dict[str, tuple[str, float]]:
+    def inputs(self) -> dict[str, tuple[str, float]]:
         """By input that an event may act on, its full name and its value in normal running."""
         inputs = {
             c.name: (f"{name}.{c.name}", c.start)
@@ -137,13 +94,13 @@ class Rig:
     def takes(self, event: Event) -> bool:
         """Whether the drive has the inputs that the event acts on."""
         machine = self.graph.components["machine"].connectors
-        return set(event.inputs(event.side)) <= set(self._inputs) and set(event.reads) <= set(machine)
+        return set(event.inputs(event.side)) <= set(self.inputs) and set(event.reads) <= set(machine)
 
     def event_signals(self, event: Event, begin: float, state: Values) -> Signals:
         """The signals of the event, by full name, if it begins at `begin` [s] with the outputs `state`."""
-        normal = {name: value for name, (_, value) in self._inputs.items()}
+        normal = {name: value for name, (_, value) in self.inputs.items()}
         signals = event.signals(normal, begin, state)
-        return {self._inputs[name][0]: signal for name, signal in signals.items()}
+        return {self.inputs[name][0]: signal for name, signal in signals.items()}
 
     def signals(self, changes: Mapping[str, OverTime] | None = None, *, ramp: bool = False) -> Signals:
         """Loads of normal running, or the `changes` in their place, and the speed reference, with `ramp` from
@@ -193,134 +150,6 @@ class Rig:
         with refusal_prefix('simulation = "me": '):
             return ModelExchange(system, signals, begin)
 
-    def leads(
-        self, simulation: Simulation, events: Sequence[Event], angle: float, speed: float
-    ) -> list[float]:
-        """Time from the saved state to the begin of each event [s]: the machine is followed without an event until
-        its crank, now at the `angle` [rad] with the mean `speed` [rad/s], passes their angles."""
-        if not events:
-            return []
-        simulation.restore()
-        simulation.signals = self.signals()
-        begin, (name, ratio) = simulation.time, self.drive.crank_output("phi")
-        targets = [angle_of_begin(event, angle) for event in events]
-        limits = [self.longest_lead(target - angle, speed) for target in targets]
-        run = simulation.run(begin + max(limits), self.step, guards={name: max(targets) * ratio})
-        times = (time_at(self.drive, run, target) for target in targets)
-        return [limit if time is None else time - begin for time, limit in zip(times, limits, strict=True)]
-
-    def longest_lead(self, ahead: float, speed: float) -> float:
-        """Time in which a crank of the mean `speed` [rad/s] passes the angle `ahead` [rad], however uneven its turn
-        is [s]. An event does not wait longer, as the crank may hardly turn."""
-        return float(_UNEVEN * ahead / max(speed, 0.5 * self.config.run.crank_speed))
-
-    def start_empty(
-        self, simulation: Simulation, progress: Progress, guards: Mapping[str, float]
-    ) -> tuple[xr.Dataset, Rig]:
-        """The start of an empty machine, until its crank turns at the share `STARTED` of its speed, until a
-        guard ends it, or until it is clear that the machine speeds up too slowly; and the rig that is fed
-        from then on."""
-        # behind a shaft line the crank is not where the motor is
-        name, ratio = self.drive.crank_output("w")
-        goal = STARTED * self.config.run.crank_speed * ratio
-        speed_limit = {**guards, name: goal}
-        longest, piece = self.config.ramp_end + _LONGEST_RISE, max(self.config.turn, 1.0)
-        stop = self.config.ramp_end + _LONGEST_START
-        run = simulation.run(stop, self.step, progress, guards=speed_limit)
-        while stop - 0.5 * self.step <= simulation.time < longest:
-            speed = float(run[name][-1])
-            before = float(run[name].sel(time=stop - piece, method="nearest"))
-            if goal - speed > (speed - before) / piece * (longest - stop):
-                break
-            stop = min(stop + piece, longest)
-            run = join([run, simulation.run(stop, self.step, progress, guards=speed_limit)])
-        rig = replace(self, fed_from=simulation.time)
-        simulation.signals = rig.signals(ramp=True)
-        return run, rig
-
-    def start_up(
-        self, simulation: Simulation, stop: float, progress: Progress, guards: Mapping[str, float]
-    ) -> StartUp:
-        """Start-up and steady running to the time `stop` [s], or longer, see `_missing`; a machine that
-        starts empty runs so long after it is fed."""
-        rig, pieces, steady_from = self, [], self.config.steady_begin
-        if self.config.empty_start:
-            run, rig = self.start_empty(simulation, progress, guards)
-            pieces = [run]
-            # a motor that follows a ramp is not steady before its end
-            feed_time = max(simulation.time, self.config.ramp_end) if self.drive.follows else simulation.time
-            later = feed_time - self.config.ramp_end
-            stop, steady_from = stop + later, steady_from + later
-            if any(abs(float(run[name][-1])) >= limit for name, limit in guards.items()):
-                return StartUp(run, steady_from, stop, rig)
-        longest = stop + max(PATIENCE * self.config.turn, _SETTLES)
-        run = join([*pieces, simulation.run(stop, self.step, progress, guards=guards)])
-        while stop - 0.5 * self.step <= simulation.time < longest:
-            lack, steady_from = self._missing(run, steady_from)
-            if lack is None:
-                break
-            # at most at the requested speed; the next round finds the turns that are still missing then
-            stop = min(longest, stop + max(lack * self.config.turn, self.step))
-            run = join([run, simulation.run(stop, self.step, progress, guards=guards)])
-        return StartUp(run, steady_from, stop, rig)
-
-    def _missing(self, run: xr.Dataset, steady_from: float) -> tuple[float | None, float]:
-        """The number of turns that are still missing for the evaluation, as the crank turns too slowly or the motor
-        has not settled, or None where none is missing; and the time from which running is steady [s], a turn later
-        if the motor has not settled."""
-        turns_asked = self.config.run.turns
-        since = run.sel(time=slice(steady_from, None))
-        turns = only_whole_turns(self.drive, since, turns_asked)
-        if turns is not None and turns_made(self.drive, turns) > turns_asked - 0.5:
-            if self.drive.chain is not None or is_settled(self.drive, turns):
-                return None, steady_from
-            # as if one turn more had been waited for
-            steady_from = float(whole_turns(self.drive, since, 1)["time"][-1])
-            since = run.sel(time=slice(steady_from, None))
-        return turns_asked + 0.1 - turns_made(self.drive, since), steady_from
-
-    def follow(
-        self,
-        simulation: Simulation,
-        event: Event,
-        begin: float,
-        stop: float,
-        progress: Progress | None = None,
-        guards: Mapping[str, float] | None = None,
-    ) -> Transient:
-        """Run an event from the saved state to the time `stop` [s], or until a guard ends it."""
-        simulation.restore()
-        before: dict[str, float] = {}
-        state: dict[str, float] = {}
-        pieces = []
-        if event.reads:
-            before = dict(self._inputs[name] for name in event.inputs(event.side))
-            simulation.signals = self.signals(before)
-            pieces.append(simulation.run(begin, self.step, progress))
-            state = {name: float(pieces[0][f"machine.{name}"][-1]) for name in event.reads}
-        signals = self.event_signals(event, begin, state)
-        simulation.signals = self.signals(signals)
-        pieces.append(simulation.run(stop, self.step, progress, guards=guards))
-        jumps = {
-            full: Jump(begin, value, after)
-            for full, value in before.items()
-            if not isinstance(after := signals[full], Profile)
-        }
-        return Transient(event, begin, join(pieces), signals, jumps, pieces[0] if jumps else None)
-
-    def coast(self, transient: Transient, run: xr.Dataset, stop: float, file: Path) -> xr.Dataset:
-        """The run of the machine (FMU `file`) behind the coupling that opened at the end of `run`, with the
-        same loads. It ends a second after the time `stop` [s] to which the motor would have been followed."""
-        begin = float(run["time"][-1])
-        model = coasting_model(self.drive)
-        start = model.start_from({k: float(x[-1]) for k, x in machine_series(run).items()})
-        p = model.parameter_layout.from_names(coasting_parameters(self.drive) | start)
-        alone = System({"machine": ModelComponent(model, p, file)})
-        loads = self.drive.loads(self.config.feed) | transient.signals
-        loads = {full: x for full, x in loads.items() if full.startswith("machine.")}
-        with self.simulation(alone, {**loads, "machine.tau": 0.0}, begin) as simulation:
-            return simulation.run(max(stop, begin) + 1.0, self.step)
-
     def residuals(self, run: xr.Dataset, lead: xr.Dataset | None = None) -> dict[str, float]:
         """Write the energy residual of each shaft into the run; a shaft that does not drive the machine
         itself is named after the part that it drives. Returns each residual over the energy moved. For `lead`
@@ -337,38 +166,6 @@ class Rig:
     def _held(self, per_unit: Callable[[Mapping[str, Any]], Any], run: xr.Dataset) -> Any:
         return per_unit(machine_series(run))
 
-    def compare(
-        self, run: xr.Dataset, transient: Transient | None = None, start: Mapping[str, float] | None = None
-    ) -> tuple[dict[str, float], dict[str, float]]:
-        """Compare a run with the monolithic solution of the same signals, from the states `start` on or from
-        rest. Returns the differences of torque and speed, relative to their peaks, and the states at the
-        end."""
-        profiles = transient.signals if transient else {}
-        signals: dict[str, Any] = dict(self.signals(profiles, ramp=start is None))
-        if transient:
-            signals |= transient.jumps
-        time = run["time"].values
-        rows = np.unique(np.append(np.arange(0, len(time), 10), len(time) - 1))
-        if transient and transient.jumps:
-            # at the jump itself the torque has two values
-            rows = rows[time[rows] != transient.begin]
-        reference = monolithic(self.graph, signals, time[rows], start=start)
-        differences = {}
-        for of in ("machine.tau", "motor.w"):
-            difference = np.abs(run[of].values[rows] - reference[of].values)
-            differences[of + DIFFERENCE] = float(np.max(difference) / np.max(np.abs(reference[of].values)))
-        return differences, {full: float(reference[full][-1]) for full in map(str, reference.data_vars)}
-
-    def release(self, simulation: Simulation, run: xr.Dataset, time: float) -> tuple[xr.Dataset, float]:
-        """A run that ended when the coupling opened, continued for the `time` [s] until no torque passes the
-        coupling; and the energy that passes in that time [J]."""
-        if time <= 0.0:
-            return run, 0.0
-        release = simulation.run(simulation.time + time, min(self.step, time))
-        torque, speed = (release[name] for name in (self.drive.motor_torque, self.drive.motor_speed))
-        energy = float(np.trapezoid(torque * speed, release["time"]))
-        return join([run, release]), energy
-
 
 _SHARE = "energy_residual_share"
 
@@ -377,10 +174,6 @@ def worst_residual(shares: Mapping[str, float]) -> float:
     """The largest of a run's energy residuals over the energy moved; `shares` are its certificates by
     name."""
     return max(share for name, share in shares.items() if name.endswith(_SHARE))
-
-
-DIFFERENCE = "_difference_to_monolithic"
-"""Suffix of the name of a variable for its largest difference to the monolithic solution, over its peak."""
 
 
 def join(pieces: list[xr.Dataset]) -> xr.Dataset:

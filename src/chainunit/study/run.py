@@ -36,10 +36,12 @@ from .record import Spread, StudyRecord
 from .registry import registered
 from .relay import start_class
 from .remarks import conclude
-from .rig import Rig, Transient
+from .rig import Rig
+from .start_up import start_up
 from .starts import StartAnalysis
 from .statics import statics
 from .torques import on_coupling
+from .transients import Transient, coast, compare, follow, lead_times, release
 from .window import Phase, Trip, whole_turns
 
 _AFTER_TRIP = 1.0
@@ -180,7 +182,7 @@ class Runner:
             begin, speed = simulation.save(), self.study.answers["steady"].speed_mean
             angle = float(crank_angle(self.rig.drive, self.study.runs["start_up"])[-1])
             progress, transients = 0.0, []
-            leads = self.rig.leads(simulation, self.events, angle, speed)
+            leads = lead_times(self.rig, simulation, self.events, angle, speed)
             for event, lead in zip(self.events, leads, strict=True):
                 transients.append(self._event(simulation, event, begin + lead, progress))
                 progress += lead + event.follow(self.study.config.turn)
@@ -221,9 +223,9 @@ class Runner:
         """
         study, rig, config = self.study, self.rig, self.study.config
         progress = self._progress("start-up and steady running", 0.0)
-        start_up = rig.start_up(simulation, self.stop, progress, rig.guards)
-        run, study.steady_from, self.stop = start_up.run, start_up.steady_from, start_up.stop
-        self.rig = rig = start_up.rig
+        study.started = start_up(rig, simulation, self.stop, progress, rig.guards)
+        run, self.stop = study.started.run, study.started.stop
+        self.rig = rig = study.started.rig
         self._certify("start_up", run)
         if simulation.time < self.stop - 0.5 * rig.step:
             raise RunError(self._opens_in_start(simulation.time))
@@ -239,7 +241,6 @@ class Runner:
         start_time = read_measure("start_time", whole)
         study.start = replace(read_answers(study.window(Phase.START_UP, start)), start_time=start_time)
         self._relay(run)
-        study.fed_from = rig.fed_from
         self._pins_and_pulls(verdict.START, start)
         if rig.fed_from is not None:
             settling = run.sel(time=slice(end, begin))
@@ -269,7 +270,7 @@ class Runner:
     def _event(self, simulation: Simulation, event: Event, begin: float, before: float) -> Transient:
         stop = begin + event.follow(self.study.config.turn)
         progress = self._progress(event.title, before)
-        transient = self.rig.follow(simulation, event, begin, stop, progress, self.rig.guards)
+        transient = follow(self.rig, simulation, event, begin, stop, progress, self.rig.guards)
         self._close(simulation, transient, stop, Phase.EVENT)
         return transient
 
@@ -291,9 +292,9 @@ class Runner:
         study.event[name] = transient.begin
         if coupling and simulation.time < stop - 0.5 * rig.step:
             time = simulation.time
-            run, energy = rig.release(simulation, run, coupling.release_time)
+            run, energy = release(rig, simulation, run, coupling.release_time)
             self._coasting = self._coasting or self._export_coasting()
-            coasting = rig.coast(transient, run, stop, self._coasting) if self._coasting else None
+            coasting = coast(rig, transient, run, stop, self._coasting) if self._coasting else None
             if coasting is not None:
                 study.runs[f"{name}_coasting"] = coasting
             trip = Trip(time, energy, coasting)
@@ -340,7 +341,7 @@ class Runner:
         peaks = {name: [] if self.rig.guards else [getattr(answers, f"{name}_peak")] for name in _PEAKS}
         for variant in (*variants, event) if self.rig.guards else variants:
             stop = begin + event.follow(self.study.config.turn)
-            run = self.rig.follow(simulation, variant, begin, stop).run.sel(time=slice(begin, None))
+            run = follow(self.rig, simulation, variant, begin, stop).run.sel(time=slice(begin, None))
             window = self.study.window(Phase.EVENT, run, begin)
             for name in _PEAKS:
                 peaks[name].append(read_measure(f"{name}_peak", window))
@@ -366,7 +367,7 @@ class Runner:
     def _compare(
         self, name: str, transient: Transient | None, states: dict[str, float] | None = None
     ) -> dict[str, float]:
-        differences, end = self.rig.compare(self.study.runs[name], transient, states)
+        differences, end = compare(self.rig, self.study.runs[name], transient, states)
         self.study.certificate[name] |= differences
         return end
 

@@ -27,7 +27,7 @@ from .limits import Check, heating, keeping_speed, starting
 from .measures import time_to_start
 from .readings import crank_angle, load_inertia, only_whole_turns, turns_made
 from .relay import start_class
-from .rig import PATIENCE, Rig
+from .rig import Rig
 from .start_runs import (
     OVERLOADED,
     StartNumbers,
@@ -37,7 +37,9 @@ from .start_runs import (
     starts_from_all,
     time_above,
 )
+from .start_up import PATIENCE
 from .torques import DutyPeak, all_feed_on, at_gear, duty_peak
+from .transients import follow
 from .verdict import CREEPS, SETTLING, STEADY
 from .window import BURNT, is_settled
 
@@ -340,7 +342,7 @@ def try_motor(
         event = simulation.save()
         for side in duty.one_sided:
             feed = config.one_sided(side)
-            shift = rig.follow(simulation, feed, event, event + feed.p.shift + turn).run
+            shift = follow(rig, simulation, feed, event, event + feed.p.shift + turn).run
             shifts.append((all_feed_on(side), shift))
             one_sided[side] = simulation.run(simulation.time + turn, rig.step)
     trial = Trial(config, motor, drive, duty.heavier, start, steady, tuple(shifts), one_sided)

@@ -25,6 +25,7 @@ from ...study.line.shaft import driveline_of, remedies
 from ...study.measures import Answers, read_answers
 from ...study.record import Amount, StudyRecord
 from ...study.rig import Rig, worst_residual
+from ...study.start_up import start_up
 from ...study.turn import Turn, TurnAnalysis
 from ...study.verdict import CREEPS, RESIDUAL, STEADY
 from ...study.window import Phase, Window, whole_turns
@@ -171,10 +172,10 @@ def _run(study: StudyRecord, rig: Rig, findings: FlywheelFindings, flywheel: flo
     sides = drive.machine.loaded_sides(config.feed)
     rig = replace(rig, drive=drive, fed_from=None)
     with rig.from_rest() as simulation:
-        start_up = rig.start_up(simulation, config.stop, lambda time: None, {})
-    run = start_up.run
+        started = start_up(rig, simulation, config.stop, lambda time: None, {})
+    run = started.run
     residual = worst_residual(rig.residuals(run))
-    turns = whole_turns(drive, run.sel(time=slice(start_up.steady_from, None)), config.run.turns)
+    turns = whole_turns(drive, run.sel(time=slice(started.steady_from, None)), config.run.turns)
     steady = Window(Phase.STEADY, turns, drive, sides, config.run.crank_speed)
     rows = run.sel(time=slice(None, turns["time"].values[0]))
     start = Window(Phase.START_UP, rows, drive, sides, config.run.crank_speed, steady=steady)

@@ -14,6 +14,7 @@ from ...core.engines import numpy_
 from ...core.errors import RunError
 from ...drives.cardan import two_joints
 from ...reading.text import entries
+from ...study.transients import follow
 from ...system import rigid
 from ..analysis import Analysis, Findings, Work
 from ..config import Config
@@ -90,7 +91,7 @@ def _rigid_runs(study: StudyRecord, work: Work) -> dict[str, xr.Dataset]:
             if not event.from_rest:
                 begin = study.event[name]
                 stop = begin + event.follow(study.config.turn)
-                runs[name] = rig.follow(simulation, event, begin, stop, guards=rig.guards).run
+                runs[name] = follow(rig, simulation, event, begin, stop, guards=rig.guards).run
     for name, event in events.items():
         if event.from_rest:
             with rig.from_rest(event) as simulation:

@@ -1,0 +1,62 @@
+"""The origins of the values of a study."""
+
+from __future__ import annotations
+
+from typing import Literal, TypeAlias
+
+from .catalogue_drive import SLIP
+from .config import Config
+from .parts import LENGTHS
+from .record import StudyRecord
+
+_CHOSEN = ("gear.efficiency", "starter.inverter.boost", SLIP)
+"""Values that sizing chooses where the file leaves them out, see `chainunit.study.choice.as_chosen`."""
+
+Origins: TypeAlias = Literal["file", "example", "declared", "tuned", "catalogue", "sizing"]
+"""The origin of a value."""
+
+
+def origin_of(study: StudyRecord, name: str) -> Origins:
+    """The origin of the value of a quantity, by its name in a study file ("motor.rotor.J"): the file, the
+    example, tuning, the catalogue (by the motor that the file names or that sizing chose), or its
+    declaration."""
+    config, (section, _, parameter) = study.config, name.partition(".")
+    if name in _CHOSEN and study.sizing is not None and _of(config, name) == "declared":
+        return "sizing"
+    if name == SLIP and config.start == "inverter" and _of(config, name) == "declared":
+        return "catalogue"
+    if section == "motor" and study.tuning is not None and parameter in study.tuning.parameters:
+        return "file" if name in config.given else "tuned"
+    if section == "machine" and parameter in LENGTHS and config.gives("ratios"):
+        return "file"
+    if section == "machine" and parameter in LENGTHS and "ratios.rho" in config.of_example:
+        return "example"
+    if config.of_catalogue and (name == "machine.ratio" or section == "motor"):
+        name_in_file = _name_in_file(config, parameter)
+        if not name_in_file:
+            return "catalogue" if study.sizing is None else "sizing"
+        name = name_in_file
+    return _of(config, name)
+
+
+def _of(config: Config, name: str) -> Origins:
+    """The origin of a value that only the study file or the example can give."""
+    if name in config.given:
+        return "file"
+    return "example" if name in config.of_example else "declared"
+
+
+def _name_in_file(config: Config, parameter: str) -> str:
+    """The name in a study file of a motor's `parameter`; empty for one that the catalogue sets."""
+    if parameter == "ratio":
+        return "gear.ratio" if _of(config, "gear.ratio") != "declared" else ""
+    group = parameter.partition(".")[0]
+    if parameter == "inverter.on":
+        return "start"
+    if parameter == "inverter.slip" and config.start == "inverter" and SLIP not in config.given:
+        return ""
+    if group in ("soft_start", "inverter"):
+        return f"starter.{parameter}"
+    if parameter in ("phi_start", "w_start") or group == "solver":
+        return f"motor.{parameter}"
+    return "sizing.ambient" if parameter == "ambient.T" else ""

@@ -1,0 +1,105 @@
+"""The start of a drive until it runs steadily."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import xarray as xr
+
+from ..system import Simulation
+from ..work.progress import Progress
+from .measures import STARTED
+from .readings import only_whole_turns, turns_made
+from .rig import Rig, join
+from .window import is_settled, whole_turns
+
+_LONGEST_START = 30.0
+"""Time after the ramp at which an empty machine is fed, unless it would reach its speed in `_LONGEST_RISE`
+[s]."""
+_LONGEST_RISE = 600.0
+"""Time after the ramp at which an empty machine is fed, however slowly it turns [s]."""
+PATIENCE = 20.0
+"""Number of turns, at the requested speed, for which a study runs on until the motor has settled and made its
+turns; for a fast machine at least the time `_SETTLES`."""
+_SETTLES = 5.0
+"""Time in which every drive settles, whatever the speed of its crank [s]."""
+
+
+@dataclass(frozen=True)
+class StartUp:
+    """Start-up and steady running: the run, the time from which it is steady and the time to which it should
+    have run [s], and the `rig` with which the study goes on."""
+
+    run: xr.Dataset
+    steady_from: float
+    stop: float
+    rig: Rig
+
+
+def _start_empty(
+    rig: Rig, simulation: Simulation, progress: Progress, guards: Mapping[str, float]
+) -> tuple[xr.Dataset, Rig]:
+    """The start of an empty machine, until its crank turns at the share `STARTED` of its speed, until a
+    guard ends it, or until it is clear that the machine speeds up too slowly; and the rig that is fed
+    from then on."""
+    # behind a shaft line the crank is not where the motor is
+    name, ratio = rig.drive.crank_output("w")
+    goal = STARTED * rig.config.run.crank_speed * ratio
+    speed_limit = {**guards, name: goal}
+    longest, piece = rig.config.ramp_end + _LONGEST_RISE, max(rig.config.turn, 1.0)
+    stop = rig.config.ramp_end + _LONGEST_START
+    run = simulation.run(stop, rig.step, progress, guards=speed_limit)
+    while stop - 0.5 * rig.step <= simulation.time < longest:
+        speed = float(run[name][-1])
+        before = float(run[name].sel(time=stop - piece, method="nearest"))
+        if goal - speed > (speed - before) / piece * (longest - stop):
+            break
+        stop = min(stop + piece, longest)
+        run = join([run, simulation.run(stop, rig.step, progress, guards=speed_limit)])
+    rig = replace(rig, fed_from=simulation.time)
+    simulation.signals = rig.signals(ramp=True)
+    return run, rig
+
+
+def start_up(
+    rig: Rig, simulation: Simulation, stop: float, progress: Progress, guards: Mapping[str, float]
+) -> StartUp:
+    """Start-up and steady running to the time `stop` [s], or longer, see `_missing`; a machine that
+    starts empty runs so long after it is fed."""
+    pieces, steady_from = list[xr.Dataset](), rig.config.steady_begin
+    if rig.config.empty_start:
+        run, rig = _start_empty(rig, simulation, progress, guards)
+        pieces = [run]
+        # a motor that follows a ramp is not steady before its end
+        feed_time = max(simulation.time, rig.config.ramp_end) if rig.drive.follows else simulation.time
+        later = feed_time - rig.config.ramp_end
+        stop, steady_from = stop + later, steady_from + later
+        if any(abs(float(run[name][-1])) >= limit for name, limit in guards.items()):
+            return StartUp(run, steady_from, stop, rig)
+    longest = stop + max(PATIENCE * rig.config.turn, _SETTLES)
+    run = join([*pieces, simulation.run(stop, rig.step, progress, guards=guards)])
+    while stop - 0.5 * rig.step <= simulation.time < longest:
+        lack, steady_from = _missing(rig, run, steady_from)
+        if lack is None:
+            break
+        # at most at the requested speed; the next round finds the turns that are still missing then
+        stop = min(longest, stop + max(lack * rig.config.turn, rig.step))
+        run = join([run, simulation.run(stop, rig.step, progress, guards=guards)])
+    return StartUp(run, steady_from, stop, rig)
+
+
+def _missing(rig: Rig, run: xr.Dataset, steady_from: float) -> tuple[float | None, float]:
+    """The number of turns that are still missing for the evaluation, as the crank turns too slowly or the motor
+    has not settled, or None where none is missing; and the time from which running is steady [s], a turn later
+    if the motor has not settled."""
+    turns_asked = rig.config.run.turns
+    since = run.sel(time=slice(steady_from, None))
+    turns = only_whole_turns(rig.drive, since, turns_asked)
+    if turns is not None and turns_made(rig.drive, turns) > turns_asked - 0.5:
+        if rig.drive.chain is not None or is_settled(rig.drive, turns):
+            return None, steady_from
+        # as if one turn more had been waited for
+        steady_from = float(whole_turns(rig.drive, since, 1)["time"][-1])
+        since = run.sel(time=slice(steady_from, None))
+    return turns_asked + 0.1 - turns_made(rig.drive, since), steady_from
