@@ -31,10 +31,11 @@ from chainunit.drives.cardan import Cardan, Twist, frozen_frequency, two_joints
 from chainunit.drives.torsion import rigid, settling_time, simulate, steady, with_damping_ratio
 from chainunit.reading.text import number
 from chainunit.report import blocks, figure
-from chainunit.study import config, parts, remarks
+from chainunit.study import config, parts
 from chainunit.study.analysis import Work
 from chainunit.study.choice import choose
 from chainunit.study.drive_fmus import export_drive, with_files
+from chainunit.study.line import shaft_runs
 from chainunit.study.line.placed import Line
 from chainunit.study.line.shaft import UNEVEN, remedies, two_masses
 from chainunit.study.record import StudyRecord
@@ -344,7 +345,7 @@ def test_finite_elements_agree_with_closed_forms():
         shafts.box(0.1, 0.1, 0.002), rel=0.015
     )
     text = f'[driveline]\nshaft2 = {{ section = "polygon", outline = {[list(c) for c in CORNERS]}, length = "1 m" }}'
-    assert parse(text).driveline.c2 == pytest.approx(8e10 * shafts.rectangle(0.08, 0.04), rel=1e-3)
+    assert parse(text).values["driveline"].c2 == pytest.approx(8e10 * shafts.rectangle(0.08, 0.04), rel=1e-3)
     for outline in ([[0, 0], [1, 1], [1, 0], [0, 1]], [[0, 0], [1, 0]]):
         with pytest.raises(InputError, match=r"^driveline\.shaft2\.outline: "):
             parse(f'[driveline]\nshaft2 = {{ section = "polygon", length = 1, outline = {outline} }}')
@@ -427,10 +428,10 @@ def test_a_speed_at_which_nothing_resonates_is_refused():
 
 
 def test_a_file_is_laid_over_the_example():
-    packaged = config.parse(parts.example("driveline"))
-    assert parse(BARE).driveline == packaged.driveline and parse("").driveline is None
-    own = parse("[driveline]\nc2 = 5000").driveline
-    assert (own.c2, own.c3, own.J4) == (5000.0, packaged.driveline.c3, packaged.driveline.J4)
+    packaged = config.parse(parts.example("driveline")).values["driveline"]
+    assert parse(BARE).values["driveline"] == packaged and parse("").values["driveline"] is None
+    own = parse("[driveline]\nc2 = 5000").values["driveline"]
+    assert (own.c2, own.c3, own.J4) == (5000.0, packaged.c3, packaged.J4)
     line = line_of(BARE)
     assert (line.J1, line.J4) == (1.2, 60.0)
     assert torsion.damping_ratio(line) == pytest.approx(0.03)
@@ -511,7 +512,7 @@ def test_crossings_are_where_the_orders_meet_the_band(study):
 def test_lower_gains_are_no_advice_against_a_control_near_the_line():
     """Of the packaged driveline lower gains raise the peaks: the control damps the torsion."""
     study = study_of(parts.example("driveline"))
-    remarks._on_shaft(study)
+    shaft_runs.remark(study)
     (warning,) = (each.text for each in study.warnings if each.kind == "control near line")
     assert "lower the gains" not in warning and "the control also damps the torsion" in warning
 

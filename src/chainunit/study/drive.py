@@ -191,21 +191,15 @@ class Drive:
             wires += [(f"motor.{output}", f"observer.{name}") for name, output in self.observed.items()]
         return replace(system, components={**system.components, **beside}, wires=wires) if beside else system
 
-    @property
-    def gear(self) -> float:
-        """Ratio of the gear that stands before the machine as a separate part; 1 where the machine includes
-        its gear."""
-        outsider = self.outsider
-        return outsider.ratio if outsider and outsider.needs_gear else 1.0
-
     @cached_property
     def whole_line(self) -> Line:
-        """The line with the gear before a foreign machine that has none. Its ratio may be 1: the twin with a rigid
-        shaft puts that of the driveline there."""
+        """The line with the gear before a foreign machine that has none. Behind other parts its ratio may be 1: the
+        twin with a rigid shaft puts that of the driveline there."""
         outsider = self.outsider
-        if self.gear == 1.0 and not (outsider and self.line and not outsider.model.has_gear()):
+        if outsider is None or outsider.model.has_gear() or not (self.line or outsider.needs_gear):
             return self.line
-        return self.line.behind(PlacedPart("gear", Gear, Gear.Parameters(ratio=self.gear), self.gear))
+        gear = Gear.Parameters(ratio=outsider.ratio)
+        return self.line.behind(PlacedPart("gear", Gear, gear, outsider.ratio))
 
     @cached_property
     def motor_bond(self) -> Bond:
@@ -230,7 +224,7 @@ class Drive:
     @property
     def ratio_at_machine(self) -> float:
         """Turns of the shaft that drives the machine's component per turn of the crank."""
-        return self.driven_machine.ratio / self.gear
+        return self.driven_machine.ratio if self.whole_line is self.line else 1.0
 
     def crank_output(self, quantity: Literal["phi", "w"]) -> tuple[str, float]:
         """Name of the angle ("phi") or speed ("w") that turns the machine in a run, and its ratio to that of the
