@@ -36,7 +36,7 @@ KNIFE = example("knife")
 def study_of(config, folder):
     """The study before its first run."""
     choice = choose(config, folder, lambda *_: None)
-    study = StudyRecord(config, choice.drive, statics(config, choice.drive), choice.tuning, choice.sizing)
+    study = StudyRecord(config, choice.drive, statics(config, choice.drive), choice.sizing)
     conclude(study)
     return study
 

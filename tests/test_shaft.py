@@ -291,7 +291,7 @@ def test_the_speed_loop_is_tuned_and_shown_with_the_line(tmp_path):
     study = run_study(config.parse(f"{SHORT}[driveline]\nJ4 = 20\n"), tmp_path)
     loop, drive = study.statics.loops["mean inertia"], study.drive
     assert loop.inertia > drive.fmu_parameters.rotor.J + 20.0 / 25.0**2
-    assert loop.crossover == pytest.approx(study.tuning.crossover, rel=0.05)
+    assert loop.crossover == pytest.approx(study.drive.tuning.crossover, rel=0.05)
 
 
 @pytest.mark.parametrize(

@@ -753,4 +753,4 @@ settle_turns = 2
         model = "ChainUnitFlexible" if name == "chains" else "ChamberForces"
         assert (kinds["machine"], kinds["model"]) == ("ChainUnitFlexible", model)
         monkeypatch.setattr(Drive, "load_model", bars)
-    assert ripples[0] < 0.4 * ripples[1] < 0.2 * study.ripple_without
+    assert ripples[0] < 0.4 * ripples[1] < 0.2 * study.findings["ripple_without_feed_forward"].ripple

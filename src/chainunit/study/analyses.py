@@ -6,12 +6,13 @@ from __future__ import annotations
 from functools import cache
 
 from .analysis import Analysis
+from .feed_forward import FeedForwardAnalysis
 from .gear_loss import GearAnalysis
 from .registry import registered
 from .starts import StartAnalysis
 from .turn import TurnAnalysis
 
-ANALYSES: tuple[type[Analysis], ...] = (TurnAnalysis, GearAnalysis, StartAnalysis)
+ANALYSES: tuple[type[Analysis], ...] = (TurnAnalysis, GearAnalysis, FeedForwardAnalysis, StartAnalysis)
 
 
 @cache

@@ -12,7 +12,6 @@ import numpy as np
 from ..core.errors import InputError, refusal_prefix
 from ..drives.catalogue import check_own
 from ..drives.motor import Motor
-from ..drives.speed_control import Tuning
 from ..fmu.backends import Backend
 from ..system import foreign_component
 from ..work.progress import Report
@@ -26,10 +25,9 @@ from .sizing import SizingResult, size
 
 @dataclass(frozen=True)
 class Choice:
-    """The drive, with the tuning or the sizing by which it was chosen."""
+    """The drive, with the sizing by which it was chosen."""
 
     drive: Drive
-    tuning: Tuning | None = None
     sizing: SizingResult | None = None
 
 
@@ -39,7 +37,7 @@ def choose(config: Config, folder: Path, report: Report, backend: Backend | None
     if config.foreign is not None:
         return _with_foreign(config)
     if config.sizing is None:
-        return Choice(*tune(config, with_line(config, _drive_of_file(config))))
+        return Choice(tune(config, with_line(config, _drive_of_file(config))))
     sizing = size(config, folder, report, backend)
     return Choice(with_line(config, sizing.best.drive), sizing=sizing)
 
@@ -144,10 +142,10 @@ def with_line(config: Config, drive: Drive) -> Drive:
     return drive
 
 
-def tune(config: Config, drive: Drive) -> tuple[Drive, Tuning | None]:
+def tune(config: Config, drive: Drive) -> Drive:
     """The drive with controller gains that are tuned to its inertia, unless the config gives them."""
     both = cycle(drive.machine, config.run.crank_speed, config.feed)
     given_gains = {name.removeprefix("motor.") for name in config.given if name.startswith("motor.")}
     inertia = drive.rotor_inertia + float(np.mean(both.outputs.J))
     parameters, tuning = drive.motor.tune(drive.parameters, inertia, given_gains)
-    return replace(drive, parameters=parameters), tuning
+    return replace(drive, parameters=parameters, tuning=tuning)

@@ -11,6 +11,7 @@ from ..core.errors import InputError
 from ..core.quantities import Layout
 from ..drives.gear import Gear
 from ..drives.motor import Motor
+from ..drives.speed_control import Tuning
 from ..machines.api import ChainUnitMachine, machine_of
 from ..machines.chain_organs import OrganLaw
 from ..machines.flexible import flexible
@@ -54,6 +55,9 @@ class Drive:
     feed_forward: bool = False
     """whether the speed control has feed-forward: a second machine FMU computes the torque of the machine
     with its normal feed, at the motor's angle and speed and the requested acceleration"""
+
+    tuning: Tuning | None = None
+    """the tuning of the gains of its control, where they were tuned"""
 
     chain: Any = None
     """the organs as chains, a `sections.ChainOrgans`; None for two bars"""

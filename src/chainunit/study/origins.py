@@ -25,7 +25,7 @@ def origin_of(study: StudyRecord, name: str) -> Origins:
         return "sizing"
     if name == SLIP and config.start == "inverter" and _of(config, name) == "declared":
         return "catalogue"
-    if section == "motor" and study.tuning is not None and parameter in study.tuning.parameters:
+    if section == "motor" and (tuning := study.drive.tuning) and parameter in tuning.parameters:
         return "file" if name in config.given else "tuned"
     if section == "machine" and parameter in LENGTHS and config.gives("ratios"):
         return "file"

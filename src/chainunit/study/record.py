@@ -9,7 +9,6 @@ from typing import Any, Literal, TypeAlias
 import xarray as xr
 
 from ..core.errors import RunError
-from ..drives.speed_control import Tuning
 from ..fmu.backends import Origin
 from ..machines.chain_unit import RodName
 from ..reading.text import entry, number
@@ -99,7 +98,6 @@ class StudyRecord:
     config: Config
     drive: Drive
     statics: DriveStatics
-    tuning: Tuning | None = None
     sizing: SizingResult | None = None
     fmus: dict[str, Origin] = field(default_factory=dict)
     """the origin of each FMU"""
@@ -125,8 +123,6 @@ class StudyRecord:
     cuts off the peaks from which the setting follows"""
     alternatives: tuple[Alternative, ...] = ()
     """ways to a coupling that a start does not open, where the start is more than running"""
-    ripple_without: float | None = None
-    """fluctuation of the speed in steady running without the study's feed-forward"""
     relay_class: int = LIGHT
     """trip class of the thermal relay that holds in the start, of a motor of the catalogue on the line"""
     findings: dict[str, Any] = field(default_factory=dict)

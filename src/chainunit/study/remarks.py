@@ -257,14 +257,6 @@ def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
             "steady running: the winding has no thermal steady state, its loss grows faster than the cooling.",
             STEADY,
         )
-    if study.ripple_without is not None:
-        study.note(
-            "feed-forward",
-            "Feed-forward of the machine's torque brings the ripple of the speed from {without} to {speed_ripple}.",
-            STEADY,
-            without=(study.ripple_without, "1", "percent"),
-            speed_ripple=(steady.speed_ripple, "1", "percent"),
-        )
 
 
 _REFUSED = (

@@ -115,8 +115,8 @@ def _statics(study: StudyRecord) -> dict[str, Any]:
             }
             for name, loop in statics.loops.items()
         },
-        "control": study.tuning.as_dict()
-        if study.tuning
+        "control": study.drive.tuning.as_dict()
+        if study.drive.tuning
         else study.drive.motor.control
         if study.drive.follows
         else "none: the motor takes the speed that its supply and the load give",
@@ -151,7 +151,7 @@ def _runs(study: StudyRecord) -> dict[str, Any]:
             for name, shares in study.certificate.items()
         },
         "block_peaks": {name: _spread(study, name) for name in study.spreads},
-        "ripple_without_feed_forward": entry(study.ripple_without, "1", "percent"),
+        "ripple_without_feed_forward": entry(None, "1", "percent"),
     }
 
 

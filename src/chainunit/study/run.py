@@ -42,7 +42,7 @@ from .starts import StartAnalysis
 from .statics import statics
 from .torques import on_coupling
 from .transients import Transient, coast, compare, follow, lead_times, release
-from .window import Phase, Trip, whole_turns
+from .window import Phase, Trip
 
 _AFTER_TRIP = 1.0
 """Time for which a start in which the coupling opens is followed without it [s]: the first swings are the largest."""
@@ -79,7 +79,7 @@ def run_study(
         if check and drive.outsiders:
             titles = " and ".join(drive.outsiders)
             raise InputError(f"--check: the equations of {titles} are not known; leave --check out")
-        study = StudyRecord(config, drive, statics(config, drive), choice.tuning, choice.sizing)
+        study = StudyRecord(config, drive, statics(config, drive), choice.sizing)
         unmade = Rig(config, drive, {})
         for part in registered():
             part.check_runs(config, unmade)
@@ -190,8 +190,6 @@ class Runner:
                 self._assumption(simulation, transient, progress)
         if check:
             self._check(transients)
-        if "model" in self.rig.graph.components:
-            self._without_feed_forward()
         for k, event in enumerate(self.starts):
             self._loaded_start(event, self.total - (len(self.starts) - k) * self.stop, check)
 
@@ -370,11 +368,3 @@ class Runner:
         differences, end = compare(self.rig, self.study.runs[name], transient, states)
         self.study.certificate[name] |= differences
         return end
-
-    def _without_feed_forward(self) -> None:
-        """Record the fluctuation of the speed that the study would have without its feed-forward."""
-        study, run = self.study, self.study.config.run
-        with self.rig.plain.from_rest() as simulation:
-            steady = simulation.run(self.stop, self.rig.step).sel(time=slice(study.steady_begin, None))
-        steady = whole_turns(self.rig.drive, steady, run.turns)
-        study.ripple_without = read_answers(study.window(Phase.STEADY, steady)).speed_ripple

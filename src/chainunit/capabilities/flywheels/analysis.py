@@ -167,7 +167,7 @@ def _run(study: StudyRecord, rig: Rig, findings: FlywheelFindings, flywheel: flo
     """The start-up and steady running of the study with another flywheel [kg m2], without its safety coupling."""
     config = study.config
     turned = with_wheel(config, replace(study.drive, observer=None), flywheel)
-    drive, _ = tune(config, turned)
+    drive = tune(config, turned)
     findings.is_retuned = findings.is_retuned or drive.parameters != turned.parameters
     sides = drive.machine.loaded_sides(config.feed)
     rig = replace(rig, drive=drive, fed_from=None)
