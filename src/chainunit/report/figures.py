@@ -14,7 +14,7 @@ from ..reading.text import forms, number
 from ..study.bearings import hardest_run
 from ..study.cycle import Cycle
 from ..study.drive import Drive
-from ..study.readings import crank_speed, crank_torque
+from ..study.readings import crank_speed, crank_torque, has_turn
 from ..study.record import StudyRecord
 from . import blocks as b
 from . import figure as fig
@@ -118,7 +118,7 @@ def _turn(s: b.Source, study: StudyRecord) -> fig.Figure:
 
 
 def _is_steady(study: StudyRecord) -> bool:
-    return "steady" in study.answers and load_figures.has_turn(study.drive, study.steady)
+    return "steady" in study.answers and has_turn(study.drive, study.steady)
 
 
 @PICTURES.declare(_is_steady, "power_turn.png")

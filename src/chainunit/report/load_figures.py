@@ -9,17 +9,12 @@ import numpy as np
 import xarray as xr
 
 from ..study.drive import Drive
-from ..study.readings import crank_motion, crank_torque, only_whole_turns, shaft_power
+from ..study.readings import crank_motion, crank_torque, shaft_power
 from ..study.window import mean
 from . import figure as fig
 
 _CLASSES = 40
 """Classes of a histogram."""
-
-
-def has_turn(drive: Drive, steady: xr.Dataset) -> bool:
-    """Whether a run has a whole turn of the crank."""
-    return only_whole_turns(drive, steady) is not None
 
 
 def power_over_turn(drive: Drive, steady: xr.Dataset, angle: fig.Axis) -> fig.Figure:

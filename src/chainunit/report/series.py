@@ -17,7 +17,7 @@ import xarray as xr
 
 from .. import __version__
 from ..core.files import netcdf, whole
-from ..study.readings import load_inertia, motor_shaft, only_whole_turns
+from ..study.readings import has_turn, load_inertia, motor_shaft
 from ..study.record import LOAD_CYCLE, StudyRecord
 from ..work.interrupts import stoppable
 from .run_names import title
@@ -53,7 +53,7 @@ def write(study: StudyRecord, folder: Path) -> list[Path]:
     ``result.nc`` is netCDF-4 with a group per run, the `tree`.
     """
     files = []
-    if "steady" in study.answers and only_whole_turns(study.drive, study.steady) is not None:
+    if "steady" in study.answers and has_turn(study.drive, study.steady):
         files.append(_load_cycle(study, study.steady, folder / LOAD_CYCLE))
     if study.runs:
         file = folder / SERIES

@@ -12,7 +12,7 @@ from .limits import Check, given_motor, reaches
 from .measures import Answers
 from .organ_limits import slack_and_mode
 from .quantiles import runs_needed
-from .readings import only_whole_turns
+from .readings import has_turn
 from .record import StudyRecord
 from .rig import worst_residual
 from .start_runs import longest_of
@@ -126,7 +126,7 @@ def _no_judgement(study: StudyRecord, speed: str) -> str:
     if lasts(study):
         return ""
     steady, why = study.answers[STEADY], "the crank does not make a whole turn"
-    if only_whole_turns(study.drive, study.steady) is not None:
+    if has_turn(study.drive, study.steady):
         gap, energy = (number(abs(x), "1", "percent") for x in (steady.cycle_gap, steady.energy_gap))
         why = f"their ends differ by {gap}, and the moving masses take up or give {energy} of the energy that passes"
     return (

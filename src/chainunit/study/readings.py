@@ -113,6 +113,11 @@ def only_whole_turns(drive: Drive, run: xr.Dataset, most: float = math.inf) -> x
     )
 
 
+def has_turn(drive: Drive, run: xr.Dataset) -> bool:
+    """Whether the crank makes a whole turn in a run."""
+    return only_whole_turns(drive, run, 1) is not None
+
+
 def largest_torque(drive: Drive, run: xr.Dataset, T: float) -> Any:
     """Largest air-gap torque that the motor can give at each instant of a run [N m], shape (time,), with its winding
     at `T` [K]; see `Motor.largest_torque`."""

@@ -15,7 +15,7 @@ from .event_torques import peaks_in_events
 from .events import Jam
 from .judgement import lasts, model_verdict, motor_limits, no_reserve
 from .measures import STARTED, Answers
-from .readings import breakdown_speed, crank_speed, only_whole_turns
+from .readings import breakdown_speed, crank_speed, has_turn
 from .record import LOAD_CYCLE, Amount, StudyRecord
 from .registry import parts_of_line
 from .sections import ChainOrgans
@@ -212,7 +212,7 @@ def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
             why=why,
             branched=addition,
         )
-    if only_whole_turns(study.drive, study.steady) is None:
+    if not has_turn(study.drive, study.steady):
         warn(
             "no whole turn",
             "steady running: the crank does not make a whole turn; means are over the whole run, and there is no "

@@ -15,7 +15,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from .arrays import peak
 from .drive import Drive
-from .readings import crank_motion, crank_speed, crank_torque, only_whole_turns, series
+from .readings import crank_motion, crank_speed, crank_torque, has_turn, only_whole_turns, series
 from .relay import LIGHT
 from .stored import energy_behind, energy_gap, energy_held
 from .verdict import CREEPS
@@ -150,7 +150,7 @@ class Window:
         more than `LASTING`, or the crank turns and makes no whole turn. Chains never repeat a turn."""
         if self.phase is not Phase.STEADY or self.drive.chain is not None:
             return True
-        if only_whole_turns(self.drive, self.run) is None:
+        if not has_turn(self.drive, self.run):
             return bool(abs(self.speed_mean) < CREEPS * self.requested_speed)
         return abs(energy_gap(self.drive, self.turns)) <= LASTING
 
@@ -158,7 +158,7 @@ class Window:
     def taken_up(self) -> tuple[float, float]:
         """Mean power [W] that the moving masses take up over the steady turns: those of the machine, and all of them
         with rotor and flywheel. 0 for a run that does not repeat its turns, and where the crank makes none."""
-        if self.phase is not Phase.STEADY or only_whole_turns(self.drive, self.run) is None:
+        if self.phase is not Phase.STEADY or not has_turn(self.drive, self.run):
             return 0.0, 0.0
         time = self.turns["time"].values
         held = energy_behind(self.drive, self.turns), energy_held(self.drive, self.turns)
