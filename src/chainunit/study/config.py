@@ -357,7 +357,7 @@ def _read_sections(
     for name, section in sections.items():
         tables[name] = {}
         with faults.collected():
-            tables[name] = section.values(getattr(checked, name))
+            tables[name] = section.form.values(getattr(checked, name))
         layout = Layout(section.declaration)
         own = {key: x for key, x in tables[name].items() if key in layout.names}
         values[name] = layout.from_names(own, section.default)
@@ -370,8 +370,8 @@ def _choices(checked: Any, parts: Parts) -> dict[str, Any]:
     for name, section in parts.sections.items():
         table = getattr(checked, name)
         known |= {f"{name}.{key}": getattr(table, key) for key in section.keys}
-        if section.instead is not None:
-            others = {v.name: getattr(table, v.name) for v in variables(section.instead.quantities)}
+        if section.form.instead is not None:
+            others = {v.name: getattr(table, v.name) for v in variables(section.form.instead)}
             known |= {f"{name}.{key}": x for key, x in others.items() if x is not None}
     known |= {"system.machine": checked.system.machine, "system.motor": parts.named_motor}
     for table in ("machine_names", "motor_names"):

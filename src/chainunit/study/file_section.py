@@ -13,16 +13,19 @@ from ..reading.tables import given_values, schema
 
 
 @dataclass(frozen=True)
-class Instead:
-    """Keys of a table that stand in place of its declared quantities."""
+class TableForm:
+    """The form of a table, and those keys that stand in place of its declared quantities."""
 
-    quantities: type
-    """declaration of the numbers among them"""
-    keys: Callable[[], Iterable[Any]]
-    """the others, each a `chainunit.study.keys.Key`"""
-    conditions: Callable[[], Mapping[str, Any]]
+    model: Callable[..., type[BaseModel]] = schema
+    values: Callable[[Any], dict[str, Any]] = given_values
+    """the values of a checked table, by the name of the quantity"""
+    instead: type | None = None
+    """declaration of the numbers that stand in place of others"""
+    keys: Callable[[], Iterable[Any]] = tuple
+    """other such keys, each a `chainunit.study.keys.Key`"""
+    conditions: Callable[[], Mapping[str, Any]] | None = None
     """the JSON Schema of which keys go together"""
-    displaced: Mapping[str, tuple[str, ...]]
+    displaced: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """by key, the keys of a file with which the value of the example has no meaning"""
 
 
@@ -44,10 +47,7 @@ class FileSection:
     """whether a study uses the table only where the analysis of the same name has findings"""
     apart: bool = False
     """whether the result has other things of the same names"""
-    instead: Instead | None = None
-    form: Callable[..., type[BaseModel]] = schema
-    values: Callable[[Any], dict[str, Any]] = given_values
-    """the values of a checked table, by the name of the quantity"""
+    form: TableForm = field(default_factory=TableForm)
     entries: Mapping[str, TableList] = field(default_factory=dict)
     """by key, the lists of tables in it"""
     follows: Mapping[str, str] = field(default_factory=dict)

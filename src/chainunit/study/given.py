@@ -137,5 +137,5 @@ def description(name: str) -> str:
     section = all_sections().get(table)
     if section is not None and key in section.keys:
         return str(section.keys[key][1].description)
-    others = variables(section.instead.quantities) if section is not None and section.instead else ()
+    others = variables(section.form.instead) if section is not None and section.form.instead else ()
     return next((v.description for v in others if v.name == key), "")

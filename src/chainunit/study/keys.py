@@ -195,9 +195,9 @@ def _of_section(name: str, section: FileSection) -> Iterator[Key]:
     yield from quantity_keys(section.declaration, values, sources=section.follows)
     for key in _of_fields(section.keys):
         yield dataclasses.replace(key, follows=section.follows.get(key.name, ""))
-    if section.instead is not None:
-        yield from quantity_keys(section.instead.quantities)
-        yield from section.instead.keys()
+    if section.form.instead is not None:
+        yield from quantity_keys(section.form.instead)
+    yield from section.form.keys()
 
 
 def _of_system() -> Iterator[Key]:

@@ -101,7 +101,7 @@ class Parts:
 def _form(machine: type[MachineModel], motor: type[Motor]) -> type[BaseModel]:
     """The form of a file with that machine and motor. It takes longer to make than a file takes to read."""
     tables: dict[str, type[BaseModel]] = {
-        name: section.form(section.declaration, name, f"{name}.", **section.keys)
+        name: section.form.model(section.declaration, name, f"{name}.", **section.keys)
         for name, section in sections_of(machine, motor).items()
     }
     tables |= {"report": ReportTable, "system": SystemTable}
@@ -250,7 +250,7 @@ LENGTHS = ("r", "l", "h", "c", "hy", "e", "l1", "l2", "z")
 def over_example(data: Mapping[str, Any], parts: Parts) -> dict[str, Any]:
     """The tables of a study file, completed by the example of its machine: a value that the file leaves out
     is the example's. The example's ratios are dropped if the file gives lengths, its motor if the file names
-    another, and so on, see `Instead.displaced`."""
+    another, and so on, see `TableForm.displaced`."""
     base = parts.example
     if any(name in named_table(data, "machine") for name in LENGTHS) and "ratios" not in data:
         base.pop("ratios", None)
@@ -261,7 +261,7 @@ def over_example(data: Mapping[str, Any], parts: Parts) -> dict[str, Any]:
         for name in ("gear", "start", "starter"):
             base.pop(name, None)
     for name, section in all_sections().items():
-        for key, others in section.instead.displaced.items() if section.instead else ():
+        for key, others in section.form.displaced.items():
             if not named_table(data, name).keys().isdisjoint(others):
                 base.get(name, {}).pop(key, None)
     base["title"] = ""

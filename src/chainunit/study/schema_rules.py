@@ -36,8 +36,8 @@ def rules() -> Iterator[Schema]:
     for table, section in all_sections().items():
         for key in section.required:
             yield from _needs(given(table), given(f"{table}.{key}"))
-        if section.instead is not None:
-            yield _where(given(table), {"properties": {table: dict(section.instead.conditions())}})
+        if section.form.conditions is not None:
+            yield _where(given(table), {"properties": {table: dict(section.form.conditions())}})
 
 
 def _where(condition: Condition, then: Schema) -> Schema:

@@ -19,7 +19,7 @@ from ...drives.shafts import SECTIONS as PROFILES
 from ...drives.shafts import Shaft
 from ...drives.torsion import with_damping_ratio
 from ..conditions import Schema, is_one_of
-from ..file_section import FileSection, Instead
+from ..file_section import FileSection, TableForm
 from .part import PartOfLine
 
 if TYPE_CHECKING:
@@ -147,14 +147,14 @@ class DrivelinePart(PartOfLine):
             Driveline,
             optional=True,
             keys={"place": (Literal[PLACES], Field("crank", description="shaft that it is on"))},
-            instead=Instead(
+            form=TableForm(
+                form,
+                partial(line_values, prefix="driveline."),
                 Damping,
                 _shaft_keys,
                 _conditions,
                 {"damping_ratio": ("d2", "d3"), **{shaft: (shaft, c) for shaft, c in SHAFTS.items()}},
             ),
-            form=form,
-            values=partial(line_values, prefix="driveline."),
             title="Driveline",
             follows={"d2": "from damping_ratio", "d3": "from damping_ratio"},
         )
