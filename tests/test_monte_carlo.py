@@ -38,7 +38,6 @@ from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 from chainunit.study.drive_fmus import export_drive, with_files
 from chainunit.study.quantiles import Estimate
-from chainunit.study.rig import Rig
 from chainunit.system import CoSimulation, monolithic
 from chainunit.work.job import CHECKS
 
@@ -66,6 +65,7 @@ SCRIPT = """
     from chainunit.capabilities.random_overloads import runs as monte_carlo
     from chainunit.study import quantiles
     from chainunit.study.drive import Drive
+    from chainunit.study.drive_fmus import export_drive
 
     if __name__ == "__main__":
         config = parse(Path("study.toml").read_text())
@@ -300,7 +300,7 @@ def test_what_the_numbers_depend_on_is_in_the_name(killed):
 
 def test_a_run_that_fails_is_a_result(killed, tmp_path, monkeypatch):
     """Its numbers are missing, its event and the reason are kept, and the runs after it are the same."""
-    task, good = task_of(killed[0], runs=5), Rig.follow
+    task, good = task_of(killed[0], runs=5), block_runs.follow
     third = task.steady + monte_carlo.draw(task.config, 2).offset
 
     def fails(rig, simulation, event, begin, *rest, **more):
@@ -308,7 +308,7 @@ def test_a_run_that_fails_is_a_result(killed, tmp_path, monkeypatch):
             raise RunError("machine: it broke")
         return good(rig, simulation, event, begin, *rest, **more)
 
-    monkeypatch.setattr(Rig, "follow", fails)
+    monkeypatch.setattr(block_runs, "follow", fails)
     result = monte_carlo.run(task, tmp_path, lambda *said: None, workers=1)
     assert result.reasons == {2: "machine: it broke"} and result.failures == 1 and result.method == "cs"
     assert result.as_dict()["failed"]["value"] == 1 and len(result.values("event")) == 4
