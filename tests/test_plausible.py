@@ -121,7 +121,7 @@ def test_the_example_and_random_machines_give_no_remark():
         ("[machine]\ncrank = { s = 50 }", "machine.crank.s", "50 mm"),
         ("[machine]\nrocker = { s = -120 }", "machine.rocker.s", "-120 mm"),
         ('[[event]]\ntype = "jam"\nside = "left"\nforce = "2000 kN"', "event.jam_left.force", "2000 N"),
-        ('[[event]]\ntype = "jam"\nside = "left"\nforce = 5e7', "event.jam_left.force", ""),
+        ('[[event]]\ntype = "jam"\nside = "left"\nforce = 5e7', "event.jam_left.force", None),
         ('[[event]]\ntype = "jam"\nside = "right"\nduration = 300', "event.jam_right.duration", "300 ms"),
         ('[[event]]\ntype = "dip"\ncrank_angle = 90', "event.dip.crank_angle", "90 deg"),
         ("[run]\ncrank_speed = 30", "run.crank_speed", "30 rev/min"),

@@ -11,7 +11,6 @@ import math
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
@@ -33,6 +32,7 @@ from ..core.errors import InputError, near_name, printable, shown
 from ..core.messages import unit_behind
 from ..core.quantities import Layout, Quantity, Variable, complaint, variables
 from . import toml_lines
+from .results import InUnit, derived, part, result
 from .toml_faults import syntax_faults
 
 T = TypeVar("T")
@@ -114,23 +114,28 @@ def option_value(name: str, text: str, unit: str, description: str) -> float:
         raise InputError(str(error)) from None
 
 
-@dataclass(frozen=True)
+@result
 class Slip:
-    """A value that no machine of this kind has, so that a slip of the unit is likely. `meant` is the probable
-    value, in the form of a study file, or empty."""
+    """A value that no machine of this kind has, so that a slip of the unit is likely."""
 
     variable: Variable
     value: float
-    meant: str
+    meant: str | None = part("the probable value, in the form of a study file")
 
-    def as_dict(self) -> dict[str, Any]:
-        """Ready for JSON; `said` is the remark in words."""
-        return {
-            "name": self.variable.name,
-            "given": {"value": self.value, "unit": self.variable.unit},
-            "meant": self.meant or None,
-            "said": str(self),
-        }
+    @derived()
+    def name(self) -> str:
+        """Name of the value."""
+        return self.variable.name
+
+    @derived()
+    def given(self) -> InUnit:
+        """The value."""
+        return InUnit(self.value, self.variable.unit)
+
+    @derived()
+    def said(self) -> str:
+        """The remark in words."""
+        return str(self)
 
     @property
     def sentence(self) -> str:
@@ -168,16 +173,16 @@ def slips(
                     yield Slip(variable, value, _meant(variable, given))
 
 
-def _meant(variable: Variable, given: Any) -> str:
-    """The given number with the unit in which it is allowed and usual; empty where there is no such unit."""
+def _meant(variable: Variable, given: Any) -> str | None:
+    """The given number with the unit in which it is allowed and usual; None where there is no such unit."""
     parts = units.split(str(given))
     if parts is None or not math.isfinite(parts[0]):
-        return ""
+        return None
     for unit in units.fitting(variable.unit, variable.kind):
         value = units.convert(parts[0], unit, variable.unit, variable.kind)
         if variable.quantity.admits(value) and variable.quantity.is_usual(value):
             return f"{parts[0]:.15g} {unit}"
-    return ""
+    return None
 
 
 def _kind(variable: Variable) -> str:

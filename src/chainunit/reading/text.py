@@ -30,7 +30,7 @@ from ..core.quantities import DISPLAY_UNITS, Layout, finite
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _THIN = "\u202f"  # between thousands
 _SPACE = "\u00a0"  # before a unit
-_PERCENT = 10.0
+MOST_PERCENT = 10.0
 """Largest share that is shown in %. A larger one is "over 1000 %"; a larger used share is a multiple."""
 _NOTHING = 5e-5
 """A share below this value is shown as 0."""
@@ -177,12 +177,12 @@ def _share(value: float, kind: str, digits: int, full: bool) -> tuple[str, str]:
         return "stands" if value < 1.005 else "turns back", ""
     if abs(value) < _NOTHING:
         value = 0.0
-    if abs(value) <= _PERCENT:
+    if abs(value) <= MOST_PERCENT:
         return digits_text(100.0 * value, digits, full=full), "%"
     if kind == "used":
         much = value <= _TIMES
         return (digits_text(value, digits) if much else f"over {digits_text(_TIMES)}"), "times"
-    return f"{'over ' if value > 0.0 else 'below −'}{digits_text(100.0 * _PERCENT)}", "%"
+    return f"{'over ' if value > 0.0 else 'below −'}{digits_text(100.0 * MOST_PERCENT)}", "%"
 
 
 def forms(
