@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..study.config import Config
 from .results import ReportedResult
@@ -16,33 +16,35 @@ if TYPE_CHECKING:
     from ..capabilities.sweep.summary import SweepSummary
 
 
-class SweepResult(ReportedResult[Config, "SweepSummary"]):
+class SweepResult(ReportedResult[Config, Any]):
     """The results of a sweep. Its `repr` shows the size of the sweep, the best points and the extremes."""
 
     _command = "sweep"
 
-    @property
+    @cached_property
     def summary(self) -> SweepSummary:
         """Extremes, best points, influences and spread, as the report reads them."""
-        return self._outcome
+        from ..capabilities.sweep.summary import summary_of
+
+        return summary_of(self._outcome)
 
     @property
     def dataset(self) -> xr.Dataset:
         """All results by their names in the study, with units: over the parameters of a grid, else over ``point``,
         with the parameters as coordinates. ``reason`` is 0 where a point has results; its attribute ``reasons`` has
         the texts. Values of points that are no grid are read when they are used."""
-        return self.summary.findings.dataset
+        return self._outcome.dataset
 
     @cached_property
     def table(self) -> pd.DataFrame:
         """A row for each point: its parameters, its results, and ``reason``, a text, empty where there is none."""
-        points = self.summary.findings.points.load()
+        points = self._outcome.points.load()
         table = points.to_dataframe()
-        reasons = ["", *map(str, self.summary.findings.task.reasons[1:])]
+        reasons = ["", *map(str, self._outcome.task.reasons[1:])]
         table["reason"] = [reasons[code] for code in points["reason"].values]
-        return table[[*self.summary.variables, "reason"]]
+        return table[[*self._outcome.variables, "reason"]]
 
     @property
     def file(self) -> Path:
         """The store of all points (Zarr), a folder."""
-        return self.summary.findings.outcome.file
+        return self._outcome.outcome.file
