@@ -24,7 +24,7 @@ from chainunit.capabilities.optimize.kernel import Kernel, pieces, symbols_of
 from chainunit.capabilities.optimize.page import optimum_report
 from chainunit.capabilities.optimize.program import AngleProgram
 from chainunit.capabilities.optimize.requirements import Requirements
-from chainunit.capabilities.optimize.result import as_dict, units_of
+from chainunit.capabilities.optimize.result import best_machine, units_of
 from chainunit.capabilities.optimize.search import Search
 from chainunit.capabilities.optimize.table import wishes_of
 from chainunit.capabilities.optimize.wishes import TurnLimit
@@ -34,6 +34,7 @@ from chainunit.core.native.compilers import compiler
 from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
+from chainunit.reading.results import as_data
 from chainunit.report.terminal import plain
 from chainunit.study import config as study_files
 from chainunit.study.cycle_quantities import cycle_quantity, evaluate
@@ -231,7 +232,7 @@ def test_sensitivities_are_those_of_perturbed_problems(best):
             continue
         step = 1e-3 * abs(each.value)
         text = TABLE
-        if each.is_bound:
+        if each.name in best.wishes.free:
             free = dict(best.wishes.free)
             low, high = free[each.name]
             free[each.name] = (low + step, high) if each.side == "min" else (low, high + step)
@@ -676,14 +677,14 @@ def test_a_speed_beyond_the_limit_of_the_organs_is_told(best):
     """The limit of the best machine, not that of today's."""
     config = study_files.parse(TABLE)
     feed, answer = best.wishes.feed, best.machine
-    (organ,) = as_dict(best, config)["organs"]
+    (organ,) = as_data(best_machine(best, config))["organs"]
     limit = ROCKER_GOOD * answer.chain_modes(feed.left, feed.right).frequency[0]
     assert (
         organ["topic"] == "rocker torque" and organ["limit"]["value"] == pytest.approx(limit) and limit < 3.0
     )
     assert "the limit of the best machine is" in plain(optimum_report(best, config))
     slow = _with(best, wishes=_with(best.wishes, crank_speed=0.9 * limit))
-    assert as_dict(slow, config)["organs"] == []
+    assert best_machine(slow, config).organs == []
 
 
 def test_in_python(best):

@@ -17,7 +17,7 @@ from ..core.quantities import group, quantity
 from .text import array_entry, entry
 
 OWN = "own"
-"""Unit of a part whose unit and kind are the fields `unit` and `kind` of the same result."""
+"""Unit of a part whose unit and kind are the fields `unit` and `kind` of the same result; it may have no kind."""
 
 
 class InUnit(NamedTuple):
@@ -174,7 +174,7 @@ def _table(x: Any, titled: bool) -> dict[str, Any]:
             value = getattr(value, attribute)
         if value is None and each.optional:
             continue
-        unit, kind = (x.unit, x.kind) if each.unit == OWN else (each.unit, each.kind)
+        unit, kind = (x.unit, getattr(x, "kind", "")) if each.unit == OWN else (each.unit, each.kind)
         own = _data(value, unit, kind, titled or each.titled)
         if each.inline:
             data |= own

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any, Literal
 
 from ..core.quantities import quantity
@@ -291,19 +290,19 @@ def _where(runs: Collection[str]) -> str:
     return f", in {', '.join(places[:-1])}{' and in ' if places[1:] else ''}{places[-1]}"
 
 
-@dataclass(frozen=True)
+@result
 class SpeedLimit:
-    """A limit of the crank speed for two bars as a model of the organs [rad/s]; `topic` as in `Reason`."""
+    """A limit of the crank speed for two bars as a model of the organs."""
 
-    topic: str
-    speed: float
+    topic: str = part("kind of limit, as of a reason")
+    speed: float = part("crank speed", unit="rad/s", kind="speed", name="limit")
     grave: bool = False
 
     def passed(self, speed: Any) -> Any:
         """Whether each crank speed [rad/s] is beyond the limit, shape of `speed`."""
         return speed >= self.speed if self.topic == "slack speed" else speed > self.speed
 
-    @property
+    @derived(name="text")
     def words(self) -> str:
         """The begin of a sentence on speeds beyond it."""
         return _TOPICS[self.topic][1]

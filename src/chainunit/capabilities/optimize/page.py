@@ -10,6 +10,8 @@ import numpy as np
 
 from ...core.files import whole
 from ...fmu.backends import Backend
+from ...reading.results import as_data
+from ...reading.text import shown_in
 from ...report import blocks as b
 from ...report import figure as fig
 from ...report.lines import Line, Name, line
@@ -18,7 +20,7 @@ from ...study.config import Config
 from ...study.study_file import toml_text
 from ...work.progress import Report as Progress
 from .best import Best, find_best
-from .result import as_dict, best_tables, units_of
+from .result import best_machine, best_tables, units_of
 from .table import wishes_of
 from .words import conflict_sentences
 
@@ -29,7 +31,9 @@ FILE = "best.toml"
 
 def optimum_report(best: Best, config: Config) -> b.Report:
     """The report on a search."""
-    result = as_dict(best, config)
+    units = units_of(best, config)
+    with shown_in(units):
+        result = as_data(best_machine(best, config))
     s = b.Source(result)
     sections = [b.Section("parameters", "Parameters and limits", tuple(_machine(s, best)))]
     if best.met:
@@ -44,7 +48,7 @@ def optimum_report(best: Best, config: Config) -> b.Report:
         tuple(_opening(s, best)),
         tuple(sections),
         source=s.line("Study file: {source} · chainunit {chainunit}"),
-        units=units_of(best, config),
+        units=units,
         opening_title="The answer",
         status="complete" if best.met else "no machine found",
     )

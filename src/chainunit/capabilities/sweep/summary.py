@@ -51,9 +51,7 @@ class ReasonShare:
 class OrganShare:
     """A limit of the crank speed for two bars as organs, of the study's machine and feed, which points pass."""
 
-    topic: str = part("kind of limit")
-    text: str = part("the limit in words")
-    limit: float = quantity("rad/s", "crank speed of the limit", kind="speed")
+    limit: SpeedLimit = part(inline=True)
     points: int = quantity("1", "number of points beyond it")
     share: float = quantity("1", "share of all points", kind="percent")
 
@@ -184,10 +182,7 @@ def summary_of(findings: SweepFindings) -> SweepSummary:
             for reason, count in list(zip(findings.task.reasons, passed.counts, strict=True))[1:]
             if count
         ],
-        organs=[
-            OrganShare(limit.topic, limit.words, limit.speed, count, count / plan.points)
-            for limit, count in _organs(findings)
-        ],
+        organs=[OrganShare(limit, count, count / plan.points) for limit, count in _organs(findings)],
         basis=plan.basis,
         event=config.events[plan.event].title if plan.event else None,
         best_by=f"{plan.best_is} {plan.best}",
