@@ -87,7 +87,7 @@ def _given_values(study: StudyRecord) -> dict[str, Any]:
     values: dict[str, Any] = {"event": {}, "motor": _motor(study)}
     for section in sections:
         if section.name != "motor":
-            _put(values, section.place, section.as_dict())
+            _put(values, section.place, section.data)
     origins = {name: origin for name in names if (origin := study.origin(name)) != "declared"}
     return {"origins": origins} | values
 

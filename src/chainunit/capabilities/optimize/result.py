@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.quantities import quantity
+from ...core.quantities import narrowed, quantity
 from ...reading.results import OWN, InUnit, part, result
 from ...reading.text import Units
 from ...study.config import Config
@@ -39,43 +39,37 @@ _SMALL = 100.0
 
 
 @result
-class FreeParameter:
-    """A free parameter of the machine."""
+class TodayAndBest:
+    """A number of today's machine and of the best one, or of the nearest one, and its limits."""
 
-    title: str = part("its meaning")
-    today: float = part("its value today", unit=OWN)
-    best: float = part("its value in the best machine, or in the nearest one", unit=OWN)
-    low: float = part("its lower bound", unit=OWN, name="min")
-    high: float = part("its upper bound", unit=OWN, name="max")
-    unit: str
-    kind: str
-
-
-@result
-class SoughtQuantity:
-    """An objective or a limited quantity."""
-
-    title: str = part("its meaning")
     today: float = part("its value today", unit=OWN)
     best: float = part("its value of the best machine, or of the nearest one", unit=OWN)
     low: float | None = part("its lower limit", unit=OWN, name="min")
     high: float | None = part("its upper limit", unit=OWN, name="max")
-    missed: bool = part("whether the limits are not met")
-    fmu: float | None = part("its value by the FMU of the best machine", unit=OWN)
-    fmu_deviation: float | None = quantity("1", "deviation of the FMU, as a share")
     unit: str
     kind: str
 
 
 @result
-class WebPull:
+class FreeParameter(TodayAndBest):
+    """A free parameter of the machine."""
+
+    title: str = part("its meaning")
+
+
+@result
+class WebPull(TodayAndBest):
     """The least pull in the webs up to the slack-free speed."""
 
-    today: float | None = quantity("N", "of today's machine")
-    best: float | None = quantity("N", "of the best machine, or of the nearest one")
-    low: float = part("its lower limit", unit="N", name="min")
-    high: float | None = part("its upper limit", unit="N", name="max")
-    missed: bool = part("whether the limit is not met")
+    missed: bool = part("whether the limits are not met")
+
+
+@result
+class SoughtQuantity(FreeParameter, WebPull):
+    """An objective or a limited quantity."""
+
+    fmu: float | None = part("its value by the FMU of the best machine", unit=OWN)
+    fmu_deviation: float | None = quantity("1", "deviation of the FMU, as a share")
 
 
 @result
@@ -159,13 +153,13 @@ def best_machine(best: Best, config: Config) -> BestMachine:
         speed=wishes.crank_speed,
         clearance=wishes.clearance,
         slack_free_speed=wishes.slack_free_speed or None,
-        basis=wishes.basis,
+        basis=narrowed(wishes.basis, CycleBasis),
         parameters=dict(_parameters(best)),
         without_effect=list(best.idle),
         without_effect_words=idle_sentence(best),
         quantities={name: _quantity(best, name) for name in best.quantities},
         # in comparison with the weight of the webs a millionth of a newton is none
-        least_pull=best.pulls and WebPull(*best.pulls, 0.0, None, not best.pulls[1] >= -1e-6),
+        least_pull=best.pulls and WebPull(*best.pulls, 0.0, None, "N", "", not best.pulls[1] >= -1e-6),
         organs=_organs(best),
         bindings=bindings(best) if best.met else [],
         clearances=clearances(best) if best.met else [],
@@ -231,7 +225,7 @@ def _parameters(best: Best) -> Iterator[tuple[str, FreeParameter]]:
     for name, own in numbers.items():
         v = variables[name]
         today, value, low, high = map(float, own)
-        yield name, FreeParameter(v.description, today, value, low, high, v.unit, v.kind)
+        yield name, FreeParameter(today, value, low, high, v.unit, v.kind, v.description)
 
 
 def _quantity(best: Best, name: str) -> SoughtQuantity:

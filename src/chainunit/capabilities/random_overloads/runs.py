@@ -46,6 +46,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+ENDS = {"stalls": "the crank stands at the end of the run", "trips": "the safety coupling opens"}
+"""By switch of a run, its meaning."""
+
+
 @declaration
 class Sample:
     """One run: its event and its results."""
@@ -58,8 +62,8 @@ class Sample:
     current_peak: Value = same_measure("current_peak")
     rocker_torque_peak: Value = same_measure("rocker_torque_peak")
     speed_least: Value = same_measure("speed_least")
-    stalls: Value = quantity("1", "1 where the crank stands at the end of the run")
-    trips: Value = quantity("1", "1 where the safety coupling opens")
+    stalls: Value = quantity("1", f"1 where {ENDS['stalls']}")
+    trips: Value = quantity("1", f"1 where {ENDS['trips']}")
 
 
 BATCH, COSIMULATED_BATCH = 512, 16

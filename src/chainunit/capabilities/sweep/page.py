@@ -193,7 +193,7 @@ def _influences(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
 
 
 def _spread_heading(summary: SweepSummary) -> str:
-    return "Spread by tolerances and ranges" if summary.evenly else "Spread by tolerances"
+    return "Spread by tolerances and ranges" if summary.spread.evenly else "Spread by tolerances"
 
 
 def _spread(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
@@ -225,9 +225,9 @@ def _spread(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
     columns = (b.Column("result"), *of_study, *(b.Column(f"{key.removeprefix('q')} %") for key in quantiles))
     groups = ((1, 2, 3), tuple(range(4, len(columns))))
     yield b.Table(tuple(rows), columns, title="Spread of the results and their quantiles", groups=groups)
-    if summary.evenly:
-        ranges = join(map(Name, summary.evenly))
-        words = " has no tolerance" if len(summary.evenly) == 1 else " have no tolerance"
+    if summary.spread.evenly:
+        ranges = join(map(Name, summary.spread.evenly))
+        words = " has no tolerance" if len(summary.spread.evenly) == 1 else " have no tolerance"
         yield b.Text(
             line(ranges, words, ": the spread counts each of their values as equally frequent."), "note"
         )

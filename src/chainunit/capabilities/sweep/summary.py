@@ -93,6 +93,36 @@ class ResultSpread:
     quantiles: Mapping[str, Estimate] = part(inline=True)
 
 
+@result
+class SweepSize:
+    """How many points there are, and how they are chosen."""
+
+    method: str = part("how the points are chosen")
+    points: int = quantity("1", "number of points")
+    states: float | None = quantity("1", "number of states of the machine that were computed")
+    seed: int = quantity("1", "seed of the random numbers")
+    angles: int = quantity("1", "number of crank angles of a turn")
+    feasible: int = quantity("1", "number of points with results")
+
+
+@result
+class SweepSpread:
+    """The spread of all results."""
+
+    evenly: list[str] = part("parameters without a tolerance, which the spread counts as evenly distributed")
+    spread: Mapping[str, ResultSpread] = part("spread by tolerances")
+    confidence: float = part("confidence of the intervals", unit="1", kind="percent", default=CONFIDENCE)
+
+
+@result
+class PointStore:
+    """The store of all points."""
+
+    made_anew: str | None = part("a sentence on damaged batches")
+    damaged_batches: int = quantity("1", "number of damaged batches, which were made anew")
+    store: str = part("name of the store")
+
+
 Row = Mapping[str, InUnit]
 """Number, parameters and results of a point."""
 
@@ -106,12 +136,7 @@ class SweepSummary:
     """parameters and results at the points behind correlations and quantiles, shape (points,), without those that
     have a reason"""
     heading: Heading = part(inline=True)
-    method: str = part("how the points are chosen")
-    points: int = quantity("1", "number of points")
-    states: float | None = quantity("1", "number of states of the machine that were computed")
-    seed: int = quantity("1", "seed of the random numbers")
-    angles: int = quantity("1", "number of crank angles of a turn")
-    feasible: int = quantity("1", "number of points with results")
+    size: SweepSize = part(inline=True)
     reasons: list[ReasonShare] = part("why points have no result")
     organs: list[OrganShare] = part("limits of two bars as organs that points pass")
     basis: CycleBasis = part("assumptions behind installed power and energy")
@@ -133,12 +158,8 @@ class SweepSummary:
     current_limit: float | None = quantity(
         "A", "limit of the motor's current, where the largest current of the points is at it"
     )
-    evenly: list[str] = part("parameters without a tolerance, which the spread counts as evenly distributed")
-    spread: Mapping[str, ResultSpread] = part("spread by tolerances")
-    confidence: float = part("confidence of the intervals", unit="1", kind="percent")
-    made_anew: str | None = part("a sentence on damaged batches")
-    damaged_batches: int = quantity("1", "number of damaged batches, which were made anew")
-    store: str = part("name of the store of all points")
+    spread: SweepSpread = part(inline=True)
+    store: PointStore = part(inline=True)
 
     def digits(self, name: str) -> int:
         """The number of digits with which a hundredth of the range of a parameter or result shows."""
@@ -171,12 +192,14 @@ def summary_of(findings: SweepFindings) -> SweepSummary:
         findings=findings,
         sample=sample,
         heading=Heading.of(config),
-        method=_METHODS[plan.method],
-        points=plan.points,
-        states=float(plan.points) * plan.angles if plan.quantities else None,
-        seed=plan.seed,
-        angles=plan.angles,
-        feasible=passed.counts[0],
+        size=SweepSize(
+            method=_METHODS[plan.method],
+            points=plan.points,
+            states=float(plan.points) * plan.angles if plan.quantities else None,
+            seed=plan.seed,
+            angles=plan.angles,
+            feasible=passed.counts[0],
+        ),
         reasons=[
             ReasonShare(str(reason), count, count / plan.points)
             for reason, count in list(zip(findings.task.reasons, passed.counts, strict=True))[1:]
@@ -196,12 +219,11 @@ def summary_of(findings: SweepFindings) -> SweepSummary:
         influences=influences,
         gaps={name: gaps[name] for name in influences},
         current_limit=_current_limit(findings),
-        evenly=[each.name for each in plan.parameters if each.tolerance is None] if has_spread else [],
-        spread=_spread(findings, sample) if has_spread else {},
-        confidence=CONFIDENCE,
-        made_anew=made_anew(damaged, "points", file) if damaged else None,
-        damaged_batches=damaged,
-        store=file,
+        spread=SweepSpread(
+            [each.name for each in plan.parameters if each.tolerance is None] if has_spread else [],
+            _spread(findings, sample) if has_spread else {},
+        ),
+        store=PointStore(made_anew(damaged, "points", file) if damaged else None, damaged, file),
     )
 
 
