@@ -385,7 +385,7 @@ def test_a_current_at_its_limit_and_damaged_batches_are_noted(current, told):
     assert drive.parameters.limit.i == 4.4
     quantiles = {"current_peak": {"q50": Estimate(2.0, 1.0, 3.0), "q95": Estimate(current, 4.0, 4.4)}}
     random = SimpleNamespace(
-        quantiles=lambda: quantiles, shortage="", damaged_batches=1, file=Path("out/runs.zarr")
+        quantiles=quantiles, shortage="", damaged_batches=1, file_name="runs.zarr"
     )
     notes = {}
     study = SimpleNamespace(drive=drive, note=lambda kind, words, **of: notes.update({kind: of}))

@@ -8,7 +8,8 @@ and properties are means of the computation. A mapping, a sequence or a nested r
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+import typing
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple, dataclass_transform
@@ -98,6 +99,7 @@ def derived(
     def declared(function: Callable[[Any], Any]) -> Any:
         own = _Derived(function)
         words = " ".join((function.__doc__ or "").split()).removesuffix(".")
+        words = words[:1].lower() + words[1:]
         own.part = ResultPart(
             function.__name__, name or function.__name__, words, unit, kind, titled=titled, optional=optional
         )
@@ -187,3 +189,46 @@ def _table(x: Any, titled: bool) -> dict[str, Any]:
 def _number(x: Any, unit: str, kind: str) -> dict[str, Any]:
     is_array = isinstance(x, list | tuple) or bool(getattr(x, "ndim", 0))
     return array_entry(x, unit, kind) if is_array else entry(x, unit, kind)
+
+
+def documented(of: type, prefix: str = "") -> Iterator[tuple[str, str, str]]:
+    """Name in the data, unit and description of each number and text of a result, with those of the results in it. In
+    a name ``*`` stands for the key of a mapping, and ``#`` for the place in a sequence."""
+    for each in parts(of):
+        steps, inner = results_in(_annotated(of, each.attribute))
+        own = prefix if each.inline else f"{prefix}{each.name}."
+        name = f"{own.removesuffix('.')}{steps}".removeprefix(".")
+        if inner is None or each.unit:
+            yield name, each.unit.replace(OWN, ""), each.description
+        else:
+            yield from documented(inner, name and f"{name}.")
+
+
+def _annotated(of: type, attribute: str) -> Any:
+    """The type of a part; None for that of a group, which is a number."""
+    for base in of.__mro__:
+        member: Any = vars(base).get(attribute)
+        if isinstance(member, _Derived):
+            hint = member.fget.__annotations__["return"]
+        else:
+            hint = vars(base).get("__annotations__", {}).get(attribute)
+        if hint is not None:
+            # other annotations of the class may have names that only a type checker knows
+            alone = type("Alone", (), {"__annotations__": {"x": hint}, "__module__": base.__module__})
+            return typing.get_type_hints(alone)["x"]
+    return None
+
+
+def results_in(hint: Any) -> tuple[str, Any]:
+    """The steps from a value of this type to the results in it, and their class; None where it has none."""
+    if hasattr(hint, "__dataclass_fields__"):
+        return "", hint if parts(hint) else None
+    found = [results_in(each) for each in typing.get_args(hint)]
+    steps, inner = next(
+        (each for each in found if each[1] is not None),
+        max(found, key=lambda each: each[0], default=("", None)),
+    )
+    outer = typing.get_origin(hint)
+    if isinstance(outer, type) and issubclass(outer, Mapping):
+        return f".*{steps}", inner
+    return (f".#{steps}" if outer in (list, tuple) and inner is not None else steps), inner

@@ -1,11 +1,11 @@
-"""The reference: all keys of study files and catalogues, the variables of all FMUs, and the commands, as tables that
-follow from the declarations."""
+"""The reference: all keys of study files and catalogues, the variables of all FMUs, the results, and the commands, as
+tables that follow from the declarations."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable, Iterator
-from typing import Any
+from typing import Any, get_type_hints
 
 from ..core.errors import InputError, near_name
 from ..core.messages import unit_behind
@@ -13,8 +13,11 @@ from ..core.model import Model
 from ..core.quantities import written
 from ..fmu.description import Interface
 from ..models import MODELS
+from ..reading.results import documented, results_in
+from ..study.analyses import all_analyses
 from ..study.keys import Key, KeyTable, catalogue_columns, key_tables
 from .blocks import Block, Report, Section, Table, TableRow, Text, heads
+from .tasks import tasks
 
 _KEY_COLUMNS = heads("key", "default", "allowed", "meaning")
 
@@ -117,6 +120,9 @@ def reference(commands: Iterable[tuple[str, str, Iterable[tuple[str, str]]]]) ->
         for table in (*key_tables(), catalogue_columns())
     ]
     sections += [Section(name, f"FMU {name}", tuple(_variables(model))) for name, model in MODELS.items()]
+    sections += [
+        Section(f"result-{name}", f"result.json: {name}", (_parts(of),)) for name, of in _results().items()
+    ]
     for name, words, options in commands:
         rows = tuple(TableRow((option, words)) for option, words in options)
         sections.append(
@@ -127,6 +133,20 @@ def reference(commands: Iterable[tuple[str, str, Iterable[tuple[str, str]]]]) ->
             )
         )
     return Report("Reference", "reference", {}, (), tuple(sections))
+
+
+def _results() -> dict[str, type]:
+    """The declared results by their names: those of the analyses of a study, and those of other commands."""
+    returned = ((each.name, get_type_hints(each.find)["return"]) for each in all_analyses())
+    found = {name: results_in(hint)[1] for name, hint in returned}
+    found |= {name: task.content for name, task in tasks().items()}
+    return {name: of for name, of in found.items() if of is not None}
+
+
+def _parts(of: type) -> Table:
+    """A row for each part of a result."""
+    rows = (TableRow((name, unit or "-", words)) for name, unit, words in documented(of))
+    return Table(tuple(rows), heads("name", "unit", "meaning"), numeric=False)
 
 
 def _variables(model: type[Model]) -> Iterator[Block]:

@@ -58,6 +58,8 @@ class Task(Generic[Question, Outcome]):
     """the error that ended the computation early; what was computed before this error is reported and written"""
     shortfall: Callable[[Outcome], str | None] = lambda outcome: None
     """None where the outcome is what was sought, else a sentence for the terminal, or "": the exit status is 1"""
+    content: type | None = None
+    """the declared content of its result.json"""
     tells_remarks: bool = False
     """whether a terminal has the remarks of the report already, as those on the study file"""
 

@@ -9,9 +9,13 @@ from .capability import capabilities
 from .task import Task
 
 
+def tasks() -> dict[str, Task[Any, Any]]:
+    """By name, the task of a study and those of the capabilities."""
+    return {"study": study_task.TASK} | {
+        name: x for part in capabilities() for name, x in part.tasks().items()
+    }
+
+
 def task_named(name: str) -> Task[Any, Any]:
     """The task of a command: that of a study, or one of a capability."""
-    tasks = {"study": study_task.TASK}
-    for part in capabilities():
-        tasks |= part.tasks()
-    return tasks[name]
+    return tasks()[name]

@@ -20,7 +20,7 @@ from ...study.config import Config
 from ...study.study_file import toml_text
 from ...work.progress import Report as Progress
 from .best import Best, find_best
-from .result import best_machine, best_tables, units_of
+from .result import BestMachine, best_machine, best_tables, units_of
 from .table import wishes_of
 from .words import conflict_sentences
 
@@ -107,6 +107,7 @@ TASK: Task[Config, OptimizedStudy] = Task(
     "optimize",
     _compute,
     lambda outcome: optimum_report(outcome.best, outcome.config),
+    content=BestMachine,
     files=(*PICTURES, FILE),
     accept=_accept,
     writers=_writers,

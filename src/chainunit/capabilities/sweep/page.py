@@ -299,6 +299,7 @@ TASK: Task[Config, SweepFindings] = Task(
     "sweep",
     _compute,
     report,
+    content=SweepSummary,
     files=("sweep_*.png",),
     writers=lambda findings, folder, of_report: [*of_report, lambda: [_store_in(findings, folder)]],
     kept=lambda findings, folder: [_store_in(findings, folder)],
