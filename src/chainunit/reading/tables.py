@@ -140,8 +140,7 @@ class Slip:
     @property
     def sentence(self) -> str:
         """The remark as a sentence with a full stop."""
-        said = str(self)
-        return said if said.endswith("?") else f"{said}."
+        return str(self) if self.meant else f"{self}."
 
     def __str__(self) -> str:
         v, (low, high) = self.variable, self.variable.quantity.usual or (0.0, 0.0)

@@ -8,7 +8,8 @@ from typing import Any
 
 from ..core.quantities import variables
 from ..drives.line_table import Damping
-from ..reading.results import InUnit, as_data
+from ..reading.results import as_data
+from ..reading.text import entry
 from .config import Config
 from .record import StudyRecord
 from .registry import registered
@@ -50,12 +51,17 @@ class GivenSection:
 
     @property
     def data(self) -> dict[str, Any]:
-        """The values as a result has them; a choice that is a number is a pure one."""
+        """The values as a result has them."""
         own = {} if self.values is None else as_data(self.values)
         own = {name: x for name, x in own.items() if name not in self.unused_names}
         ranges = {name: {**own[name], "value": list(ends)} for name, ends in self.ranges.items()}
-        choices = {key: InUnit(x, "1") if isinstance(x, float) else x for key, x in self.choices.items()}
-        return own | ranges | as_data(choices)
+        return own | ranges | {key: _choice(value) for key, value in self.choices.items()}
+
+
+def _choice(value: Any) -> Any:
+    if isinstance(value, float):
+        return entry(value, "1")
+    return list(value) if isinstance(value, tuple) else value
 
 
 def given_sections(study: StudyRecord) -> list[GivenSection]:

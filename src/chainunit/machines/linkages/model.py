@@ -370,19 +370,24 @@ class LinkageDescription(LinkageOutputs):
         bearings = {self.variable("joint", name): parts.receivers[name][0] for name in self.structure.joints}
         titles = {name: self.variable("joint", name) for name in self.structure.joints}
         given = tuple(each["name"] for each in data.get("parameters", ()))
-        words = {
-            "least margin of the group of {} over the way of the driver": (
-                "the linkage does not close all the way, or comes to a dead position"
+        groups = self.structure.groups
+        triads = [each for each in groups if each.kind == "triad"]
+        demands = (
+            (
+                groups,
+                "least margin of the group of {} over the way of the driver",
+                "the linkage does not close all the way, or comes to a dead position",
             ),
-            "largest misfit of a leg of the group of {} over the turn of the driver, in parts of its length": (
-                "the group does not close all the way round from the start pose, or moves too sharply to be followed"
+            (
+                triads,
+                "largest misfit of a leg of the group of {} over the turn of the driver, in parts of its length",
+                "the group does not close all the way round from the start pose, or moves too sharply to be followed",
             ),
-        }
+        )
         required = tuple(
             Requirement(subject.format(", ".join(each.links)), "1", why, given)
-            for subject, why in words.items()
-            for each in self.structure.groups
-            if subject.startswith("least") or each.kind == "triad"
+            for of, subject, why in demands
+            for each in of
         ) + tuple(requirement_of_width(*each, given) for each in self.widths)
 
         class FileMachine(InverseMachine):
