@@ -139,7 +139,7 @@ def as_data(x: Any, *, titled: bool = False) -> Any:
     Raises
     ------
     TypeError
-        for a number without a unit, and for a value that is no data.
+        for a number without a unit, and for a value that is no result.
     """
     return _data(x, "", "", titled)
 
@@ -154,7 +154,7 @@ def _data(x: Any, unit: str, kind: str, titled: bool) -> Any:
         return {str(key): _data(each, unit, kind, titled) for key, each in x.items()}
     if unit:
         return _number(x, unit, kind)
-    if dataclasses.is_dataclass(x):
+    if dataclasses.is_dataclass(x) and parts(type(x)):  # type: ignore[arg-type]
         return _table(x, titled)
     if hasattr(x, "tolist"):
         x = x.tolist()
@@ -164,7 +164,7 @@ def _data(x: Any, unit: str, kind: str, titled: bool) -> Any:
         return str(x)
     if x is None or isinstance(x, str | bool | int):
         return x
-    raise TypeError(f"{x!r} has no declared unit")
+    raise TypeError(f"{x!r} has no declared unit, and no declared parts")
 
 
 def _table(x: Any, titled: bool) -> dict[str, Any]:

@@ -4,7 +4,6 @@ the rocker has carried by then."""
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ import xarray as xr
 
 from ...core.quantities import Value, declaration, quantity
 from ...machines.chain_unit import SIDES
-from ...reading.text import entries, entry
+from ...reading.results import derived, part, result
 from ...study.analysis import Analysis, Findings, Work
 from ...study.arrays import peak
 from ...study.config import Config
@@ -56,34 +55,26 @@ class Observed:
     rocker_torque: Value = quantity("N.m", "rocker torque, largest")
 
 
-@dataclass(frozen=True)
+@result
 class ObserverFindings(Findings):
     """The `notices` by event and device; by event the side that the observer names first, empty where it names none,
     and the loaded side; and the estimates in normal running."""
 
-    notices: Mapping[str, Mapping[str, Notice]]
+    notices: Mapping[str, Mapping[str, Notice]] = part("when each device notices an event")
     named: Mapping[str, str]
     loaded: Mapping[str, str]
-    steady: Observed
-    alarm_in_start: float | None
-    """time of the first alarm before running is steady [s]"""
+    steady: Observed = part("the estimates in normal running")
+    alarm_in_start: float | None = quantity("s", "time of the first alarm before running is steady")
     alarms_in_steady: bool
     resonance: float | None
     """speed in parts of the lowest resonance of the chains, where the organs are chains"""
 
-    def as_dict(self) -> dict[str, Any]:
-        """Ready for JSON."""
+    @derived()
+    def sides(self) -> dict[str, dict[str, str | None]]:
+        """By event, the side that the observer names first, and the loaded one."""
         return {
-            "steady": entries(self.steady),
-            "alarm_in_start": entry(self.alarm_in_start, "s"),
-            "notices": {
-                run: {device: entries(notice) for device, notice in of.items()}
-                for run, of in self.notices.items()
-            },
-            "sides": {
-                run: {"named": self.named[run] or None, "loaded": self.loaded[run] or None}
-                for run in self.notices
-            },
+            run: {"named": self.named[run] or None, "loaded": self.loaded[run] or None}
+            for run in self.notices
         }
 
     def remark(self, study: StudyRecord) -> None:
