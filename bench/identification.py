@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -26,21 +27,23 @@ from typing import Any
 import numpy as np
 from figures import parser, save, table
 
-from chainunit.capabilities.identification.fit import fit
-from chainunit.capabilities.identification.plant import Plant
 from chainunit.capabilities.identification.posterior import posterior
-from chainunit.capabilities.identification.problem import Problem, RecordedRun, Sensor
-from chainunit.capabilities.identification.residuals import check_residuals, strained_priors, strains
-from chainunit.capabilities.identification.shaft import MeasuredShaft
-from chainunit.capabilities.identification.suspicion import suspicions
-from chainunit.capabilities.identification.synthetic import HiddenRun, Logger, synthetic
-from chainunit.capabilities.identification.unknown import Unknown
+from chainunit.capabilities.identification.score_tests import suspicions
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor
 from chainunit.machines.chain_unit import ChamberForces
+from chainunit.recordings.fit import fit
+from chainunit.recordings.plant import Plant
+from chainunit.recordings.problem import Problem, RecordedRun, Sensor
+from chainunit.recordings.residuals import check_residuals, strained_priors, strains
+from chainunit.recordings.shaft import MeasuredShaft
+from chainunit.recordings.unknown import Unknown
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 from chainunit.study.sections import ChainOrgans
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "examples" / "identification"))
+from synthetic import HiddenRun, Logger, synthetic
 
 RODS = [f"{side}.{rod}_mass" for side in ("left", "right") for rod in ("wall", "web")]
 BODIES = [f"{body}.{x}" for body in ("crank", "coupler", "rocker") for x in ("m", "I")]

@@ -9,23 +9,23 @@ import pytest
 from derivatives import check_derivatives
 from scipy.optimize import nnls
 from scipy.stats import f
+from synthetic import HiddenRun, Logger, synthetic
 
 from chainunit import InputError, RunError
-from chainunit.capabilities.identification import fit as fitting
 from chainunit.capabilities.identification import information as what_runs_tell
-from chainunit.capabilities.identification import residuals
-from chainunit.capabilities.identification.fit import fit, normal
 from chainunit.capabilities.identification.information import information
-from chainunit.capabilities.identification.plant import Plant
 from chainunit.capabilities.identification.posterior import posterior
-from chainunit.capabilities.identification.problem import Comparison, Problem, RecordedRun, Sensor, Unknown
-from chainunit.capabilities.identification.recording import Recording
-from chainunit.capabilities.identification.residuals import check_residuals, strains
-from chainunit.capabilities.identification.suspicion import suspicions
-from chainunit.capabilities.identification.synthetic import HiddenRun, Logger, synthetic
+from chainunit.capabilities.identification.score_tests import suspicions
 from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor
+from chainunit.recordings import fit as fitting
+from chainunit.recordings import residuals
+from chainunit.recordings.fit import fit, normal
+from chainunit.recordings.plant import Plant
+from chainunit.recordings.problem import Comparison, Problem, RecordedRun, Sensor, Unknown
+from chainunit.recordings.recording import Recording
+from chainunit.recordings.residuals import check_residuals, strains
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 

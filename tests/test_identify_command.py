@@ -10,17 +10,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from command import chainunit
+from synthetic import HiddenRun, Logger, synthetic
 
 from chainunit import InputError, Study
 from chainunit.capabilities.identification import identification
 from chainunit.capabilities.identification import page as report
-from chainunit.capabilities.identification.false_loads import false_loads
-from chainunit.capabilities.identification.measurands import MEASURANDS
 from chainunit.capabilities.identification.result import _number, identified_tables, sentences
-from chainunit.capabilities.identification.synthetic import HiddenRun, Logger, synthetic
-from chainunit.capabilities.identification.unknown import Unknown
+from chainunit.capabilities.watch.false_loads import false_loads
 from chainunit.core.native.compilers import compiler
 from chainunit.machines.load_observer import LoadObserver
+from chainunit.recordings.measurands import MEASURANDS
+from chainunit.recordings.unknown import Unknown
 from chainunit.report import blocks
 from chainunit.study import config as study_files
 from chainunit.study.choice import choose

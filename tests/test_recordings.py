@@ -10,20 +10,20 @@ import pytest
 
 from chainunit import InputError
 from chainunit.capabilities.identification.identification import read_runs
-from chainunit.capabilities.identification.inspection import (
+from chainunit.capabilities.identification.reading import PlannedRun
+from chainunit.capabilities.watch.watch import watch
+from chainunit.recordings.inspection import (
     Expectation,
     inspect_columns,
     inspect_motion,
     inspect_steadiness,
 )
-from chainunit.capabilities.identification.reading import PlannedRun
-from chainunit.capabilities.identification.recording import (
+from chainunit.recordings.recording import (
     Recording,
     read_part,
     read_recording,
     write_recording,
 )
-from chainunit.capabilities.identification.watch import watch
 from chainunit.study.config import parse
 
 SPEED, RATIO, RATE = 3.0, 50.0, 0.83

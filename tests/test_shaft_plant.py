@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from derivatives import check_derivatives
+from synthetic import HiddenRun, Logger, synthetic
 
 from chainunit import InputError
-from chainunit.capabilities.identification.fit import fit
 from chainunit.capabilities.identification.identification import inspect_runs
-from chainunit.capabilities.identification.problem import Problem, RecordedRun, Sensor, Unknown
-from chainunit.capabilities.identification.residuals import check_residuals
-from chainunit.capabilities.identification.shaft import WAVES, MeasuredShaft
-from chainunit.capabilities.identification.synthetic import HiddenRun, Logger, synthetic
 from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
+from chainunit.recordings.fit import fit
+from chainunit.recordings.problem import Problem, RecordedRun, Sensor, Unknown
+from chainunit.recordings.residuals import check_residuals
+from chainunit.recordings.shaft import WAVES, MeasuredShaft
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 

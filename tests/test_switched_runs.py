@@ -7,17 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from derivatives import check_derivatives
+from synthetic import HiddenRun, Logger, synthetic
 
-from chainunit.capabilities.identification.fit import fit
 from chainunit.capabilities.identification.information import information
-from chainunit.capabilities.identification.plant import Plant
-from chainunit.capabilities.identification.problem import Problem, RecordedRun, Sensor, Unknown
-from chainunit.capabilities.identification.residuals import check_residuals
-from chainunit.capabilities.identification.shaft import MeasuredShaft
-from chainunit.capabilities.identification.synthetic import HiddenRun, Logger, synthetic
 from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor
+from chainunit.recordings.fit import fit
+from chainunit.recordings.plant import Plant
+from chainunit.recordings.problem import Problem, RecordedRun, Sensor, Unknown
+from chainunit.recordings.residuals import check_residuals
+from chainunit.recordings.shaft import MeasuredShaft
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 from chainunit.system import Profile
@@ -77,7 +77,7 @@ def problem_of(kind, *runs):
 @pytest.fixture
 def fine(monkeypatch):
     """Rows of a simulation so near to one another that the derivatives are not those of their interpolation."""
-    monkeypatch.setattr("chainunit.capabilities.identification.problem.STEP", 4e-4)
+    monkeypatch.setattr("chainunit.recordings.problem.STEP", 4e-4)
 
 
 @pytest.mark.slow

@@ -14,17 +14,17 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from ...batch.transients import Transients, signal_table
-from ...core.errors import InputError
-from ...study.arrays import rms
-from ...study.drive import Drive
-from ...system.compiled_simulation import LONGEST, CompiledSystem
-from ...system.reference import monolithic
-from ...system.signals import at_time
-from .measurands import COUNTS, MEASURANDS
-from .plant import MOVING, free, source_of
-from .problem import JITTER
-from .recording import Recording
+from chainunit.batch.transients import Transients, signal_table
+from chainunit.core.errors import InputError
+from chainunit.recordings.measurands import COUNTS, MEASURANDS
+from chainunit.recordings.plant import MOVING, free, source_of
+from chainunit.recordings.problem import JITTER
+from chainunit.recordings.recording import Recording
+from chainunit.study.arrays import rms
+from chainunit.study.drive import Drive
+from chainunit.system.compiled_simulation import LONGEST, CompiledSystem
+from chainunit.system.reference import monolithic
+from chainunit.system.signals import at_time
 
 INTEGRATORS = ("compiled", "monolithic")
 _STEP = 1e-3

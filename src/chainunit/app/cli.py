@@ -14,15 +14,13 @@ from typing import Annotated, Any
 import typer
 import typer.core
 
+from ..capabilities import commands
 from ..core.errors import InputError, InterruptedRunError, RunError, printable
 from ..core.files import full, written
+from ..report.command_options import BackendOption
+from ..report.console import carry_out, exit_status, study_file, terminal_console
 from ..work import interrupts
-from .command_options import BackendOption
-from .console import carry_out, exit_status, study_file, terminal_console
 from .export_command import ExportCommand, export, export_ssp
-from .identify_command import identify
-from .sweep_command import sweep
-from .watch_command import watch
 
 
 class Example(StrEnum):
@@ -138,25 +136,8 @@ def compare(
     carry_out(TASK, (read_result(first), read_result(second)), output)
 
 
-@app.command()
-def optimize(
-    config: Annotated[Path, typer.Argument(help="Study file (TOML) with the table [optimize].")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")] = Path("best"),
-    backend: BackendOption = None,
-) -> None:
-    """Search for the best machine: parameters with the least torque, load, power or energy under limits.
-
-    Writes best.toml, report.html, result.json, result.md and pictures into the output folder.
-    """
-    question = study_file(config)
-    from ..report.tasks import task_named
-
-    carry_out(task_named("optimize"), question, output, backend=backend and backend.value)
-
-
-app.command()(sweep)
-app.command()(identify)
-app.command()(watch)
+for command in commands():
+    app.command()(command)
 app.command(cls=ExportCommand)(export)
 app.command("export-ssp")(export_ssp)
 

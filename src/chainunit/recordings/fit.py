@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from ...core.errors import RunError
-from .problem import OUTLIER, Comparison, Problem, SimulatedRun
+from ..core.errors import RunError
+from ..reading.text import difference_entry, entry
+from .plant import ANGLE
+from .problem import MARK_ANGLE, OUTLIER, Comparison, Problem, SimulatedRun
+from .unknown import Unknown
 
 MOST_ROUNDS = 60
 """Most rounds from a start to its end."""
@@ -307,3 +310,14 @@ def _next(problem: Problem, at: Normal, damping: float) -> Any:
         step[passing] = np.clip(z, low, high)[passing] - at.z[passing]
         moving &= ~passing
     return np.clip(at.z + step, low, high)
+
+
+def fitted_entries(problem: Problem, best: Normal) -> Iterator[tuple[Unknown, dict[str, Any]]]:
+    """Each unknown of a fit with its value and standard deviation as entries of a result. The angle of a run is
+    within a turn; that of the mark lies on both sides of 0."""
+    for unknown, x, s in zip(problem.unknowns, best.z, best.deviations, strict=True):
+        value, unit = float(x), unknown.unit
+        if unknown.is_nuisance and unknown.name.endswith(f".{ANGLE}") and unknown.name != MARK_ANGLE:
+            value %= 2.0 * math.pi
+        kind = "temperature" if unit == "K" else ""
+        yield unknown, {"value": entry(value, unit, kind), "deviation": difference_entry(float(s), unit)}

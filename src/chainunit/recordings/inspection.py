@@ -9,15 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from ...core.errors import InputError
-from ...core.messages import unit_behind
-from ...core.units import scale
-from ...study.arrays import rms, stretches
-from .measurands import COUNTS, MEASURANDS
+from ..core.errors import Faults, InputError
+from ..core.messages import unit_behind
+from ..core.units import scale
+from ..study.arrays import rms, stretches
+from .measurands import COUNTS, MEASURANDS, OFFSET_SHARE
 from .plant import MOVING
+from .problem import Problem, likeness, mark_times, speed_column
 from .problem import crank_speed as speed_at
-from .problem import mark_times, speed_column
-from .reading import OFFSET_SHARE
 from .recording import Recording, name_and_unit
 
 MISSING = 0.2
@@ -49,6 +48,9 @@ degree of a polynomial over the run that is taken off before, as a motor warms u
 OFFSETS, LIKE = 3.0, 0.5
 """Standard deviations of an offset up to which a mean may be that of an offset; and the correlation of a column with
 its simulated course that tells its sign."""
+WIDE, NEAR = 5.0, 1.2
+"""Factors by which the RMS of a column may differ from the simulated one: of a current, power or torque, which depend
+on the sought numbers; and of a speed or a voltage under control."""
 _ROWS_STUCK = 20
 OF_SPEED = ("motor.w", "crank.w", "motor.u")
 """Quantities whose sizes follow from the speed."""
@@ -73,6 +75,37 @@ class Expectation:
         any energy the mean may be that of an offset, and the course tells the sign."""
         clear = abs(mean) > OFFSETS * OFFSET_SHARE * size
         return mean < 0.0 and self.likeness < (LIKE if clear else -LIKE)
+
+
+def inspect_runs(problem: Problem, workers: int) -> None:
+    """Refuse recordings with faults; the sizes to expect are those of the drive at the start values. What needs no
+    simulation is told before it, as with a wrong unit of the time it has no end."""
+    faults, ratio = Faults(), problem.plant.ratio
+    for run in problem.runs:
+        reference = run.values.get("motor.w_ref")
+        speeds = [run.crank_speed, *(w / ratio for _, _, w in getattr(reference, "changes", ()))]
+        faults.add(inspect_motion(run.recording, (min(speeds), max(speeds)), ratio, run.off))
+    faults.refuse()
+    for run in problem.runs:
+        response = problem.simulated(run, problem.starts, workers)
+        expected, off = dict[str, Expectation](), np.inf if run.off is None else run.off
+        # of less than a turn the RMS is that of an angle
+        known = off - float(run.recording.time[0]) >= 2.0 * np.pi / run.crank_speed
+        has_angle = len(mark_times(run.recording)) > 0
+        for name in run.recording.columns if known else ():
+            rows = response.describes(name, response.time) & (response.time <= off)
+            if MEASURANDS[name].analog and rows.any():
+                size, factor = rms(response.values[name][rows]), NEAR if name in OF_SPEED else WIDE
+                words = f"{1.0 / factor:.2g} to {factor:g} times the simulated one"
+                like = likeness(run.recording, name, response) if has_angle else 0.0
+                expected[name] = Expectation(size / factor, size * factor, words, like)
+        faults.add(inspect_columns(run.recording, expected, run.off))
+    faults.refuse()
+    for run in problem.runs:
+        reference = run.values.get("motor.w_ref")
+        if not hasattr(reference, "changes"):
+            faults.add(inspect_steadiness(run.recording, ratio, run.off, reference is not None))
+    faults.refuse()
 
 
 def inspect_motion(

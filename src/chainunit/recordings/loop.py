@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from ...batch.transients import Transients, signal_table
-from ...study.drive import Drive
-from ...system.compiled_simulation import LONGEST, CompiledSystem
+from ..batch.transients import Transients, signal_table
+from ..study.drive import Drive
+from ..system.compiled_simulation import LONGEST, CompiledSystem
 
 
 @dataclass(frozen=True)

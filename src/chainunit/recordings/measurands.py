@@ -32,3 +32,15 @@ _ALL = (
 )
 MEASURANDS = {each.name: each for each in _ALL}
 """By name."""
+OF_TERMINALS = ("motor.i", "motor.u", "motor.power")
+"""Signals at the terminals of the motor."""
+SIGNALS = (*OF_TERMINALS, "crank.tau")
+"""Quantities that depend on the torque: a recording must have one."""
+OFFSET_SHARE = 0.05
+"""Standard deviation of the offset of a sensor of current or torque without another knowledge, in parts of the RMS of
+its column."""
+
+
+def usual_offset(name: str, size: float) -> float:
+    """Standard deviation of the usual offset of a sensor whose column has the RMS `size`; 0 for most quantities."""
+    return OFFSET_SHARE * size if name in ("motor.i", "crank.tau") else 0.0

@@ -13,11 +13,11 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from ...core.errors import InputError
-from ...drives.free_rotor import FreeRotor
-from ...machines.machine import Machine
-from ...study.drive import Drive
-from ...system.compiled_simulation import CompiledSystem
+from ..core.errors import InputError
+from ..drives.free_rotor import FreeRotor
+from ..machines.machine import Machine
+from ..study.drive import Drive
+from ..system.compiled_simulation import CompiledSystem
 from .loop import DirectedLoop, Piece
 from .measurands import COUNTS
 
@@ -111,7 +111,7 @@ class Response:
 
 
 class AnyPlant(Protocol):
-    """A plant, whose runs a `chainunit.capabilities.identification.problem.Problem` compares with recordings."""
+    """A plant, whose runs a `chainunit.recordings.problem.Problem` compares with recordings."""
 
     @property
     def ratio(self) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import uniform_filter1d
 
-from ...study.arrays import rms
+from ..study.arrays import rms
 from .measurands import COUNTS, MEASURANDS
 from .plant import ANGLE, CRANK, AnyPlant, Course, Nuisance, Overview, Response
 from .recording import Recording

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from ...core.errors import Faults, InputError, meant, near_name, printable
-from ...core.files import whole
-from ...core.units import must_be, of_other_kind, scale
-from ...reading.tables import decoded, file_bytes
-from .measurands import MEASURANDS, Measurand
+from ..core.errors import Faults, InputError, meant, near_name, printable
+from ..core.files import whole
+from ..core.units import must_be, of_other_kind, scale
+from ..reading.tables import decoded, file_bytes
+from .measurands import MEASURANDS, SIGNALS, Measurand
 
 FEWEST = 100
 """Fewest rows of a recording."""
@@ -181,6 +181,28 @@ def read_part(file: Path, names: Mapping[str, str], begin: float, end: float) ->
         count = part.columns["motor.count"]
         part = replace(part, columns={**part.columns, "motor.count": count - count[0]})
     return part
+
+
+def read_signal(file: Path, names: Mapping[str, str], begin: float, end: float) -> Recording:
+    """The rows of a recording from `begin` to `end` [s], with a column that depends on the torque.
+
+    Raises
+    ------
+    InputError
+        see `read_part`; and without such a column.
+    """
+    recording = read_part(file, names, begin, end)
+    if not recording.columns.keys() & set(SIGNALS):
+        others = recording.others
+        more = (
+            f"; its other heads are: {printable(', '.join(others))}{remedy('motor.i', others)}"
+            if others
+            else ""
+        )
+        raise InputError(
+            f"{file}: has no column that tells the torque; must have one of {', '.join(SIGNALS)}{more}"
+        )
+    return recording
 
 
 def _text(file: Path) -> str:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import f
 
-from ...core.messages import unit_behind
+from ..core.messages import unit_behind
 from .fit import Normal
 from .problem import Comparison, Problem
 from .unknown import Unknown

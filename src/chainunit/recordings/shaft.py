@@ -22,11 +22,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ...batch.evaluate import evaluate
-from ...core.errors import InputError, RunError
-from ...drives.free_rotor import FreeRotor
-from ...machines.machine import Machine
-from ...study.drive import Drive
+from ..batch.evaluate import evaluate
+from ..core.errors import InputError, RunError
+from ..drives.free_rotor import FreeRotor
+from ..machines.machine import Machine
+from ..study.drive import Drive
 from .measurands import COUNTS
 from .plant import ANGLE, CRANK, GUARD, Course, Nuisance, Overview, Response, SourcedLoop
 

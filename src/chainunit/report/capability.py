@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol, Self
 
 from ..study.capability import StudyCapability
+from ..study.config import Config
 from ..study.record import StudyRecord
 from ..study.registry import registered
 from .blocks import Block, Source
@@ -22,6 +23,24 @@ class Contents:
     heading: str
     blocks: Callable[[Source, StudyRecord], Iterator[Block]]
     pictures: tuple[str, ...] = ()
+
+
+class AnyStudy(Protocol):
+    """A study from Python, `chainunit.Study`, as a capability knows it."""
+
+    config: Config
+
+    def of_tables(self, tables: dict[str, Any], source: str) -> Self:
+        """A study of the same kind with other `tables` of a study file; paths in them are relative to `source`."""
+
+
+@dataclass(frozen=True)
+class StudyMethod:
+    """A method of `chainunit.Study`, which has the name of the function, and the class of its result, which is public
+    as ``chainunit.NAME``."""
+
+    method: Callable[..., Any]
+    result: type
 
 
 class Capability(StudyCapability):
@@ -43,6 +62,10 @@ class Capability(StudyCapability):
     def tasks(self) -> Mapping[str, Task[Any, Any]]:
         """Its commands, by name."""
         return {}
+
+    def study_methods(self) -> Iterable[StudyMethod]:
+        """Its methods of a study from Python."""
+        return ()
 
     def supplement(self, study: StudyRecord) -> Supplement | None:
         """Its additions to the machine in motion."""

@@ -10,12 +10,12 @@ from typing import Any, ClassVar, Generic, Self
 from ..core.errors import WriteError
 from ..core.files import whole
 from ..core.temporary_folders import in_temporary_folder
-from ..report import files, html, terminal
-from ..report.blocks import Report
-from ..report.task import Outcome, Question, Task
-from ..report.tasks import task_named
 from ..work.progress import Report as Progress
 from ..work.progress import quiet
+from . import files, html, terminal
+from .blocks import Report
+from .task import Outcome, Question, Task
+from .tasks import task_named
 
 
 class ReportedResult(Generic[Question, Outcome]):

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .console import carry_out, study_file, terminal_console
+from ...report.console import carry_out, study_file, terminal_console
 
 
 def identify(
@@ -21,10 +21,13 @@ def identify(
     recordings.
     """
     question = study_file(config)
-    from ..capabilities.identification.page import TASK
-    from ..capabilities.identification.result import outlook
+    from .page import TASK
+    from .result import outlook
 
     errors = terminal_console(stderr=True)
     carry_out(
         TASK, question, output, errors, told=lambda *before: errors.print(outlook(*before), soft_wrap=True)
     )
+
+
+COMMAND = identify

@@ -3,40 +3,34 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from ...core.errors import Faults, InputError, printable
-from ...core.temporary_folders import scratch
+from ...core.errors import Faults, InputError
 from ...drives.induction_motor import InductionMotor
+from ...recordings.fit import MOST_ROUNDS, Fit, fit
+from ...recordings.inspection import (
+    inspect_runs,
+)
+from ...recordings.measurands import MEASURANDS, OF_TERMINALS, SIGNALS, usual_offset
+from ...recordings.problem import Comparison, Problem, RecordedRun, Sensor
+from ...recordings.recorded_drive import drive_of, is_of_shaft, plant_for
+from ...recordings.recording import Recording, read_signal
+from ...recordings.residuals import ResidualCheck, Strain, check_residuals, strained_priors, strains
+from ...recordings.unknown import Unknown
 from ...study.arrays import rms
-from ...study.choice import choose
 from ...study.config import Config
 from ...study.drive import Drive
 from ...system import Profile
 from ...work.progress import Report, quiet
-from .fit import MOST_ROUNDS, Fit, fit
 from .information import Combination, Information, information
-from .inspection import OF_SPEED, Expectation, inspect_columns, inspect_motion, inspect_steadiness
-from .measurands import MEASURANDS
-from .plant import AnyPlant, Plant
 from .posterior import Posterior, posterior
-from .problem import Comparison, Problem, RecordedRun, Sensor, likeness, mark_times
-from .reading import OFFSET_SHARE, WITH_OFFSET, IdentificationPlan, PlannedRun, WatchPlan
-from .recording import Recording, read_part, remedy
-from .residuals import ResidualCheck, Strain, check_residuals, strained_priors, strains
-from .shaft import MEASURED, MeasuredShaft
-from .suspicion import Suspicion, suspicions
-from .unknown import Unknown
+from .reading import IdentificationPlan, PlannedRun
+from .score_tests import Suspicion, suspicions
 
-SIGNALS = ("motor.i", "motor.u", "motor.power", "crank.tau")
-"""Quantities of which a recording must have one: they tell the torque."""
-WIDE, NEAR = 5.0, 1.2
-"""Factors by which the RMS of a column may differ from the simulated one: of a current, power or torque, which depend
-on the sought numbers; and of a speed or a voltage under control."""
 CONTROL = ("speed_control.kp", "speed_control.ki", "current_control.kp", "current_control.ki")
 """Gains of the control of a motor, of which the course of its current depends."""
 AT_BOUND = 0.02
@@ -221,28 +215,6 @@ def plan_of(config: Config) -> IdentificationPlan:
     return plan
 
 
-def read_signal(of: PlannedRun | WatchPlan) -> Recording:
-    """The part of a recording that counts.
-
-    Raises
-    ------
-    InputError
-        see `read_part`; and where no column tells the torque.
-    """
-    recording = read_part(of.file, of.columns, of.begin, of.end)
-    if not recording.columns.keys() & set(SIGNALS):
-        others = recording.others
-        more = (
-            f"; its other heads are: {printable(', '.join(others))}{remedy('motor.i', others)}"
-            if others
-            else ""
-        )
-        raise InputError(
-            f"{of.file}: has no column that tells the torque; must have one of {', '.join(SIGNALS)}{more}"
-        )
-    return recording
-
-
 def read_runs(runs: Sequence[PlannedRun]) -> dict[str, Recording]:
     """The recordings by the names of the runs, each with the part that counts.
 
@@ -254,7 +226,7 @@ def read_runs(runs: Sequence[PlannedRun]) -> dict[str, Recording]:
     faults, recordings = Faults(), dict[str, Recording]()
     for run in runs:
         with faults.collected():
-            recording = read_signal(run)
+            recording = read_signal(run.file, run.columns, run.begin, run.end)
             begin, end = recording.time[0], recording.time[-1]
             if run.off is not None and not begin < run.off < end:
                 raise InputError(
@@ -283,19 +255,6 @@ def _same_rows(first: Recording, second: Recording) -> bool:
     return bool(common) and all(np.array_equal(first.columns[name], second.columns[name]) for name in common)
 
 
-def drive_of(config: Config, recordings: Mapping[str, Recording]) -> Drive:
-    """The drive of the study, tuned where the file does not give the gains of its control."""
-    of_motor = sorted({name for each in recordings.values() for name in each.columns if name in SIGNALS[:3]})
-    if of_motor and not (config.gives("motor") or config.plate is not None):
-        raise InputError(
-            f"motor: is missing, and the recordings have {', '.join(of_motor)}; add [motor] with its data, or "
-            "system.motor with a motor of the catalogue",
-            "motor",
-        )
-    with scratch() as folder:
-        return choose(config, folder, quiet).drive
-
-
 def _problem(
     config: Config, plan: IdentificationPlan, drive: Drive, recordings: Mapping[str, Recording]
 ) -> Problem:
@@ -305,17 +264,6 @@ def _problem(
     of_shaft = is_of_shaft(measured)
     runs = [_run(config, drive, run, recordings[run.name], of_shaft) for run in plan.runs]
     return Problem(plant, runs, sought, _sensors(plan, measured, recordings))
-
-
-def is_of_shaft(columns: Collection[str]) -> bool:
-    """Whether the columns are those of a machine whose motor is not recorded."""
-    return all(name in (*MEASURED, "mark") for name in columns)
-
-
-def plant_for(drive: Drive, columns: Collection[str], by: list[str]) -> AnyPlant:
-    """The plant that has these columns, with derivatives by these parameters and inputs of the system."""
-    measured = [name for name in columns if name != "mark"]
-    return MeasuredShaft(drive.machine, measured, by) if is_of_shaft(columns) else Plant(drive, measured, by)
 
 
 def _run(config: Config, drive: Drive, run: PlannedRun, recording: Recording, of_shaft: bool) -> RecordedRun:
@@ -349,42 +297,9 @@ def _sensors(
             continue
         own = plan.sensor(name)
         size = max(rms(each.columns[name]) for each in recordings.values() if name in each.columns)
-        usual = OFFSET_SHARE * size if name in WITH_OFFSET else 0.0
-        sensors[name] = Sensor(
-            own.noise, own.resolution, own.gain, usual if own.offset is None else own.offset
-        )
+        offset = usual_offset(name, size) if own.offset is None else own.offset
+        sensors[name] = Sensor(own.noise, own.resolution, own.gain, offset)
     return sensors
-
-
-def inspect_runs(problem: Problem, workers: int) -> None:
-    """Refuse recordings with faults; the sizes to expect are those of the drive at the start values. What needs no
-    simulation is told before it, as with a wrong unit of the time it has no end."""
-    faults, ratio = Faults(), problem.plant.ratio
-    for run in problem.runs:
-        reference = run.values.get("motor.w_ref")
-        speeds = [run.crank_speed, *(w / ratio for _, _, w in getattr(reference, "changes", ()))]
-        faults.add(inspect_motion(run.recording, (min(speeds), max(speeds)), ratio, run.off))
-    faults.refuse()
-    for run in problem.runs:
-        response = problem.simulated(run, problem.starts, workers)
-        expected, off = dict[str, Expectation](), np.inf if run.off is None else run.off
-        # of less than a turn the RMS is that of an angle
-        known = off - float(run.recording.time[0]) >= 2.0 * np.pi / run.crank_speed
-        has_angle = len(mark_times(run.recording)) > 0
-        for name in run.recording.columns if known else ():
-            rows = response.describes(name, response.time) & (response.time <= off)
-            if MEASURANDS[name].analog and rows.any():
-                size, factor = rms(response.values[name][rows]), NEAR if name in OF_SPEED else WIDE
-                words = f"{1.0 / factor:.2g} to {factor:g} times the simulated one"
-                like = likeness(run.recording, name, response) if has_angle else 0.0
-                expected[name] = Expectation(size / factor, size * factor, words, like)
-        faults.add(inspect_columns(run.recording, expected, run.off))
-    faults.refuse()
-    for run in problem.runs:
-        reference = run.values.get("motor.w_ref")
-        if not hasattr(reference, "changes"):
-            faults.add(inspect_steadiness(run.recording, ratio, run.off, reference is not None))
-    faults.refuse()
 
 
 def remarks(found: IdentifiedMachine) -> Iterator[str]:
@@ -415,7 +330,7 @@ def remarks(found: IdentifiedMachine) -> Iterator[str]:
                 f"{run.recording.source} has no mark: the angle of the crank follows from the course of the other "
                 "columns, and machines that are alike in both halves of a turn may be taken for each other"
             )
-    has_motor = bool(columns & set(SIGNALS[:3]))
+    has_motor = bool(columns & set(OF_TERMINALS))
     if has_motor and config.motor is not None and config.motor_type.follows(config.motor):
         tuned = [f"motor.{name}" for name in CONTROL if f"motor.{name}" not in config.given]
         if tuned:

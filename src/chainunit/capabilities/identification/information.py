@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from ...recordings.fit import Normal, inverse, normal
+from ...recordings.plant import CRANK
+from ...recordings.problem import Problem, RecordedRun
+from ...recordings.recording import Recording
 from ...system import Profile
-from .fit import Normal, inverse, normal
-from .plant import CRANK
-from .problem import Problem, RecordedRun
-from .recording import Recording
 
 TOLD = 0.5
 """Standard deviation by the runs alone, in parts of that of the prior, below which they tell a number."""

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ...core.files import whole
 from ...reading.text import shown_in
+from ...recordings.measurands import MEASURANDS
 from ...report import blocks as b
 from ...report import figure as fig
 from ...report.lines import Line, Name, line
@@ -14,7 +15,6 @@ from ...report.task import Task, Writer
 from ...study.config import Config
 from ...study.study_file import toml_text
 from .identification import IdentifiedMachine, identify
-from .measurands import MEASURANDS
 from .result import as_dict, identified_notes, identified_tables, sentences
 
 WRONG = "The model does not describe the recordings: these are not the numbers of the machine."

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2
 
-from .fit import Normal, inverse
-from .problem import OUTLIER, Problem
+from ...recordings.fit import Normal, inverse
+from ...recordings.problem import OUTLIER, Problem
 
 WIDE = 0.02
 """Standard deviation of a direction, in parts of that of its prior, from which on it counts as wide."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,19 +11,16 @@ import numpy as np
 
 from ... import __version__
 from ...core.messages import unit_behind
-from ...core.quantities import Layout
-from ...reading.text import array_entry, entry, shown_in
+from ...reading.text import array_entry, difference_entry, entry, shown_in
+from ...recordings.fit import fitted_entries
+from ...recordings.measurands import MEASURANDS
+from ...recordings.residuals import LOUD, ResidualCheck
+from ...study.capability import Estimates
+from ...study.registry import registered
 from ...study.study_file import changed_tables
-from .fit import Normal
 from .identification import FittedNumber, IdentifiedMachine, remarks, system_name
 from .information import Combination, Information, short_name
-from .measurands import MEASURANDS
-from .observation import false_imbalance, usual_loads
-from .plant import ANGLE
-from .problem import MARK_ANGLE, Problem
 from .reading import IdentificationPlan
-from .residuals import LOUD, ResidualCheck
-from .unknown import Unknown
 
 RESULT = "result.json"
 """Name of the file with the result."""
@@ -111,21 +108,16 @@ def _number(found: IdentifiedMachine, each: FittedNumber) -> dict[str, Any]:
         "told": each.is_told,
         "value": entry(each.value if each.is_told else None, unit, kind),
         "fitted": entry(each.fitted if each.is_told else None, unit, kind),
-        "deviation": _difference(each.deviation, unit),
+        "deviation": difference_entry(each.deviation, unit),
         "from": entry(each.low, unit, kind),
         "to": entry(each.high, unit, kind),
         "given": entry(own.start, unit, kind),
-        "given_deviation": _difference(own.spread, unit),
+        "given_deviation": difference_entry(own.spread, unit),
         "least": entry(own.low, unit, kind),
         "most": entry(own.high, unit, kind),
-        "expected": _difference(before.by_both, unit),
-        "by_runs": _difference(before.by_runs, unit),
+        "expected": difference_entry(before.by_both, unit),
+        "by_runs": difference_entry(before.by_runs, unit),
     }
-
-
-def _difference(x: float, unit: str) -> dict[str, Any]:
-    """The entry of a number that is no temperature itself, such as a standard deviation."""
-    return entry(x, unit, "difference" if unit == "K" else "")
 
 
 def _correlations(found: IdentifiedMachine) -> Iterator[dict[str, Any]]:
@@ -145,8 +137,8 @@ def _combination(found: IdentifiedMachine, each: Combination) -> dict[str, Any]:
         "text": str(each),
         "terms": dict(each.terms),
         # of temperatures, a sum is no temperature
-        "value": _difference(value, each.unit),
-        "deviation": _difference(deviation, each.unit),
+        "value": difference_entry(value, each.unit),
+        "deviation": difference_entry(deviation, each.unit),
     }
 
 
@@ -181,22 +173,6 @@ def _check(found: IdentifiedMachine, each: ResidualCheck) -> dict[str, Any]:
             {"order": entry(float(order), "1"), "amplitude": entry(size, unit)} for order, size in each.orders
         ],
     }
-
-
-def fitted_entries(problem: Problem, best: Normal) -> Iterator[tuple[Unknown, dict[str, Any]]]:
-    """Each unknown of a fit with its value and standard deviation as entries of a result. The angle of a run is
-    within a turn; that of the mark lies on both sides of 0."""
-    for unknown, x, s in zip(problem.unknowns, best.z, best.deviations, strict=True):
-        value, unit = float(x), unknown.unit
-        if unknown.is_nuisance and unknown.name.endswith(f".{ANGLE}") and unknown.name != MARK_ANGLE:
-            value %= 2.0 * math.pi
-        yield (
-            unknown,
-            {
-                "value": entry(value, unit, "temperature" if unit == "K" else ""),
-                "deviation": _difference(float(s), unit),
-            },
-        )
 
 
 def _courses(found: IdentifiedMachine, run: str) -> dict[str, Any]:
@@ -279,29 +255,15 @@ def sentences(found: IdentifiedMachine) -> list[str]:
 
 def identified_tables(found: IdentifiedMachine, folder: Path) -> dict[str, Any]:
     """The tables of the study with the fitted values, as a file in `folder` has them, beside the result of the
-    identification, by which a recording is watched. A number that the recordings do
-    not tell has its fitted value, too: only all of them together give the measured courses. A table [observer] has
-    the false imbalance that errors of the machine make."""
+    identification. A number that the recordings do not determine has its fitted value, too: only all of them together
+    give the measured courses. Other capabilities take the errors of the values into their tables."""
     values = {name: float(f"{each.fitted:.6g}") for name, each in found.estimates.items()}
     tables = changed_tables(found.config, values, "identified", folder)
     tables.pop("identify", None)
-    if "watch" in tables:
-        tables["watch"]["identification"] = RESULT
-    if "observer" in tables:
-        false = _false_imbalance(found, values)
-        tables["observer"] |= {name: float(f"{x:.4g}") for name, x in false.items()}
+    estimates = Estimates(values, found.covariance, RESULT)
+    for part in registered():
+        part.take_estimates(found.config, estimates, tables)
     return tables
-
-
-def _false_imbalance(found: IdentifiedMachine, values: Mapping[str, float]) -> dict[str, float]:
-    """The false imbalance of an observer of the machine with the fitted `values`, by its key in [observer]."""
-    config = found.config
-    loads = {name.removeprefix("feed."): x for name, x in values.items() if name.startswith("feed.")}
-    feed = Layout(type(config.feed)).from_names(loads, config.feed)
-    own = {name.removeprefix("machine."): x for name, x in values.items()}
-    names = [name.removeprefix("machine.") for name in found.estimates]
-    known = config.machine.by_name | own | usual_loads(feed)
-    return false_imbalance(known, names, found.covariance, config.run.crank_speed)
 
 
 def identified_notes(found: IdentifiedMachine) -> dict[str, str]:

@@ -17,9 +17,9 @@ import numpy as np
 
 from ...core.errors import RunError
 from ...core.messages import unit_behind
-from .fit import Normal, normal_of
-from .problem import Comparison, Problem
-from .unknown import Unknown
+from ...recordings.fit import Normal, normal_of
+from ...recordings.problem import Comparison, Problem
+from ...recordings.unknown import Unknown
 
 SUSPECTS = ("pin.w_smooth", "processing.v_smooth", "r", "l", "h", "e", "l1", "z", "web_share")
 """Numbers of a chain unit that may be wrong: its law of friction, its dimensions, and where the material lies."""

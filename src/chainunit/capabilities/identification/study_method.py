@@ -1,20 +1,21 @@
-"""`IdentificationResult` and `WatchResult`: an identified machine, and a watched recording, from Python."""
+"""`Study.identify`, and its result."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..study.config import Config
-from .results import ReportedResult
+from ...report.capability import AnyStudy
+from ...report.reported_result import ReportedResult
+from ...study.config import Config
+from ...work.progress import Report as Progress
+from .identification import IdentifiedMachine
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from ..capabilities.identification.identification import IdentifiedMachine
-    from ..capabilities.identification.watch import Alarm, WatchedRecording
 
-
-class IdentificationResult(ReportedResult[Config, "IdentifiedMachine"]):
+class IdentificationResult(ReportedResult[Config, IdentifiedMachine]):
     """An identified machine. Its `repr` shows the numbers and the limits of the recordings; `found` is all that the
     fit found."""
 
@@ -50,17 +51,23 @@ class IdentificationResult(ReportedResult[Config, "IdentifiedMachine"]):
         return pd.DataFrame.from_dict(rows, orient="index")
 
 
-class WatchResult(ReportedResult[Config, "WatchedRecording"]):
-    """A watched recording. Its `repr` shows the alarms; `watched` has the outputs of the observer at all rows."""
+def identify(
+    study: AnyStudy, folder: str | Path | None = None, progress: Progress | None = None
+) -> IdentificationResult:
+    """Identify the machine from recordings, as the table [identify] asks: two of a minute take some ten seconds.
 
-    _command = "watch"
+    Parameters
+    ----------
+    folder : the folder to which the files of ``chainunit identify -o`` are written
+    progress : as of `run`
 
-    @property
-    def watched(self) -> WatchedRecording:
-        """The alarms and the outputs of the observer at all rows."""
-        return self._outcome
-
-    @property
-    def alarms(self) -> tuple[Alarm, ...]:
-        """The alarms in order: side, begin, end and ground of each."""
-        return self.watched.alarms
+    Raises
+    ------
+    InputError
+        for a study without the table [identify], and with a line for each fault of the recordings.
+    RunError
+        where the fit does not end.
+    WriteError
+        for a file that cannot be written; the others are written.
+    """
+    return IdentificationResult.made(study.config, folder, progress)

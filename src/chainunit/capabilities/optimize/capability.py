@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from ...report.capability import Capability
+from ...report.capability import Capability, StudyMethod
 from ...report.task import Task
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
@@ -52,6 +52,12 @@ class OptimizeCapability(Capability):
         from . import page
 
         return {"optimize": page.TASK}
+
+    def study_methods(self) -> Iterable[StudyMethod]:
+        """Its method of a study from Python."""
+        from .study_method import BestResult, optimize
+
+        return (StudyMethod(optimize, BestResult),)
 
 
 CAPABILITY = OptimizeCapability()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from ...report.capability import Capability
+from ...report.capability import Capability, StudyMethod
 from ...report.task import Task
 from ...study.conditions import given, has_entries, has_entry, is_one_of
 from ...study.file_reading import FileReading
@@ -87,6 +87,12 @@ class SweepCapability(Capability):
         from . import page
 
         return {"sweep": page.TASK}
+
+    def study_methods(self) -> Iterable[StudyMethod]:
+        """Its method of a study from Python."""
+        from .study_method import SweepResult, sweep
+
+        return (StudyMethod(sweep, SweepResult),)
 
 
 CAPABILITY = SweepCapability()

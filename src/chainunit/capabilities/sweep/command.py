@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .console import carry_out, study_file
+from ...report.console import carry_out, study_file
 
 
 def sweep(
@@ -33,6 +33,9 @@ def sweep(
     was killed goes on from its store.
     """
     question = study_file(config)
-    from ..report.tasks import task_named
+    from .page import TASK
 
-    carry_out(task_named("sweep"), question, output, workers=workers, scheduler=scheduler)
+    carry_out(TASK, question, output, workers=workers, scheduler=scheduler)
+
+
+COMMAND = sweep

@@ -1,4 +1,4 @@
-"""`SweepResult`: the results of a sweep over parameters of a study, in Python."""
+"""`Study.sweep`, and its result."""
 
 from __future__ import annotations
 
@@ -6,17 +6,18 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..study.config import Config
-from .results import ReportedResult
+from ...report.capability import AnyStudy
+from ...report.reported_result import ReportedResult
+from ...study.config import Config
+from ...work.progress import Report as Progress
+from .summary import SweepSummary
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-    from ..capabilities.sweep.summary import SweepSummary
 
-
-class SweepResult(ReportedResult[Config, "SweepSummary"]):
+class SweepResult(ReportedResult[Config, SweepSummary]):
     """The results of a sweep. Its `repr` shows the size of the sweep, the best points and the extremes."""
 
     _command = "sweep"
@@ -46,3 +47,32 @@ class SweepResult(ReportedResult[Config, "SweepSummary"]):
     def file(self) -> Path:
         """The store of all points (Zarr), a folder."""
         return self.summary.findings.outcome.file
+
+
+def sweep(
+    study: AnyStudy,
+    folder: str | Path | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: Progress | None = None,
+) -> SweepResult:
+    """Run the sweep of the study, its table ``sweep``, as ``chainunit sweep`` does.
+
+    Parameters
+    ----------
+    folder : the folder with the store of all points and the report; a store that fits is continued. Without it
+        the store is in a temporary folder, which lasts as long as the result
+    workers : number of threads, or with measures of processes; by default one for each processor
+    scheduler : address of a Dask scheduler whose workers make the points, such as ``tcp://10.0.0.5:8786``
+    progress : as of `run`
+
+    Raises
+    ------
+    InputError
+        for a study without a sweep, and for a fault that only a run shows.
+    RunError
+        where a batch fails; earlier ones are in the store.
+    WriteError
+        for a file that cannot be written.
+    """
+    return SweepResult.made(study.config, folder, progress, workers=workers, scheduler=scheduler)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .console import carry_out, study_file
+from ...report.console import carry_out, study_file
 
 
 def watch(
@@ -19,6 +19,9 @@ def watch(
     Writes report.html, result.json, result.md and pictures into the output folder.
     """
     question = study_file(config)
-    from ..report.tasks import task_named
+    from .page import TASK
 
-    carry_out(task_named("watch"), question, output)
+    carry_out(TASK, question, output)
+
+
+COMMAND = watch

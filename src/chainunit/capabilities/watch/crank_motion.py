@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from ...core.errors import InputError
-from .measurands import COUNTS
-from .problem import crank_speed, mark_times
-from .recording import Recording
+from ...recordings.measurands import COUNTS
+from ...recordings.problem import crank_speed, mark_times
+from ...recordings.recording import Recording
 
 NEIGHBOURS = 4
 """Passes of the mark on both sides over which the instant of one is smoothed."""

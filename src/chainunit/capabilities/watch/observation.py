@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from ...core.quantities import Layout
 from ...drives.terminal_signals import TerminalSignals, terminal_signals
 from ...machines.load_observer import LoadObserver
 from ...study.arrays import rms
+from ...study.capability import Estimates
 from ...study.config import Config
 from ...study.cycle import cycle
 from ...study.drive import Drive
@@ -89,6 +91,16 @@ def tuning(table: ObserverTable, feed: Any, speed: float, torque: float) -> dict
         "imbalance.force_overload": table.force_overload,
         "alarm.rate": table.false_alarms,
     }
+
+
+def false_imbalance_of(config: Config, estimates: Estimates) -> dict[str, float]:
+    """The keys of the table [observer] with the false imbalance of an observer of the estimated machine."""
+    values = estimates.values
+    loads = {name.removeprefix("feed."): x for name, x in values.items() if name.startswith("feed.")}
+    feed = Layout(type(config.feed)).from_names(loads, config.feed)
+    own = {name.removeprefix("machine."): x for name, x in values.items()}
+    known = config.machine.by_name | own | usual_loads(feed)
+    return false_imbalance(known, list(own), estimates.covariance, config.run.crank_speed)
 
 
 def false_imbalance(

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 
 from ...reading.text import shown_in
+from ...recordings.residuals import LOUD
 from ...report import blocks as b
 from ...report import figure as fig
 from ...report.lines import Name, join, line
 from ...report.task import Task
 from ...study.config import Config
-from .residuals import LOUD
+from .result import as_dict
 from .watch import WatchedRecording, watch
-from .watch_result import as_dict
 
 PICTURES = ("loads.png", "imbalance.png")
 _USUAL = {

@@ -10,7 +10,7 @@ import numpy as np
 from ... import __version__
 from ...machines.load_observer import LoadObserver
 from ...reading.text import array_entry, entry, shown_in
-from .result import fitted_entries
+from ...recordings.fit import fitted_entries
 from .watch import GAP, OUTPUTS, Alarm, WatchedRecording, file_name
 
 ROWS = 1500

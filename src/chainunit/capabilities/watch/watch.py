@@ -19,26 +19,26 @@ from ...drives.terminal_signals import terminal_signals
 from ...fmu.backends import export
 from ...machines.load_observer import LoadObserver
 from ...reading.tables import instance
+from ...recordings.fit import Fit, fit
+from ...recordings.inspection import FEWEST_TURNS, constant_parts, inspect_runs
+from ...recordings.measurands import MEASURANDS, usual_offset
+from ...recordings.problem import MARK_ANGLE, Problem, RecordedRun, Sensor, speed_column
+from ...recordings.recorded_drive import drive_of, is_of_shaft, plant_for
+from ...recordings.recording import Recording, read_signal
+from ...recordings.residuals import ResidualCheck, Strain, check_residuals, strained_priors, strains
+from ...recordings.unknown import Unknown
 from ...study.arrays import rms, stretches
 from ...study.config import Config
 from ...study.drive import Drive
 from ...system.instance import Fmu, Instance
 from ...work.progress import Report, quiet
 from .crank_motion import crank_motion
-from .fit import Fit, fit
-from .identification import drive_of, inspect_runs, is_of_shaft, plant_for, read_signal
-from .inspection import FEWEST_TURNS, constant_parts
-from .measurands import MEASURANDS
 from .observation import false_imbalance, tuning, weights
 from .observer_table import ObserverTable
-from .problem import MARK_ANGLE, Problem, RecordedRun, Sensor, speed_column
-from .reading import OFFSET_SHARE, WITH_OFFSET, WatchPlan
-from .recording import Recording
-from .residuals import ResidualCheck, Strain, check_residuals, strained_priors, strains
-from .unknown import Unknown
+from .reading import WatchPlan
 
 RUN = "watch"
-OF_TERMINALS = {"current": "motor.i", "power": "motor.power"}
+COLUMN_OF = {"current": "motor.i", "power": "motor.power"}
 """By signal at the terminals of a motor, its column."""
 FORCE_SPREAD, MOST_FORCE = 200.0, 2000.0
 """Standard deviation and bound of a processing force that is learned [N]."""
@@ -168,7 +168,7 @@ def watch_plan_of(config: Config) -> WatchPlan:
     InputError
         for a study without the table [watch].
     """
-    plan: WatchPlan | None = config.plans["identification"].watch
+    plan: WatchPlan | None = config.plans["watch"].watch
     if plan is None:
         raise InputError("watch: is missing; add [watch] with the recording (file)", key="watch")
     return plan
@@ -244,7 +244,7 @@ def _files(plan: WatchPlan) -> tuple[Recording, MachineErrors | None]:
     """The recording, and the errors of the machine where the file of an identification has them."""
     faults, errors, found = Faults(), None, list[Recording]()
     with faults.collected():
-        found.append(read_signal(plan))
+        found.append(read_signal(plan.file, plan.columns, plan.begin, plan.end))
     if plan.identification is not None:
         with faults.collected():
             errors = _errors(plan.identification)
@@ -264,7 +264,7 @@ def _problem(config: Config, plan: WatchPlan, drive: Drive, recording: Recording
         else:
             sought.append(Unknown(full, "N", value, 0.0, MOST_FORCE, FORCE_SPREAD))
     sensors = {
-        name: Sensor(plan.noise, gain=plan.gain, offset=OFFSET_SHARE * rms(x) if name in WITH_OFFSET else 0.0)
+        name: Sensor(plan.noise, gain=plan.gain, offset=usual_offset(name, rms(x)))
         for name, x in recording.columns.items()
         if MEASURANDS[name].analog
     }
@@ -278,7 +278,7 @@ def _signals(recording: Recording) -> dict[str, str]:
     """By input of the observer, the column that feeds it."""
     if is_of_shaft(recording.columns):
         return {"torque": "crank.tau"}
-    return {name: column for name, column in OF_TERMINALS.items() if column in recording.columns}
+    return {name: column for name, column in COLUMN_OF.items() if column in recording.columns}
 
 
 def _parameters(
@@ -307,7 +307,7 @@ def _parameters(
         p, w = drive.fmu_parameters, plan.crank_speed * drive.ratio
         mean = float(np.mean(columns["motor.power"])) / w if "motor.power" in columns else 0.0
         signals = terminal_signals(drive.motor, p, w, mean, found[f"{RUN}.temperature"])
-        missing = [OF_TERMINALS[name] for name in signals.outputs if OF_TERMINALS[name] not in columns]
+        missing = [COLUMN_OF[name] for name in signals.outputs if COLUMN_OF[name] not in columns]
         if missing:
             raise InputError(
                 f"{recording.source}: the load of this motor is watched by {' and '.join(missing)}, too; record it"
@@ -319,7 +319,7 @@ def _parameters(
     layout = drive.machine.model.feed_layout
     feed = layout.from_names({name: found[f"machine.{name}"] for name in layout.names})
     table = replace(
-        config.plans["identification"].observer or instance(ObserverTable, {}),
+        config.plans["watch"].observer or instance(ObserverTable, {}),
         signal_noise=plan.noise * louder[0],
         speed_noise=plan.noise * louder[1],
         rate=1.0 / recording.step,

@@ -17,7 +17,7 @@ from ..core.errors import InputError, InterruptedRunError, RemarkWarning, printa
 from ..work import interrupts
 
 if TYPE_CHECKING:
-    from ..report.task import Outcome, Question, Task
+    from .task import Outcome, Question, Task
 
 
 def terminal_console(**options: Any) -> Console:
@@ -51,7 +51,7 @@ def carry_out(
             outcome = task.outcome(question, output, progress, **options)
         report = task.report(outcome)
         written, unwritten = task.write(outcome, report, output)
-        from ..report import terminal
+        from . import terminal
 
         console = terminal_console()
         has_remarks = task.tells_remarks and errors.is_terminal and console.is_terminal

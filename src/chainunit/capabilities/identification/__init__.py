@@ -1,0 +1,1 @@
+"""Identification: masses, friction and feed of a real machine from recordings of its motor."""

@@ -1,0 +1,1 @@
+"""Sweep: quantities of a turn and measures of runs over parameters of the study, at many points."""
