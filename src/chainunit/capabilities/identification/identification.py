@@ -205,7 +205,7 @@ def plan_of(config: Config) -> IdentificationPlan:
     InputError
         for a study without the table [identify].
     """
-    plan: IdentificationPlan | None = config.plans["identification"].identify
+    plan: IdentificationPlan | None = config.plans["identification"]
     if plan is None:
         raise InputError(
             "identify: is missing; add [[identify.run]] with the recordings, and [[identify.parameter]] with the "
