@@ -336,11 +336,11 @@ def test_a_motor_beside_the_torque_of_the_crank(tmp_path):
 def test_a_deviation_of_a_temperature_is_a_difference():
     """20 K are no -253 degC."""
     unknown = Unknown("motor.ambient.T", "K", 293.15, 250.0, 340.0, 5.0)
-    outlook = SimpleNamespace(name="motor.ambient.T", by_both=2.0, by_runs=3.0)
+    expected = SimpleNamespace(name="motor.ambient.T", by_both=2.0, by_runs=3.0)
     variable = SimpleNamespace(description="", unit="K", kind="temperature")
     found = SimpleNamespace(
         plan=SimpleNamespace(variables={"motor.ambient.T": variable}),
-        before=SimpleNamespace(outlooks=[outlook]),
+        information_at_start=SimpleNamespace(determinations=[expected]),
     )
     each = identification.FittedNumber(unknown, 300.0, 300.0, 2.0, 296.0, 304.0, True)
     own = _number(found, each)

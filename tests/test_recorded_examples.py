@@ -17,7 +17,7 @@ from chainunit.recordings.fit import fit
 from chainunit.recordings.plant import Plant
 from chainunit.recordings.problem import Problem, RecordedRun, Sensor, Unknown
 from chainunit.recordings.recording import read_recording
-from chainunit.recordings.residuals import check_residuals
+from chainunit.recordings.residuals import residual_tests
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 
@@ -74,7 +74,7 @@ def test_the_hidden_machine_is_identified():
             assert abs(found - true) < 0.03 * true, name
         elif name in ("pin.friction", "joint_damping"):
             assert abs(found - true) < 0.05 * true, name
-    assert all(each.is_noise and 0.97 < each.noise < 1.03 for each in check_residuals(best))
+    assert all(each.is_noise and 0.97 < each.noise < 1.03 for each in residual_tests(best))
 
 
 @pytest.mark.slow

@@ -23,15 +23,15 @@ TURNS = 5.0
 """Turns of the crank that are fitted first."""
 ROUGH = 1e-3
 """Expected decrease of the sum of squares of the first turns, in parts of it, below which their fit ends."""
-ALIKE = 1.005
+SAME_POINT = 1.005
 """Sums of squares that differ by less than this factor are those of the same point."""
 DAMPING = 1e-2
 """Damping of the first step, in parts of the information of the priors."""
-STATED = 100.0
+STATED_ROWS = 100.0
 """Number of rows that would tell the noise of a column as well as its sensor's data sheet does."""
 _MEDIAN = 0.455
 """Median of the square of a standard normal number."""
-SETTLINGS = 5
+MOST_SENSOR_STEPS = 5
 """Most steps of the unknowns of clocks and sensors without simulation."""
 NEAR = 1.5
 """Deviation of a column, in parts of its noise, from which on it counts by its noise."""
@@ -40,7 +40,7 @@ ENOUGH = 1e-2
 
 
 @dataclass(frozen=True)
-class Normal:
+class NormalEquations:
     """The `comparisons` at a point `z`, their sum of squares with that of the priors, its gradient, and the matrix of
     the normal equations: of the runs alone, `fisher`, and with the priors, `matrix`. By run and column, `weights` are
     factors on the residuals."""
@@ -54,7 +54,7 @@ class Normal:
     matrix: Any
 
     @cached_property
-    def shares(self) -> dict[tuple[str, str], float]:
+    def mean_squares(self) -> dict[tuple[str, str], float]:
         """The mean squares of the residuals by run and column."""
         return {(each.run, each.column): float(np.mean(each.residuals**2)) for each in self.comparisons}
 
@@ -79,19 +79,21 @@ Scales = Mapping[tuple[str, str], float]
 """By run and column, a factor on the standard deviation of the column."""
 
 
-def normal(problem: Problem, z: Any, workers: int = 2, scales: Scales | None = None) -> Normal:
+def normal_equations(
+    problem: Problem, z: Any, workers: int = 2, scales: Scales | None = None
+) -> NormalEquations:
     """The normal equations at these values of the unknowns. A residual that is an outlier counts less (Huber)."""
-    return normal_of(problem, z, tuple(problem.comparisons(z, workers)), scales)
+    return assemble(problem, z, tuple(problem.comparisons(z, workers)), scales)
 
 
-def normal_of(
+def assemble(
     problem: Problem, z: Any, comparisons: tuple[Comparison, ...], scales: Scales | None = None
-) -> Normal:
+) -> NormalEquations:
     """The same from the `comparisons` at these values."""
-    spread = problem.spreads
-    size = len(spread)
-    fisher, gradient = np.zeros((size, size)), (problem.starts - z) / spread**2
-    cost = float(np.sum(((z - problem.starts) / spread) ** 2))
+    deviations = problem.prior_deviations
+    size = len(deviations)
+    fisher, gradient = np.zeros((size, size)), (problem.start_values - z) / deviations**2
+    cost = float(np.sum(((z - problem.start_values) / deviations) ** 2))
     weights = {(c.run, c.column): 1.0 / (scales or {}).get((c.run, c.column), 1.0) for c in comparisons}
     for each in comparisons:
         factor = weights[each.run, each.column]
@@ -107,11 +109,13 @@ def normal_of(
         # the product of a matrix with itself costs half of that of two
         fisher[np.ix_(places, places)] += factor**2 * (slopes.T @ slopes)
         gradient[places] += factor**2 * (slopes.T @ (root * each.residuals))
-    return Normal(z, comparisons, weights, cost, gradient, fisher, fisher + np.diag(1.0 / spread**2))
+    return NormalEquations(
+        z, comparisons, weights, cost, gradient, fisher, fisher + np.diag(1.0 / deviations**2)
+    )
 
 
 @dataclass(frozen=True)
-class Fit(Normal):
+class Fit(NormalEquations):
     """The best fit, and the number of `rounds` that it took. `starts` is the number of points from which it was
     sought, and `agreeing` of them led to it."""
 
@@ -142,28 +146,28 @@ def fit(
     """
     counter = itertools.count(1)
 
-    def rounds_of(own: Problem) -> _Rounds:
-        return _Rounds(own, workers, lambda cost: report(next(counter), cost))
+    def rounds_of(own: Problem) -> _LevenbergMarquardt:
+        return _LevenbergMarquardt(own, workers, lambda cost: report(next(counter), cost))
 
     first, rng = _first_turns(problem), np.random.default_rng(seed)
-    z = problem.started(workers) if z is None else z
-    ends = list[Normal]()
+    z = problem.initial_point(workers) if z is None else z
+    ends = list[NormalEquations]()
     for k in range(starts if first is not problem or starts > 1 else 0):
         rounds = rounds_of(first)
         try:
-            near = _near(rounds, _random(problem, z, rng) if k else z)
-            ends.append(rounds.down(near, None, ROUGH))
+            near = _fit_roughly(rounds, _random_start(problem, z, rng) if k else z)
+            ends.append(rounds.minimize(near, None, ROUGH))
         except RunError:
             if starts == 1:
                 raise
     if ends:
         best = min(ends, key=lambda end: end.cost)
-        # what the clock does in the first turns tells nothing about the rest
-        z = np.where([".count." in u.name for u in problem.unknowns], problem.starts, best.z)
+        # the clock of the first turns says nothing about the rest
+        z = np.where([".count." in u.name for u in problem.unknowns], problem.start_values, best.z)
     rounds = rounds_of(problem)
-    whole = rounds.down(_near(rounds, z), None, 0.0)
-    whole = rounds.down(whole, _noises(whole), 0.0)
-    agreeing = sum(end.cost < ALIKE * best.cost for end in ends) if ends else 1
+    whole = rounds.minimize(_fit_roughly(rounds, z), None, 0.0)
+    whole = rounds.minimize(whole, _measured_noises(whole), 0.0)
+    agreeing = sum(end.cost < SAME_POINT * best.cost for end in ends) if ends else 1
     point = whole.z, whole.comparisons, whole.weights, whole.cost, whole.gradient, whole.fisher
     return Fit(*point, whole.matrix, next(counter) - 1, starts, agreeing)
 
@@ -181,85 +185,85 @@ def _first_turns(problem: Problem) -> Problem:
     return Problem(problem.plant, runs, problem.sought, problem.sensors)
 
 
-def _random(problem: Problem, z: Any, rng: Any) -> Any:
+def _random_start(problem: Problem, z: Any, rng: Any) -> Any:
     """A point with random values of the sought numbers in their bounds."""
     low, high = problem.bounds
     sought = ~np.array([u.is_nuisance for u in problem.unknowns])
-    random = np.clip(problem.starts + problem.spreads * rng.standard_normal(len(z)), low, high)
+    random = np.clip(problem.start_values + problem.prior_deviations * rng.standard_normal(len(z)), low, high)
     bounded = sought & np.isfinite(high - low)
     random[bounded] = rng.uniform(low[bounded], high[bounded])
     return np.where(sought, random, z)
 
 
-def _near(rounds: _Rounds, z: Any) -> Normal:
+def _fit_roughly(rounds: _LevenbergMarquardt, z: Any) -> NormalEquations:
     """From `z` on, the fit with columns that count by their deviations, until all deviate by their noise."""
-    best = rounds.at(z, None)
+    best = rounds.evaluate(z, None)
     while max((scales := _scales(best)).values()) > NEAR:
-        before = best.shares
-        best = rounds.down(best, scales, 0.02)
-        if all(best.shares[key] > 0.9 * share for key, share in before.items()):
+        before = best.mean_squares
+        best = rounds.minimize(best, scales, 0.02)
+        if all(best.mean_squares[key] > 0.9 * share for key, share in before.items()):
             break
-    return rounds.scaled(best, None)
+    return rounds.reweight(best, None)
 
 
-def _scales(at: Normal) -> dict[tuple[str, str], float]:
-    return {key: max(1.0, math.sqrt(share)) for key, share in at.shares.items()}
+def _scales(at: NormalEquations) -> dict[tuple[str, str], float]:
+    return {key: max(1.0, math.sqrt(share)) for key, share in at.mean_squares.items()}
 
 
-def _noises(at: Normal) -> dict[tuple[str, str], float]:
+def _measured_noises(at: NormalEquations) -> dict[tuple[str, str], float]:
     """The measured noise of each column in parts of the stated one, which counts as some rows. Outliers are those
     of noise of the median size."""
     noises = {}
     for each in at.comparisons:
         squares = each.residuals**2
         outlier = OUTLIER**2 * max(1.0, float(np.median(squares)) / _MEDIAN)
-        total = STATED + float(np.sum(np.minimum(squares, outlier)))
-        noises[each.run, each.column] = math.sqrt(total / (STATED + len(squares)))
+        total = STATED_ROWS + float(np.sum(np.minimum(squares, outlier)))
+        noises[each.run, each.column] = math.sqrt(total / (STATED_ROWS + len(squares)))
     return noises
 
 
-class _Rounds:
+class _LevenbergMarquardt:
     """The rounds of a fit, by Levenberg's and Marquardt's method."""
 
     def __init__(self, problem: Problem, workers: int, report: Callable[[float], None]) -> None:
         self._problem, self._workers, self._report, self._count = problem, workers, report, 0
         self._damping = DAMPING
 
-    def scaled(self, at: Normal, scales: Scales | None) -> Normal:
+    def reweight(self, at: NormalEquations, scales: Scales | None) -> NormalEquations:
         """The same point, with columns that count otherwise."""
-        return normal_of(self._problem, at.z, at.comparisons, scales)
+        return assemble(self._problem, at.z, at.comparisons, scales)
 
-    def at(self, z: Any, scales: Scales | None) -> Normal:
+    def evaluate(self, z: Any, scales: Scales | None) -> NormalEquations:
         """The normal equations at these values; those of clocks and sensors are the best."""
         self._count += 1
-        simulations = self._problem.simulations(z, self._workers)
-        z = _settled(self._problem, simulations, z, scales)
-        found = normal_of(self._problem, z, tuple(self._problem.compared(simulations, z)), scales)
-        self._report(found.cost)
-        return found
+        simulations = self._problem.simulate_all(z, self._workers)
+        z = _fit_sensors(self._problem, simulations, z, scales)
+        equations = assemble(self._problem, z, tuple(self._problem.compare(simulations, z)), scales)
+        self._report(equations.cost)
+        return equations
 
-    def _tried(self, z: Any, scales: Scales | None) -> Normal | None:
+    def _evaluate_if_possible(self, z: Any, scales: Scales | None) -> NormalEquations | None:
         """The normal equations at these values, or None where the machine does not run with them."""
         if self._count == MOST_ROUNDS:
             raise RunError(
                 f"the fit did not end in {MOST_ROUNDS} rounds; start nearer, or give narrower bounds"
             )
         try:
-            return self.at(z, scales)
+            return self.evaluate(z, scales)
         except RunError:
             return None
 
-    def down(self, best: Normal, scales: Scales | None, enough: float) -> Normal:
+    def minimize(self, best: NormalEquations, scales: Scales | None, enough: float) -> NormalEquations:
         """The least sum of squares, up to the share `enough` of it."""
         problem, growth = self._problem, 2.0
-        best = self.scaled(best, scales)
+        best = self.reweight(best, scales)
         while self._damping < 1e12:
-            z = _next(problem, best, self._damping)
+            z = _next_point(problem, best, self._damping)
             step = z - best.z
             expected = float(2.0 * step @ best.gradient - step @ best.matrix @ step)
             if expected < max(ENOUGH, enough * best.cost):
                 return best
-            trial = self._tried(z, scales)
+            trial = self._evaluate_if_possible(z, scales)
             gain = best.cost - trial.cost if trial else 0.0
             if trial and gain > 0.0:
                 # the damping follows the agreement with the expected gain (Nielsen)
@@ -271,12 +275,12 @@ class _Rounds:
         return best
 
 
-def _settled(problem: Problem, simulations: Sequence[SimulatedRun], z: Any, scales: Scales | None) -> Any:
+def _fit_sensors(problem: Problem, simulations: Sequence[SimulatedRun], z: Any, scales: Scales | None) -> Any:
     """The values with those of clocks and sensors that fit best, without another simulation."""
-    own = ~problem.simulated_with
+    own = ~problem.needs_simulation
     best = None
-    for _ in range(SETTLINGS):
-        at = normal_of(problem, z, tuple(problem.compared(simulations, z, with_slopes=False)), scales)
+    for _ in range(MOST_SENSOR_STEPS):
+        at = assemble(problem, z, tuple(problem.compare(simulations, z, with_slopes=False)), scales)
         if best is not None and at.cost >= best.cost:
             break
         best, step = at, np.zeros(len(z))
@@ -294,11 +298,13 @@ def _solve(matrix: Any, gradient: Any) -> Any:
     return scale * np.linalg.solve(matrix * np.outer(scale, scale), scale * gradient)
 
 
-def _next(problem: Problem, at: Normal, damping: float) -> Any:
+def _next_point(problem: Problem, at: NormalEquations, damping: float) -> Any:
     """The next point. Unknowns that would pass a bound stop there, and the others follow."""
     low, high = problem.bounds
     step, moving = np.zeros(len(at.z)), np.ones(len(at.z), bool)
-    damped = at.matrix + np.diag(np.where(problem.simulated_with, damping / problem.spreads**2, 0.0))
+    damped = at.matrix + np.diag(
+        np.where(problem.needs_simulation, damping / problem.prior_deviations**2, 0.0)
+    )
     for _ in range(len(at.z)):
         # those that have stopped change the gradient of the others
         gradient = at.gradient[moving] - at.matrix[np.ix_(moving, ~moving)] @ step[~moving]
@@ -312,7 +318,7 @@ def _next(problem: Problem, at: Normal, damping: float) -> Any:
     return np.clip(at.z + step, low, high)
 
 
-def fitted_entries(problem: Problem, best: Normal) -> Iterator[tuple[Unknown, dict[str, Any]]]:
+def fitted_entries(problem: Problem, best: NormalEquations) -> Iterator[tuple[Unknown, dict[str, Any]]]:
     """Each unknown of a fit with its value and standard deviation as entries of a result. The angle of a run is
     within a turn; that of the mark lies on both sides of 0."""
     for unknown, x, s in zip(problem.unknowns, best.z, best.deviations, strict=True):

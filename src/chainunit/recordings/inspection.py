@@ -15,8 +15,7 @@ from ..core.units import scale
 from ..study.arrays import rms, stretches
 from .measurands import COUNTS, MEASURANDS, OFFSET_SHARE
 from .plant import MOVING
-from .problem import Problem, likeness, mark_times, speed_column
-from .problem import crank_speed as speed_at
+from .problem import Problem, likeness, mark_times, measured_speed, speed_column
 from .recording import Recording, name_and_unit
 
 MISSING = 0.2
@@ -87,7 +86,7 @@ def inspect_runs(problem: Problem, workers: int) -> None:
         faults.add(inspect_motion(run.recording, (min(speeds), max(speeds)), ratio, run.off))
     faults.refuse()
     for run in problem.runs:
-        response = problem.simulated(run, problem.starts, workers)
+        response = problem.simulate(run, problem.start_values, workers)
         expected, off = dict[str, Expectation](), np.inf if run.off is None else run.off
         # of less than a turn the RMS is that of an angle
         known = off - float(run.recording.time[0]) >= 2.0 * np.pi / run.crank_speed
@@ -198,7 +197,7 @@ def _turns(recording: Recording, ratio: float) -> tuple[str, Any]:
         turned = recording.columns["motor.count"] / (COUNTS * ratio)
         turned = np.maximum.accumulate(turned - turned[0])
         return "motor.count", np.interp(np.arange(0.0, turned[-1]), turned, time)
-    speed = speed_at(recording, ratio)
+    speed = measured_speed(recording, ratio)
     if speed is None:
         return "", np.zeros(0)
     turned = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(time))]) / (
@@ -295,7 +294,7 @@ def _marks(recording: Recording, speeds: tuple[float, float], ratio: float) -> I
     """That the marks are not those of the turns. The speed is that of the run, or the measured one."""
     if "mark" not in recording.columns or len(recording.time) < 2:
         return
-    own = speed_at(recording, ratio)
+    own = measured_speed(recording, ratio)
     known = [*speeds, *([] if own is None else [float(np.mean(own))])]
     seen = recording.step * len(recording.time) / (2.0 * math.pi)
     passes, rows = int(np.sum(recording.columns["mark"] > 0.5)), len(recording.time)

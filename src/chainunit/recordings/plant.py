@@ -37,13 +37,13 @@ MOVING = ("motor.w", "motor.count", "crank.tau", "crank.w", CRANK)
 
 
 class Nuisance(NamedTuple):
-    """A number that a plant needs of each run: its start value with standard deviation `spread`, the change for which
+    """A number that a plant needs of each run: its start value with its standard deviation, the change for which
     derivatives are integrated, and its lower bound."""
 
     name: str
     unit: str
     start: float
-    spread: float
+    prior_deviation: float
     change: float
     low: float = -math.inf
 
@@ -63,7 +63,7 @@ class Overview:
 
 
 @dataclass(frozen=True)
-class Course:
+class Scenario:
     """How a run goes: the values of parameters and inputs of the system by full name, those of inputs also as
     `Profile`; the nuisances of the run by name; the speed of the crank with which it begins [rad/s]; the times of the
     first and the last row, the time between rows of a simulation, the times at which something was measured [s],
@@ -122,7 +122,7 @@ class AnyPlant(Protocol):
         """The machine."""
 
     @property
-    def slips(self) -> bool:
+    def may_advance(self) -> bool:
         """Whether a simulated machine may get ahead of the recorded one."""
 
     def with_names(self, by: Sequence[str]) -> AnyPlant:
@@ -132,13 +132,13 @@ class AnyPlant(Protocol):
         """The numbers that it needs of a run beside the values of parameters and inputs."""
 
     def respond(
-        self, course: Course, directions: Mapping[str, tuple[str, float]], workers: int = 1
+        self, scenario: Scenario, directions: Mapping[str, tuple[str, float]], workers: int = 1
     ) -> Response:
         """Simulate a run.
 
         Parameters
         ----------
-        course : how the run goes
+        scenario : how the run goes
         directions : by any name, what changes, and by how much: a sought quantity or a nuisance. The slopes are
             derivatives by a change of this size, which should be one that matters.
 
@@ -225,7 +225,7 @@ class Plant:
         for a quantity that this drive does not have, a drive with a foreign FMU, and where there is no C compiler.
     """
 
-    slips = True
+    may_advance = True
 
     def __init__(self, drive: Drive, measured: Sequence[str], by: Sequence[str]) -> None:
         self._loop = SourcedLoop(drive, measured, by)
@@ -260,30 +260,30 @@ class Plant:
             yield Nuisance(OFF, "s", run.off, OFF_SPREAD, OFF_SPREAD)
 
     def respond(
-        self, course: Course, directions: Mapping[str, tuple[str, float]], workers: int = 1
+        self, scenario: Scenario, directions: Mapping[str, tuple[str, float]], workers: int = 1
     ) -> Response:
         """Simulate a run; the slopes are derivatives by changes of the size of the `directions`."""
         loop, changes = self._loop, list(directions.values())
-        speed, lead = course.crank_speed * self.ratio, course.begin - LEAD
-        angle = course.nuisances[ANGLE] * self.ratio - speed * LEAD
-        start = loop.start(course.values, {"motor.phi_start": angle, "motor.w_start": speed}, lead)
-        start[self._temperature] = course.nuisances[TEMPERATURE]
+        speed, lead = scenario.crank_speed * self.ratio, scenario.begin - LEAD
+        angle = scenario.nuisances[ANGLE] * self.ratio - speed * LEAD
+        start = loop.start(scenario.values, {"motor.phi_start": angle, "motor.w_start": speed}, lead)
+        start[self._temperature] = scenario.nuisances[TEMPERATURE]
         turned = {"motor.phi": (ANGLE, self.ratio), self._temperature: (TEMPERATURE, 1.0)}
         states = {name: np.array([x, *(0.0 for _ in changes)]) for name, x in start.items()}
         for state, (nuisance, factor) in turned.items():
             states[state][1:] = [size * factor * (name == nuisance) for name, size in changes]
-        switched = course.off is not None and course.off + GUARD < course.end
-        off = course.nuisances[OFF] if switched else course.end
-        powered = loop.run(course.values, states, changes, (lead, off), course.step, workers)
-        first = int(np.searchsorted(powered.time, course.begin - course.step))
+        switched = scenario.off is not None and scenario.off + GUARD < scenario.end
+        off = scenario.nuisances[OFF] if switched else scenario.end
+        powered = loop.run(scenario.values, states, changes, (lead, off), scenario.step, workers)
+        first = int(np.searchsorted(powered.time, scenario.begin - scenario.step))
         response = loop.response(powered, first)
-        if course.off is None or not switched:
+        if scenario.off is None or not switched:
             return response
-        rolling = self._switched_off(course, powered, changes, (off, course.end), workers)
-        return _joined(response, self._free.response(rolling), course.off)
+        rolling = self._switched_off(scenario, powered, changes, (off, scenario.end), workers)
+        return _joined(response, self._free.response(rolling), scenario.off)
 
     def _switched_off(
-        self, course: Course, powered: Piece, changes: Sequence[tuple[str, float]],
+        self, scenario: Scenario, powered: Piece, changes: Sequence[tuple[str, float]],
         span: tuple[float, float], workers: int,
     ) -> Piece:  # fmt: skip
         """The run from the time on at which the motor is switched off."""
@@ -291,10 +291,10 @@ class Plant:
         states = {name: powered.states[name].copy() for name in free.states}
         # later by dt, the speed has changed by the former acceleration, and not yet by the new one
         now = {name: x[:1] for name, x in states.items()}
-        then = free.run(course.values, now, [], (span[0], span[0]), course.step)
+        then = free.run(scenario.values, now, [], (span[0], span[0]), scenario.step)
         fall = powered.values["motor.a"][-1] - then.values["motor.a"][0]
         states["motor.w"][1:] += [size * fall * (name == OFF) for name, size in changes]
-        return free.run(course.values, states, changes, span, course.step, workers)
+        return free.run(scenario.values, states, changes, span, scenario.step, workers)
 
 
 def _joined(powered: Response, rolling: Response, off: float) -> Response:

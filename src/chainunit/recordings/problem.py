@@ -14,7 +14,7 @@ from scipy.ndimage import uniform_filter1d
 
 from ..study.arrays import rms
 from .measurands import COUNTS, MEASURANDS
-from .plant import ANGLE, CRANK, AnyPlant, Course, Nuisance, Overview, Response
+from .plant import ANGLE, CRANK, AnyPlant, Nuisance, Overview, Response, Scenario
 from .recording import Recording
 from .unknown import Unknown
 
@@ -26,7 +26,7 @@ STEP = 2e-3
 """Time between the rows of a simulation [s], between which it is interpolated."""
 ANGLES, TURNS = 24, 3.0
 """Number of crank angles at which a run without marks is tried, and the turns that are tried."""
-ORDERS, SLIP = (1, 2, 3), 1e4
+ADVANCE_ORDERS, ADVANCE = (1, 2, 3), 1e4
 """Orders of a polynomial over the run by which the machine may be ahead of the simulated one, and its size in counts
 of the encoder. The mean speed depends on the frequency of the supply and on the warming of the motor, to which the
 count is far more sensitive than any other column; within a turn it shows the motion."""
@@ -95,7 +95,7 @@ class SimulatedRun:
         self.run, self.response, self.names, self._sizes = run, response, tuple(names), sizes
         self._courses = dict[tuple[str, int], CubicSpline]()
 
-    def sampled(self, name: str, at: Any, with_slopes: bool = True) -> tuple[Any, Any, Any]:
+    def interpolate(self, name: str, at: Any, with_slopes: bool = True) -> tuple[Any, Any, Any]:
         """A simulated quantity at the times `at` [s], shape (n,), its derivatives by `names`, shape (n, names), and
         by time. Before the first and behind the last simulated time it stands."""
         response = self.response
@@ -137,27 +137,27 @@ class Problem:
         self.sensors = {name: sensors.get(name, Sensor()) for run in runs for name in run.recording.columns}
         self.unknowns = (
             *self.sought,
-            *self._of_sensors(),
-            *(u for run in self.runs for u in self._of_run(run)),
+            *self._sensor_unknowns(),
+            *(u for run in self.runs for u in self._run_unknowns(run)),
         )
         self.place = {unknown.name: k for k, unknown in enumerate(self.unknowns)}
 
     @property
-    def starts(self) -> Any:
+    def start_values(self) -> Any:
         """The start values, shape (unknowns,)."""
         return np.array([u.start for u in self.unknowns])
 
     @property
-    def spreads(self) -> Any:
+    def prior_deviations(self) -> Any:
         """The standard deviations of the priors, shape (unknowns,)."""
-        return np.array([u.spread for u in self.unknowns])
+        return np.array([u.prior_deviation for u in self.unknowns])
 
     @cached_property
     def bounds(self) -> tuple[Any, Any]:
         """Lower and upper bounds, each of shape (unknowns,)."""
         return np.array([u.low for u in self.unknowns]), np.array([u.high for u in self.unknowns])
 
-    def _of_sensors(self) -> Iterator[Unknown]:
+    def _sensor_unknowns(self) -> Iterator[Unknown]:
         """What the runs have in common: the gains of sensors, and the angle of the mark."""
         for name, sensor in self.sensors.items():
             if sensor.gain:
@@ -166,7 +166,7 @@ class Problem:
             # the mark is near the crank angle 0, at most a twentieth of a turn beside it
             yield _nuisance(MARK_ANGLE, "rad", 0.0, 0.2)
 
-    def _of_run(self, run: RecordedRun) -> Iterator[Unknown]:
+    def _run_unknowns(self, run: RecordedRun) -> Iterator[Unknown]:
         columns = run.recording.columns
         for each in self._nuisances(run):
             yield Unknown(
@@ -175,15 +175,15 @@ class Problem:
                 each.start,
                 each.low,
                 math.inf,
-                each.spread,
+                each.prior_deviation,
                 is_nuisance=True,
             )
         if "mark" in columns or "motor.count" in columns:
             yield _nuisance(f"{run.name}.drift", "1", 0.0, 5e-5)
         if "motor.count" in columns:
             yield _nuisance(f"{run.name}.count", "1", 0.0, 3.0)
-            if self.plant.slips:
-                yield from (_nuisance(f"{run.name}.count.{k}", "1", 0.0, SLIP) for k in ORDERS)
+            if self.plant.may_advance:
+                yield from (_nuisance(f"{run.name}.count.{k}", "1", 0.0, ADVANCE) for k in ADVANCE_ORDERS)
         for name in columns:
             if MEASURANDS[name].analog and self.sensors[name].offset:
                 yield _nuisance(
@@ -192,15 +192,15 @@ class Problem:
 
     def _nuisances(self, run: RecordedRun) -> Iterator[Nuisance]:
         """What the plant needs of a run."""
-        time, speed, passed = run.recording.time, speed_of(run, self.plant.ratio), mark_times(run.recording)
+        time, speed, passed = run.recording.time, mean_speed(run, self.plant.ratio), mark_times(run.recording)
         angle = -speed * float(passed[0] - time[0]) if len(passed) else 0.0
         overview = Overview(angle, speed, run.ambient, float(time[0]), float(time[-1]), run.off)
         return self.plant.nuisances(overview)
 
-    def started(self, workers: int = 2) -> Any:
+    def initial_point(self, workers: int = 2) -> Any:
         """The start values, shape (unknowns,), with the crank angle of each run without marks at which the course of
         its analog columns is most like the simulated one."""
-        z = self.starts
+        z = self.start_values
         for run in self.runs:
             if not len(mark_times(run.recording)):
                 turns = TURNS * 2.0 * math.pi / run.crank_speed
@@ -216,7 +216,7 @@ class Problem:
 
     def _likeness(self, run: RecordedRun, value: Mapping[str, float], workers: int) -> float:
         """The sum of the correlations of measured and simulated columns."""
-        response = self.plant.respond(self._course(run, value), {}, workers)
+        response = self.plant.respond(self._scenario(run, value), {}, workers)
         return sum(likeness(run.recording, name, response) for name in run.recording.columns)
 
     def thinned(self, step: float) -> Problem:
@@ -234,7 +234,7 @@ class Problem:
         return Problem(self.plant, runs, self.sought, self.sensors)
 
     @cached_property
-    def simulated_with(self) -> Any:
+    def needs_simulation(self) -> Any:
         """Whether a change of the unknown needs another simulation, shape (unknowns,). The others are those of clocks
         and sensors."""
         own = {f"{run.name}.{each.name}" for run in self.runs for each in self._nuisances(run)}
@@ -242,118 +242,152 @@ class Problem:
 
     def comparisons(self, z: Any, workers: int = 2) -> Iterator[Comparison]:
         """The comparisons of all runs with the values `z` of the unknowns, shape (unknowns,)."""
-        yield from self.compared(self.simulations(z, workers), z)
+        yield from self.compare(self.simulate_all(z, workers), z)
 
-    def simulations(self, z: Any, workers: int = 2) -> list[SimulatedRun]:
+    def simulate_all(self, z: Any, workers: int = 2) -> list[SimulatedRun]:
         """All runs, simulated with the values `z` of the unknowns, shape (unknowns,)."""
-        return [self._simulation(run, self._values(z), workers) for run in self.runs]
+        return [self._simulate(run, self._values(z), workers) for run in self.runs]
 
-    def compared(
+    def compare(
         self, simulations: Iterable[SimulatedRun], z: Any, with_slopes: bool = True
     ) -> Iterator[Comparison]:
         """The comparisons of simulated runs with the values `z` of clocks and sensors; without slopes, with the
         derivatives by clocks and sensors alone."""
         value = self._values(z)
         for each in simulations:
-            yield from self._compared(each, value, with_slopes)
+            yield from self._compare_columns(each, value, with_slopes)
 
     def _values(self, z: Any) -> dict[str, float]:
         return {u.name: float(x) for u, x in zip(self.unknowns, z, strict=True)}
 
-    def _course(self, run: RecordedRun, value: Mapping[str, float]) -> Course:
+    def _scenario(self, run: RecordedRun, value: Mapping[str, float]) -> Scenario:
         """How the run goes with these values of the unknowns."""
         recording = run.recording
         begin, end = float(recording.time[0]), float(recording.time[-1])
         # the clock of the logger may be wrong by a ten-thousandth
-        ahead = self._clock(run, np.array([end]), value)[0][0] - end
+        ahead = self._simulation_times(run, np.array([end]), value)[0][0] - end
         part = AHEAD if "motor.count" in recording.columns else 1e-3
         margin = 2.0 * recording.step + part * (end - begin) + max(0.0, float(ahead))
-        return Course(
+        return Scenario(
             {u.name: value[u.name] + run.added.get(u.name, 0.0) for u in self.sought} | dict(run.values),
             {each.name: value[f"{run.name}.{each.name}"] for each in self._nuisances(run)},
             run.crank_speed,
             begin,
             end + margin,
             STEP,
-            self._clock(run, np.union1d(recording.time, mark_times(recording)), value)[0],
+            self._simulation_times(run, np.union1d(recording.time, mark_times(recording)), value)[0],
             run.off,
         )
 
-    def _simulation(self, run: RecordedRun, value: Mapping[str, float], workers: int) -> SimulatedRun:
+    def _simulate(self, run: RecordedRun, value: Mapping[str, float], workers: int) -> SimulatedRun:
         free = [u for u in self.sought if u.name not in run.values]
-        directions = {u.name: (u.name, _CHANGE * u.spread) for u in free}
+        directions = {u.name: (u.name, _CHANGE * u.prior_deviation) for u in free}
         directions |= {f"{run.name}.{each.name}": (each.name, each.change) for each in self._nuisances(run)}
-        response = self.plant.respond(self._course(run, value), directions, workers)
+        response = self.plant.respond(self._scenario(run, value), directions, workers)
         return SimulatedRun(run, response, list(directions), [size for _, size in directions.values()])
 
-    def simulated(self, run: RecordedRun, z: Any, workers: int = 2) -> Response:
+    def simulate(self, run: RecordedRun, z: Any, workers: int = 2) -> Response:
         """The course of a run with these values of the unknowns, shape (unknowns,), without derivatives."""
-        return self.plant.respond(self._course(run, self._values(z)), {}, workers)
+        return self.plant.respond(self._scenario(run, self._values(z)), {}, workers)
 
-    def _clock(self, run: RecordedRun, at: Any, value: Mapping[str, float]) -> tuple[Any, dict[str, Any]]:
+    def _simulation_times(
+        self, run: RecordedRun, at: Any, value: Mapping[str, float]
+    ) -> tuple[Any, dict[str, Any]]:
         """The times of the simulation that belong to times of the logger, and their derivatives by unknowns."""
         begin, end = float(run.recording.time[0]), float(run.recording.time[-1])
         since = at - begin
         rates = {f"{run.name}.drift": since}
         part, counts = since / (end - begin), run.crank_speed * self.plant.ratio * COUNTS / (2.0 * math.pi)
-        rates |= {f"{run.name}.count.{k}": part**k / counts for k in ORDERS}
+        rates |= {f"{run.name}.count.{k}": part**k / counts for k in ADVANCE_ORDERS}
         rates = {name: rate for name, rate in rates.items() if name in self.place}
         return at + sum(value[name] * rate for name, rate in rates.items()), rates
 
-    def _compared(
+    def _compare_columns(
         self, simulation: SimulatedRun, value: Mapping[str, float], with_slopes: bool
     ) -> Iterator[Comparison]:
         """Measured over simulated, column by column."""
         run, response = simulation.run, simulation.response
         recording, names = run.recording, simulation.names if with_slopes else ()
-        time, rates = self._clock(run, recording.time, value)
+        time, rates = self._simulation_times(run, recording.time, value)
         angle = np.interp(time, response.time, response.values[CRANK])
         for name, y in recording.columns.items():
             if name == "mark":
-                passed = mark_times(recording)
-                passed = passed[response.describes(name, passed)]
-                if len(passed) < 2:
-                    continue
-                at, sooner = self._clock(run, passed, value)
-                x, slopes, rate = simulation.sampled(CRANK, at, with_slopes)
-                size = speed_of(run, self.plant.ratio) * recording.step / math.sqrt(12.0)
-                off = (x - value[MARK_ANGLE] + math.pi) % (2.0 * math.pi) - math.pi
-                more = {key: rate * each for key, each in sooner.items()} | {MARK_ANGLE: -np.ones(len(x))}
-                yield self._comparison(run, name, -off / size, slopes / size, names, more, x, size)
+                yield from self._compare_marks(simulation, value, with_slopes)
                 continue
-            x, slopes, rate = simulation.sampled(name, time, with_slopes)
-            more = {key: rate * each for key, each in rates.items()}
-            if name == "motor.count":
-                size = math.hypot(
-                    math.sqrt(1.0 / 12.0), JITTER * float(np.sum(np.abs(np.diff(y)))) / np.ptp(recording.time)
-                )
-                more[f"{run.name}.count"] = np.ones(len(x))
-                # it counts from the first row on, and rounds down
-                x, slopes = x - x[0] + value[f"{run.name}.count"] - 0.5, slopes - slopes[0]
-            else:
-                sensor, gain, offset = self.sensors[name], f"gain({name})", f"{run.name}.offset({name})"
-                size = math.hypot(sensor.noise * rms(y), sensor.resolution / math.sqrt(12.0))
-                if gain in self.place:
-                    more = {key: each * value[gain] for key, each in more.items()} | {gain: x}
-                    x, slopes = x * value[gain], slopes * value[gain]
-                if offset in self.place:
-                    more[offset] = np.ones(len(x))
-                    x = x + value[offset]
+            x, slopes, rate = simulation.interpolate(name, time, with_slopes)
+            by_clock = {key: rate * each for key, each in rates.items()}
+            shown = self._count if name == "motor.count" else self._sensor
+            x, slopes, further, size = shown(run, name, x, slopes, by_clock, value)
             rows = response.describes(name, recording.time)
             if rows.any():
-                own = {key: each[rows] for key, each in more.items()}
+                further = {key: each[rows] for key, each in further.items()}
                 residuals = (y - x)[rows] / size
                 yield self._comparison(
-                    run, name, residuals, slopes[rows] / size, names, own, angle[rows], size, rows
+                    run, name, residuals, slopes[rows] / size, names, further, angle[rows], size, rows
                 )
+
+    def _compare_marks(
+        self, simulation: SimulatedRun, value: Mapping[str, float], with_slopes: bool
+    ) -> Iterator[Comparison]:
+        """The crank angles at which the mark is passed, where it is passed twice or more."""
+        run, recording = simulation.run, simulation.run.recording
+        passed = mark_times(recording)
+        passed = passed[simulation.response.describes("mark", passed)]
+        if len(passed) < 2:
+            return
+        at, rates = self._simulation_times(run, passed, value)
+        x, slopes, rate = simulation.interpolate(CRANK, at, with_slopes)
+        size = mean_speed(run, self.plant.ratio) * recording.step / math.sqrt(12.0)
+        off = (x - value[MARK_ANGLE] + math.pi) % (2.0 * math.pi) - math.pi
+        further = {key: rate * each for key, each in rates.items()} | {MARK_ANGLE: -np.ones(len(x))}
+        names = simulation.names if with_slopes else ()
+        yield self._comparison(run, "mark", -off / size, slopes / size, names, further, x, size)
+
+    def _count(
+        self,
+        run: RecordedRun,
+        name: str,
+        x: Any,
+        slopes: Any,
+        further: dict[str, Any],
+        value: Mapping[str, float],
+    ) -> tuple[Any, Any, dict[str, Any], float]:
+        """The simulated column `x` with its slopes as an encoder counts it from the first row on, rounded down; the
+        derivatives by clock and encoder, and the standard deviation of the column."""
+        y, time = run.recording.columns[name], run.recording.time
+        size = math.hypot(math.sqrt(1.0 / 12.0), JITTER * float(np.sum(np.abs(np.diff(y)))) / np.ptp(time))
+        start = f"{run.name}.count"
+        return x - x[0] + value[start] - 0.5, slopes - slopes[0], further | {start: np.ones(len(x))}, size
+
+    def _sensor(
+        self,
+        run: RecordedRun,
+        name: str,
+        x: Any,
+        slopes: Any,
+        further: dict[str, Any],
+        value: Mapping[str, float],
+    ) -> tuple[Any, Any, dict[str, Any], float]:
+        """The same as an analog sensor shows it, with its gain and its offset."""
+        sensor, gain, offset = self.sensors[name], f"gain({name})", f"{run.name}.offset({name})"
+        size = math.hypot(
+            sensor.noise * rms(run.recording.columns[name]), sensor.resolution / math.sqrt(12.0)
+        )
+        if gain in self.place:
+            further = {key: each * value[gain] for key, each in further.items()} | {gain: x}
+            x, slopes = x * value[gain], slopes * value[gain]
+        if offset in self.place:
+            further = further | {offset: np.ones(len(x))}
+            x = x + value[offset]
+        return x, slopes, further, size
 
     def _comparison(
         self, run: RecordedRun, column: str, residuals: Any, slopes: Any, names: Sequence[str],
-        more: Mapping[str, Any], angle: Any, size: float, rows: Any = None,
+        further: Mapping[str, Any], angle: Any, size: float, rows: Any = None,
     ) -> Comparison:  # fmt: skip
         """The residuals with the derivatives by all unknowns."""
-        columns = [slopes, *(np.reshape(x, (-1, 1)) / size for x in more.values())]
-        places = [self.place[name] for name in (*names, *more)]
+        columns = [slopes, *(np.reshape(x, (-1, 1)) / size for x in further.values())]
+        places = [self.place[name] for name in (*names, *further)]
         return Comparison(run.name, column, residuals, np.hstack(columns), places, angle, size, rows)
 
 
@@ -384,7 +418,7 @@ def speed_column(recording: Recording) -> str:
     return next((name for name in ("crank.w", "motor.w") if name in recording.columns), "")
 
 
-def crank_speed(recording: Recording, ratio: float) -> Any:
+def measured_speed(recording: Recording, ratio: float) -> Any:
     """The speed of the crank at the rows [rad/s], shape (n,), by a column of it or of the motor's speed; None without
     one."""
     name = speed_column(recording)
@@ -399,7 +433,7 @@ def until_rest(run: RecordedRun, ratio: float) -> RecordedRun:
     recording, columns = run.recording, run.recording.columns
     if run.off is None or not {"crank.w", "motor.w", "motor.count"} & columns.keys():
         return run
-    speed = crank_speed(recording, ratio)
+    speed = measured_speed(recording, ratio)
     if speed is None:
         speed = np.gradient(columns["motor.count"], recording.time) * (2.0 * math.pi / COUNTS / ratio)
     smooth = uniform_filter1d(speed, max(1, round(SMOOTHED / recording.step)))
@@ -408,7 +442,7 @@ def until_rest(run: RecordedRun, ratio: float) -> RecordedRun:
     return replace(run, recording=recording.part(end=max(rest, run.off)))
 
 
-def speed_of(run: RecordedRun, ratio: float) -> float:
+def mean_speed(run: RecordedRun, ratio: float) -> float:
     """Mean speed of the crank before the motor is switched off [rad/s]: by the marks where there are two, by the
     count of an encoder, or by the measured speed. `ratio` are the turns of the motor in a turn of the crank."""
     recording = run.recording.part(end=math.inf if run.off is None else run.off)
@@ -420,5 +454,5 @@ def speed_of(run: RecordedRun, ratio: float) -> float:
     if "motor.count" in columns:
         turns = np.ptp(columns["motor.count"]) / (COUNTS * ratio)
         return float(2.0 * math.pi * turns / np.ptp(recording.time))
-    speed = crank_speed(recording, ratio)
+    speed = measured_speed(recording, ratio)
     return run.crank_speed if speed is None else float(np.mean(speed))

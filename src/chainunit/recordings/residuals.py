@@ -1,6 +1,6 @@
-"""Whether a fit describes the recordings. A wrong model leaves orders of the crank in the residuals, or strains
-clocks and sensors: a wrong gear is described by a clock that runs too fast. A machine whose speed or load was not
-steady leaves residuals that change slowly, beside the orders."""
+"""Whether a fit describes the recordings. A wrong model leaves orders of the crank in the residuals, or moves clocks
+and sensors away from their known values: a wrong gear is described by a clock that runs too fast. A machine whose
+speed or load was not steady leaves residuals that change slowly, beside the orders."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import f
 
 from ..core.messages import unit_behind
-from .fit import Normal
+from .fit import NormalEquations
 from .problem import Comparison, Problem
 from .unknown import Unknown
 
@@ -25,17 +25,17 @@ RESOLVED = 2e-2
 """Size of a combination of orders over the rows, in parts of the largest one, from which on they resolve it."""
 PART = 0.5 * math.pi
 """Crank angle of a part of the run, of which the mean is looked at [rad]."""
-LOUD = 1.5
+EXCESS_NOISE = 1.5
 """Noise in parts of the stated one from which on a sentence names it, and slow changes are no noise: those of a
 smaller size do not bend a result by much."""
-FALSE_ALARMS = 1e-3
+FALSE_REJECTIONS = 1e-3
 """Share of right models of which some column is taken for wrong."""
-STRAINED = 5.0
+CONFLICT = 5.0
 """Deviation from what is known of a clock or a sensor, in standard deviations, that is no chance."""
 
 
 @dataclass(frozen=True)
-class ResidualCheck:
+class ResidualTest:
     """The residuals of a column of a run.
 
     `statistic` is the sum of the squares of the parts of the residuals along cosine and sine of all orders, in
@@ -60,7 +60,7 @@ class ResidualCheck:
     def reason(self) -> str:
         """Why the residuals are no noise: "slow", "orders"; empty where they may be noise. The size of noise alone is
         no reason."""
-        if self.noise > LOUD and self.slow > self.slow_limit:
+        if self.noise > EXCESS_NOISE and self.slow > self.slow_limit:
             return "slow"
         return "orders" if not self.statistic <= self.limit else ""
 
@@ -71,7 +71,7 @@ class ResidualCheck:
 
 
 @dataclass(frozen=True)
-class Strain:
+class PriorConflict:
     """A number of a clock or a sensor whose best value is farther from what is known of it than chance explains, by
     so many standard deviations."""
 
@@ -89,29 +89,33 @@ class Strain:
         )
 
 
-def strains(problem: Problem, best: Normal) -> list[Strain]:
-    """The strained numbers of clocks and sensors."""
-    numbers = zip(problem.unknowns, best.z, problem.simulated_with, strict=True)
-    own = [(u, float(x), (float(x) - u.start) / u.spread) for u, x, simulated in numbers if not simulated]
-    return [Strain(u.name, u.unit, x, far) for u, x, far in own if abs(far) > STRAINED]
+def sensor_conflicts(problem: Problem, best: NormalEquations) -> list[PriorConflict]:
+    """The numbers of clocks and sensors that are not as they are known."""
+    numbers = zip(problem.unknowns, best.z, problem.needs_simulation, strict=True)
+    own = [
+        (u, float(x), (float(x) - u.start) / u.prior_deviation)
+        for u, x, simulated in numbers
+        if not simulated
+    ]
+    return [PriorConflict(u.name, u.unit, x, far) for u, x, far in own if abs(far) > CONFLICT]
 
 
-def strained_priors(sought: Sequence[Unknown], best: Normal) -> list[Strain]:
+def prior_conflicts(sought: Sequence[Unknown], best: NormalEquations) -> list[PriorConflict]:
     """The `sought` numbers with a stated deviation, in the order of the problem, that are not as they are known."""
     known = [(u, float(x)) for u, x in zip(sought, best.z, strict=False) if not u.is_even]
-    priors = [Strain(u.name, u.unit, x, (x - u.start) / u.spread, u.start) for u, x in known]
-    return [each for each in priors if abs(each.deviations) > STRAINED]
+    priors = [PriorConflict(u.name, u.unit, x, (x - u.start) / u.prior_deviation, u.start) for u, x in known]
+    return [each for each in priors if abs(each.deviations) > CONFLICT]
 
 
-def check_residuals(best: Normal) -> list[ResidualCheck]:
+def residual_tests(best: NormalEquations) -> list[ResidualTest]:
     """The checks of all columns of a fit that have a value in each row. Of few rows fewer orders are looked at."""
     columns = [each for each in best.comparisons if each.column != "mark" and len(each.residuals) >= 2 * ROWS]
     # each has two statistics
-    level = (1.0 - FALSE_ALARMS) ** (0.5 / max(1, len(columns)))
-    return [check(each, level) for each in columns]
+    level = (1.0 - FALSE_REJECTIONS) ** (0.5 / max(1, len(columns)))
+    return [residual_test(each, level) for each in columns]
 
 
-def check(of: Comparison, level: float) -> ResidualCheck:
+def residual_test(of: Comparison, level: float) -> ResidualTest:
     """The check of one column; noise is within the limit of its statistic with the probability `level`.
 
     Over a part of a turn, such as a machine that swings after its motor was switched off, the orders are nearly one
@@ -136,10 +140,12 @@ def check(of: Comparison, level: float) -> ResidualCheck:
     parts = combinations @ (along / sizes)
     amplitudes = np.hypot(parts[::2], parts[1::2]) * of.size
     largest = np.argsort(-amplitudes)[:3]
-    found = tuple((int(k) + 1, float(amplitudes[k])) for k in largest)
+    orders_found = tuple((int(k) + 1, float(amplitudes[k])) for k in largest)
     statistic = _over(float(along @ along), noise**2)
     slow = _slow(rest, of.angle, level)
-    return ResidualCheck(of.run, of.column, statistic, limit, found, noise, *slow[:2], slow[2] * of.size)
+    return ResidualTest(
+        of.run, of.column, statistic, limit, orders_found, noise, *slow[:2], slow[2] * of.size
+    )
 
 
 def _slow(residuals: Any, angle: Any, level: float) -> tuple[float, float, float]:

@@ -28,7 +28,7 @@ from ..drives.free_rotor import FreeRotor
 from ..machines.machine import Machine
 from ..study.drive import Drive
 from .measurands import COUNTS
-from .plant import ANGLE, CRANK, GUARD, Course, Nuisance, Overview, Response, SourcedLoop
+from .plant import ANGLE, CRANK, GUARD, Nuisance, Overview, Response, Scenario, SourcedLoop
 
 MEASURED = ("crank.tau", "crank.w", "motor.w", "motor.count")
 """Quantities of a machine whose torque is measured behind its motor, of which nothing need be known."""
@@ -72,7 +72,7 @@ class MeasuredShaft:
         for another quantity, and for a name of the motor.
     """
 
-    slips = False
+    may_advance = False
 
     def __init__(self, machine: Machine, measured: Sequence[str], by: Sequence[str]) -> None:
         for name in measured:
@@ -122,15 +122,15 @@ class MeasuredShaft:
             yield Nuisance(name, "rad", 0.0, spread, spread)
 
     def respond(
-        self, course: Course, directions: Mapping[str, tuple[str, float]], workers: int = 1
+        self, scenario: Scenario, directions: Mapping[str, tuple[str, float]], workers: int = 1
     ) -> Response:
         """Simulate a run; the slopes are derivatives by changes of the size of the `directions`."""
         changes = list(directions.values())
-        if course.off is not None:
-            return self._switched_off(course, course.off, changes, workers)
-        time = course.rows
-        motion = CrankSeries(course.nuisances, time, (course.begin, course.end))
-        torque, slopes_of = self._torque(course.values, motion.rows, workers)
+        if scenario.off is not None:
+            return self._switched_off(scenario, scenario.off, changes, workers)
+        time = scenario.rows
+        motion = CrankSeries(scenario.nuisances, time, (scenario.begin, scenario.end))
+        torque, slopes_of = self._torque(scenario.values, motion.rows, workers)
         angle, speed = motion.rows[:2]
         count = self.ratio * COUNTS / (2.0 * math.pi)
         rows = {"crank.tau": torque, "crank.w": speed, "motor.w": self.ratio * speed, CRANK: angle}
@@ -176,21 +176,21 @@ class MeasuredShaft:
         return ratio * result["tau"].values, slopes
 
     def _switched_off(
-        self, course: Course, off: float, changes: Sequence[tuple[str, float]], workers: int
+        self, scenario: Scenario, off: float, changes: Sequence[tuple[str, float]], workers: int
     ) -> Response:
         """The run from the time on at which the motor is switched off."""
-        if off + GUARD >= course.end:
-            none, nothing = np.zeros(len(course.rows)), np.zeros((len(changes), len(course.rows)))
+        if off + GUARD >= scenario.end:
+            none, nothing = np.zeros(len(scenario.rows)), np.zeros((len(changes), len(scenario.rows)))
             kept = (*self._measured, CRANK)
             return Response(
-                course.rows,
+                scenario.rows,
                 dict.fromkeys(kept, none),
                 dict.fromkeys(kept, nothing),
                 spans=dict.fromkeys((*kept, "mark"), ()),
             )
-        own, ratio = course.nuisances, self.ratio
+        own, ratio = scenario.nuisances, self.ratio
         names = {INERTIA: ("motor.rotor.J", ratio**-2), FRICTION: ("motor.rotor.d", ratio**-2)}
-        values = dict(course.values) | {full: own[name] * factor for name, (full, factor) in names.items()}
+        values = dict(scenario.values) | {full: own[name] * factor for name, (full, factor) in names.items()}
         turned = [
             (names[name][0], size * names[name][1]) if name in names else (name, size)
             for name, size in changes
@@ -201,7 +201,7 @@ class MeasuredShaft:
         for state, nuisance in (("motor.phi", ANGLE), ("motor.w", SPEED)):
             states[state][0] = own[nuisance] * ratio
             states[state][1:] = [size * ratio * (name == nuisance) for name, size in changes]
-        piece = loop.run(values, states, turned, (off, course.end), course.step, workers)
+        piece = loop.run(values, states, turned, (off, scenario.end), scenario.step, workers)
         response = loop.response(piece)
         spans = dict.fromkeys(response.values, ((off + GUARD, math.inf),))
         return replace(response, spans={**spans, "mark": ()})

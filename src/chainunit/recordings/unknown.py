@@ -9,14 +9,14 @@ from dataclasses import dataclass
 @dataclass(frozen=True)
 class Unknown:
     """A number that is sought: its start value, its bounds, and its prior, the start value with the standard
-    deviation `spread`. Bounds alone have the standard deviation of an even distribution."""
+    deviation `prior_deviation`. Bounds alone have the standard deviation of an even distribution."""
 
     name: str
     unit: str
     start: float
     low: float
     high: float
-    spread: float
+    prior_deviation: float
     is_nuisance: bool = False
     is_even: bool = False
 

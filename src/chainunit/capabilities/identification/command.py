@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -22,12 +22,14 @@ def identify(
     """
     question = study_file(config)
     from .page import TASK
-    from .result import outlook
+    from .result import sentence_before_fit
 
     errors = terminal_console(stderr=True)
-    carry_out(
-        TASK, question, output, errors, told=lambda *before: errors.print(outlook(*before), soft_wrap=True)
-    )
+
+    def before_fit(*information: Any) -> None:
+        errors.print(sentence_before_fit(*information), soft_wrap=True)
+
+    carry_out(TASK, question, output, errors, before_fit=before_fit)
 
 
 COMMAND = identify

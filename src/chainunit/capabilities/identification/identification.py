@@ -1,4 +1,4 @@
-"""The identification of a machine: its recordings, the numbers that they can tell, the fit, and its checks."""
+"""The identification of a machine: its recordings, the numbers that they can determine, the fit, and its tests."""
 
 from __future__ import annotations
 
@@ -19,7 +19,13 @@ from ...recordings.measurands import MEASURANDS, OF_TERMINALS, SIGNALS, usual_of
 from ...recordings.problem import Comparison, Problem, RecordedRun, Sensor
 from ...recordings.recorded_drive import drive_of, is_of_shaft, plant_for
 from ...recordings.recording import Recording, read_signal
-from ...recordings.residuals import ResidualCheck, Strain, check_residuals, strained_priors, strains
+from ...recordings.residuals import (
+    PriorConflict,
+    ResidualTest,
+    prior_conflicts,
+    residual_tests,
+    sensor_conflicts,
+)
 from ...recordings.unknown import Unknown
 from ...study.arrays import rms
 from ...study.config import Config
@@ -29,7 +35,7 @@ from ...work.progress import Report, quiet
 from .information import Combination, Information, information
 from .posterior import Posterior, posterior
 from .reading import IdentificationPlan, PlannedRun
-from .score_tests import Suspicion, suspicions
+from .score_tests import ScoreTest, score_tests
 
 CONTROL = ("speed_control.kp", "speed_control.ki", "current_control.kp", "current_control.ki")
 """Gains of the control of a motor, of which the course of its current depends."""
@@ -42,7 +48,7 @@ it."""
 class FittedNumber:
     """A sought number: its value in the best fit, `fitted`, which has a meaning together with those of all others;
     its mean `value` in the distribution that the recordings leave, its standard deviation, the ends of its interval
-    of 95 %, and whether the recordings tell it."""
+    of 95 %, and whether the recordings determine it."""
 
     unknown: Unknown
     fitted: float
@@ -50,37 +56,37 @@ class FittedNumber:
     deviation: float
     low: float
     high: float
-    is_told: bool
+    is_determined: bool
 
     @property
     def at_bound(self) -> str:
-        """The bound at which the fit ended, "lower" or "upper"; such a number is not told."""
-        return _bound(self.unknown, self.fitted)
+        """The bound at which the fit ended, "lower" or "upper"; such a number is not determined."""
+        return _bound_of(self.unknown, self.fitted)
 
 
 @dataclass(frozen=True)
 class IdentifiedMachine:
     """An identified machine.
 
-    `before` is what the runs can tell at the start values, with further runs in order; `after` the same at the fitted
-    values. `best` are the normal equations there, `posterior` is the distribution of the sought numbers around them,
-    `checks` are those of the residuals, and `suspicions` those of known numbers.
+    `information_at_start` is the information of the runs at the start values, with further runs in order;
+    `information_at_fit` the same at the fitted values. `best` are the normal equations there, `posterior` is the
+    distribution of the sought numbers around them, and `score_tests` are those of known numbers.
     """
 
     config: Config
     plan: IdentificationPlan
     problem: Problem
-    before: Information
+    information_at_start: Information
     best: Fit
     posterior: Posterior
-    after: Information
-    checks: tuple[ResidualCheck, ...]
-    suspicions: tuple[Suspicion, ...]
+    information_at_fit: Information
+    residual_tests: tuple[ResidualTest, ...]
+    score_tests: tuple[ScoreTest, ...]
 
     @property
     def estimates(self) -> dict[str, FittedNumber]:
         """The sought numbers by the full names of the study file."""
-        told = {each.name: each.is_told for each in self.after.outlooks}
+        determined = {each.name: each.is_determined for each in self.information_at_fit.determinations}
         return {
             own.name: FittedNumber(
                 own,
@@ -89,7 +95,7 @@ class IdentifiedMachine:
                 each.deviation,
                 each.low,
                 each.high,
-                told[each.name] and not _bound(own, float(x)),
+                determined[each.name] and not _bound_of(own, float(x)),
             )
             for own, x, each in zip(
                 self.plan.sought,
@@ -106,18 +112,20 @@ class IdentifiedMachine:
 
     @property
     def is_described(self) -> bool:
-        """Whether the residuals may be noise, clocks, sensors and known numbers are as they are known, and no number
-        is held by a bound."""
-        doubts = self.strains or self.posterior.held or any(each.is_suspicious for each in self.suspicions)
-        return all(check.is_noise for check in self.checks) and not doubts
+        """Whether the residuals may be noise, clocks, sensors and known numbers are as they are known, and no bound
+        is active."""
+        if self.prior_conflicts or self.posterior.active_bounds:
+            return False
+        are_rejected = any(test.is_rejected for test in self.score_tests)
+        return not are_rejected and all(test.is_noise for test in self.residual_tests)
 
     @property
-    def strains(self) -> list[Strain]:
+    def prior_conflicts(self) -> list[PriorConflict]:
         """The numbers of clocks and sensors, and sought ones with a stated deviation, that are not as they are
         known."""
-        return [*strains(self.problem, self.best), *strained_priors(self.plan.sought, self.best)]
+        return [*sensor_conflicts(self.problem, self.best), *prior_conflicts(self.plan.sought, self.best)]
 
-    def courses(self, comparison: Comparison) -> tuple[Any, Any, Any]:
+    def columns_over_time(self, comparison: Comparison) -> tuple[Any, Any, Any]:
         """The times of the rows that are compared [s], a measured column, and the simulated one as its sensor would
         show it, each of shape (n,)."""
         recording = self._run(comparison.run).recording
@@ -132,16 +140,16 @@ class IdentifiedMachine:
     def _run(self, name: str) -> RecordedRun:
         return next(each for each in self.problem.runs if each.name == name)
 
-    def combined(self, combination: Combination) -> tuple[float, float]:
+    def value_of_sum(self, combination: Combination) -> tuple[float, float]:
         """The value of a sum of sought numbers, and its standard deviation."""
         places = [self.problem.place[name] for name, _ in combination.terms]
         sums = self.posterior.samples[:, places] @ [factor for _, factor in combination.terms]
         return float(np.mean(sums)), float(np.std(sums))
 
 
-def _bound(own: Unknown, x: float) -> str:
+def _bound_of(own: Unknown, x: float) -> str:
     """The bound at which a fitted value lies, "lower" or "upper"; empty between them."""
-    near = AT_BOUND * own.spread
+    near = AT_BOUND * own.prior_deviation
     return "lower" if x <= own.low + near else "upper" if x >= own.high - near else ""
 
 
@@ -153,13 +161,13 @@ def system_name(name: str) -> str:
 def identify(
     config: Config,
     report: Report = quiet,
-    told: Callable[[IdentificationPlan, Information], None] = lambda *_: None,
+    before_fit: Callable[[IdentificationPlan, Information], None] = lambda *_: None,
 ) -> IdentifiedMachine:
     """Identify the machine of a study from the recordings of its table [identify].
 
     Parameters
     ----------
-    told : gets what the recordings can tell, before anything is fitted
+    before_fit : gets the plan and the information of the recordings, before anything is fitted
 
     Raises
     ------
@@ -177,9 +185,9 @@ def identify(
     problem = _problem(config, plan, drive, recordings)
     inspect_runs(problem, workers)
     report("what the recordings can tell", 0.15, 1.0)
-    start = problem.started(workers)
+    start = problem.initial_point(workers)
     before = information(problem, start, workers)
-    told(plan, before)
+    before_fit(plan, before)
     best = fit(
         problem,
         start,
@@ -193,8 +201,8 @@ def identify(
     report("checks", 0.95, 1.0)
     after = information(problem, best.z, workers, propose=False, at=best)
     around = posterior(problem, best, workers, plan.seed)
-    checks, suspects = tuple(check_residuals(best)), tuple(suspicions(problem, best, workers))
-    return IdentifiedMachine(config, plan, problem, before, best, around, after, checks, suspects)
+    tests = tuple(residual_tests(best)), tuple(score_tests(problem, best, workers))
+    return IdentifiedMachine(config, plan, problem, before, best, around, after, *tests)
 
 
 def plan_of(config: Config) -> IdentificationPlan:
@@ -302,17 +310,17 @@ def _sensors(
     return sensors
 
 
-def remarks(found: IdentifiedMachine) -> Iterator[str]:
+def remarks(machine: IdentifiedMachine) -> Iterator[str]:
     """Sentences on data that are missing or assumed."""
-    runs, config = found.problem.runs, found.config
+    runs, config = machine.problem.runs, machine.config
     columns = {name for run in runs for name in run.recording.columns}
     if (
         issubclass(config.motor_type, InductionMotor)
         and "motor.i" in columns
         and "motor.power" not in columns
     ):
-        of_current = next(each for each in found.best.comparisons if each.column == "motor.i")
-        time, _, current = found.courses(of_current)
+        of_current = next(each for each in machine.best.comparisons if each.column == "motor.i")
+        time, _, current = machine.columns_over_time(of_current)
         speed = next(run.crank_speed for run in runs if run.name == of_current.run)
         turn = current[time > time[-1] - 2.0 * np.pi / speed]
         swing = np.ptp(turn) / np.mean(turn)

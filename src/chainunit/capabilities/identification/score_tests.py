@@ -1,6 +1,6 @@
 """Known numbers of a machine that the recordings contradict.
 
-Each is let free alone, around the best fit: the derivatives of the columns by it tell how far it would move, and with
+Each is freed alone, around the best fit: the derivatives of the columns by it say how far it would move, and with
 which standard deviation (a score test). A wrong dimension or another law of friction, which the sought numbers make
 up for almost wholly, shows here before it shows in the sum of all orders of the residuals. As the torque is far from
 straight in the speed of smooth friction, the secant up to another law stands for its derivative.
@@ -17,27 +17,27 @@ import numpy as np
 
 from ...core.errors import RunError
 from ...core.messages import unit_behind
-from ...recordings.fit import Normal, normal_of
+from ...recordings.fit import NormalEquations, assemble
 from ...recordings.problem import Comparison, Problem
 from ...recordings.unknown import Unknown
 
-SUSPECTS = ("pin.w_smooth", "processing.v_smooth", "r", "l", "h", "e", "l1", "z", "web_share")
-"""Numbers of a chain unit that may be wrong: its law of friction, its dimensions, and where the material lies."""
+TESTED = ("pin.w_smooth", "processing.v_smooth", "r", "l", "h", "e", "l1", "z", "web_share")
+"""Known numbers of a chain unit that are tested: its law of friction, its dimensions, and where the material lies."""
 SMOOTH, LAW = "machine.pin.w_smooth", 10.0
 """The number by which the law of friction is another one, and the factor on it for friction that grows with speed."""
 NEAR = 0.3
 """Change of the crank angle by the other law up to which its columns are compared [rad]."""
-SUSPICIOUS = 4.0
-"""Change of a number, in standard deviations, from which it is suspicious."""
-BLIND = 1e-9
+REJECTION = 4.0
+"""Change of a number, in standard deviations, from which the recordings reject its value."""
+ROUNDING = 1e-9
 """Information on a number with all others free, in parts of that with all others known, that is rounding alone."""
 _CHANGE = 0.05
 """Change for which the derivatives are integrated, in parts of the number."""
 
 
 @dataclass(frozen=True)
-class Suspicion:
-    """A number that is held for known: its `known` value, the `change` that the recordings would prefer, and the
+class ScoreTest:
+    """A number that counts as known: its `known` value, the `change` that the recordings would prefer, and the
     standard deviation of that change, with all sought numbers free: infinite where no column depends on it."""
 
     name: str
@@ -57,16 +57,15 @@ class Suspicion:
         )
 
     @property
-    def is_suspicious(self) -> bool:
+    def is_rejected(self) -> bool:
         """Whether the recordings contradict the number."""
-        return abs(self.change) > SUSPICIOUS * self.deviation
+        return abs(self.change) > REJECTION * self.deviation
 
 
-def suspicions(
-    problem: Problem, best: Normal, workers: int = 2, names: Sequence[str] = SUSPECTS
-) -> list[Suspicion]:
-    """The changes that the recordings would prefer of those of the `names` that the machine has and that are not
-    sought, at the best fit."""
+def score_tests(
+    problem: Problem, best: NormalEquations, workers: int = 2, names: Sequence[str] = TESTED
+) -> list[ScoreTest]:
+    """The tests of the numbers `names` of the machine, except the sought ones, at the best fit."""
     machine, taken = problem.plant.machine, {u.name for u in problem.sought}
     layout = machine.model.parameter_layout
     units = {v.name: v.unit for v in layout.variables}
@@ -79,14 +78,14 @@ def suspicions(
         return []
     sought = (*problem.sought, *more)
     wider = Problem(problem.plant.with_names([u.name for u in sought]), problem.runs, sought, problem.sensors)
-    z = wider.starts
+    z = wider.start_values
     for name, place in problem.place.items():
         z[wider.place[name]] = best.z[place]
     comparisons = tuple(wider.comparisons(z, workers))
     if SMOOTH in wider.place and SMOOTH not in taken:
         comparisons = _with_secant(wider, z, comparisons, workers)
-    at = normal_of(wider, z, comparisons, {key: 1.0 / weight for key, weight in best.weights.items()})
-    return [_suspicion(each, wider, at, {u.name for u in more}) for each in more]
+    at = assemble(wider, z, comparisons, {key: 1.0 / weight for key, weight in best.weights.items()})
+    return [_score_test(each, wider, at, {u.name for u in more}) for each in more]
 
 
 def _with_secant(
@@ -103,17 +102,17 @@ def _with_secant(
     pairs = list(zip(comparisons, others, strict=True))
     if max(float(np.max(np.abs(there.angle - here.angle))) for here, there in pairs) > NEAR:
         return comparisons
-    found = []
+    replaced = []
     for here, there in pairs:
         slopes = here.slopes.copy()
         if place in here.places:
             change = here.residuals - there.residuals
             slopes[:, list(here.places).index(place)] = change / (other[place] - z[place])
-        found.append(replace(here, slopes=slopes))
-    return tuple(found)
+        replaced.append(replace(here, slopes=slopes))
+    return tuple(replaced)
 
 
-def _suspicion(of: Unknown, problem: Problem, at: Normal, more: set[str]) -> Suspicion:
+def _score_test(of: Unknown, problem: Problem, at: NormalEquations, more: set[str]) -> ScoreTest:
     """The step of one number with all others but the further ones free."""
     place = problem.place[of.name]
     free = [k for name, k in problem.place.items() if name not in more]
@@ -122,7 +121,7 @@ def _suspicion(of: Unknown, problem: Problem, at: Normal, more: set[str]) -> Sus
     own: Any = np.linalg.solve(at.matrix[np.ix_(free, free)] * np.outer(scale, scale), cross)
     alone = float(at.fisher[place, place])
     information = alone - float(cross @ own)
-    if information <= BLIND * alone:
-        return Suspicion(of.name, of.unit, of.start, 0.0, math.inf)
+    if information <= ROUNDING * alone:
+        return ScoreTest(of.name, of.unit, of.start, 0.0, math.inf)
     change = float(at.gradient[place] - own @ (scale * at.gradient[free])) / information
-    return Suspicion(of.name, of.unit, of.start, change, 1.0 / math.sqrt(information))
+    return ScoreTest(of.name, of.unit, of.start, change, 1.0 / math.sqrt(information))

@@ -34,17 +34,17 @@ class IdentificationResult(ReportedResult[Config, IdentifiedMachine]):
     @property
     def numbers(self) -> pd.DataFrame:
         """The sought numbers by name: value, standard deviation, interval of 95 % (low, high), unit, and whether the
-        recordings tell the number; the value of one that they do not tell is no number."""
+        recordings determine the number; the value of one that they do not determine is no number."""
         import pandas as pd
 
         rows = {
             name: {
-                "value": each.value if each.is_told else float("nan"),
+                "value": each.value if each.is_determined else float("nan"),
                 "deviation": each.deviation,
                 "low": each.low,
                 "high": each.high,
                 "unit": each.unknown.unit,
-                "is_told": each.is_told,
+                "is_told": each.is_determined,
             }
             for name, each in self.found.estimates.items()
         }

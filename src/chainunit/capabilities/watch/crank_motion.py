@@ -9,7 +9,7 @@ import numpy as np
 
 from ...core.errors import InputError
 from ...recordings.measurands import COUNTS
-from ...recordings.problem import crank_speed, mark_times
+from ...recordings.problem import mark_times, measured_speed
 from ...recordings.recording import Recording
 
 NEIGHBOURS = 4
@@ -38,9 +38,9 @@ def crank_motion(recording: Recording, angle: float, ratio: float) -> tuple[Any,
     if "motor.count" in columns:
         # the count is rounded down
         phi = angle + (columns["motor.count"] + 0.5) * (2.0 * math.pi / COUNTS) / ratio
-        w = crank_speed(recording, ratio)
+        w = measured_speed(recording, ratio)
         return phi, _counted_speed(recording, phi) if w is None else w
-    w, passed = crank_speed(recording, ratio), mark_times(recording)
+    w, passed = measured_speed(recording, ratio), mark_times(recording)
     if w is None or len(passed) < 3:
         raise InputError(
             f"{recording.source}: the angle of the crank is not known; must have a column motor.count, or mark with "

@@ -119,5 +119,5 @@ def false_imbalance(
     known = [k for k, name in enumerate(names) if name in layout.names]
     own = layout.from_names({name: x for name, x in values.items() if name in layout.names})
     sigma = np.asarray(covariance)[np.ix_(known, known)]
-    found = false_loads(own, [names[k] for k in known], sigma, crank_speed)
-    return {"uncertainty": found.imbalance, "force_uncertainty": found.force_imbalance}
+    loads = false_loads(own, [names[k] for k in known], sigma, crank_speed)
+    return {"uncertainty": loads.imbalance, "force_uncertainty": loads.force_imbalance}

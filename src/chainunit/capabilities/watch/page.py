@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...reading.text import shown_in
-from ...recordings.residuals import LOUD
+from ...recordings.residuals import EXCESS_NOISE
 from ...report import blocks as b
 from ...report import figure as fig
 from ...report.lines import Name, join, line
@@ -81,7 +81,7 @@ def _opening(s: b.Source) -> Iterator[b.Block]:
             ),
         )
     for name, of in (("signal", "signal"), ("speed", "measured speed")):
-        if (s.value(f"noise.{name}") or 0.0) > LOUD:
+        if (s.value(f"noise.{name}") or 0.0) > EXCESS_NOISE:
             louder = f"The noise of the {of} at the begin is {{=noise.{name}:2}} times the stated one (watch.noise)"
             yield b.Judgement("warning", s.line(f"{louder}: the thresholds are those of the measured noise."))
     for each in s.lines("constant_parts"):

@@ -48,19 +48,19 @@ def _as_dict(watched: WatchedRecording) -> dict[str, Any]:
                 "statistic": entry(each.statistic, "1"),
                 "limit": entry(each.limit, "1"),
             }
-            for each in watched.checks
+            for each in watched.residual_tests
         ],
         "doubts": [
             *(
                 f"order {each.orders[0][0]} of the crank remains in {each.column}"
                 if each.reason == "orders"
                 else f"slow changes remain in {each.column}"
-                for each in watched.checks
+                for each in watched.residual_tests
                 if not each.is_noise
             ),
-            *map(str, watched.strains),
+            *map(str, watched.prior_conflicts),
         ],
-        "of_feed_alone": watched.is_of_feed,
+        "of_feed_alone": watched.only_feed_differs,
         "alarms": [_alarm(watched, each) for each in watched.alarms],
         **_thresholds(watched),
         "uncertainty": entry(watched.uncertainty[0], "kg"),

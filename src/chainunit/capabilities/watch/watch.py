@@ -25,7 +25,13 @@ from ...recordings.measurands import MEASURANDS, usual_offset
 from ...recordings.problem import MARK_ANGLE, Problem, RecordedRun, Sensor, speed_column
 from ...recordings.recorded_drive import drive_of, is_of_shaft, plant_for
 from ...recordings.recording import Recording, read_signal
-from ...recordings.residuals import ResidualCheck, Strain, check_residuals, strained_priors, strains
+from ...recordings.residuals import (
+    PriorConflict,
+    ResidualTest,
+    prior_conflicts,
+    residual_tests,
+    sensor_conflicts,
+)
 from ...recordings.unknown import Unknown
 from ...study.arrays import rms, stretches
 from ...study.config import Config
@@ -104,7 +110,7 @@ class MachineErrors:
 class WatchedRecording:
     """A recording with the outputs of the observer at its rows.
 
-    `learned` is the fit over its begin, `checks` are those of its residuals, `parameters` are those of the observer
+    `learned` is the fit over its begin with the tests of its residuals, `parameters` are those of the observer
     by name, and `uncertainty` is the false imbalance by errors of the machine's parameters: of the feed [kg] and of
     the forces [N]. With these errors the thresholds are wider by the factors `widening`. `failed` says whether
     the model of the identification did not describe its own recordings.
@@ -116,7 +122,7 @@ class WatchedRecording:
     drive: Drive
     problem: Problem
     learned: Fit
-    checks: tuple[ResidualCheck, ...]
+    residual_tests: tuple[ResidualTest, ...]
     parameters: Mapping[str, float]
     uncertainty: tuple[float, float]
     widening: tuple[float, float]
@@ -127,25 +133,25 @@ class WatchedRecording:
     @property
     def is_described(self) -> bool:
         """Whether the machine of the study describes the begin of the recording."""
-        return all(check.is_noise for check in self.checks) and not self.strains
+        return all(test.is_noise for test in self.residual_tests) and not self.prior_conflicts
 
     @property
-    def strains(self) -> list[Strain]:
+    def prior_conflicts(self) -> list[PriorConflict]:
         """The numbers of clock and sensors that are not as they are known, and feeds that are not as stated."""
-        loads = strained_priors(self.problem.sought, self.learned)
+        loads = prior_conflicts(self.problem.sought, self.learned)
         named = (replace(each, name=file_name(each.name)) for each in loads)
-        return [*strains(self.problem, self.learned), *named]
+        return [*sensor_conflicts(self.problem, self.learned), *named]
 
     @property
-    def is_of_feed(self) -> bool:
+    def only_feed_differs(self) -> bool:
         """Whether nothing but a feed that is not as stated speaks against the machine of the study."""
-        own = strains(self.problem, self.learned)
-        return not self.is_described and not own and all(check.is_noise for check in self.checks)
+        own = sensor_conflicts(self.problem, self.learned)
+        return not self.is_described and not own and all(test.is_noise for test in self.residual_tests)
 
     @property
     def noises(self) -> tuple[float, float]:
         """The noise of the signal and of the measured speed, over the stated noise [1], see `noises`."""
-        return noises(self.checks, self.problem.runs[0].recording)
+        return noises(self.residual_tests, self.problem.runs[0].recording)
 
     @property
     def constant_parts(self) -> list[str]:
@@ -186,7 +192,7 @@ def watch(config: Config, report: Report = quiet) -> WatchedRecording:
     plan = watch_plan_of(config)
     workers = min(2, os.cpu_count() or 1)
     report("reading the recording", 0.0, 1.0)
-    recording, errors = _files(plan)
+    recording, errors = _read_files(plan)
     duration = float(recording.time[-1] - recording.time[0])
     least = FEWEST_TURNS * plan.turn
     if not least <= plan.learning < duration:
@@ -200,18 +206,18 @@ def watch(config: Config, report: Report = quiet) -> WatchedRecording:
     inspect_runs(problem, workers)
     report("learning angle, zero and forces", 0.1, 1.0)
     learned = fit(problem, None, workers)
-    found = {u.name: float(x) for u, x in zip(problem.unknowns, learned.z, strict=True)}
+    learned_values = {u.name: float(x) for u, x in zip(problem.unknowns, learned.z, strict=True)}
     shaft = is_of_shaft(recording.columns)
     ratio = 1.0 if shaft else drive.ratio
     angle = next(each.angle[0] for each in learned.comparisons if each.rows is not None)
-    angle = float(angle) if "motor.count" in recording.columns else found.get(MARK_ANGLE, 0.0)
+    angle = float(angle) if "motor.count" in recording.columns else learned_values.get(MARK_ANGLE, 0.0)
     phi, w = crank_motion(recording, angle, drive.ratio)
-    checks = tuple(check_residuals(learned))
+    checks = tuple(residual_tests(learned))
     first = problem.runs[0].recording
-    values = _parameters(config, plan, drive, first, found, ratio, noises(checks, first))
+    values = _parameters(config, plan, drive, first, learned_values, ratio, noises(checks, first))
     uncertainty = _uncertainty(plan, values, errors)
     values |= dict(zip(UNCERTAINTIES, uncertainty, strict=True))
-    gain = {name: found.get(f"gain({name})", 1.0) for name in recording.columns}
+    gain = {name: learned_values.get(f"gain({name})", 1.0) for name in recording.columns}
     of_speed = gain.get(speed_column(recording), 1.0)
     signals = {"phi": phi * ratio, "w": w * ratio / of_speed} | {
         name: recording.columns[column] / gain[column] for name, column in _signals(recording).items()
@@ -240,16 +246,16 @@ def watch(config: Config, report: Report = quiet) -> WatchedRecording:
     )
 
 
-def _files(plan: WatchPlan) -> tuple[Recording, MachineErrors | None]:
+def _read_files(plan: WatchPlan) -> tuple[Recording, MachineErrors | None]:
     """The recording, and the errors of the machine where the file of an identification has them."""
-    faults, errors, found = Faults(), None, list[Recording]()
+    faults, errors, recordings = Faults(), None, list[Recording]()
     with faults.collected():
-        found.append(read_signal(plan.file, plan.columns, plan.begin, plan.end))
+        recordings.append(read_signal(plan.file, plan.columns, plan.begin, plan.end))
     if plan.identification is not None:
         with faults.collected():
-            errors = _errors(plan.identification)
+            errors = _read_errors(plan.identification)
     faults.refuse()
-    return found[0], errors
+    return recordings[0], errors
 
 
 def _problem(config: Config, plan: WatchPlan, drive: Drive, recording: Recording) -> Problem:
@@ -286,7 +292,7 @@ def _parameters(
     plan: WatchPlan,
     drive: Drive,
     recording: Recording,
-    found: Mapping[str, float],
+    learned_values: Mapping[str, float],
     ratio: float,
     louder: tuple[float, float],
 ) -> dict[str, float]:
@@ -301,23 +307,27 @@ def _parameters(
             "crank.I": _LIGHT * own["crank.I"],
             "rotor.d": 0.0,
         }
-        own |= {"signal.torque": 1.0, "signal.current": 0.0, "signal.zero": _zero(found, "crank.tau")}
+        own |= {
+            "signal.torque": 1.0,
+            "signal.current": 0.0,
+            "signal.zero": _zero(learned_values, "crank.tau"),
+        }
         torque = rms(columns["crank.tau"])
     else:
         p, w = drive.fmu_parameters, plan.crank_speed * drive.ratio
         mean = float(np.mean(columns["motor.power"])) / w if "motor.power" in columns else 0.0
-        signals = terminal_signals(drive.motor, p, w, mean, found[f"{RUN}.temperature"])
+        signals = terminal_signals(drive.motor, p, w, mean, learned_values[f"{RUN}.temperature"])
         missing = [COLUMN_OF[name] for name in signals.outputs if COLUMN_OF[name] not in columns]
         if missing:
             raise InputError(
                 f"{recording.source}: the load of this motor is watched by {' and '.join(missing)}, too; record it"
             )
         own |= {"rotor.J": p.rotor.J, "rotor.d": p.rotor.d} | weights(signals)
-        own |= {"signal.zero": signals.per_current * _zero(found, "motor.i")}
+        own |= {"signal.zero": signals.per_current * _zero(learned_values, "motor.i")}
         torque = signals.per_current * rms(columns["motor.i"])
         torque += signals.per_power * rms(columns["motor.power"]) if signals.per_power else 0.0
     layout = drive.machine.model.feed_layout
-    feed = layout.from_names({name: found[f"machine.{name}"] for name in layout.names})
+    feed = layout.from_names({name: learned_values[f"machine.{name}"] for name in layout.names})
     table = replace(
         config.plans["watch"].observer or instance(ObserverTable, {}),
         signal_noise=plan.noise * louder[0],
@@ -327,17 +337,17 @@ def _parameters(
     return own | tuning(table, feed, plan.crank_speed * ratio, torque)
 
 
-def _zero(found: Mapping[str, float], column: str) -> float:
+def _zero(learned_values: Mapping[str, float], column: str) -> float:
     """The value of a column where its sensor shows 0, as the true quantity."""
-    return found[f"{RUN}.offset({column})"] / found.get(f"gain({column})", 1.0)
+    return learned_values[f"{RUN}.offset({column})"] / learned_values.get(f"gain({column})", 1.0)
 
 
-def noises(checks: Sequence[ResidualCheck], recording: Recording) -> tuple[float, float]:
+def noises(checks: Sequence[ResidualTest], recording: Recording) -> tuple[float, float]:
     """The noise of the signal of the observer and that of the speed at the begin of the recording, in parts of the
     stated one, where they are larger."""
-    found = {check.column: check.noise for check in checks}
-    signal = max([1.0, *(found.get(name, 1.0) for name in _signals(recording).values())])
-    return signal, max(1.0, found.get(speed_column(recording), 1.0))
+    by_column = {check.column: check.noise for check in checks}
+    signal = max([1.0, *(by_column.get(name, 1.0) for name in _signals(recording).values())])
+    return signal, max(1.0, by_column.get(speed_column(recording), 1.0))
 
 
 def _uncertainty(
@@ -351,7 +361,7 @@ def _uncertainty(
     return feed, force
 
 
-def _errors(file: Path) -> MachineErrors:
+def _read_errors(file: Path) -> MachineErrors:
     """The errors of the machine by the result of an identification."""
     try:
         result = json.loads(file.read_text("utf-8"))
@@ -419,7 +429,7 @@ def _outputs(unit: Instance, signals: list[str], table: Any, time: Any, usual: f
 
 def _alarms(time: Any, outputs: Mapping[str, Any], turn: float) -> list[Alarm]:
     """The alarms in order; those of one side with a short lull between them are one."""
-    found: list[Alarm] = []
+    alarms: list[Alarm] = []
     for side, sign in (("left", 1.0), ("right", -1.0)):
         joined: list[tuple[int, int]] = []
         for first, last in stretches(outputs["alarm"] == sign):
@@ -437,5 +447,5 @@ def _alarms(time: Any, outputs: Mapping[str, Any], turn: float) -> list[Alarm]:
             # an alarm begins on the ground that is beyond its threshold first
             first_ground = max(shares, key=lambda name: float(shares[name][0]))
             lasts = last == len(time)
-            found.append(Alarm(side, begin, end, first_ground, lasts, float(time[at]), values))
-    return sorted(found, key=lambda alarm: alarm.begin)
+            alarms.append(Alarm(side, begin, end, first_ground, lasts, float(time[at]), values))
+    return sorted(alarms, key=lambda alarm: alarm.begin)
