@@ -34,6 +34,7 @@ from ...mechanism.machine import MachineState, Mechanism, derived_numbers
 from ...mechanism.models import InverseMachine
 from .closing import dead_group, gap_hint, open_group
 from .declarations import LinkageMotion, LinkBody, common_parameters, field_of
+from .geometry import LinkGeometry
 from .loads import (
     ForceLaw,
     LinkAngle,
@@ -106,7 +107,7 @@ class LinkageDescription(LinkageOutputs):
             )
         self.Inputs = declared_class("Inputs", (motion,), inputs)
         p, u = self.Parameters(), self.Inputs()
-        self.sides = dict(LinkageParts(MATH, self.structure, self.values(p, u)).sides)
+        self.sides = dict(LinkageParts(LinkGeometry(MATH, self.structure, self.values(p, u))).sides)
         self.sides |= turns_of_triads(self.linkage(MATH, p, u))
         self.turning = self._followed(p, u)
         self._check_extremes()
@@ -145,7 +146,7 @@ class LinkageDescription(LinkageOutputs):
 
     def parts(self, xp: Any, p: Any, u: Any) -> LinkageParts:
         """The groups with the values of parameters and inputs."""
-        return LinkageParts(xp, self.structure, self.values(p, u), self.sides)
+        return LinkageParts(LinkGeometry(xp, self.structure, self.values(p, u)), self.sides)
 
     def linkage(self, xp: Any, p: Any, u: Any) -> DescribedLinkage:
         """The linkage with the values of parameters and inputs."""
@@ -156,7 +157,7 @@ class LinkageDescription(LinkageOutputs):
         loads["pins"] = PinLosses(p.pins, p.pins.damping)
         if any(j.kind == PRISMATIC for j in self.structure.joints.values()):
             lengths = {
-                parts.receivers[each["name"]][0]: parts.number(each["length"])
+                parts.receivers[each["name"]][0]: parts.geometry.number(each["length"])
                 for each in self.data["joints"]
                 if "length" in each
             }
@@ -168,7 +169,7 @@ class LinkageDescription(LinkageOutputs):
         """An extreme of the motion, by its name in expressions."""
         kind, link, point, axis = place_of(name)
         frame, ends = parts.frames[link], self.structure.driver.linear
-        at = frame.of(parts.point(link, point) if point else ZERO)
+        at = frame.of(parts.geometry.point(link, point) if point else ZERO)
 
         def course(xp: Any, m: Any) -> tuple[Any, Any, Any]:
             moving = m.links[link]
@@ -200,21 +201,21 @@ class LinkageDescription(LinkageOutputs):
         kind, link = load["type"], load["on"][0]
         if kind == "torque":
             angle = self._angle_for([load["torque"]], link, parts)
-            return TorqueLaw(link, load["torque"], parts.values, self.tables, angle)
+            return TorqueLaw(link, load["torque"], parts.geometry.values, self.tables, angle)
         if kind == "spring":
             ends = [
                 (None if link == GROUND else link, parts.pin_on(link, point))
                 for link, point in (load["on"], load["by"])
             ]
             stiffness, length, damping = (
-                parts.number(load[key]) for key in ("stiffness", "length", "damping")
+                parts.geometry.number(load[key]) for key in ("stiffness", "length", "damping")
             )
             return SpringDamper((ends[0], ends[1]), stiffness, length, damping)
         pin = parts.pin_on(link, load["on"][1])
         axis = parts.frames[link].axis if kind == "follower" else None
         fx, fy = load["force"]
         angle = self._angle_for([fx, fy], link, parts)
-        return ForceLaw(link, pin, (fx, fy), axis, parts.values, self.tables, angle)
+        return ForceLaw(link, pin, (fx, fy), axis, parts.geometry.values, self.tables, angle)
 
     def _angle_for(self, entries: Sequence[float | str], link: str, parts: LinkageParts) -> LinkAngle | None:
         """The angle of a link for a load; None where the load does not depend on it."""

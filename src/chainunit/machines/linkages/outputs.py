@@ -96,10 +96,10 @@ class LinkageOutputs:
                 "a": moving.t2 * (w * w) + moving.t1 * a,
             }
             for point in link.points:
-                at = frame.of(parts.point(name, point))
+                at = frame.of(parts.geometry.point(name, point))
                 fields[point] = point_motion(moving.beside(at.x, at.y), w, a)
             if link.heavy:
-                at = frame.of(parts.vector(link.centroid))
+                at = frame.of(parts.geometry.vector(link.centroid))
                 fields["centroid"] = point_motion(moving.beside(at.x, at.y), w, a)
             values[self.variable("link", name)] = self.link_outputs[name](**fields)
         return values

@@ -11,7 +11,8 @@ from ...groups.group import GuideForce
 from ...mechanism.assur import GROUND, PRISMATIC
 from ...mechanism.machine import Mechanism
 from .declarations import GuideReaction, PointMotion
-from .parts import LinkageParts, LinkFrame
+from .geometry import LinkFrame
+from .parts import LinkageParts
 from .structure import DriverEntry, JointEntry, LinkEntry, Structure
 
 _Node = TypeVar("_Node")
