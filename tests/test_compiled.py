@@ -142,7 +142,7 @@ def test_a_state_at_the_start_may_depend_on_another_model():
     np.testing.assert_allclose(
         Layout(CHAINS.States).values(x.machine), Layout(CHAINS.States).values(alone), rtol=1e-12, atol=1e-12
     )
-    assert part.model.controlled and part.model.start_unknowns == CHAINS.start_unknowns
+    assert part.model.controlled and part.model.start_problem.unknowns == CHAINS.start_problem.unknowns
     for tolerance, least in ((1e-12, 1e-12), (1e-3, 1e-10)):
         tuned = compiled(system.with_values({"machine.tolerance": tolerance}))
         assert tuned.model.tolerance(MATH, tuned.parameters) == least
@@ -175,7 +175,7 @@ def test_a_linkage_file_says_where_it_does_not_close():
 
 def test_another_process_gets_the_same_model(system):
     part = compiled(system)
-    assert pickle.loads(pickle.dumps(part.model)) is part.model is composed(*part.model.maker[1])
+    assert pickle.loads(pickle.dumps(part.model)) is part.model is composed(*part.model.made.arguments)
     p, u, x = ready(part)
     assert pickle.loads(pickle.dumps((p, u, x))) == (p, u, x)
     script = (

@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 
 from .composition import Composition, SystemPoint, modules_of, referred
 from .errors import GeometryError, refusal_prefix
-from .model import About, Model, Part, keep
+from .model import About, FmuData, Making, Model, Part, StartProblem, keep
 from .quantities import Layout
 
 
@@ -97,7 +97,7 @@ class CompositeModel(Model):
                 continue
             model, own = cls.of.models[name], point.p[name]
             entries, _ = point.inputs(name)
-            mine = unknowns(model, own, entries) if model.start_unknowns else []
+            mine = unknowns(model, own, entries) if model.start_problem.unknowns else []
             z += mine
 
             def states(
@@ -119,7 +119,7 @@ class CompositeModel(Model):
         before = iter(z)
 
         def improved(model: type[Model], own: Any, entries: Any) -> list[Any]:
-            mine = [next(before) for _ in range(model.start_unknowns)]
+            mine = [next(before) for _ in range(model.start_problem.unknowns)]
             return model.start_improved(xp, own, entries, mine)
 
         return cls._begin(xp, p, u, improved)[0]
@@ -130,7 +130,7 @@ class CompositeModel(Model):
         before = iter(z)
 
         def given(model: type[Model], own: Any, entries: Any) -> list[Any]:
-            return [next(before) for _ in range(model.start_unknowns)]
+            return [next(before) for _ in range(model.start_problem.unknowns)]
 
         _, point = cls._begin(xp, p, u, given)
         assert cls.States is not None
@@ -142,7 +142,7 @@ class CompositeModel(Model):
         point = cls.at(xp, p, u, x)
         point.advance(cls.of.steps)
         for name, model in cls._components():
-            if model.start_required:
+            if model.start_problem.required:
                 yield from model.start_limits(*point.arguments(name))
 
     # -- the run
@@ -227,7 +227,8 @@ def composed(text: str) -> type[CompositeModel]:
 def _composed(text: str, *models: type[Model]) -> type[CompositeModel]:
     of = Composition(json.loads(text), models)
     references = [each for _, each in of.data["components"]]
-    apart = of.by_differences()
+    apart, modules = of.by_differences(), set[str]().union(*map(modules_of, references))
+    about = of.data["about"]
     members: dict[str, Any] = {
         "__module__": __name__,
         "__doc__": of.words(),
@@ -235,15 +236,20 @@ def _composed(text: str, *models: type[Model]) -> type[CompositeModel]:
         "description": of.data["title"],
         "of": of,
         "components": MappingProxyType(of.models),
-        "maker": (composed, (text,)),
-        "built_by": f"composed({text!r})",
-        "modules": tuple(sorted(set[str]().union(*map(modules_of, references)))),
+        "made": Making(f"composed({text!r})", composed, (text,), tuple(sorted(modules))),
         "Parameters": of.Parameters,
         "Inputs": of.Inputs,
         "States": of.States if of.has_states else None,
         "required": of.required(lambda model: model.required),
-        "start_required": of.required(lambda model: model.start_required),
-        "about": About(**of.data["about"]) if of.data["about"] is not None else None,
+        "start_problem": StartProblem(
+            sum(model.start_problem.unknowns for model in models),
+            of.data["start_rounds"],
+            of.required(lambda model: model.start_problem.required),
+        ),
+        "fmu_data": FmuData(
+            about=None if about is None else About(**about),
+            experiment=MappingProxyType(of.data["experiment"]),
+        ),
         "repeated": {
             f"{own}.{name}": f"{own}.{one}"
             for own, model in of.models.items()
@@ -254,12 +260,9 @@ def _composed(text: str, *models: type[Model]) -> type[CompositeModel]:
             for own, model in of.models.items()
             for name, value in model.constant.items()
         },
-        "experiment": MappingProxyType(of.data["experiment"]),
         "terminals": of.terminals(),
         "derived": sum(model.derived for model in models),
         "input_rates": of.input_rates(),
-        "start_unknowns": sum(model.start_unknowns for model in models),
-        "start_rounds": of.data["start_rounds"],
         "controlled": of.has_states,
         "parts": tuple(
             Part(

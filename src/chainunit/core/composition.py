@@ -48,10 +48,10 @@ SOLVER = tuple(f"{_SOLVER}.{name}" for name in Layout(SystemSolver).names)
 
 def reference(model: type[Model]) -> dict[str, Any]:
     """A model as JSON can hold it: by its name in a module, or by the call that makes it."""
-    maker = vars(model).get("maker")
-    if maker is None:
+    made = vars(model).get("made")
+    if made is None:
         return {"of": _place(model)}
-    function, arguments = maker
+    function, arguments = made.function, made.arguments
     return {"of": _place(function), "arguments": [_argument(each) for each in arguments]}
 
 
@@ -91,7 +91,8 @@ def modules_of(place: Mapping[str, Any]) -> set[str]:
     own = {place["of"].partition(":")[0]}
     own = {module.removeprefix(".") for module in own if module.startswith(".")}
     inner = [each for each in place.get("arguments", ()) if isinstance(each, dict)]
-    return own.union(*map(modules_of, inner), referred(place).modules)
+    made = referred(place).made
+    return own.union(*map(modules_of, inner), made.modules if made else ())
 
 
 # -- the parts of a system

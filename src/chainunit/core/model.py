@@ -80,6 +80,40 @@ class About:
     version: str = ""
 
 
+@dataclass(frozen=True)
+class FmuData:
+    """Data of a model that only its FMU needs."""
+
+    notes: str = ""
+    """further paragraphs of the documentation, each behind an empty line: frame, signs, limits"""
+    about: About | None = None
+    """who made the model, where its user did; None for the models of this package"""
+    experiment: Mapping[str, float] = field(default_factory=dict)
+    """``step`` and ``stop`` [s] of the default experiment, where the maker of the model knows them"""
+
+
+@dataclass(frozen=True)
+class Making:
+    """How a class is made that no module names: the `call` as text of Python, the same as `function` and `arguments`,
+    by which another process gets the class, and further `modules` of this package that the call imports by name,
+    such as ``drives.dc_motor``."""
+
+    call: str
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...]
+    modules: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class StartProblem:
+    """How the states at the start are found: the number of `unknowns` of an iteration, its `rounds`, and the
+    conditions on the states, see `Model.start_limits`."""
+
+    unknowns: int = 0
+    rounds: int = 0
+    required: tuple[Requirement, ...] = ()
+
+
 Place = tuple[float, float]
 
 
@@ -118,15 +152,15 @@ class ModelType(type):
 def _reduced(model: Any) -> str | tuple[Callable[..., Any], tuple[Any, ...]]:
     """A model as pickle stores it: by its name, or, for a class that has no name in a module, by the call
     that makes it."""
-    maker = vars(model).get("maker")
-    return model.__qualname__ if maker is None else maker
+    made = vars(model).get("made")
+    return model.__qualname__ if made is None else (made.function, made.arguments)
 
 
 copyreg.pickle(ModelType, _reduced)
 
 
 def keep(model: type[Model], *names: str) -> None:
-    """Let pickle take instances of these declarations of a model with a `maker`, whose classes no module names."""
+    """Let pickle take instances of these declarations of a model that is `made`, whose classes no module names."""
     for name in names:
         of = getattr(model, name)
 
@@ -168,34 +202,20 @@ class Model(metaclass=ModelType):
     """Inputs of a co-simulation FMU whose time derivative is another input (``phi`` has ``w``, ``w`` has
     ``a``). They are extrapolated inside a step; without that a turning shaft would stand still in each
     step."""
-    start_unknowns: ClassVar[int] = 0
-    """Number of unknowns that an iteration finds to give the states at the start; see `start`."""
-    start_rounds: ClassVar[int] = 0
-    """Number of rounds of that iteration."""
-    start_required: ClassVar[tuple[Requirement, ...]] = ()
-    """Conditions on the states at the start; see `start_limits`."""
+    start_problem: ClassVar[StartProblem] = StartProblem()
+    """Iteration for the states at the start; see `start`."""
     controlled: ClassVar[bool] = False
     """Whether a co-simulation FMU integrates with error control to `tolerance` and corrects the states by
     `closed` after each substep; otherwise it integrates in equal steps."""
-    built_by: ClassVar[str] = ""
-    """The call that makes this class, if a function of its module makes it; else empty."""
+    made: ClassVar[Making | None] = None
+    """How a function of its module makes this class; None for a class that the module names."""
     components: ClassVar[Mapping[str, type[Model]]] = {}
     """By name, the models that make this one, if it is a system of models."""
-    modules: ClassVar[tuple[str, ...]] = ()
-    """Further modules of this package that the call imports by name, such as ``drives.dc_motor``."""
-    maker: ClassVar[tuple[Callable[..., Any], tuple[Any, ...]] | None] = None
-    """The same call as function and arguments, by which another process gets the class."""
-
-    notes: ClassVar[str] = ""
-    """Further paragraphs of the documentation of its FMU, each behind an empty line: frame, signs, limits."""
-    about: ClassVar[About | None] = None
-    """Who made the model, where its user did; None for the models of this package."""
+    fmu_data: ClassVar[FmuData] = FmuData()
     repeated: ClassVar[Mapping[str, str]] = {}
     """Outputs that are another output under a further name, by their names: their FMU has one value for both."""
     constant: ClassVar[Mapping[str, float]] = {}
     """Outputs that never change, with their values by name."""
-    experiment: ClassVar[Mapping[str, float]] = {}
-    """``step`` and ``stop`` [s] of the default experiment of its FMU, where the maker of the model knows them."""
 
     parameter_layout: ClassVar[Layout]
     input_layout: ClassVar[Layout]
@@ -207,6 +227,11 @@ class Model(metaclass=ModelType):
         cls.parameter_layout = Layout(cls.Parameters)
         cls.input_layout = Layout(cls.Inputs)
         cls.state_layout = Layout(cls.States) if cls.States else None
+
+    @classmethod
+    def expression(cls) -> str:
+        """The expression of Python that gives this class in its module."""
+        return cls.made.call if cls.made else cls.__qualname__
 
     @staticmethod
     def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
@@ -298,7 +323,7 @@ class Model(metaclass=ModelType):
 
     @staticmethod
     def start_limits(xp: Any, p: Any, u: Any, x: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """Value, lower limit and upper limit of each requirement of `start_required`, in order, for the
+        """Value, lower limit and upper limit of each requirement of the `start_problem`, in order, for the
         states `x`."""
         return iter(())
 
@@ -312,15 +337,15 @@ class Model(metaclass=ModelType):
             where the states do not meet a condition, in one line.
         """
         x = cls.start(MATH, p, u)
-        cls._meets(p, cls.start_required, cls.start_limits(MATH, p, u, x))
+        cls._meets(p, cls.start_problem.required, cls.start_limits(MATH, p, u, x))
         return x
 
     @classmethod
     def start(cls, xp: Any, p: Any, u: Any, rounds: int | None = None) -> Any:
-        """States at the start with the inputs `u`, by `start_rounds` or so many `rounds`: a few show the
-        dependencies."""
+        """States at the start with the inputs `u`, by the rounds of the `start_problem` or so many `rounds`: a few
+        show the dependencies."""
         z = cls.start_guess(xp, p, u)
-        for _ in range(cls.start_rounds if rounds is None else rounds):
+        for _ in range(cls.start_problem.rounds if rounds is None else rounds):
             z = cls.start_improved(xp, p, u, z)
         return cls.start_states(xp, p, u, z)
 

@@ -113,7 +113,7 @@ class Interface:
         rows_at_start = [*outputs, *derivatives]
         if model.state_layout:
             states = model.state_layout.values(x)
-            first = model.start(casadi_(), p, u, rounds=min(2, model.start_rounds))
+            first = model.start(casadi_(), p, u, rounds=min(2, model.start_problem.rounds))
             start = model.state_layout.values(first)
             rows_at_start = [*trace(model).outputs_at(first), *model.derivatives(casadi_(), p, u, first)]
         in_run = self._influences(symbols, [*states, *outputs, *derivatives])
@@ -334,7 +334,9 @@ def _root(model: type[Model], version: str, own: Mapping[str, str]) -> Element:
     """The root element, with the attributes that are common to both versions of FMI. `version` is that of this
     package."""
     fmi, identifier = own.items()
-    about = model.about or About(metadata.metadata("chainunit")["Author"], _copyright(), "MIT", version)
+    about = model.fmu_data.about or About(
+        metadata.metadata("chainunit")["Author"], _copyright(), "MIT", version
+    )
     given = {"author": about.author, "version": about.version}
     given |= {"copyright": about.copyright, "license": about.license}
     return Element(

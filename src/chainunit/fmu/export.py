@@ -202,18 +202,19 @@ def _script(model: type[Model], start: dict[str, float]) -> str:
     a function makes, the arguments of that function."""
     file = script_file(model)
     module = model.__module__.rpartition(".")[2]
-    call = model.built_by or model.__qualname__
-    paths = (*(f"{__package__.partition('.')[0]}.{each}" for each in model.modules), model.__module__)
+    made, call = model.made, model.expression()
+    paths = (
+        *(f"{__package__.partition('.')[0]}.{each}" for each in (made.modules if made else ())),
+        model.__module__,
+    )
     imports = "\n".join("from {0} import {2}".format(*path.rpartition(".")) for path in paths)
     own = script_of(model)
     extras = {"experiment": own.experiment, "sizes": own.sizes}
     more = "".join(f"    {name} = {values!r}\n" for name, values in extras.items() if values)
     plain = _SCRIPT.format(name=model.name, imports=imports, module=module, call=call, more=more)
     text = file.read_text() if file else plain
-    if model.built_by:
-        text = re.sub(
-            r"(?m)^(    model = \w+\.)\w+\([\d, ]*\)(?:\.\w+\(\))*", rf"\g<1>{model.built_by}", text
-        )
+    if made:
+        text = re.sub(r"(?m)^(    model = \w+\.)\w+\([\d, ]*\)(?:\.\w+\(\))*", rf"\g<1>{call}", text)
     values = {name: float(start[name]) for name in sorted(start)}
     return text + (f"    start = {values!r}\n" if values else "")
 

@@ -22,7 +22,7 @@ from types import MappingProxyType
 from typing import Any, ClassVar
 
 from ..core.errors import InputError
-from ..core.model import Requirement
+from ..core.model import Making, Requirement, StartProblem
 from ..core.ports import PortSlopes
 from ..core.quantities import Layout, declared_class, group
 from ..mechanism.chains import ChainedState
@@ -66,12 +66,11 @@ class ChainedModel(LinkageModel):
 
     organs: ClassVar[Organs]
     controlled = True
-    start_required = _HANGS
 
     def __init_subclass__(cls) -> None:
         if hasattr(cls, "organs"):
-            cls.start_unknowns = cls.organs.unknowns
-            cls.start_rounds = 100 if cls.start_unknowns else 0
+            unknowns = cls.organs.unknowns
+            cls.start_problem = StartProblem(unknowns, 100 if unknowns else 0, _HANGS)
         super().__init_subclass__()
 
     @staticmethod
@@ -195,8 +194,7 @@ def _flexible(walls: int, webs: int) -> type[InverseMachine]:
         """
 
         name = "ChainUnitFlexible"
-        built_by = f"flexible({walls}, {webs})"
-        maker = (flexible, (walls, webs))
+        made = Making(f"flexible({walls}, {webs})", flexible, (walls, webs))
         description = (
             f"Forces in a chain unit whose organs are chains of {chains.number} rods, {walls} in the wall and {webs} "
             "in the web: from motor angle and speed to torque, load port and every support reaction"

@@ -14,7 +14,7 @@ from functools import cache
 from typing import Any, ClassVar
 
 from ..core.engines import MATH
-from ..core.model import Model, Part, Sketch, keep
+from ..core.model import Making, Model, Part, Sketch, keep
 from ..core.ports import PortSlopes, ShaftMotion
 from ..core.quantities import (
     Fields,
@@ -153,7 +153,7 @@ class InverseMachine(LinkageModel, MachineModel):
         if "name" in own and "direct_name" not in own:
             cls.direct_name = f"{cls.name}Direct"
         # a function that makes classes may make several of one name
-        if "name" in own and not cls.built_by:
+        if "name" in own and not cls.made:
             MACHINES[cls.name] = cls
         if hasattr(cls, "Outputs") and "parts" not in own:
             apart = cls.by_differences
@@ -248,11 +248,9 @@ class InverseMachine(LinkageModel, MachineModel):
             "description": cls.direct_description
             or f"{cls.name} that moves by itself: from {port.words.effort} to {port.words.place}, speed, "
             "acceleration and every reaction",
-            "built_by": f"{cls.built_by or cls.__qualname__}.direct()",
-            "maker": (direct_model, (cls,)),
+            "made": Making(f"{cls.expression()}.direct()", direct_model, (cls,)),
             "inverse": cls,
-            "about": cls.about,
-            "notes": cls.notes,
+            "fmu_data": cls.fmu_data,
             "repeated": cls.repeated,
             "constant": cls.constant,
             "terminals": port.flanges,
@@ -271,7 +269,7 @@ class InverseMachine(LinkageModel, MachineModel):
             **more,
         }
         model = type(f"Direct{cls.__name__}", (base,), members)
-        if cls.built_by:
+        if cls.made:
             keep(model, "Parameters", "Inputs")
         return model
 

@@ -321,6 +321,6 @@ class _Plan:
 
         def rounds(name: str) -> int:
             before = max(map(rounds, self._started_by[name]), default=0)
-            return before + self._models[name].start_rounds
+            return before + self._models[name].start_problem.rounds
 
         return max(map(rounds, self._started_by), default=0)

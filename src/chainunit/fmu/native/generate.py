@@ -77,15 +77,15 @@ def _programs(interface: Interface) -> Iterator[Program]:
     if interface.states:
         yield one("derivatives", point, derivatives, "OFTEN")
         assert model.state_layout is not None
-        unknowns = casadi.SX.sym("z", model.start_unknowns)
-        z = casadi.vertsplit(unknowns) if model.start_unknowns else []
+        unknowns = casadi.SX.sym("z", model.start_problem.unknowns)
+        z = casadi.vertsplit(unknowns) if model.start_problem.unknowns else []
         if z:
             yield one("guess", [ps, us], model.start_guess(casadi_(), p, u))
             yield one("improved", [ps, us, unknowns], model.start_improved(casadi_(), p, u, z))
         yield one(
             "initial", [ps, us, unknowns], model.state_layout.values(model.start_states(casadi_(), p, u, z))
         )
-        if model.start_required:
+        if model.start_problem.required:
             yield one(
                 "start_limits", point, [v for row in model.start_limits(casadi_(), p, u, x) for v in row]
             )
@@ -204,7 +204,7 @@ def tables(interface: Interface, guid: str, room: int) -> str:
         _array("Group", "group", group_rows),
         _array("Type", "discrete_type", [interface.others[i].type.upper() for i in interface.discrete]),
     ]
-    requirements = (*model.required, *model.start_required)
+    requirements = (*model.required, *model.start_problem.required)
     for i, r in enumerate(requirements):
         lines.append(_array("int", f"given_{i}", [str(parameter_names.index(n)) for n in r.context]))
     rows = [
@@ -221,12 +221,12 @@ def tables(interface: Interface, guid: str, room: int) -> str:
         "n_x": len(interface.states),
         "n_y": n_y,
         "n_k": model.derived,
-        "n_z": model.start_unknowns,
+        "n_z": model.start_problem.unknowns,
         "n_w": room,
         "n_groups": len(group_rows),
         "differenced": f"{sum(1 << g for g in difference_groups(interface))}u",
         "n_required": len(model.required),
-        "n_start_required": len(model.start_required),
+        "n_start_required": len(model.start_problem.required),
         "start": "starts",
         "declared": "declared",
         "nominal": "nominal",
@@ -237,7 +237,7 @@ def tables(interface: Interface, guid: str, room: int) -> str:
         "discrete": len(group_rows) - 1 if interface.discrete else -1,
         "discrete_type": "discrete_type",
         "required": "required" if rows else "NULL",
-        "start_rounds": model.start_rounds,
+        "start_rounds": model.start_problem.rounds,
         "max_steps": parameter_names.index(MAX_STEPS) if interface.states else -1,
     }
     lines.append("const Model model = {")

@@ -18,7 +18,7 @@ from typing import Any, cast
 from ...core.engines import MATH
 from ...core.errors import GeometryError, InputError
 from ...core.messages import unit_behind
-from ...core.model import About, Requirement, keep
+from ...core.model import About, FmuData, Making, Requirement, keep
 from ...core.planar import ZERO
 from ...core.quantities import Value, declared_class, group, quantity
 from ...groups.loads import GuideLosses, PinLosses, Weight
@@ -392,10 +392,8 @@ class LinkageDescription(LinkageOutputs):
             noun = data["title"] or data["name"]
             turning = data["driver"]["link"]
             description = data["title"] or f"linkage {data['name']}"
-            built_by = f"machine_of({described.text!r})"
-            maker = (machine_of, (described.text,))
-            about = About(**data.get("about", {}))
-            notes = described.notes
+            made = Making(f"machine_of({described.text!r})", machine_of, (described.text,))
+            fmu_data = FmuData(described.notes, About(**data.get("about", {})))
             repeated = repeated_outputs(described.structure, described.variable)
             constant = constant_outputs(described.structure, described.variable)
             driver_port = described.port
