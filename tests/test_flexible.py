@@ -391,7 +391,7 @@ def moving(rng, *, frictionless=False):
             -1.0, 1.0
         )
     for _ in range(50):
-        before, x = x, model.closed(MATH, p, u, layout.instance(x))
+        before, x = x, model.constrained_states(MATH, p, u, layout.instance(x))
         if np.allclose(x, before, rtol=0.0, atol=1e-13 * np.max(np.abs(x))):
             break
     else:

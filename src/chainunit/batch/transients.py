@@ -200,7 +200,7 @@ class Transients:
         ]
         out = np.empty((len(self.outputs) * (2 if self._by else 1), room, rows))
         count = np.zeros(room, np.int64)
-        p, model = self.model.prepared(MATH, parameters), self.model
+        p, model = self.model.with_derived(MATH, parameters), self.model
         numbers = [
             step,
             longest or float(model.internal_step(MATH, p)),
@@ -333,7 +333,7 @@ def _operations(model: type[Model], outputs: Sequence[str], by: Sequence[str]) -
     values = [*casadi.vertsplit(t.symbols[2]), *t.outputs]
     rows = casadi.vertcat(*(casadi.SX(values[k]) for k in find(outputs, declared, "output")), casadi.SX(0, 1))
     rates = casadi.vertcat(*(casadi.SX(rate) for rate in t.derivatives))
-    closed = model.closed(casadi_(), t.p, t.u, t.x) if model.controlled else []
+    closed = model.constrained_states(casadi_(), t.p, t.u, t.x) if model.controlled else []
     met = casadi.vertcat(*(casadi.SX(x) for x in closed), casadi.SX(0, 1))
     p, u, x = t.symbols[:3]
     groups = t.explicit([rates, rows, met])

@@ -149,14 +149,14 @@ class ModelType(type):
     """The type of all models."""
 
 
-def _reduced(model: Any) -> str | tuple[Callable[..., Any], tuple[Any, ...]]:
+def _pickled_form(model: Any) -> str | tuple[Callable[..., Any], tuple[Any, ...]]:
     """A model as pickle stores it: by its name, or, for a class that has no name in a module, by the call
     that makes it."""
     made = vars(model).get("made")
     return model.__qualname__ if made is None else (made.function, made.arguments)
 
 
-copyreg.pickle(ModelType, _reduced)
+copyreg.pickle(ModelType, _pickled_form)
 
 
 def keep(model: type[Model], *names: str) -> None:
@@ -167,12 +167,12 @@ def keep(model: type[Model], *names: str) -> None:
         def reduced(instance: Any, of: type = of, name: str = name) -> str | tuple[Any, ...]:
             if type(instance) is not of:  # of another declaration with these fields
                 return copyreg.__newobj__, (type(instance),), vars(instance)  # type: ignore[attr-defined]
-            return _kept, (model, name, Layout(of).values(instance), getattr(instance, "derived", None))
+            return _unpickled, (model, name, Layout(of).values(instance), getattr(instance, "derived", None))
 
         of.__reduce__ = reduced
 
 
-def _kept(model: type[Model], name: str, values: Sequence[Any], derived: Any) -> Any:
+def _unpickled(model: type[Model], name: str, values: Sequence[Any], derived: Any) -> Any:
     """The instance of that declaration of a model; see `keep`."""
     instance = Layout(getattr(model, name)).instance(values)
     if derived is not None:
@@ -206,7 +206,7 @@ class Model(metaclass=ModelType):
     """Iteration for the states at the start; see `start`."""
     controlled: ClassVar[bool] = False
     """Whether a co-simulation FMU integrates with error control to `tolerance` and corrects the states by
-    `closed` after each substep; otherwise it integrates in equal steps."""
+    `constrained_states` after each substep; otherwise it integrates in equal steps."""
     made: ClassVar[Making | None] = None
     """How a function of its module makes this class; None for a class that the module names."""
     components: ClassVar[Mapping[str, type[Model]]] = {}
@@ -245,7 +245,7 @@ class Model(metaclass=ModelType):
         return []
 
     @classmethod
-    def prepared(cls, xp: Any, p: Any, derived: list[Any] | None = None) -> Any:
+    def with_derived(cls, xp: Any, p: Any, derived: list[Any] | None = None) -> Any:
         """The parameters with the values of `derive`, or with the values `derived` in their place."""
         if not cls.derived:
             return p
@@ -256,7 +256,7 @@ class Model(metaclass=ModelType):
 
     @classmethod
     def check(cls, p: Any, derived: list[Any] | None = None) -> Any:
-        """The parameters `prepared`, with the values `derived` if they are given. Parameters that are out of
+        """The parameters `with_derived`, with the values `derived` if they are given. Parameters that are out of
         bounds, or with which the machine does not work, are refused.
 
         Raises
@@ -270,10 +270,10 @@ class Model(metaclass=ModelType):
             raise InputError(line)
         p = within_bounds(cls.parameter_layout, p)
         try:
-            p = cls.prepared(MATH, p, derived)
+            p = cls.with_derived(MATH, p, derived)
         except (ArithmeticError, ValueError):
             # `math` raises where other engines give NaN, which no requirement admits
-            p = cls.prepared(MATH, p, [math.nan] * cls.derived)
+            p = cls.with_derived(MATH, p, [math.nan] * cls.derived)
         cls._meets(p, cls.required, cls.requirements(MATH, p))
         return p
 
@@ -288,7 +288,7 @@ class Model(metaclass=ModelType):
                 raise error
 
     @classmethod
-    def course(cls, values: Sequence[Any]) -> list[tuple[int, Any, Any]]:
+    def extrapolations(cls, values: Sequence[Any]) -> list[tuple[int, Any, Any]]:
         """Index, rate and half of the second derivative of each input of `input_rates`, from the `values` of
         all inputs: after the time `since` the input has changed by since * (rate + since * half)."""
 
@@ -312,7 +312,7 @@ class Model(metaclass=ModelType):
         return []
 
     @staticmethod
-    def start_improved(xp: Any, p: Any, u: Any, z: list[Any]) -> list[Any]:
+    def improve_start(xp: Any, p: Any, u: Any, z: list[Any]) -> list[Any]:
         """The unknowns of the start after one more round."""
         raise NotImplementedError
 
@@ -346,7 +346,7 @@ class Model(metaclass=ModelType):
         show the dependencies."""
         z = cls.start_guess(xp, p, u)
         for _ in range(cls.start_problem.rounds if rounds is None else rounds):
-            z = cls.start_improved(xp, p, u, z)
+            z = cls.improve_start(xp, p, u, z)
         return cls.start_states(xp, p, u, z)
 
     @staticmethod
@@ -365,7 +365,7 @@ class Model(metaclass=ModelType):
         raise NotImplementedError
 
     @staticmethod
-    def closed(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+    def constrained_states(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
         """The states near `x`, in declared order, that meet the model's constraints (`controlled` models)."""
         raise NotImplementedError
 
@@ -376,10 +376,10 @@ class Model(metaclass=ModelType):
 
     @classmethod
     def evaluate(cls, xp: Any, p: Any, u: Any, x: Any = None) -> tuple[Any, ...]:
-        """The outputs of every part at one point (or array of points). Parameters that are not yet `prepared`
+        """The outputs of every part at one point (or array of points). Parameters that are not yet `with_derived`
         are prepared in each call."""
         if cls.derived and not hasattr(p, "derived"):
-            p = cls.prepared(MATH, p)
+            p = cls.with_derived(MATH, p)
         shared = cls.shared(xp, p, u, x)
         return tuple(part.equations(xp, p, u, x, shared) for part in cls.parts)
 
@@ -389,7 +389,7 @@ class Model(metaclass=ModelType):
         return None
 
     @classmethod
-    def further(cls, xp: Any, p: Any, u: Any, x: Any = None) -> list[tuple[Variable, Any]]:
+    def further_quantities(cls, xp: Any, p: Any, u: Any, x: Any = None) -> list[tuple[Variable, Any]]:
         """Quantities beside the outputs, each declared and with its value at one point. Batches and cycle quantities
         know them; FMUs do not have them."""
         return []

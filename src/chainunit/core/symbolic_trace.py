@@ -30,9 +30,9 @@ class Trace:
     derivatives: list[Any]
 
     @cached_property
-    def further(self) -> list[tuple[Variable, Any]]:
-        """The quantities beside the outputs, see `Model.further`."""
-        return self.model.further(casadi_(), self.p, self.u, self.x)
+    def further_quantities(self) -> list[tuple[Variable, Any]]:
+        """The quantities beside the outputs, see `Model.further_quantities`."""
+        return self.model.further_quantities(casadi_(), self.p, self.u, self.x)
 
     def outputs_at(self, x: Any) -> list[Any]:
         """The outputs with the states `x` in place of the symbols."""
@@ -61,7 +61,7 @@ def trace(model: type[Model]) -> Trace:
     symbols.append(casadi.SX.sym("k", model.derived))
     p = model.parameter_layout.instance(casadi.vertsplit(symbols[0]))
     if model.derived:
-        p = model.prepared(casadi_(), p, casadi.vertsplit(symbols[3]))
+        p = model.with_derived(casadi_(), p, casadi.vertsplit(symbols[3]))
     u = model.input_layout.instance(casadi.vertsplit(symbols[1]))
     x = model.state_layout.instance(casadi.vertsplit(symbols[2])) if model.state_layout else None
     derivatives = model.derivatives(casadi_(), p, u, x) if model.state_layout else []

@@ -1,8 +1,8 @@
 """A system of models as one: declarations side by side, and equations in the order of their dependencies.
 
 The description of a system is a text in JSON, from which another process, or an FMU, makes the same model
-(`chainunit.core.composite.composed`); `chainunit.system.compiled` writes it. Each component is a group: the names are
-the full names of the system, such as ``motor.armature.R``. Standard library only: FMUs carry this file.
+(`chainunit.core.system_model.system_model`); `chainunit.system.compiled` writes it. Each component is a group: the
+names are the full names of the system, such as ``motor.armature.R``. Standard library only: FMUs carry this file.
 """
 
 from __future__ import annotations
@@ -77,13 +77,13 @@ def _place(thing: Any) -> str:
     return f"{module[len(own) - 1 :] if module.startswith(own) else module}:{thing.__qualname__}"
 
 
-def referred(place: Mapping[str, Any]) -> Any:
+def model_at(place: Mapping[str, Any]) -> Any:
     """The model of a `reference`."""
     module, _, name = place["of"].partition(":")
     thing = attrgetter(name)(import_module(module, __package__))
     if "arguments" not in place:
         return thing
-    return thing(*(referred(each) if isinstance(each, dict) else each for each in place["arguments"]))
+    return thing(*(model_at(each) if isinstance(each, dict) else each for each in place["arguments"]))
 
 
 def modules_of(place: Mapping[str, Any]) -> set[str]:
@@ -91,7 +91,7 @@ def modules_of(place: Mapping[str, Any]) -> set[str]:
     own = {place["of"].partition(":")[0]}
     own = {module.removeprefix(".") for module in own if module.startswith(".")}
     inner = [each for each in place.get("arguments", ()) if isinstance(each, dict)]
-    made = referred(place).made
+    made = model_at(place).made
     return own.union(*map(modules_of, inner), made.modules if made else ())
 
 
@@ -121,7 +121,7 @@ class Member:
         return self.model.state_layout.names if self.model.state_layout else ()
 
 
-class Composition:
+class SystemDescription:
     """What all values of a system share, from its description.
 
     The description has the `name` and `title` of the model, a `reference` of each of the `components`, the
@@ -287,7 +287,7 @@ class SystemPoint:
     not yet known has its declared start value. The order sees to it that no output that is read depends on it.
     """
 
-    def __init__(self, of: Composition, xp: Any, p: Any, u: Any, states: Mapping[str, Any]) -> None:
+    def __init__(self, of: SystemDescription, xp: Any, p: Any, u: Any, states: Mapping[str, Any]) -> None:
         self._of, self._xp, self._u = of, xp, u
         self.p = of.parameters(p)
         self._states = dict(states)

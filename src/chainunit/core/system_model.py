@@ -1,4 +1,4 @@
-"""The model of a system of models: `composed` makes it from its description (`chainunit.core.composition`).
+"""The model of a system of models: `system_model` makes it from its description (`chainunit.core.system_description`).
 
 Standard library only: FMUs carry this file.
 """
@@ -12,44 +12,44 @@ from functools import cache
 from types import MappingProxyType
 from typing import Any, ClassVar
 
-from .composition import Composition, SystemPoint, modules_of, referred
 from .errors import GeometryError, refusal_prefix
 from .model import About, FmuData, Making, Model, Part, StartProblem, keep
 from .quantities import Layout
+from .system_description import SystemDescription, SystemPoint, model_at, modules_of
 
 
-class CompositeModel(Model):
-    """A model that a system of models makes; `composed` gives its subclasses.
+class SystemModel(Model):
+    """A model that a system of models makes; `system_model` gives its subclasses.
 
     Its internal integrator controls the error: the limits of a control bend the course of the states, and friction
     near rest acts within microseconds. With equal steps of 0.25 ms such a bend alone costs an accuracy of 1e-6.
     """
 
-    of: ClassVar[Composition]
+    system: ClassVar[SystemDescription]
 
     @classmethod
     def at(cls, xp: Any, p: Any, u: Any, x: Any) -> SystemPoint:
         """The system at one point."""
-        names = [name for name, member in cls.of.members.items() if member.states]
-        return SystemPoint(cls.of, xp, p, u, {name: getattr(x, name) for name in names} if x else {})
+        names = [name for name, member in cls.system.members.items() if member.states]
+        return SystemPoint(cls.system, xp, p, u, {name: getattr(x, name) for name in names} if x else {})
 
     @classmethod
     def _components(cls) -> Iterator[tuple[str, type[Model]]]:
-        yield from cls.of.models.items()
+        yield from cls.system.models.items()
 
     @classmethod
-    def prepared(cls, xp: Any, p: Any, derived: list[Any] | None = None) -> Any:
-        """See `Model.prepared`; each component gets its own derived values."""
+    def with_derived(cls, xp: Any, p: Any, derived: list[Any] | None = None) -> Any:
+        """See `Model.with_derived`; each component gets its own derived values."""
         if not cls.derived:
             return p
         ready, first = copy.copy(p), 0
         values: list[Any] = []
         # the copy has those of the original
         vars(ready).pop("of_components", None)
-        own = cls.of.parameters(ready)
+        own = cls.system.parameters(ready)
         for name, model in cls._components():
             given = None if derived is None else derived[first : first + model.derived]
-            own[name] = model.prepared(xp, own[name], given)
+            own[name] = model.with_derived(xp, own[name], given)
             values += own[name].derived if model.derived else []
             first += model.derived
         object.__setattr__(ready, "derived", values)
@@ -58,7 +58,7 @@ class CompositeModel(Model):
     @classmethod
     def derive(cls, xp: Any, p: Any) -> list[Any]:
         """The derived values of all components."""
-        own = cls.of.parameters(p)
+        own = cls.system.parameters(p)
         return [v for name, model in cls._components() for v in model.derive(xp, own[name])]
 
     @classmethod
@@ -67,7 +67,7 @@ class CompositeModel(Model):
         try:
             return super().check(p, derived)
         except GeometryError as error:
-            own = cls.of.parameters(p)
+            own = cls.system.parameters(p)
             for name, model in cls._components():
                 if next(base for base in model.__mro__ if "check" in vars(base)) is not Model:
                     with refusal_prefix(f"{name}: "):
@@ -77,7 +77,7 @@ class CompositeModel(Model):
     @classmethod
     def requirements(cls, xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
         """The limits of all components."""
-        own = cls.of.parameters(p)
+        own = cls.system.parameters(p)
         for name, model in cls._components():
             yield from model.requirements(xp, own[name])
 
@@ -89,13 +89,13 @@ class CompositeModel(Model):
     ) -> tuple[list[Any], SystemPoint]:
         """The unknowns of the start of all components, and the system with the states that follow from them;
         `unknowns` gives those of a component from its model, parameters and inputs."""
-        point = SystemPoint(cls.of, xp, p, u, {})
+        point = SystemPoint(cls.system, xp, p, u, {})
         z: list[Any] = []
-        for name, outputs in cls.of.start:
+        for name, outputs in cls.system.start:
             if outputs is not None:
                 point.advance([(name, outputs)])
                 continue
-            model, own = cls.of.models[name], point.p[name]
+            model, own = cls.system.models[name], point.p[name]
             entries, _ = point.inputs(name)
             mine = unknowns(model, own, entries) if model.start_problem.unknowns else []
             z += mine
@@ -114,13 +114,13 @@ class CompositeModel(Model):
         return cls._begin(xp, p, u, lambda model, own, entries: model.start_guess(xp, own, entries))[0]
 
     @classmethod
-    def start_improved(cls, xp: Any, p: Any, u: Any, z: list[Any]) -> list[Any]:
+    def improve_start(cls, xp: Any, p: Any, u: Any, z: list[Any]) -> list[Any]:
         """The unknowns of the start after one more round, of all components in order."""
         before = iter(z)
 
         def improved(model: type[Model], own: Any, entries: Any) -> list[Any]:
             mine = [next(before) for _ in range(model.start_problem.unknowns)]
-            return model.start_improved(xp, own, entries, mine)
+            return model.improve_start(xp, own, entries, mine)
 
         return cls._begin(xp, p, u, improved)[0]
 
@@ -134,13 +134,13 @@ class CompositeModel(Model):
 
         _, point = cls._begin(xp, p, u, given)
         assert cls.States is not None
-        return cls.States(**{name: point.states(name) for name, m in cls.of.members.items() if m.states})
+        return cls.States(**{name: point.states(name) for name, m in cls.system.members.items() if m.states})
 
     @classmethod
     def start_limits(cls, xp: Any, p: Any, u: Any, x: Any) -> Iterator[tuple[Any, Any, Any]]:
         """The limits of all components."""
         point = cls.at(xp, p, u, x)
-        point.advance(cls.of.steps)
+        point.advance(cls.system.steps)
         for name, model in cls._components():
             if model.start_problem.required:
                 yield from model.start_limits(*point.arguments(name))
@@ -151,7 +151,7 @@ class CompositeModel(Model):
     def derivatives(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
         """Time derivatives of the states, component by component."""
         point = cls.at(xp, p, u, x)
-        point.advance(cls.of.rate_steps)
+        point.advance(cls.system.rate_steps)
         rates: list[Any] = []
         for name, model in cls._components():
             if model.state_layout:
@@ -162,7 +162,7 @@ class CompositeModel(Model):
     def shared(cls, xp: Any, p: Any, u: Any, x: Any) -> SystemPoint:
         """The system with all inputs of its components."""
         point = cls.at(xp, p, u, x)
-        point.advance(cls.of.steps)
+        point.advance(cls.system.steps)
         return point
 
     @classmethod
@@ -189,7 +189,7 @@ class CompositeModel(Model):
     @classmethod
     def internal_step(cls, xp: Any, p: Any) -> Any:
         """The least of the components' longest steps."""
-        own = cls.of.parameters(p)
+        own = cls.system.parameters(p)
         models = [(name, model) for name, model in cls._components() if model.state_layout]
         return cls._least(xp, (model.internal_step(xp, own[name]) for name, model in models))
 
@@ -197,35 +197,35 @@ class CompositeModel(Model):
     def tolerance(cls, xp: Any, p: Any) -> Any:
         """The parameter `solver.tolerance`, or the least of those of the components that control the error if it is
         less."""
-        own = cls.of.parameters(p)
+        own = cls.system.parameters(p)
         models = [(name, model) for name, model in cls._components() if model.controlled]
         return cls._least(
             xp, [p.solver.tolerance, *(model.tolerance(xp, own[name]) for name, model in models)]
         )
 
     @classmethod
-    def closed(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+    def constrained_states(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
         """The states near `x` that meet the constraints of each component; the others are those of `x`."""
         point = cls.at(xp, p, u, x)
-        point.advance(cls.of.closed_steps)
+        point.advance(cls.system.closed_steps)
         values: list[Any] = []
         for name, model in cls._components():
             if model.controlled:
-                values += model.closed(*point.arguments(name))
+                values += model.constrained_states(*point.arguments(name))
             elif model.state_layout:
                 values += model.state_layout.values(point.states(name))
         return values
 
 
-def composed(text: str) -> type[CompositeModel]:
+def system_model(text: str) -> type[SystemModel]:
     """The model of a description."""
     # a class that was defined anew, as in a notebook, makes a new model
-    return _composed(text, *(referred(each) for _, each in json.loads(text)["components"]))
+    return _system_model(text, *(model_at(each) for _, each in json.loads(text)["components"]))
 
 
 @cache
-def _composed(text: str, *models: type[Model]) -> type[CompositeModel]:
-    of = Composition(json.loads(text), models)
+def _system_model(text: str, *models: type[Model]) -> type[SystemModel]:
+    of = SystemDescription(json.loads(text), models)
     references = [each for _, each in of.data["components"]]
     apart, modules = of.by_differences(), set[str]().union(*map(modules_of, references))
     about = of.data["about"]
@@ -234,9 +234,9 @@ def _composed(text: str, *models: type[Model]) -> type[CompositeModel]:
         "__doc__": of.words(),
         "name": of.data["name"],
         "description": of.data["title"],
-        "of": of,
+        "system": of,
         "components": MappingProxyType(of.models),
-        "made": Making(f"composed({text!r})", composed, (text,), tuple(sorted(modules))),
+        "made": Making(f"system_model({text!r})", system_model, (text,), tuple(sorted(modules))),
         "Parameters": of.Parameters,
         "Inputs": of.Inputs,
         "States": of.States if of.has_states else None,
@@ -267,13 +267,13 @@ def _composed(text: str, *models: type[Model]) -> type[CompositeModel]:
         "parts": tuple(
             Part(
                 declared,
-                CompositeModel._outputs(declared),
+                SystemModel._outputs(declared),
                 by_differences=apart & {*Layout(declared).names},
             )
             for declared in (of.Outputs, of.Extra)
             if declared
         ),
     }
-    model = type(of.data["name"], (CompositeModel,), members)
+    model = type(of.data["name"], (SystemModel,), members)
     keep(model, *("Parameters", "Inputs", *(["States"] if of.has_states else [])))
     return model

@@ -79,7 +79,7 @@ class Interface:
     @cached_property
     def repeated(self) -> dict[str, Signal]:
         """The outputs that repeat another one, by name, with the signal of that one."""
-        own = {signal.name: signal for signal in self.of("output")}
+        own = {signal.name: signal for signal in self.signals_of("output")}
         return {name: own[of] for name, of in self.model.repeated.items()}
 
     @property
@@ -87,7 +87,7 @@ class Interface:
         """Places among the outputs after the states of those that are counts or switches."""
         return [i for i, v in enumerate(self.others) if v.type != "Real"]
 
-    def of(self, causality: str) -> list[Signal]:
+    def signals_of(self, causality: str) -> list[Signal]:
         """Signals of one causality, in order."""
         return [s for s in self.signals if s.causality == causality]
 
@@ -148,7 +148,7 @@ class Interface:
 
     @property
     def reinitialized(self) -> frozenset[str]:
-        """The states that an event may change: `Model.closed` gives others than the states themselves."""
+        """The states that an event may change: `Model.constrained_states` gives others than the states themselves."""
         return _shared(self.model)._reinitialized
 
     @cached_property
@@ -158,7 +158,7 @@ class Interface:
         if not (self.model.state_layout and self.model.controlled):
             return frozenset()
         _, p, u, x, *_ = self.trace
-        closed = self.model.closed(casadi_(), p, u, x)
+        closed = self.model.constrained_states(casadi_(), p, u, x)
         pairs = zip(self.states, self.model.state_layout.values(x), closed, strict=True)
         return frozenset(v.name for v, own, met in pairs if not casadi.is_equal(casadi.SX(met), own))
 
@@ -265,7 +265,7 @@ def model_description_3(
         derivative = {} if state is None else {"derivative": str(state)}
         tag = TYPES_3[kind]
         elements[attributes["name"]] = SubElement(variables, tag, {**attributes, **own, **derivative})
-    for signal in interface.of("output"):
+    for signal in interface.signals_of("output"):
         if (one := interface.repeated.get(signal.name)) is not None:
             SubElement(elements[one.name], "Alias", name=signal.name, description=signal.variable.description)
     time = {
@@ -313,7 +313,7 @@ def _variables(
 
 def _structure(interface: Interface, derivatives: bool) -> Iterator[tuple[str, int, list[int]]]:
     """For each unknown: its kind in FMI 3.0, its value reference, and the value references of its dependencies."""
-    outputs = [s.reference for s in interface.of("output")]
+    outputs = [s.reference for s in interface.signals_of("output")]
     rates = [len(interface.signals) + i for i in range(len(interface.states) if derivatives else 0)]
     kinds = ["Output"] * len(outputs) + ["ContinuousStateDerivative"] * len(rates)
     unknowns = list(zip(kinds, [*outputs, *rates], interface.dependencies, strict=False))

@@ -36,10 +36,10 @@ def page(interface: Interface, version: str, sketch: Sketch | None) -> str:
     text = escape(inspect.cleandoc(model.__doc__ or "") + model.fmu_data.notes).replace("\n\n", "</p><p>")
     picture = f"<figure>{drawing(sketch)}<figcaption>{_FIGURE}</figcaption></figure>\n" if sketch else ""
     tables = "".join(
-        f"<h2>{title}</h2>\n{_table(interface.of(causality), causality)}"
+        f"<h2>{title}</h2>\n{_table(interface.signals_of(causality), causality)}"
         for title, causality in (("Parameters", "parameter"), ("Inputs", "input"), ("Outputs", "output"))
     )
-    motion = {s.name: s for s in interface.of("input") if s.name in ("phi", "w", "a")}
+    motion = {s.name: s for s in interface.signals_of("input") if s.name in ("phi", "w", "a")}
     inputs = _NOT_CONNECTED
     if len(motion) == 3 and not motion["w"].start:
         phi = motion["phi"]

@@ -24,7 +24,7 @@ from ..core.errors import InputError
 from ..core.files import folder, whole
 from ..core.model import Model
 from ..core.temporary_folders import scratch
-from .accompany import companion_files
+from .companion_files import companion_files
 from .description import Interface, model_description
 from .pack import interface_of, pack
 from .recipe import script_file, script_of

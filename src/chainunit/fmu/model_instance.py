@@ -151,7 +151,7 @@ class ModelInstance:
         assert layout is not None
 
         def close(since: float, x: Any) -> list[float]:
-            return model.closed(MATH, p, self._inputs(run, since), layout.instance(x))
+            return model.constrained_states(MATH, p, self._inputs(run, since), layout.instance(x))
 
         for _ in range(0 if self._closed else 2):
             x = close(0.0, x)
@@ -294,7 +294,7 @@ class ModelInstance:
     def _running(self) -> list[tuple[int, float, float]]:
         """Place, rate and half of the second derivative of each input that follows another one."""
         first = self.references.first_input
-        return [(first + place, rate, half) for place, rate, half in self.model.course(self._set[first:])]
+        return [(first + place, rate, half) for place, rate, half in self.model.extrapolations(self._set[first:])]
 
     def _bad_input(self) -> str:
         if self._doubtful:

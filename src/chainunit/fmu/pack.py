@@ -29,10 +29,10 @@ def interface_of(
         where the start values are out of bounds or make no machine.
     """
     interface = Interface(model, {name: float(value) for name, value in (start or {}).items()}, own)
-    for signal in interface.of("input"):
+    for signal in interface.signals_of("input"):
         if not signal.variable.quantity.admits(signal.start or 0.0):
             raise InputError(complaint(signal.variable, signal.start))
-    model.check(model.parameter_layout.instance([s.start for s in interface.of("parameter")]))
+    model.check(model.parameter_layout.instance([s.start for s in interface.signals_of("parameter")]))
     return interface
 
 

@@ -65,7 +65,7 @@ def _script(file: Path) -> type[Script]:
     return own
 
 
-def often(model: type[Model]) -> set[str]:
+def frequent_outputs(model: type[Model]) -> set[str]:
     """The outputs that are read at every step: those of the terminals."""
     return {name for terminal in model.terminals for name in terminal.members.values()}
 

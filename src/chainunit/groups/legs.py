@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 
 from ..core.planar import ZERO, Link, Motion, Vec2, coriolis, coriolis_third, rod_rates
 from .body import Bar, Load
-from .group import GuideForce, Joint, Placed, Rail, Slide, Third
+from .group import GuideForce, Joint, PlacedLinkage, Rail, Slide, Third
 
 
 @dataclass
@@ -39,7 +39,7 @@ class Leg:
         """The line of an earlier link on which it slides, if any."""
         return None
 
-    def placed(self, at: Placed) -> PlacedLeg:
+    def at_position(self, at: PlacedLinkage) -> PlacedLeg:
         """The leg, with the linkage `at` before it, for any pose of the ternary link."""
         raise NotImplementedError
 
@@ -69,7 +69,7 @@ class LegAt:
         """Right side for the second derivatives of the pose, from the first ones."""
         raise NotImplementedError
 
-    def third(self, ternary: Link, outer: Third) -> Any:
+    def third_right_side(self, ternary: Link, outer: Third) -> Any:
         """Right side for the third derivatives of the pose, from those of the outer pin or of the rail."""
         raise NotImplementedError
 
@@ -77,7 +77,7 @@ class LegAt:
         """Third derivatives of the leg, and of its inner pin, from those of the ternary link (`own`)."""
         raise NotImplementedError
 
-    def solved(self, ternary: Link) -> tuple[Link, Motion | None, Slide | None]:
+    def solution(self, ternary: Link) -> tuple[Link, Motion | None, Slide | None]:
         """The leg as a link, its inner pin, and the motion in its sliding joint."""
         raise NotImplementedError
 
@@ -111,7 +111,7 @@ class RodLeg(Leg):
         """Pin and link of the outer and of the inner reaction."""
         return (self.bar.pin, self.bar.name), (self.pin, self.bar.name)
 
-    def placed(self, at: Placed) -> PlacedLeg:
+    def at_position(self, at: PlacedLinkage) -> PlacedLeg:
         """The leg, with the linkage `at` before it, for any pose of the ternary link."""
         return partial(RodAt, at.pins[self.bar.pin], self.bar.length, self.arm)
 
@@ -148,7 +148,7 @@ class RodAt(LegAt):
         a, p = self.spot, self._outer
         return self._r.dot(p.p2 + a * (t1 * t1)) - (origin1 + a.turned() * t1 - p.p1).squared()
 
-    def third(self, ternary: Link, outer: Third) -> Any:
+    def third_right_side(self, ternary: Link, outer: Third) -> Any:
         """Right side for the third derivatives of the pose, from those of the outer pin or the rail."""
         a, p, t1 = self.spot, self._outer, ternary.t1
         k = ternary.carried(a)
@@ -159,12 +159,12 @@ class RodAt(LegAt):
 
     def link_third(self, ternary: Link, own: Third, outer: Third) -> tuple[Third, Vec2 | None]:
         """Third derivatives of the leg and of its inner pin, from those of the ternary link."""
-        end = ternary.third(self.spot, *own)
+        end = ternary.third_derivative(self.spot, *own)
         p, k = self._outer, ternary.carried(self.spot)
         t1 = self._r.cross(k.p1 - p.p1) * self._per_square
         return (outer[0], self._r.cross(end - outer[0]) * self._per_square + t1 * t1 * t1), end
 
-    def solved(self, ternary: Link) -> tuple[Link, Motion | None, Slide | None]:
+    def solution(self, ternary: Link) -> tuple[Link, Motion | None, Slide | None]:
         """The leg as a link, its inner pin, and the motion in its sliding joint."""
         p, k, r = self._outer, ternary.carried(self.spot), self._r
         k = Motion(p.p + r, k.p1, k.p2)
@@ -213,9 +213,9 @@ class BlockLeg(Leg):
         """The line of an earlier link on which the leg slides."""
         return self.on
 
-    def placed(self, at: Placed) -> PlacedLeg:
+    def at_position(self, at: PlacedLinkage) -> PlacedLeg:
         """The leg, with the linkage `at` before it, for any pose of the ternary link."""
-        return partial(BlockAt, self.on.placed(at.links), self.arm)
+        return partial(BlockAt, self.on.at_position(at.links), self.arm)
 
 
 class BlockAt(LegAt):
@@ -253,19 +253,19 @@ class BlockAt(LegAt):
         s2 = (k.p2 - coriolis(rail, carried, rail.u * s1)).dot(rail.u)
         return Slide(rail.u, self._way.dot(rail.u), s1, s2)
 
-    def third(self, ternary: Link, outer: Third) -> Any:
+    def third_right_side(self, ternary: Link, outer: Third) -> Any:
         """Right side for the third derivatives of the pose, from those of the outer pin or the rail."""
         a, t1, slide, rail = self.spot, ternary.t1, self._slide(ternary), self._rail
-        carried = rail.third(self._way, *outer)
+        carried = rail.third_derivative(self._way, *outer)
         moved = coriolis_third(rail, carried, slide.d * slide.s1, slide.d * slide.s2)
         return (moved + a.turned() * (t1 * t1 * t1) + a * (3.0 * (t1 * ternary.t2))).dot(self._n)
 
     def link_third(self, ternary: Link, own: Third, outer: Third) -> tuple[Third, Vec2 | None]:
         """Third derivatives of the leg and of its inner pin, from those of the ternary link."""
-        end = ternary.third(self.spot, *own)
+        end = ternary.third_derivative(self.spot, *own)
         return (end, outer[1]), end
 
-    def solved(self, ternary: Link) -> tuple[Link, Motion | None, Slide | None]:
+    def solution(self, ternary: Link) -> tuple[Link, Motion | None, Slide | None]:
         """The leg as a link, its inner pin, and the motion in its sliding joint."""
         k, rail = ternary.carried(self.spot), self._rail
         return Link(k, rail.u, rail.t1, rail.t2), k, self._slide(ternary)
@@ -298,7 +298,7 @@ class SlotLeg(Leg):
         """Pin and link of the outer and of the inner reaction."""
         return (self.bar.pin, self.bar.name), (self.guide, self.bar.name)
 
-    def placed(self, at: Placed) -> PlacedLeg:
+    def at_position(self, at: PlacedLinkage) -> PlacedLeg:
         """The leg, with the linkage `at` before it, for any pose of the ternary link."""
         return partial(SlotAt, at.pins[self.bar.pin], self.at, self.along)
 
@@ -331,7 +331,7 @@ class SlotAt(LegAt):
         y1 = self._outer.p1 - origin1
         return self._outer.p2.dot(self._n) - 2.0 * (t1 * y1.dot(self._d)) - t1 * t1 * self._y.dot(self._n)
 
-    def third(self, ternary: Link, outer: Third) -> Any:
+    def third_right_side(self, ternary: Link, outer: Third) -> Any:
         """Right side for the third derivatives of the pose, from those of the outer pin or the rail."""
         d, n, y, t1, t2 = self._d, self._n, self._y, ternary.t1, ternary.t2
         y1, y2 = self._outer.p1 - ternary.pin.p1, self._outer.p2 - ternary.pin.p2
@@ -342,7 +342,7 @@ class SlotAt(LegAt):
         """Third derivatives of the leg and of its inner pin, from those of the ternary link."""
         return (outer[0], own[1]), None
 
-    def solved(self, ternary: Link) -> tuple[Link, Motion | None, Slide | None]:
+    def solution(self, ternary: Link) -> tuple[Link, Motion | None, Slide | None]:
         """The leg as a link, its inner pin, and the motion in its sliding joint."""
         p, d = self._outer, self._d
         carried = ternary.carried(self._y)

@@ -279,7 +279,7 @@ class Organs:
             **on_drive(xp, p, s, a, reactions, at_a1),
         }
 
-    def closed(self, xp: Any, p: Any, u: Any, x: Any, q: Any, w: Any) -> list[Any]:
+    def constrained_states(self, xp: Any, p: Any, u: Any, x: Any, q: Any, w: Any) -> list[Any]:
         """States with which both chains end at A2 and move with it, by the smallest change in the metric of the
         masses. Where the drive has corrected its speed, the change is a jolt from the rocker; its work enters
         `energy_due`."""

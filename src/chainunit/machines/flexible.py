@@ -104,7 +104,7 @@ class ChainedModel(LinkageModel):
         return cls.organs.guess(xp, p, u, cls.at_crank(p, u)[0])
 
     @classmethod
-    def start_improved(cls, xp: Any, p: Any, u: Any, z: Sequence[Any]) -> list[Any]:
+    def improve_start(cls, xp: Any, p: Any, u: Any, z: Sequence[Any]) -> list[Any]:
         """The unknowns of the start after one more round."""
         return cls.organs.improved(xp, p, u, cls.at_crank(p, u)[0], z)
 
@@ -115,9 +115,9 @@ class ChainedModel(LinkageModel):
         return cls.States(**cls.organs.start_states(xp, p, u, *cls.at_crank(p, u), z))
 
     @classmethod
-    def closed(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+    def constrained_states(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
         """The states with which both chains end at A2 and move with it."""
-        return cls.organs.closed(xp, p, u, x, *cls.at_crank(p, u, x))
+        return cls.organs.constrained_states(xp, p, u, x, *cls.at_crank(p, u, x))
 
     @classmethod
     def shared(cls, xp: Any, p: Any, u: Any, x: Any) -> ChainedState:
@@ -152,9 +152,9 @@ class TurningChains(ChainedModel, DirectMachine):
         return cls.States(**vars(cls.initial_states(xp, p)), **chains)
 
     @classmethod
-    def closed(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+    def constrained_states(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
         """The states with which both chains end at A2 and move with it."""
-        return [x.phi, x.w, *super().closed(xp, p, u, x)]
+        return [x.phi, x.w, *super().constrained_states(xp, p, u, x)]
 
     @classmethod
     def derivatives(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
@@ -234,7 +234,7 @@ def _flexible(walls: int, webs: int) -> type[InverseMachine]:
             """The direct model of the same machine: torque in, motion out."""
             words = "start of the rods"
             rods = group(chains.RodsStart, words, default=chains.RodsStart())
-            return cls._turning(TurningChains, [("rods_start", chains.RodsStart, rods)], organs=chains)
+            return cls._direct_of(TurningChains, [("rods_start", chains.RodsStart, rods)], organs=chains)
 
         @classmethod
         def derivatives(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:

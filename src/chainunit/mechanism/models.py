@@ -198,7 +198,7 @@ class InverseMachine(LinkageModel, MachineModel):
         return sketch_of(cls.state(MATH, p, cls.Inputs(), low + (high - low) / (2.0 * math.pi), 0.0).m)
 
     @classmethod
-    def further(cls, xp: Any, p: Any, u: Any, x: Any = None) -> list[tuple[Variable, Any]]:
+    def further_quantities(cls, xp: Any, p: Any, u: Any, x: Any = None) -> list[tuple[Variable, Any]]:
         """The effort at the driver, ``crank_torque``; the size of each force, ``force(pivot)``; and the places of all
         pins, ``x(A)`` and ``y(A)``. A machine whose outputs depend on states has no places here."""
         outputs = cls.parts[0].layout.by_name(cls.evaluate(xp, p, u, x)[0])
@@ -230,12 +230,14 @@ class InverseMachine(LinkageModel, MachineModel):
         """
         stops = cls.end_stops
         if stops is None:
-            return cls._turning(DirectMachine)
+            return cls._direct_of(DirectMachine)
         more = ("end_stops", EndStops, group(EndStops, "end stops of the driver", default=stops))
-        return cls._turning(DirectMachine, [more])
+        return cls._direct_of(DirectMachine, [more])
 
     @classmethod
-    def _turning(cls, base: type[DirectMachine], parameters: Fields = (), **more: Any) -> type[DirectMachine]:
+    def _direct_of(
+        cls, base: type[DirectMachine], parameters: Fields = (), **more: Any
+    ) -> type[DirectMachine]:
         """The direct model as a subclass of `base`, with more `parameters` and attributes."""
         outputs = fields_of(cls.Outputs, without=("tau", *names_of(cls.driver_port.values)))
         # where the start declares the same name, the machine's own declaration counts
@@ -349,7 +351,7 @@ class DirectMachine(LinkageModel):
         return 1e-9
 
     @staticmethod
-    def closed(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+    def constrained_states(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
         """The states themselves: they have no constraints."""
         return [x.phi, x.w]
 

@@ -234,7 +234,7 @@ def read_table(form: type[BaseModel], table: Mapping[str, Any], prefix: str = ""
     try:
         return form.model_validate(dict(table))
     except ValidationError as error:
-        raise InputError.of(refusals(error, form, prefix)) from error
+        raise InputError.joined(refusals(error, form, prefix)) from error
 
 
 def given_values(section: BaseModel) -> dict[str, Any]:
@@ -354,7 +354,7 @@ def toml(text: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except ValueError as error:  # TOMLDecodeError, and numbers that are too long
-        raise InputError.of(syntax_faults(text, error)) from error
+        raise InputError.joined(syntax_faults(text, error)) from error
     except RecursionError as error:
         raise InputError("no valid TOML: tables or lists are nested too deeply") from error
 
@@ -388,7 +388,7 @@ def in_file(source: str, lines_of: Callable[[], Mapping[str, int]]) -> Iterator[
 
         # faults of another file that this file names come last
         ordered = sorted(error.faults, key=lambda fault: (fault.placed, line_of(fault)))
-        raise InputError.of(
+        raise InputError.joined(
             [
                 fault
                 if fault.placed

@@ -215,7 +215,7 @@ def of_tables(data: Mapping[str, Any], source: str) -> Config:
     except InputError as error:
         # the commands read the recordings; a missing one is told beside the faults of the file
         if missing := list(missing_recordings(data, source)):
-            raise InputError.of([*error.faults, *missing]) from error
+            raise InputError.joined([*error.faults, *missing]) from error
         raise
 
 
@@ -224,7 +224,7 @@ def _of_tables(data: Mapping[str, Any], source: str) -> Config:
     parts, faults = check_values(in_system, source)
     if parts is None:
         # a key that the file has, not the one that stands for it
-        raise InputError.of(faults if in_system is data else [_of_linkage(fault) for fault in faults])
+        raise InputError.joined(faults if in_system is data else [_of_linkage(fault) for fault in faults])
     data = in_system
     if not faults:
         return _of_values(data, parts, source)
@@ -233,7 +233,7 @@ def _of_tables(data: Mapping[str, Any], source: str) -> Config:
         _of_values(without(data, faults), parts, source)
     except InputError as error:
         faults += independent(error.faults, faults, parts)
-    raise InputError.of(faults)
+    raise InputError.joined(faults)
 
 
 def _of_linkage(fault: InputError) -> InputError:

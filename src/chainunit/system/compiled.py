@@ -16,13 +16,13 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from ..core.composite import composed
-from ..core.composition import RESERVED, SOLVER, reference
 from ..core.engines import casadi_
 from ..core.errors import InputError, printable, shown
 from ..core.integrators import MAX_STEPS
 from ..core.model import About, Model, Terminal
 from ..core.ports import MEASURED
+from ..core.system_description import RESERVED, SOLVER, reference
+from ..core.system_model import system_model
 from ..fmu.backends import Backend, Origin
 from ..fmu.backends import export as export_fmu
 from ..fmu.description import Interface
@@ -77,7 +77,7 @@ def compiled(
         )
     description = _description(system, models, name, printable(title))
     description |= {"about": about and asdict(about), "experiment": dict(experiment or {})}
-    model = composed(json.dumps(description, sort_keys=True))
+    model = system_model(json.dumps(description, sort_keys=True))
     values = system.values
     layout = model.parameter_layout
     limits = {own: [values[full] for each in models if (full := f"{each}.{own}") in values] for own in SOLVER}
@@ -122,7 +122,7 @@ def input_starts(system: System, model: type[Model]) -> dict[str, float]:
 
 
 def _description(system: System, models: Mapping[str, type[Model]], name: str, title: str) -> dict[str, Any]:
-    """The description of a system that a `chainunit.core.composition.Composition` takes."""
+    """The description of a system that a `chainunit.core.system_description.SystemDescription` takes."""
     exact = hold_loads(system).connections
     influences = {each: _influences(model) for each, model in models.items()}
     free = _free_terminals(system)
@@ -243,7 +243,7 @@ def _constraints(interface: Interface) -> set[str]:
     import casadi
 
     (_, us, *_), p, u, x, *_ = interface.trace
-    rows = casadi.vertcat(*interface.model.closed(casadi_(), p, u, x))
+    rows = casadi.vertcat(*interface.model.constrained_states(casadi_(), p, u, x))
     names = [v.name for v in interface.inputs]
     return {
         name for name, counts in zip(names, casadi.which_depends(rows, us, 1, False), strict=True) if counts

@@ -208,7 +208,7 @@ class Kernel:
             matrix[:n, :n] += np.array(self._derived[2](outer[_P][0], by_derived))
         return 0.5 * (matrix + matrix.T)
 
-    def by_angle(self, x: Any, q: Any, w: Any, columns: Any) -> tuple[Any, Any, Any, Any]:
+    def derivatives_by_angle(self, x: Any, q: Any, w: Any, columns: Any) -> tuple[Any, Any, Any, Any]:
         """Of one column in each lane, `columns` of shape (lanes,): its value, its slope by the angle, the
         derivatives of this slope by the free parameters, shape (free, lanes), and that by the angle."""
         outer, slopes = self._directions(x)
@@ -239,7 +239,7 @@ def symbols_of(machine: Machine, names: Sequence[str]) -> list[Any]:
     """
     t = trace(machine.model)
     places = {v.name: k for k, v in enumerate(columns_of(machine.model))}
-    values = [*t.outputs, *(value for _, value in t.further)]
+    values = [*t.outputs, *(value for _, value in t.further_quantities)]
     missing = [name for name in names if name not in places]
     if missing:
         raise RunError(f"{missing[0]}: no such column of the {machine.model.name}")

@@ -15,7 +15,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from ...core.files import folder, whole
 from ...core.model import Model
-from ..accompany import companion_files
+from ..companion_files import companion_files
 from ..description import model_description, model_description_3
 from ..pack import interface_of, pack, xml_bytes
 from ..recipe import recipes

@@ -24,7 +24,7 @@ def groups(interface: Interface) -> list[list[int]]:
     """Outputs that are evaluated together, as places among the declared outputs: last all discrete ones."""
     lists: list[list[int]] = []
     discrete = interface.discrete
-    terminal_outputs, at = recipe.often(interface.model), 0
+    terminal_outputs, at = recipe.frequent_outputs(interface.model), 0
     for part in interface.model.parts:
         places = {name: at + i for i, name in enumerate(part.layout.names) if at + i not in discrete}
         at += len(part.layout.names)
@@ -81,7 +81,7 @@ def _programs(interface: Interface) -> Iterator[Program]:
         z = casadi.vertsplit(unknowns) if model.start_problem.unknowns else []
         if z:
             yield one("guess", [ps, us], model.start_guess(casadi_(), p, u))
-            yield one("improved", [ps, us, unknowns], model.start_improved(casadi_(), p, u, z))
+            yield one("improved", [ps, us, unknowns], model.improve_start(casadi_(), p, u, z))
         yield one(
             "initial", [ps, us, unknowns], model.state_layout.values(model.start_states(casadi_(), p, u, z))
         )
@@ -92,7 +92,7 @@ def _programs(interface: Interface) -> Iterator[Program]:
         yield one("internal_step", [ps], [model.internal_step(casadi_(), p)])
         if model.controlled:
             yield one("tolerance", [ps], [model.tolerance(casadi_(), p)])
-            yield one("closed", point, model.closed(casadi_(), p, u, x), "OFTEN")
+            yield one("closed", point, model.constrained_states(casadi_(), p, u, x), "OFTEN")
     if limits := [v for row in model.requirements(casadi_(), p) for v in row]:
         yield one("requirements", [ps, *more], limits)
     if model.derived:
@@ -186,7 +186,7 @@ def tables(interface: Interface, guid: str, room: int) -> str:
             place[output], group_of[output] = first + k, g
         first += len(group)
     n_y = len(interface.others)
-    starts = [s.start for s in (*interface.of("parameter"), *interface.of("input"))]
+    starts = [s.start for s in (*interface.signals_of("parameter"), *interface.signals_of("input"))]
     parameter_names = model.parameter_layout.names
     lines = [
         f"/* {model.name}: tables for model.h, generated from the model's declarations. */",

@@ -27,12 +27,12 @@ class LinkFrame(NamedTuple):
     origin: Vec2
     axis: Vec2
 
-    def of(self, point: Vec2) -> Vec2:
-        """A point in this frame."""
-        return self.of_vector(point - self.origin)
+    def coordinates(self, point: Vec2) -> Vec2:
+        """The coordinates of a point in this frame [m]."""
+        return self.components(point - self.origin)
 
-    def of_vector(self, v: Vec2) -> Vec2:
-        """A vector in this frame."""
+    def components(self, v: Vec2) -> Vec2:
+        """The components of a vector in this frame."""
         return Vec2(self.axis.dot(v), self.axis.cross(v))
 
 
@@ -85,7 +85,7 @@ class LinkGeometry:
             share = mass / (total + 1e-300)
             inertia = inertia + m * share * (at - c).squared()
             m, c = total, c + (at - c) * share
-        at = frame.of(c)
+        at = frame.coordinates(c)
         return Mass(m, at.x, inertia, at.y)
 
     def span(self, link: str, start: str, end: str) -> tuple[LinkFrame, Any]:
@@ -117,7 +117,7 @@ class LinkGeometry:
     def line_through(self, joint: JointEntry, link: str, point: Vec2) -> Vec2:
         """The place, in the link on the other side, of a point through which the line of a `point` of the link
         goes."""
-        own, other = self.point(link, joint.at(link)), joint.other(link)
+        own, other = self.point(link, joint.at(link)), joint.other_link(link)
         return self.point(other, joint.at(other)) + self.across(joint, point - own, link)
 
 

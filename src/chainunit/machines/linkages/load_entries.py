@@ -141,10 +141,10 @@ class LoadReader(EntryReader):
 
     # extremes of the motion
 
-    def further(self, given: Expression, in_load: bool) -> dict[str, str | None]:
+    def further_units(self, given: Expression, in_load: bool) -> dict[str, str | None]:
         """The units of the extremes and tables of an expression, by name; a load may have them."""
         if not in_load:
-            return super().further(given, in_load)
+            return super().further_units(given, in_load)
         found: dict[str, str | None] = {each: self.extreme(each, given.text) for each in given.extremes}
         for name in given.tables:
             if name not in self.curve_units:

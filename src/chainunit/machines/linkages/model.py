@@ -50,7 +50,7 @@ from .loads import (
 from .narrow import check_triads, lesser, lows, turns_of_triads
 from .outputs import DescribedLinkage, LinkageOutputs
 from .parts import LinkageParts
-from .probes import constant_outputs, notes_on, own_axis, repeated_outputs
+from .probes import constant_outputs, description_axis, notes_on, repeated_outputs
 from .structure import check_groups, structure_of
 
 ANGLES = 48
@@ -91,7 +91,7 @@ class LinkageDescription(LinkageOutputs):
         }
         self.tables = {name: self.curves[name] for name, each in tables.items() if each["over"] == "phi"}
         self.extremes = extremes_of(data["loads"])
-        self.turning: dict[str, tuple[float, float]] = {}
+        self.link_turns: dict[str, tuple[float, float]] = {}
         self.Parameters = self._parameters()
         inputs = [field_of(each) for each in data.get("inputs", ())]
         self.port, motion = ROTATING, cast("type", LinkageMotion)
@@ -109,7 +109,7 @@ class LinkageDescription(LinkageOutputs):
         p, u = self.Parameters(), self.Inputs()
         self.sides = dict(LinkageParts(LinkGeometry(MATH, self.structure, self.values(p, u))).sides)
         self.sides |= turns_of_triads(self.linkage(MATH, p, u))
-        self.turning = self._followed(p, u)
+        self.link_turns = self._followed(p, u)
         self._check_extremes()
         self.widths = (
             checked_widths(data["loads"], self.values(self._ready(), u)) if widths_of(data["loads"]) else ()
@@ -169,16 +169,16 @@ class LinkageDescription(LinkageOutputs):
         """An extreme of the motion, by its name in expressions."""
         kind, link, point, axis = place_of(name)
         frame, ends = parts.frames[link], self.structure.driver.linear
-        at = frame.of(parts.geometry.point(link, point) if point else ZERO)
+        at = frame.coordinates(parts.geometry.point(link, point) if point else ZERO)
 
-        def course(xp: Any, m: Any) -> tuple[Any, Any, Any]:
+        def coordinate(xp: Any, m: Any) -> tuple[Any, Any, Any]:
             moving = m.links[link]
             if axis == "angle":
-                return self.angle(xp, link, own_axis(moving.u, frame), m.q), moving.t1, moving.t2
+                return self.angle(xp, link, description_axis(moving.u, frame), m.q), moving.t1, moving.t2
             k = moving.beside(at.x, at.y)
             return getattr(k.p, axis), getattr(k.p1, axis), getattr(k.p2, axis)
 
-        return MotionExtreme(course, self.places(), 1.0 if kind == "max" else -1.0, ends)
+        return MotionExtreme(coordinate, self.places(), 1.0 if kind == "max" else -1.0, ends)
 
     def _check_extremes(self) -> None:
         """Refuse extremes of the angle of a link that turns round.
@@ -190,7 +190,7 @@ class LinkageDescription(LinkageOutputs):
         """
         for name in self.extremes:
             _, link, _, axis = place_of(name)
-            if axis == "angle" and self.turning[link][0]:
+            if axis == "angle" and self.link_turns[link][0]:
                 raise InputError(
                     f"{name}: {link} turns all the way round, and its angle has no extremes; take those of a "
                     "point, or of a link that swings",
@@ -222,7 +222,7 @@ class LinkageDescription(LinkageOutputs):
         if not any(isinstance(each, str) and "angle" in expression(each).names for each in entries):
             return None
         frame = parts.frames[link]
-        return lambda xp, m: self.angle(xp, link, own_axis(m.links[link].u, frame), m.q)
+        return lambda xp, m: self.angle(xp, link, description_axis(m.links[link].u, frame), m.q)
 
     # the rotation of links over the turn
 
@@ -270,7 +270,7 @@ class LinkageDescription(LinkageOutputs):
         around = [*places, places[0] + 2.0 * math.pi] if not self.data["driver"]["linear"] else places
         angles: dict[str, list[float]] = {}
         signs: list[float] = []
-        courses: list[list[float]] = []
+        margins_over_way: list[list[float]] = []
         for q in around:
             try:
                 m = Mechanism(MATH, linkage, q, derived)
@@ -278,12 +278,12 @@ class LinkageDescription(LinkageOutputs):
                 raise self._closing(linkage, derived) from None
             margins = m.margins()
             signs = signs or [math.copysign(1.0, margin) for margin in margins]
-            courses.append([margin * sign for margin, sign in zip(margins, signs, strict=True)])
-            for each, margin in zip(self.structure.groups, courses[-1], strict=True):
+            margins_over_way.append([margin * sign for margin, sign in zip(margins, signs, strict=True)])
+            for each, margin in zip(self.structure.groups, margins_over_way[-1], strict=True):
                 if not margin > LEAST_MARGIN:
                     raise dead_group(each.links, self._at(q))
             for name in self.structure.links:
-                axis = own_axis(m.links[name].u, parts.frames[name])
+                axis = description_axis(m.links[name].u, parts.frames[name])
                 angle = math.atan2(axis.y, axis.x)
                 before = angles.setdefault(name, [self.structure.poses[name][2]])
                 before.append(before[-1] + math.remainder(angle - before[-1], 2.0 * math.pi))
@@ -292,19 +292,21 @@ class LinkageDescription(LinkageOutputs):
             margins = Mechanism(MATH, linkage, q, derived).margins()
             return [margin * sign for margin, sign in zip(margins, signs, strict=True)]
 
-        for k, q, least in lows(margins_at, courses, around):
+        for k, q, least in lows(margins_at, margins_over_way, around):
             links = self.structure.groups[k].links
             if not least > LEAST_MARGIN:
                 if math.isnan(least):
                     raise open_group(links, self._at(q), self._gap(linkage, k, derived, q))
                 raise dead_group(links, self._at(q))
-        turning = {}
-        for name, course in angles.items():
-            course = course[1:]
-            rate = 0.0 if self.data["driver"]["linear"] else round((course[-1] - course[0]) / (2.0 * math.pi))
-            rest = [angle - rate * (q - around[0]) for angle, q in zip(course, around, strict=True)]
-            turning[name] = rate, 0.5 * (min(rest) + max(rest)) - rate * around[0]
-        return turning
+        turns = {}
+        for name, samples in angles.items():
+            samples = samples[1:]
+            rate = (
+                0.0 if self.data["driver"]["linear"] else round((samples[-1] - samples[0]) / (2.0 * math.pi))
+            )
+            rest = [angle - rate * (q - around[0]) for angle, q in zip(samples, around, strict=True)]
+            turns[name] = rate, 0.5 * (min(rest) + max(rest)) - rate * around[0]
+        return turns
 
     def obstacle(self, p: Any) -> str:
         """The sentence on the place at which the linkage with these parameters does not close or jams, with the

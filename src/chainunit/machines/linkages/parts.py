@@ -78,7 +78,7 @@ class LinkageParts:
                 if self._carriers[pin] == link or (link, name) not in self.structure.marked:
                     continue
                 pin = f"{link}.{name}"
-            at = frame.of(self.geometry.point(link, name))
+            at = frame.coordinates(self.geometry.point(link, name))
             points[pin], self._carriers[pin] = (at.x, at.y), link
         return Bar(link, start, length, self.geometry.mass(entry, frame), points)
 
@@ -86,10 +86,10 @@ class LinkageParts:
 
     def _rail(self, joint: JointEntry, link: str, point: Vec2) -> Rail:
         """The line along which a `point` of the link moves in a link before it."""
-        of = joint.other(link)
+        of = joint.other_link(link)
         frame = self.frames[of]
-        at = frame.of(self.geometry.line_through(joint, link, point))
-        return Rail(None if of == GROUND else of, at, frame.of_vector(self.geometry.direction(joint, of)))
+        at = frame.coordinates(self.geometry.line_through(joint, link, point))
+        return Rail(None if of == GROUND else of, at, frame.components(self.geometry.direction(joint, of)))
 
     def _receive(self, joint: JointEntry, pin: str, link: str) -> None:
         """The reaction of a joint acts in the groups at that pin on that link."""
@@ -97,7 +97,7 @@ class LinkageParts:
 
     def _outer(self, joint: JointEntry, link: str) -> str:
         """The pin of a link before it from which a link starts."""
-        other = joint.other(link)
+        other = joint.other_link(link)
         pin = self.pin_on(other, joint.at(other))
         self._receive(joint, pin, link)
         return pin
@@ -140,7 +140,9 @@ class LinkageParts:
             link: LinkFrame(self.geometry.point(link, joint.at(link)), along[link])
             for link, joint in ((barrel, p), (rod, c))
         }
-        (near, far) = (frame.of(self.geometry.point(link, slide.at(link))) for link, frame in frames.items())
+        (near, far) = (
+            frame.coordinates(self.geometry.point(link, slide.at(link))) for link, frame in frames.items()
+        )
         bars = self._bar(barrel, frames[barrel], self._outer(p, barrel)), self._bar(rod, frames[rod])
         swung = self._rod(lever, q, c)
 
@@ -179,7 +181,7 @@ class LinkageParts:
         bars = self._rod(first, p, b), self._rod(second, q, b)
 
         def turn() -> Any:
-            start, end = self._rough.place(p.other(first), p), self._rough.place(q.other(second), q)
+            start, end = self._rough.place(p.other_link(first), p), self._rough.place(q.other_link(second), q)
             return (end - start).cross(self._rough.place(second, b) - start)
 
         return Dyad(inner, *bars, self._side(first, turn))
@@ -217,7 +219,7 @@ class LinkageParts:
         bar, rail, guide = self._slider(slider, g, c.at(slider))
 
         def along() -> Any:
-            return (self._rough.place(slider, c) - self._rough.place(p.other(first), p)).dot(
+            return (self._rough.place(slider, c) - self._rough.place(p.other_link(first), p)).dot(
                 self._rough.line(g)
             )
 
@@ -229,7 +231,7 @@ class LinkageParts:
             for link, j in ((first, p), (second, q))
         ]
         block, line = (
-            frame.of(self.geometry.point(link, g.at(link)))
+            frame.coordinates(self.geometry.point(link, g.at(link)))
             for frame, link in zip(frames, (first, second), strict=True)
         )
         starts = self._outer(p, first), self._outer(q, second)
@@ -239,7 +241,7 @@ class LinkageParts:
         ]
 
         def along() -> Any:
-            arm = self._rough.place(p.other(first), p) - self._rough.place(q.other(second), q)
+            arm = self._rough.place(p.other_link(first), p) - self._rough.place(q.other_link(second), q)
             return arm.dot(self._rough.line(g))
 
         offset = line.y - block.y
@@ -258,7 +260,7 @@ class LinkageParts:
         origin = self.geometry.line_through(s, block, pin)
         rail = self._rail(g, yoke, origin)
         own = LinkFrame(origin, along)
-        slot = own.of_vector(self.geometry.direction(s, yoke))
+        slot = own.components(self.geometry.direction(s, yoke))
         in_block = self.geometry.across(s, along, yoke)
         bars = self._bar(block, LinkFrame(pin, in_block), start), self._bar(yoke, own)
         return RPP(*bars, rail, slot, (self._guide(s, block), self._guide(g, yoke)))

@@ -18,7 +18,7 @@ from .structure import DriverEntry, JointEntry, LinkEntry, Structure
 _Node = TypeVar("_Node")
 
 
-def own_axis(u: Vec2, frame: LinkFrame) -> Vec2:
+def description_axis(u: Vec2, frame: LinkFrame) -> Vec2:
     """The x axis of a link's description, from the direction of its frame in the group."""
     e = frame.axis
     return Vec2(u.x * e.x + u.y * e.y, u.y * e.x - u.x * e.y)
