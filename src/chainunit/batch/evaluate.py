@@ -77,7 +77,7 @@ def evaluate(
     ----------
     model : the model, such as `ChamberForces`; a model with states takes each state from `values`
     values : by the name of a parameter, input or state: a number, a DataArray, or an array of one dimension, which
-        becomes the dimension of that name. A DataArray whose ``units`` differ from those of the declaration is
+        becomes the dimension of that name. A DataArray whose ``units`` differ from the declared units is
         converted. Dimensions of the same name belong together; all others are combined.
     outputs : names of the outputs, or of quantities beside them (`Model.further`: ``crank_torque``,
         ``force(pivot)``); by default all outputs

@@ -65,7 +65,7 @@ def profile_rows(signal: Any, changes: int) -> list[float]:
 def signal_table(
     driven: Sequence[str], signals: Sequence[Mapping[str, Any]], otherwise: Mapping[str, float], changes: int
 ) -> Any:
-    """The signals of runs by the names of the `driven` inputs, with the values `otherwise` of those that a run does
+    """The signals of runs by the names of the `driven` inputs, with the values `otherwise` of signals that a run does
     not change, as `Transients.run` takes them: shape (inputs, 1 + 3*changes, runs)."""
     rows = [
         [profile_rows(own.get(name, otherwise.get(name, 0.0)), changes) for own in signals] for name in driven
@@ -102,7 +102,7 @@ class Runs:
 
 
 def _filled(x: Any, runs: int, *shape: int) -> Any:
-    """The values of all runs, filled up to whole vectors by those of the last run; a new array of the shape
+    """The values of all runs, filled up to whole vectors by the values of the last run; a new array of the shape
     (*shape, lanes)."""
     full = np.broadcast_to(np.asarray(x, float), (*shape, runs))
     return np.ascontiguousarray(np.concatenate([full, np.repeat(full[..., -1:], -runs % _LANES, -1)], -1))
@@ -117,7 +117,7 @@ class Transients:
     outputs : names of the outputs and states to keep
     varying : names of the parameters that differ between runs
     driven : names of the inputs with signals or with values that differ between runs
-    guarded : those of the outputs that may end a run by a limit of their size
+    guarded : the outputs that may end a run by a limit of their size
     by : names of the parameters and inputs of which a direction consists
 
     Raises

@@ -100,7 +100,7 @@ def modules_of(place: Mapping[str, Any]) -> set[str]:
 
 @dataclass(frozen=True)
 class Member:
-    """A component: its model, and how its parameters and inputs follow from those of the system.
+    """A component: its model, and how its parameters and inputs follow from the parameters and inputs of the system.
 
     `parameters` has for each parameter a function of the system's parameters; `free` for each input a function of the
     system's inputs, or None, and `sources` then its source by full name, or None where it has its declared start

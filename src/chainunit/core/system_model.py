@@ -1,4 +1,4 @@
-"""The model of a system of models: `system_model` makes it from its description (`chainunit.core.system_description`).
+"""The model of a system of models: `system_model` makes it from a description (`core.system_description`).
 
 Standard library only: FMUs carry this file.
 """
@@ -44,7 +44,7 @@ class SystemModel(Model):
             return p
         ready, first = copy.copy(p), 0
         values: list[Any] = []
-        # the copy has those of the original
+        # the copy has the values of the original
         vars(ready).pop("of_components", None)
         own = cls.system.parameters(ready)
         for name, model in cls._components():

@@ -84,7 +84,7 @@ class Interface:
 
     @property
     def discrete(self) -> list[int]:
-        """Places among the outputs after the states of those that are counts or switches."""
+        """Places, among the outputs after the states, of counts and switches."""
         return [i for i, v in enumerate(self.others) if v.type != "Real"]
 
     def signals_of(self, causality: str) -> list[Signal]:

@@ -66,7 +66,7 @@ def _script(file: Path) -> type[Script]:
 
 
 def frequent_outputs(model: type[Model]) -> set[str]:
-    """The outputs that are read at every step: those of the terminals."""
+    """The outputs that are read at every step: the members of the terminals."""
     return {name for terminal in model.terminals for name in terminal.members.values()}
 
 

@@ -125,7 +125,7 @@ class SolvedCylinder(SolvedDriver):
     def third_derivatives(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """Third derivatives by q of the links and the pins, from those of the outer pins and the rails."""
+        """Third derivatives by q of the links and the pins, from the outer pins' and rails'."""
         barrel, _, lever = self.links
         e, r, d = self._e, self._r, barrel.u
         t1, t2, turn1, turn2 = barrel.t1, barrel.t2, lever.t1, lever.t2

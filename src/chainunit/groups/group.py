@@ -146,7 +146,7 @@ class Group:
 
 
 def rail_third(rail: Rail, placed: Link, links: Mapping[str, Link], thirds: Mapping[str, Third]) -> Third:
-    """The third derivatives of a rail, where it is `placed`, from those of the links."""
+    """The third derivatives of a rail, where it is `placed`, from the third derivatives of the links."""
     if rail.of is None:
         return ZERO, 0.0
     link, third = links[rail.of], thirds[rail.of]

@@ -70,11 +70,11 @@ class LegAt:
         raise NotImplementedError
 
     def third_right_side(self, ternary: Link, outer: Third) -> Any:
-        """Right side for the third derivatives of the pose, from those of the outer pin or of the rail."""
+        """Right side for the third derivatives of the pose, from the outer pin or the rail."""
         raise NotImplementedError
 
     def link_third(self, ternary: Link, own: Third, outer: Third) -> tuple[Third, Vec2 | None]:
-        """Third derivatives of the leg, and of its inner pin, from those of the ternary link (`own`)."""
+        """Third derivatives of the leg, and of its inner pin, from the ternary link's (`own`)."""
         raise NotImplementedError
 
     def solution(self, ternary: Link) -> tuple[Link, Motion | None, Slide | None]:
@@ -149,7 +149,7 @@ class RodAt(LegAt):
         return self._r.dot(p.p2 + a * (t1 * t1)) - (origin1 + a.turned() * t1 - p.p1).squared()
 
     def third_right_side(self, ternary: Link, outer: Third) -> Any:
-        """Right side for the third derivatives of the pose, from those of the outer pin or the rail."""
+        """Right side for the third derivatives of the pose, from the outer pin or the rail."""
         a, p, t1 = self.spot, self._outer, ternary.t1
         k = ternary.carried(a)
         centripetal = 3.0 * (k.p1 - p.p1).dot(k.p2 - p.p2)
@@ -158,7 +158,7 @@ class RodAt(LegAt):
         )
 
     def link_third(self, ternary: Link, own: Third, outer: Third) -> tuple[Third, Vec2 | None]:
-        """Third derivatives of the leg and of its inner pin, from those of the ternary link."""
+        """Third derivatives of the leg and of its inner pin, from the ternary link's."""
         end = ternary.third_derivative(self.spot, *own)
         p, k = self._outer, ternary.carried(self.spot)
         t1 = self._r.cross(k.p1 - p.p1) * self._per_square
@@ -254,14 +254,14 @@ class BlockAt(LegAt):
         return Slide(rail.u, self._way.dot(rail.u), s1, s2)
 
     def third_right_side(self, ternary: Link, outer: Third) -> Any:
-        """Right side for the third derivatives of the pose, from those of the outer pin or the rail."""
+        """Right side for the third derivatives of the pose, from the outer pin or the rail."""
         a, t1, slide, rail = self.spot, ternary.t1, self._slide(ternary), self._rail
         carried = rail.third_derivative(self._way, *outer)
         moved = coriolis_third(rail, carried, slide.d * slide.s1, slide.d * slide.s2)
         return (moved + a.turned() * (t1 * t1 * t1) + a * (3.0 * (t1 * ternary.t2))).dot(self._n)
 
     def link_third(self, ternary: Link, own: Third, outer: Third) -> tuple[Third, Vec2 | None]:
-        """Third derivatives of the leg and of its inner pin, from those of the ternary link."""
+        """Third derivatives of the leg and of its inner pin, from the ternary link's."""
         end = ternary.third_derivative(self.spot, *own)
         return (end, outer[1]), end
 
@@ -332,14 +332,14 @@ class SlotAt(LegAt):
         return self._outer.p2.dot(self._n) - 2.0 * (t1 * y1.dot(self._d)) - t1 * t1 * self._y.dot(self._n)
 
     def third_right_side(self, ternary: Link, outer: Third) -> Any:
-        """Right side for the third derivatives of the pose, from those of the outer pin or the rail."""
+        """Right side for the third derivatives of the pose, from the outer pin or the rail."""
         d, n, y, t1, t2 = self._d, self._n, self._y, ternary.t1, ternary.t2
         y1, y2 = self._outer.p1 - ternary.pin.p1, self._outer.p2 - ternary.pin.p2
         rest = t1 * y2.dot(d) + t2 * y1.dot(d) + t1 * t1 * y1.dot(n) + t1 * t2 * y.dot(n)
         return outer[0].dot(n) - 3.0 * rest + t1 * t1 * t1 * y.dot(d)
 
     def link_third(self, ternary: Link, own: Third, outer: Third) -> tuple[Third, Vec2 | None]:
-        """Third derivatives of the leg and of its inner pin, from those of the ternary link."""
+        """Third derivatives of the leg and of its inner pin, from the ternary link's."""
         return (outer[0], own[1]), None
 
     def solution(self, ternary: Link) -> tuple[Link, Motion | None, Slide | None]:

@@ -122,7 +122,7 @@ class SolvedRRP(SolvedGroup):
     def third_derivatives(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """Third derivatives by q of the links and the pins, from those of the outer pins and the rails."""
+        """Third derivatives by q of the links and the pins, from the outer pins' and rails'."""
         (p,), ((base, t3),), (rod, slider), rail = outer, rails, self.links, self._rail
         (slide,), inner = self.slides, slider.pin
         r, r1, r2 = inner.p - rod.pin.p, inner.p1 - rod.pin.p1, inner.p2 - rod.pin.p2
@@ -237,7 +237,7 @@ class SolvedRPR(SolvedGroup):
     def third_derivatives(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """Third derivatives by q of the links and the pins, from those of the outer pins and the rails."""
+        """Third derivatives by q of the links and the pins, from the outer pins' and rails'."""
         (p, q), (slide,), (link, _) = outer, self.slides, self.links
         n, t1, t2 = slide.d.turned(), link.t1, link.t2
         # the part along n of v''' = (t3 - t1^3) (L n - offset d) - 3 t1 t2 v + 3 t2 L' n - 3 t1^2 L' d

@@ -319,7 +319,7 @@ class SolvedTriad(SolvedGroup):
     def third_derivatives(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """Third derivatives by q of the links and the pins, from those of the outer pins and the rails."""
+        """Third derivatives by q of the links and the pins, from the outer pins' and rails'."""
         *_, ternary = self.links
         starts, lines = iter(outer), iter(rails)
         before = [next(lines) if leg.on_rail else (next(starts), 0.0) for leg in self.legs]

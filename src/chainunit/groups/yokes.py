@@ -103,7 +103,7 @@ class SolvedPRP(SolvedGroup):
     def third_derivatives(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """Third derivatives by q of the links and the pins, from those of the outer pins and the rails."""
+        """Third derivatives by q of the links and the pins, from the outer pins' and rails'."""
         (a, b, per), (one, other), (inner,) = self._rails, self.slides, self.pins
         most = []
         for rail, slide, (base, t3) in ((a, one, rails[0]), (b, other, rails[1])):
@@ -225,7 +225,7 @@ class SolvedRPP(SolvedGroup):
     def third_derivatives(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """Third derivatives by q of the links and the pins, from those of the outer pins and the rails."""
+        """Third derivatives by q of the links and the pins, from the outer pins' and rails'."""
         (p,), ((base, t3),), rail, (slot, way) = outer, rails, self._rail, self.slides
         block, yoke = self.links
         d, e = way.d, slot.d

@@ -341,7 +341,7 @@ class Organs:
         return sides
 
     def _start_state(self, rods_start: Any, side: str, hanging: State) -> State:
-        """Angles and speeds of a side: those of `rods_start`, or those of the hanging chain."""
+        """Angles and speeds of a side, of `rods_start` or of the hanging chain."""
         N, share = self.number, rods_start.given
         start = self._start_layout.values(getattr(rods_start, side))
         values = [

@@ -41,8 +41,8 @@ class JointOf(NamedTuple):
 class AssurGroup(NamedTuple):
     """A group: its kind (RRR, RRP, RPR, PRP, RPP, or triad), its links, and its joints in the order of their roles.
 
-    Of a dyad the links are `first` and `second`, the joints those of the first link with what stands before, between
-    both, and of the second link. Of a triad the ternary link stands first, then its legs; the joints are the outer
+    Of a dyad the links are `first` and `second`; the joints connect the first link with the links before, both with
+    each other, and the second link with the links before. Of a triad the ternary link stands first, then its legs; the joints are the outer
     ones of the legs, then their inner ones.
     """
 

@@ -89,7 +89,7 @@ class Linkage:
 
     @property
     def derived(self) -> int:
-        """The number of values that follow from the lengths, once before a run: those of the groups, then the
+        """The number of values that follow from the lengths, once before a run: of the groups, and of the
         extremes."""
         return sum(group.derived for group in self.groups) + len(self.extremes)
 

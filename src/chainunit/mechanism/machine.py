@@ -224,7 +224,7 @@ def _placed(
 
 
 def derived_numbers(xp: Any, linkage: Linkage) -> list[Any]:
-    """Values that follow from the lengths, once before a run: those of the groups, then the extremes."""
+    """Values that follow from the lengths, once before a run: of the groups, then of the extremes."""
     numbers: list[Any] = []
     for k, group in enumerate(linkage.groups):
         numbers += group.derive(xp, functools.partial(_placed, xp, linkage.before(k), tuple(numbers)))
@@ -280,7 +280,7 @@ class MachineState:
         ----------
         xp : engine (see `chainunit.core.engines`)
         w : speed of the crank [rad/s]
-        loads : loads in place of those of the linkage
+        loads : loads in place of the linkage's own
         """
         self._xp, self.m, self.w = xp, m, w
         self._loads = m.linkage.loads if loads is None else loads

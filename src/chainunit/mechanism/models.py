@@ -62,7 +62,7 @@ class LinkageModel(Model):
 
     @staticmethod
     def linkage(xp: Any, p: Any, u: Any) -> Linkage:
-        """The linkage with these parameters and inputs, whose values are those of the engine `xp`; places and
+        """The linkage with these parameters and inputs, whose values the engine `xp` computes; places and
         lengths do not depend on the inputs."""
         raise NotImplementedError
 
@@ -171,7 +171,7 @@ class InverseMachine(LinkageModel, MachineModel):
 
     @classmethod
     def shared(cls, xp: Any, p: Any, u: Any, x: Any) -> MachineState:
-        """The machine at the crank angle and speed that follow from those of the motor."""
+        """The machine at the crank angle and speed that follow from angle and speed of the motor."""
         return cls.state(xp, p, u, u.phi / p.ratio, u.w / p.ratio)
 
     @classmethod
@@ -225,8 +225,8 @@ class InverseMachine(LinkageModel, MachineModel):
     def direct(cls) -> type[DirectMachine]:
         """The direct model of the same machine: torque in, motion out.
 
-        Its parameters are those of the machine, the inertia on its shaft and the start. Its inputs are the torque and
-        the loads. Its outputs are those of the machine without `tau` and load port, and those of `DriverPort.answer`.
+        It has the parameters of the machine, the inertia on its shaft and the start. Its inputs are the torque and
+        the loads. It has the outputs of the machine without `tau` and load port, and the outputs of `DriverPort.answer`.
         """
         stops = cls.end_stops
         if stops is None:
@@ -357,7 +357,7 @@ class DirectMachine(LinkageModel):
 
     @classmethod
     def shared(cls, xp: Any, p: Any, u: Any, x: Any) -> MachineState:
-        """The machine at the crank angle and speed that follow from those of the motor."""
+        """The machine at the crank angle and speed that follow from angle and speed of the motor."""
         return cls.state(xp, p, u, x.phi / p.ratio, x.w / p.ratio)
 
     @classmethod

@@ -24,7 +24,7 @@ TURNS = 5.0
 ROUGH = 1e-3
 """Expected decrease of the sum of squares of the first turns, in parts of it, below which their fit ends."""
 SAME_POINT = 1.005
-"""Sums of squares that differ by less than this factor are those of the same point."""
+"""Sums of squares that differ by less than this factor belong to the same point."""
 DAMPING = 1e-2
 """Damping of the first step, in parts of the information of the priors."""
 STATED_ROWS = 100.0
@@ -306,7 +306,7 @@ def _next_point(problem: Problem, at: NormalEquations, damping: float) -> Any:
         np.where(problem.needs_simulation, damping / problem.prior_deviations**2, 0.0)
     )
     for _ in range(len(at.z)):
-        # those that have stopped change the gradient of the others
+        # unknowns that have stopped change the gradient of the others
         gradient = at.gradient[moving] - at.matrix[np.ix_(moving, ~moving)] @ step[~moving]
         step[moving] = _solve(damped[np.ix_(moving, moving)], gradient)
         z = at.z + step

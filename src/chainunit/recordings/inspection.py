@@ -77,7 +77,7 @@ class Expectation:
 
 
 def inspect_runs(problem: Problem, workers: int) -> None:
-    """Refuse recordings with faults; the sizes to expect are those of the drive at the start values. What needs no
+    """Refuse recordings with faults; the expected sizes are simulated with the start values. What needs no
     simulation is told before it, as with a wrong unit of the time it has no end."""
     faults, ratio = Faults(), problem.plant.ratio
     for run in problem.runs:
@@ -291,7 +291,7 @@ def _likely_unit(recording: Recording, turn: float, longest: float) -> str:
 
 
 def _marks(recording: Recording, speeds: tuple[float, float], ratio: float) -> Iterator[InputError]:
-    """That the marks are not those of the turns. The speed is that of the run, or the measured one."""
+    """The fault of marks that do not come once a turn. The speed is the one of the run, or the measured one."""
     if "mark" not in recording.columns or len(recording.time) < 2:
         return
     own = measured_speed(recording, ratio)

@@ -33,7 +33,7 @@ class DirectedLoop:
     ----------
     drive : motor and machine
     outputs : names of the states and outputs to keep
-    by : full names of parameters and inputs; of those that the system has, directions may consist
+    by : full names of parameters and inputs; directions may consist of the ones that the system has
     """
 
     def __init__(self, drive: Drive, outputs: Sequence[str], by: Sequence[str]) -> None:

@@ -119,7 +119,7 @@ def residual_test(of: Comparison, level: float) -> ResidualTest:
     """The check of one column; noise is within the limit of its statistic with the probability `level`.
 
     Over a part of a turn, such as a machine that swings after its motor was switched off, the orders are nearly one
-    another's sums. Their orthogonal combinations are looked at, up to those that the angles resolve.
+    another's sums. Their orthogonal combinations are looked at, as far as the angles resolve them.
     """
     rows = len(of.residuals)
     orders = min(ORDERS, rows // ROWS)

@@ -153,8 +153,8 @@ class MeasuredShaft:
 
     def _torque(self, values: Mapping[str, Any], motion: Any, workers: int) -> tuple[Any, dict[str, Any]]:
         """The torque at the crank along a motion of the crank (angle, speed, acceleration), shape (3, rows), and its
-        derivatives by all sought quantities and by the motion: with those that a run does not need, all runs share
-        compiled code."""
+        derivatives by all sought quantities and by the motion: with derivatives that a run does not need, all runs
+        share compiled code."""
         model, ratio = self._machine.model, self.ratio
         own = {name.removeprefix("machine."): x for name, x in values.items() if name.startswith("machine.")}
         p = self._machine.replace({k: x for k, x in own.items() if k in model.parameter_layout.names}).p

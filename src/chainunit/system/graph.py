@@ -126,7 +126,7 @@ class System:
     components : by name; a machine comes before its driver
     joints : pairs of terminals by full name, such as ``("motor.flange", "machine.flange")``
     wires : single connections from an output to an input
-    start : start values of parameters and inputs by full name, beside those of the components
+    start : start values of parameters and inputs by full name, beside the start values of the components
     slopes : whether load ports pass their slopes; without them the load is held constant over a step
 
     Raises
@@ -199,7 +199,7 @@ class System:
 
     @cached_property
     def connections(self) -> list[Connection]:
-        """All connections between variables, those of the joints first."""
+        """All connections between variables, first those by joints."""
         excluded = () if self.slopes else Layout(PortSlopes).names
         connections = [
             c for joint in self.joints for member, c in self._joint(*joint) if member not in excluded

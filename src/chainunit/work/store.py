@@ -150,7 +150,7 @@ class BatchStore:
         Raises
         ------
         RunError
-            for results that are not those that the job declares.
+            for results that the job does not declare.
         WriteError
             where a file cannot be written.
         """

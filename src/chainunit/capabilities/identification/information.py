@@ -244,8 +244,8 @@ def _proposals(
 
 
 def _sparse(problem: Problem, run: RecordedRun) -> tuple[RecordedRun, dict[tuple[str, str], float]]:
-    """The run with fewer rows, of which each counts for those that it stands for, and the factors on the standard
-    deviations by which it does."""
+    """The run with fewer rows, and the factors on the standard deviations by which each of them counts for
+    several."""
     step = min(SPARSE, 2.0 * math.pi / (SPARSE_ROWS * run.crank_speed))
     (sparse,) = Problem(problem.plant, (run,), problem.sought, problem.sensors).thinned(step).runs
     every = sparse.recording.step / run.recording.step

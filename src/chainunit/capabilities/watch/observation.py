@@ -110,9 +110,9 @@ def false_imbalance(
 
     Parameters
     ----------
-    values : parameters of the observer by name; others are those of the declaration
-    names : numbers of which the `covariance`, shape (names, names), is known; those that the observer does not know
-        count as right
+    values : parameters of the observer by name; others have their declared values
+    names : numbers of which the `covariance`, shape (names, names), is known; a number that the observer does not
+        know counts as right
     crank_speed : mean speed of the crank [rad/s]
     """
     layout = LoadObserver.parameter_layout

@@ -235,7 +235,7 @@ class EntryReader(Entry):
         return text
 
     def checked_parameter(self, key: str, given: Any, text: str) -> str:
-        """A parameter that is an expression, in those that are numbers; empty where it is wrong."""
+        """A parameter that is an expression, in parameters that are numbers; empty where it is wrong."""
         if self.refused & words(text):
             return ""
         with self.at(key):

@@ -252,7 +252,7 @@ class _LinkageReader(LoadReader):
         return {"mass": mass, "inertia": f"{mass} * {square} / 12.0", "centroid": middle}
 
     def joints(self) -> list[dict[str, Any]]:
-        """The joints: those that are named, and a revolute one for each further link in a point of the same name."""
+        """The joints: the named ones, and a revolute one for each further link in a point of the same name."""
         joints = []
         for name, key, given in self.tables("joints", _JOINT_KEYS):
             kind = given.get("type", PRISMATIC if "toward" in given else REVOLUTE)
