@@ -42,8 +42,8 @@ class AssurGroup(NamedTuple):
     """A group: its kind (RRR, RRP, RPR, PRP, RPP, or triad), its links, and its joints in the order of their roles.
 
     Of a dyad the links are `first` and `second`; the joints connect the first link with the links before, both with
-    each other, and the second link with the links before. Of a triad the ternary link stands first, then its legs; the joints are the outer
-    ones of the legs, then their inner ones.
+    each other, and the second link with the links before. Of a triad the ternary link stands first, then its legs;
+    the joints are the outer ones of the legs, then their inner ones.
     """
 
     kind: str
