@@ -122,8 +122,8 @@ class Study:
         if self._changes:
             config = dataclasses.replace(config, source=f"{source} with {self._changed}")
         self.config = config
-        for slip in config.slips:
-            warnings.warn(slip.sentence, RemarkWarning, stacklevel=3)
+        for value in config.unusual:
+            warnings.warn(value.sentence, RemarkWarning, stacklevel=3)
         return self
 
     def with_values(self, values: Mapping[str, Any]) -> Self:

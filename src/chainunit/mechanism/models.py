@@ -226,7 +226,7 @@ class InverseMachine(LinkageModel, MachineModel):
         """The direct model of the same machine: torque in, motion out.
 
         It has the parameters of the machine, the inertia on its shaft and the start. Its inputs are the torque and
-        the loads. It has the outputs of the machine without `tau` and load port, and the outputs of `DriverPort.answer`.
+        the loads. It has the outputs of the machine without `tau` and load port, and those of `DriverPort.answer`.
         """
         stops = cls.end_stops
         if stops is None:

@@ -115,7 +115,7 @@ def option_value(name: str, text: str, unit: str, description: str) -> float:
 
 
 @dataclass(frozen=True)
-class Slip:
+class UnusualValue:
     """A value that no machine of this kind has, so that a slip of the unit is likely. `meant` is the probable
     value, in the form of a study file, or empty."""
 
@@ -146,11 +146,11 @@ class Slip:
         return f"{v.name} = {self.value:g}{unit}: is unusual ({v.description}; {usual}){hint}"
 
 
-def slips(
+def unusual_values(
     declared: Mapping[str, type],
     data: Mapping[str, Any],
     usual: Mapping[str, tuple[float, float]] = MappingProxyType({}),
-) -> Iterator[Slip]:
+) -> Iterator[UnusualValue]:
     """The unusual values in the sections of a checked file. `declared` has the declaration of each section by
     its name. `usual` has, by the name of a quantity, the usual sizes that replace the declared ones."""
     for section, of in declared.items():
@@ -165,7 +165,7 @@ def slips(
                 )
                 value = to_number(variable, given)
                 if not variable.quantity.is_usual(value):
-                    yield Slip(variable, value, _meant(variable, given))
+                    yield UnusualValue(variable, value, _meant(variable, given))
 
 
 def _meant(variable: Variable, given: Any) -> str:

@@ -121,6 +121,6 @@ def study_file(file: Path | None) -> Any:
     from ..study import config as configuration
 
     loaded = configuration.load(file)
-    for slip in loaded.slips:
-        show_remark(slip.sentence)
+    for value in loaded.unusual:
+        show_remark(value.sentence)
     return loaded

@@ -62,7 +62,7 @@ def _as_dict(study: StudyRecord) -> dict[str, Any]:
         "verdict": {"model": _on_model(study), "motor": motor_verdict(study)},
         "warnings": [remark.as_dict() for remark in study.warnings],
         "notes": [remark.as_dict() for remark in study.notes],
-        "slips": [slip.as_dict() for slip in config.slips],
+        "slips": [value.as_dict() for value in config.unusual],
         **(given := _given_values(study)),
         **_statics(study),
         **_runs(study),
