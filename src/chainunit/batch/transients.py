@@ -247,7 +247,7 @@ def _compiled(
     guarded: tuple[str, ...],
     by: tuple[str, ...],
     changes: int,
-    own: Compiler,
+    compiler: Compiler,
 ) -> tuple[str, ctypes.CDLL, list[str]]:
     """A digest of the source of the loop, its library, and the names of its uniform arguments."""
     operations = _operations(model, outputs, by)
@@ -309,7 +309,7 @@ def _compiled(
     names = [v.name for v in arguments_of(model)]
     starts = (0, sizes[0], sum(sizes))
     digest = hashlib.sha256(source.encode()).hexdigest()
-    return digest, load(source, own), [names[starts[kind] + k] for kind, k in code.inputs]
+    return digest, load(source, compiler), [names[starts[kind] + k] for kind, k in code.inputs]
 
 
 def _method(model: type[Model], operations: Operations) -> str:

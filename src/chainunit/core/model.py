@@ -162,14 +162,14 @@ copyreg.pickle(ModelType, _pickled_form)
 def keep(model: type[Model], *names: str) -> None:
     """Let pickle take instances of these declarations of a model that is `made`, whose classes no module names."""
     for name in names:
-        of = getattr(model, name)
+        declared = getattr(model, name)
 
-        def reduced(instance: Any, of: type = of, name: str = name) -> str | tuple[Any, ...]:
-            if type(instance) is not of:  # of another declaration with these fields
+        def reduced(instance: Any, declared: type = declared, name: str = name) -> str | tuple[Any, ...]:
+            if type(instance) is not declared:  # of another declaration with these fields
                 return copyreg.__newobj__, (type(instance),), vars(instance)  # type: ignore[attr-defined]
-            return _unpickled, (model, name, Layout(of).values(instance), getattr(instance, "derived", None))
+            return _unpickled, (model, name, Layout(declared).values(instance), getattr(instance, "derived", None))
 
-        of.__reduce__ = reduced
+        declared.__reduce__ = reduced
 
 
 def _unpickled(model: type[Model], name: str, values: Sequence[Any], derived: Any) -> Any:

@@ -156,19 +156,23 @@ class SystemDescription:
         }
 
     def _declared(
-        self, name: str, of: Callable[[type[Model]], type | None], leave_out: Iterable[str], more: Any = ()
+        self,
+        name: str,
+        declaration_of: Callable[[type[Model]], type | None],
+        leave_out: Iterable[str],
+        further_fields: Any = (),
     ) -> Any:
         """A declaration with a group for each component that has such quantities."""
         fields = []
         for component, model in self.models.items():
-            declared = of(model)
+            declared = declaration_of(model)
             inner = pruned(declared, {*leave_out}, f"{component}.") if declared else None
             if inner is not None:
                 variables = Layout(inner).variables
                 known = all(v.quantity.start is not None for v in variables)
                 default = Layout(inner).from_names({}) if known else None
                 fields.append((component, inner, group(inner, component, default=default)))
-        return declared_class(name, (), [*fields, *more])
+        return declared_class(name, (), [*fields, *further_fields])
 
     def _extra(self, names: Iterable[str]) -> Any:
         """A declaration of these outputs of further parts, by full name; None without any."""
@@ -218,17 +222,19 @@ class SystemDescription:
             f"makes the steps of all.\n\nConnected inside: {joined or 'nothing'}."
         )
 
-    def required(self, of: Callable[[type[Model]], Sequence[Requirement]]) -> tuple[Requirement, ...]:
+    def required(
+        self, requirements_of: Callable[[type[Model]], Sequence[Requirement]]
+    ) -> tuple[Requirement, ...]:
         """The requirements of all components, by full names."""
         return tuple(
             replace(
-                each,
-                subject=self._full(name, each.subject),
-                context=tuple(self._full(name, x) for x in each.context),
-                depends=tuple(self._full(name, x) for x in each.depends),
+                requirement,
+                subject=self._full(name, requirement.subject),
+                context=tuple(self._full(name, x) for x in requirement.context),
+                depends=tuple(self._full(name, x) for x in requirement.depends),
             )
             for name, model in self.models.items()
-            for each in of(model)
+            for requirement in requirements_of(model)
         )
 
     def _full(self, name: str, subject: str) -> str:

@@ -95,15 +95,15 @@ class SystemModel(Model):
             if outputs is not None:
                 point.advance([(name, outputs)])
                 continue
-            model, own = cls.system.models[name], point.p[name]
+            model, parameters = cls.system.models[name], point.p[name]
             entries, _ = point.inputs(name)
-            mine = unknowns(model, own, entries) if model.start_problem.unknowns else []
+            mine = unknowns(model, parameters, entries) if model.start_problem.unknowns else []
             z += mine
 
             def states(
-                model: type[Model] = model, own: Any = own, entries: Any = entries, z: list[Any] = mine
+                model: type[Model] = model, parameters: Any = parameters, entries: Any = entries, z: list[Any] = mine
             ) -> Any:
-                return model.start_states(xp, own, entries, z)
+                return model.start_states(xp, parameters, entries, z)
 
             point.begin(name, states)
         return z, point
@@ -118,9 +118,9 @@ class SystemModel(Model):
         """The unknowns of the start after one more round, of all components in order."""
         before = iter(z)
 
-        def improved(model: type[Model], own: Any, entries: Any) -> list[Any]:
+        def improved(model: type[Model], parameters: Any, entries: Any) -> list[Any]:
             mine = [next(before) for _ in range(model.start_problem.unknowns)]
-            return model.improve_start(xp, own, entries, mine)
+            return model.improve_start(xp, parameters, entries, mine)
 
         return cls._begin(xp, p, u, improved)[0]
 
@@ -129,7 +129,7 @@ class SystemModel(Model):
         """States at the start with the inputs `u`, from the unknowns `z` of all components."""
         before = iter(z)
 
-        def given(model: type[Model], own: Any, entries: Any) -> list[Any]:
+        def given(model: type[Model], parameters: Any, entries: Any) -> list[Any]:
             return [next(before) for _ in range(model.start_problem.unknowns)]
 
         _, point = cls._begin(xp, p, u, given)

@@ -44,12 +44,12 @@ class Interface:
     """The variables of a model's FMU in the order of their value references: parameters, inputs, states
     (each an output), other outputs part by part."""
 
-    def __init__(self, model: type[Model], start: dict[str, float], own: type[Script] | None = None) -> None:
+    def __init__(self, model: type[Model], start: dict[str, float], script: type[Script] | None = None) -> None:
         """
         Parameters
         ----------
         start : start values in place of the declared ones
-        own : the class of the user's script; by default the class of the model's script in `fmu/`
+        script : the class of the user's script; by default the class of the model's script in `fmu/`
 
         Raises
         ------
@@ -57,7 +57,7 @@ class Interface:
             for a name in `start` that is neither parameter nor input.
         """
         self.model = model
-        self.script = own or script_of(model)
+        self.script = script or script_of(model)
         self.parameters = model.parameter_layout.variables
         self.inputs = model.input_layout.variables
         self.states = model.state_layout.variables if model.state_layout else ()
@@ -330,10 +330,10 @@ def _dependencies(references: Iterable[int]) -> dict[str, str]:
     return {"dependencies": " ".join(texts), "dependenciesKind": " ".join("dependent" for _ in texts)}
 
 
-def _root(model: type[Model], version: str, own: Mapping[str, str]) -> Element:
+def _root(model: type[Model], version: str, identity: Mapping[str, str]) -> Element:
     """The root element, with the attributes that are common to both versions of FMI. `version` is that of this
     package."""
-    fmi, identifier = own.items()
+    fmi, identifier = identity.items()
     about = model.fmu_data.about or About(
         metadata.metadata("chainunit")["Author"], _copyright(), "MIT", version
     )
@@ -401,12 +401,12 @@ def _definitions(
     root: Element,
     interface: Interface,
     derivatives: bool,
-    more: set[str],
+    further_units: set[str],
     add_type: Callable[[Element, str, dict[str, str]], None],
 ) -> None:
-    """Write the definitions of all units and of those in `more`, the declared types, the categories of messages, and
-    the default experiment."""
-    units = more | {s.variable.unit for s in interface.signals if s.variable.type == "Real"}
+    """Write the definitions of all units with the `further_units`, the declared types, the categories of messages,
+    and the default experiment."""
+    units = further_units | {s.variable.unit for s in interface.signals if s.variable.type == "Real"}
     units |= {_per_second(v.unit) for v in interface.states if derivatives}
     definitions = SubElement(root, "UnitDefinitions")
     for unit in sorted(units):

@@ -262,8 +262,8 @@ def _inertia(interface: Interface, torque: str) -> float:
     return float(1.0 / (abs(slopes).max() or 1.0))
 
 
-def _size(q: Quantity, start: float | None, own: float | None) -> float:
-    return own or start or q.nominal or _SIZES.get(q.unit, 1.0)
+def _size(q: Quantity, start: float | None, stated: float | None) -> float:
+    return stated or start or q.nominal or _SIZES.get(q.unit, 1.0)
 
 
 def _swing(q: Quantity, size: float, k: int) -> Callable[[float], float]:

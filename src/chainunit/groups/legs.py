@@ -73,8 +73,8 @@ class LegAt:
         """Right side for the third derivatives of the pose, from the outer pin or the rail."""
         raise NotImplementedError
 
-    def link_third(self, ternary: Link, own: Third, outer: Third) -> tuple[Third, Vec2 | None]:
-        """Third derivatives of the leg, and of its inner pin, from the ternary link's (`own`)."""
+    def link_third(self, ternary: Link, ternary_third: Third, outer: Third) -> tuple[Third, Vec2 | None]:
+        """Third derivatives of the leg, and of its inner pin, from the ternary link's (`ternary_third`)."""
         raise NotImplementedError
 
     def solution(self, ternary: Link) -> tuple[Link, Motion | None, Slide | None]:
@@ -157,9 +157,9 @@ class RodAt(LegAt):
             self._r.dot(outer[0] + a.turned() * (t1 * t1 * t1) + a * (3.0 * (t1 * ternary.t2))) - centripetal
         )
 
-    def link_third(self, ternary: Link, own: Third, outer: Third) -> tuple[Third, Vec2 | None]:
+    def link_third(self, ternary: Link, ternary_third: Third, outer: Third) -> tuple[Third, Vec2 | None]:
         """Third derivatives of the leg and of its inner pin, from the ternary link's."""
-        end = ternary.third_derivative(self.spot, *own)
+        end = ternary.third_derivative(self.spot, *ternary_third)
         p, k = self._outer, ternary.carried(self.spot)
         t1 = self._r.cross(k.p1 - p.p1) * self._per_square
         return (outer[0], self._r.cross(end - outer[0]) * self._per_square + t1 * t1 * t1), end
@@ -260,9 +260,9 @@ class BlockAt(LegAt):
         moved = coriolis_third(rail, carried, slide.d * slide.s1, slide.d * slide.s2)
         return (moved + a.turned() * (t1 * t1 * t1) + a * (3.0 * (t1 * ternary.t2))).dot(self._n)
 
-    def link_third(self, ternary: Link, own: Third, outer: Third) -> tuple[Third, Vec2 | None]:
+    def link_third(self, ternary: Link, ternary_third: Third, outer: Third) -> tuple[Third, Vec2 | None]:
         """Third derivatives of the leg and of its inner pin, from the ternary link's."""
-        end = ternary.third_derivative(self.spot, *own)
+        end = ternary.third_derivative(self.spot, *ternary_third)
         return (end, outer[1]), end
 
     def solution(self, ternary: Link) -> tuple[Link, Motion | None, Slide | None]:
@@ -338,9 +338,9 @@ class SlotAt(LegAt):
         rest = t1 * y2.dot(d) + t2 * y1.dot(d) + t1 * t1 * y1.dot(n) + t1 * t2 * y.dot(n)
         return outer[0].dot(n) - 3.0 * rest + t1 * t1 * t1 * y.dot(d)
 
-    def link_third(self, ternary: Link, own: Third, outer: Third) -> tuple[Third, Vec2 | None]:
+    def link_third(self, ternary: Link, ternary_third: Third, outer: Third) -> tuple[Third, Vec2 | None]:
         """Third derivatives of the leg and of its inner pin, from the ternary link's."""
-        return (outer[0], own[1]), None
+        return (outer[0], ternary_third[1]), None
 
     def solution(self, ternary: Link) -> tuple[Link, Motion | None, Slide | None]:
         """The leg as a link, its inner pin, and the motion in its sliding joint."""

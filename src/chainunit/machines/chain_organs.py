@@ -117,9 +117,9 @@ def _rod_fields(
     ]
 
 
-def both(of: type, default: Any = None) -> list[Any]:
-    """Fields for the declaration `of` on each side."""
-    return [(name, of, group(of, f"{name} organ", default=default)) for name in SIDES]
+def both(declared: type, default: Any = None) -> list[Any]:
+    """Fields for the declaration `declared` on each side."""
+    return [(name, declared, group(declared, f"{name} organ", default=default)) for name in SIDES]
 
 
 @declaration

@@ -38,9 +38,9 @@ MACHINES: dict[str, type[InverseMachine]] = {}
 """The machines by name: every subclass of `InverseMachine` with a name is a machine that study files may name."""
 
 
-def names_of(of: type) -> tuple[str, ...]:
+def names_of(declared: type) -> tuple[str, ...]:
     """The names of the fields of a declaration."""
-    return tuple(f.name for f in dataclasses.fields(of))
+    return tuple(f.name for f in dataclasses.fields(declared))
 
 
 @declaration

@@ -146,8 +146,8 @@ def fit(
     """
     counter = itertools.count(1)
 
-    def rounds_of(own: Problem) -> _LevenbergMarquardt:
-        return _LevenbergMarquardt(own, workers, lambda cost: report(next(counter), cost))
+    def rounds_of(part: Problem) -> _LevenbergMarquardt:
+        return _LevenbergMarquardt(part, workers, lambda cost: report(next(counter), cost))
 
     first, rng = _first_turns(problem), np.random.default_rng(seed)
     z = problem.initial_point(workers) if z is None else z

@@ -115,18 +115,18 @@ def residual_tests(best: NormalEquations) -> list[ResidualTest]:
     return [residual_test(each, level) for each in columns]
 
 
-def residual_test(of: Comparison, level: float) -> ResidualTest:
+def residual_test(comparison: Comparison, level: float) -> ResidualTest:
     """The check of one column; noise is within the limit of its statistic with the probability `level`.
 
     Over a part of a turn, such as a machine that swings after its motor was switched off, the orders are nearly one
     another's sums. Their orthogonal combinations are looked at, as far as the angles resolve them.
     """
-    rows = len(of.residuals)
+    rows = len(comparison.residuals)
     orders = min(ORDERS, rows // ROWS)
     # the constant part is that of an offset
-    waves = np.stack(list(_waves(of.angle, orders)), axis=1)
+    waves = np.stack(list(_waves(comparison.angle, orders)), axis=1)
     waves -= np.mean(waves, axis=0)
-    residuals = of.residuals - np.mean(of.residuals)
+    residuals = comparison.residuals - np.mean(comparison.residuals)
     squares, combinations = np.linalg.eigh(waves.T @ waves)
     resolved = squares > RESOLVED**2 * squares[-1]
     sizes, combinations = np.sqrt(squares[resolved]), combinations[:, resolved]
@@ -138,13 +138,13 @@ def residual_test(of: Comparison, level: float) -> ResidualTest:
     # the noise is measured, too
     limit = count * float(f.ppf(level, count, free))
     parts = combinations @ (along / sizes)
-    amplitudes = np.hypot(parts[::2], parts[1::2]) * of.size
+    amplitudes = np.hypot(parts[::2], parts[1::2]) * comparison.size
     largest = np.argsort(-amplitudes)[:3]
     orders_found = tuple((int(k) + 1, float(amplitudes[k])) for k in largest)
     statistic = _over(float(along @ along), noise**2)
-    slow = _slow(rest, of.angle, level)
+    slow = _slow(rest, comparison.angle, level)
     return ResidualTest(
-        of.run, of.column, statistic, limit, orders_found, noise, *slow[:2], slow[2] * of.size
+        comparison.run, comparison.column, statistic, limit, orders_found, noise, *slow[:2], slow[2] * comparison.size
     )
 
 

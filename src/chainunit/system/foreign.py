@@ -206,10 +206,10 @@ def _prefixes(names: Iterable[str], members: Iterable[str]) -> list[str]:
     return sorted(set.intersection(*sets))
 
 
-def _of(ends: Iterable[str], like: Terminal, name: str, prefix: str) -> Terminal:
-    """A terminal of the kind of `like`, with those of its members that the FMU has."""
-    members = {m: prefix + m for m in like.members if prefix + m in ends}
-    return Terminal(name, like.kind, like.description, members)
+def _of(ends: Iterable[str], known: Terminal, name: str, prefix: str) -> Terminal:
+    """A terminal of the kind of `known`, with those of its members that the FMU has."""
+    members = {m: prefix + m for m in known.members if prefix + m in ends}
+    return Terminal(name, known.kind, known.description, members)
 
 
 def _declared(file: Path, ours: Mapping[str, str]) -> list[Terminal]:

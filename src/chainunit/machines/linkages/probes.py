@@ -107,12 +107,12 @@ def _pinned(structure: Structure, end: tuple[str, str]) -> set[tuple[str, str]]:
     return _connected(end, pins)
 
 
-def _connected(one: _Node, pairs: Sequence[set[_Node]]) -> set[_Node]:
+def _connected(start: _Node, pairs: Sequence[set[_Node]]) -> set[_Node]:
     """All that the pairs connect with this one, and itself."""
-    met, grows = {one}, True
+    met, grows = {start}, True
     while grows:
-        more = met.union(*(pair for pair in pairs if pair & met))
-        met, grows = more, more != met
+        grown = met.union(*(pair for pair in pairs if pair & met))
+        met, grows = grown, grown != met
     return met
 
 
