@@ -9,7 +9,7 @@ import copyreg
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 from . import messages
 from .engines import MATH
@@ -126,6 +126,15 @@ class Sketch:
     links: Mapping[str, Sequence[str]]
     driven: str
     ground: frozenset[str]
+
+
+class Extrapolation(NamedTuple):
+    """How an input goes on inside a step: the `place` of the input, its `rate`, and `half` of its second derivative.
+    After the time `since` it has changed by since * (rate + since * half)."""
+
+    place: int
+    rate: Any
+    half: Any
 
 
 class Part:
@@ -288,9 +297,8 @@ class Model(metaclass=ModelType):
                 raise error
 
     @classmethod
-    def extrapolations(cls, values: Sequence[Any]) -> list[tuple[int, Any, Any]]:
-        """Index, rate and half of the second derivative of each input of `input_rates`, from the `values` of
-        all inputs: after the time `since` the input has changed by since * (rate + since * half)."""
+    def extrapolations(cls, values: Sequence[Any]) -> list[Extrapolation]:
+        """The extrapolation of each input of `input_rates`, from the `values` of all inputs."""
 
         def rate(name: str | None) -> Any:
             other = cls.input_rates.get(name or "")
@@ -298,7 +306,8 @@ class Model(metaclass=ModelType):
 
         names = cls.input_layout.names
         return [
-            (names.index(name), rate(name), 0.5 * rate(cls.input_rates[name])) for name in cls.input_rates
+            Extrapolation(names.index(name), rate(name), 0.5 * rate(cls.input_rates[name]))
+            for name in cls.input_rates
         ]
 
     @staticmethod

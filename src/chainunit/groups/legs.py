@@ -11,11 +11,19 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 from ..core.planar import ZERO, Link, Motion, Vec2, coriolis, coriolis_third, rod_rates
 from .body import Bar, Load
 from .group import GuideForce, Joint, PlacedLinkage, Rail, Slide, Third
+
+
+class SolvedLeg(NamedTuple):
+    """A leg as a link, its inner pin, and the motion in its sliding joint, where it has one."""
+
+    link: Link
+    pin: Motion | None
+    slide: Slide | None
 
 
 @dataclass
@@ -77,7 +85,7 @@ class LegAt:
         """Third derivatives of the leg, and of its inner pin, from the ternary link's (`ternary_third`)."""
         raise NotImplementedError
 
-    def solution(self, ternary: Link) -> tuple[Link, Motion | None, Slide | None]:
+    def solution(self, ternary: Link) -> SolvedLeg:
         """The leg as a link, its inner pin, and the motion in its sliding joint."""
         raise NotImplementedError
 
@@ -164,12 +172,12 @@ class RodAt(LegAt):
         t1 = self._r.cross(k.p1 - p.p1) * self._per_square
         return (outer[0], self._r.cross(end - outer[0]) * self._per_square + t1 * t1 * t1), end
 
-    def solution(self, ternary: Link) -> tuple[Link, Motion | None, Slide | None]:
+    def solution(self, ternary: Link) -> SolvedLeg:
         """The leg as a link, its inner pin, and the motion in its sliding joint."""
         p, k, r = self._outer, ternary.carried(self.spot), self._r
         k = Motion(p.p + r, k.p1, k.p2)
         rates = rod_rates(r, k.p1 - p.p1, k.p2 - p.p2, self._per_square)
-        return Link(p, r * (1.0 / self.size), *rates), k, None
+        return SolvedLeg(Link(p, r * (1.0 / self.size), *rates), k, None)
 
     def known_part(self, load: Load) -> tuple[Vec2, Any]:
         """See `LegAt`: the force across the rod, which the moment about its outer pin needs."""
@@ -265,10 +273,10 @@ class BlockAt(LegAt):
         end = ternary.third_derivative(self.spot, *ternary_third)
         return (end, outer[1]), end
 
-    def solution(self, ternary: Link) -> tuple[Link, Motion | None, Slide | None]:
+    def solution(self, ternary: Link) -> SolvedLeg:
         """The leg as a link, its inner pin, and the motion in its sliding joint."""
         k, rail = ternary.carried(self.spot), self._rail
-        return Link(k, rail.u, rail.t1, rail.t2), k, self._slide(ternary)
+        return SolvedLeg(Link(k, rail.u, rail.t1, rail.t2), k, self._slide(ternary))
 
     def known_part(self, load: Load) -> tuple[Vec2, Any]:
         """See `LegAt`: the force along the rail."""
@@ -342,14 +350,14 @@ class SlotAt(LegAt):
         """Third derivatives of the leg and of its inner pin, from the ternary link's."""
         return (outer[0], ternary_third[1]), None
 
-    def solution(self, ternary: Link) -> tuple[Link, Motion | None, Slide | None]:
+    def solution(self, ternary: Link) -> SolvedLeg:
         """The leg as a link, its inner pin, and the motion in its sliding joint."""
         p, d = self._outer, self._d
         carried = ternary.carried(self._y)
         s1 = (p.p1 - carried.p1).dot(d)
         s2 = (p.p2 - coriolis(ternary, carried, d * s1)).dot(d)
         slide = Slide(d, (self._y - self.spot).dot(d), s1, s2)
-        return Link(p, d, ternary.t1, ternary.t2), None, slide
+        return SolvedLeg(Link(p, d, ternary.t1, ternary.t2), None, slide)
 
     def known_part(self, load: Load) -> tuple[Vec2, Any]:
         """See `LegAt`: the moment of the block."""

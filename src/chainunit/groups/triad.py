@@ -310,10 +310,10 @@ class SolvedTriad(SolvedGroup):
         margin = rows.det / (rows.legs[0].size * rows.legs[1].size * rows.legs[2].size * size)
         return cls(
             rows,
-            (*(link for link, _, _ in solved), ternary),
-            tuple(pin for _, pin, _ in solved if pin is not None),
+            (*(leg.link for leg in solved), ternary),
+            tuple(leg.pin for leg in solved if leg.pin is not None),
             margin,
-            tuple(slide for _, _, slide in solved if slide is not None),
+            tuple(leg.slide for leg in solved if leg.slide is not None),
         )
 
     def third_derivatives(

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -86,6 +86,16 @@ class Comparison:
     angle: Any
     size: float
     rows: Any = None
+
+
+class ShownColumn(NamedTuple):
+    """A simulated column as its sensor shows it, shape (n,), with its slopes, shape (n, names); by name, its
+    derivatives by clock and sensor, and the standard deviation `size` of the measured column."""
+
+    values: Any
+    slopes: Any
+    further: dict[str, Any]
+    size: float
 
 
 class SimulatedRun:
@@ -351,13 +361,14 @@ class Problem:
         slopes: Any,
         further: dict[str, Any],
         value: Mapping[str, float],
-    ) -> tuple[Any, Any, dict[str, Any], float]:
-        """The simulated column `x` with its slopes as an encoder counts it from the first row on, rounded down; the
-        derivatives by clock and encoder, and the standard deviation of the column."""
+    ) -> ShownColumn:
+        """The simulated column `x` with its slopes as an encoder counts it from the first row on, rounded down."""
         y, time = run.recording.columns[name], run.recording.time
         size = math.hypot(math.sqrt(1.0 / 12.0), JITTER * float(np.sum(np.abs(np.diff(y)))) / np.ptp(time))
         start = f"{run.name}.count"
-        return x - x[0] + value[start] - 0.5, slopes - slopes[0], further | {start: np.ones(len(x))}, size
+        return ShownColumn(
+            x - x[0] + value[start] - 0.5, slopes - slopes[0], further | {start: np.ones(len(x))}, size
+        )
 
     def _sensor(
         self,
@@ -367,7 +378,7 @@ class Problem:
         slopes: Any,
         further: dict[str, Any],
         value: Mapping[str, float],
-    ) -> tuple[Any, Any, dict[str, Any], float]:
+    ) -> ShownColumn:
         """The same as an analog sensor shows it, with its gain and its offset."""
         sensor, gain, offset = self.sensors[name], f"gain({name})", f"{run.name}.offset({name})"
         size = math.hypot(
@@ -379,7 +390,7 @@ class Problem:
         if offset in self.place:
             further = further | {offset: np.ones(len(x))}
             x = x + value[offset]
-        return x, slopes, further, size
+        return ShownColumn(x, slopes, further, size)
 
     def _comparison(
         self, run: RecordedRun, column: str, residuals: Any, slopes: Any, names: Sequence[str],

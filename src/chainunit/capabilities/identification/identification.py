@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -62,6 +62,15 @@ class FittedNumber:
     def at_bound(self) -> str:
         """The bound at which the fit ended, "lower" or "upper"; such a number is not determined."""
         return _bound_of(self.unknown, self.fitted)
+
+
+class ComparedColumn(NamedTuple):
+    """The times of the rows that are compared [s], the measured column, and the simulated one as its sensor would
+    show it, each of shape (n,)."""
+
+    time: Any
+    measured: Any
+    simulated: Any
 
 
 @dataclass(frozen=True)
@@ -125,12 +134,12 @@ class IdentifiedMachine:
         known."""
         return [*sensor_conflicts(self.problem, self.best), *prior_conflicts(self.plan.sought, self.best)]
 
-    def columns_over_time(self, comparison: Comparison) -> tuple[Any, Any, Any]:
-        """The times of the rows that are compared [s], a measured column, and the simulated one as its sensor would
-        show it, each of shape (n,)."""
+    def columns_over_time(self, comparison: Comparison) -> ComparedColumn:
+        """The measured and the simulated column of a comparison."""
         recording = self._run(comparison.run).recording
         measured = recording.columns[comparison.column][comparison.rows]
-        return recording.time[comparison.rows], measured, measured - comparison.residuals * comparison.size
+        simulated = measured - comparison.residuals * comparison.size
+        return ComparedColumn(recording.time[comparison.rows], measured, simulated)
 
     def is_steady(self, name: str) -> bool:
         """Whether the turns of a run are alike."""
@@ -320,9 +329,9 @@ def remarks(machine: IdentifiedMachine) -> Iterator[str]:
         and "motor.power" not in columns
     ):
         of_current = next(each for each in machine.best.comparisons if each.column == "motor.i")
-        time, _, current = machine.columns_over_time(of_current)
+        column = machine.columns_over_time(of_current)
         speed = next(run.crank_speed for run in runs if run.name == of_current.run)
-        turn = current[time > time[-1] - 2.0 * np.pi / speed]
+        turn = column.simulated[column.time > column.time[-1] - 2.0 * np.pi / speed]
         swing = np.ptp(turn) / np.mean(turn)
         yield (
             f"The recordings have no active power. The current of this induction motor changes by {100.0 * swing:.2g}"
