@@ -148,7 +148,7 @@ def test_a_torque_that_no_load_explains_leaves_the_estimates_within_bounds(study
     for load, of in (("material_mass", p.feed), ("processing_force", p.force)):
         for side in ("left", "right"):
             deviation = np.abs(run[f"observer.{side}.{load}"].values - of.expected)
-            assert np.max(deviation) <= 1.01 * FARTHEST * of.prior_deviation
+            assert np.max(deviation) <= 1.01 * FARTHEST * of.spread
     assert abs(float(run["observer.speed"][-1]) - float(run["motor.w"][-1])) < 1.0
 
 
