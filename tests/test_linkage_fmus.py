@@ -40,7 +40,7 @@ def test_direct_parameters_stay_direct_parameters(file):
     again = pickle.loads(pickle.dumps(p))
     for each in (p, again):
         assert type(each) is model.Parameters and each.J_added == 0.25
-    assert len(getattr(again, "derived", ())) == model.derived
+    assert len(getattr(again, "derived", ())) == model.derived_count
 
 
 @pytest.mark.parametrize(

@@ -100,7 +100,7 @@ def test_derivatives_through_derived_numbers(monkeypatch):
     monkeypatch.setattr(kernels, "native_kernel", lambda *_: None)
     machine = Machine(KnifeDrive)
     kernel, _ = kernel_of(machine, ["crank_torque", "blade.y"], ["r", "ab", "o3d"])
-    assert machine.model.derived
+    assert machine.model.derived_count
     check_derivatives(kernel, machine, machine.model.Feed(), ["r", "ab", "o3d"], 3.0, angles=5)
 
 

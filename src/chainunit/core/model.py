@@ -204,7 +204,7 @@ class Model(metaclass=ModelType):
     parts: ClassVar[tuple[Part, ...]]
     required: ClassVar[tuple[Requirement, ...]] = ()
     terminals: ClassVar[tuple[Terminal, ...]] = ()
-    derived: ClassVar[int] = 0
+    derived_count: ClassVar[int] = 0
     """Number of values that follow from the fixed parameters alone and are computed once before a run; see
     `derive`."""
     input_rates: ClassVar[Mapping[str, str]] = {}
@@ -256,7 +256,7 @@ class Model(metaclass=ModelType):
     @classmethod
     def with_derived(cls, xp: Any, p: Any, derived: list[Any] | None = None) -> Any:
         """The parameters with the values of `derive`, or with the values `derived` in their place."""
-        if not cls.derived:
+        if not cls.derived_count:
             return p
         # not `copy.copy`, which asks for the pickled form: that has no symbols and no values of a subclass
         ready = object.__new__(type(p))
@@ -282,7 +282,7 @@ class Model(metaclass=ModelType):
             p = cls.with_derived(MATH, p, derived)
         except (ArithmeticError, ValueError):
             # `math` raises where other engines give NaN, which no requirement admits
-            p = cls.with_derived(MATH, p, [math.nan] * cls.derived)
+            p = cls.with_derived(MATH, p, [math.nan] * cls.derived_count)
         cls._meets(p, cls.required, cls.requirements(MATH, p))
         return p
 
@@ -387,7 +387,7 @@ class Model(metaclass=ModelType):
     def evaluate(cls, xp: Any, p: Any, u: Any, x: Any = None) -> tuple[Any, ...]:
         """The outputs of every part at one point (or array of points). Parameters that are not yet `with_derived`
         are prepared in each call."""
-        if cls.derived and not hasattr(p, "derived"):
+        if cls.derived_count and not hasattr(p, "derived"):
             p = cls.with_derived(MATH, p)
         shared = cls.shared(xp, p, u, x)
         return tuple(part.equations(xp, p, u, x, shared) for part in cls.parts)

@@ -40,7 +40,7 @@ class SystemModel(Model):
     @classmethod
     def with_derived(cls, xp: Any, p: Any, derived: list[Any] | None = None) -> Any:
         """See `Model.with_derived`; each component gets its own derived values."""
-        if not cls.derived:
+        if not cls.derived_count:
             return p
         ready, first = copy.copy(p), 0
         values: list[Any] = []
@@ -48,10 +48,10 @@ class SystemModel(Model):
         vars(ready).pop("of_components", None)
         own = cls.system.parameters(ready)
         for name, model in cls._components():
-            given = None if derived is None else derived[first : first + model.derived]
+            given = None if derived is None else derived[first : first + model.derived_count]
             own[name] = model.with_derived(xp, own[name], given)
-            values += own[name].derived if model.derived else []
-            first += model.derived
+            values += own[name].derived if model.derived_count else []
+            first += model.derived_count
         object.__setattr__(ready, "derived", values)
         return ready
 
@@ -261,7 +261,7 @@ def _system_model(text: str, *models: type[Model]) -> type[SystemModel]:
             for name, value in model.constant.items()
         },
         "terminals": of.terminals(),
-        "derived": sum(model.derived for model in models),
+        "derived_count": sum(model.derived_count for model in models),
         "input_rates": of.input_rates(),
         "controlled": of.has_states,
         "parts": tuple(

@@ -134,7 +134,7 @@ class Interface:
         """
         import casadi
 
-        if not self.model.derived:
+        if not self.model.derived_count:
             return []
         symbols, p, *_ = self.trace
         rows = [casadi.SX(v) for v in self.model.derive(casadi_(), p)]
@@ -167,7 +167,7 @@ class Interface:
         derived values."""
         direct = self._places(symbols, rows)
         first = sum(symbol.shape[0] for symbol in symbols[:3])
-        through = self._places(symbols[:1], self.derived) if self.model.derived else []
+        through = self._places(symbols[:1], self.derived) if self.model.derived_count else []
         return [
             sorted({j for i in row for j in (through[i - first] if i >= first else (i,))}) for row in direct
         ]

@@ -107,7 +107,7 @@ class SolvedGroup:
 class Group:
     """A group as data."""
 
-    derived: ClassVar[int] = 0
+    derived_count: ClassVar[int] = 0
     """The number of values that `derive` computes from the lengths, once before a run."""
 
     @property

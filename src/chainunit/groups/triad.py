@@ -121,7 +121,7 @@ class Triad(Group):
     start: float = 0.0
     turns: float = 0.0
 
-    derived: ClassVar[int] = 3 * (2 * HARMONICS + 1) + 2
+    derived_count: ClassVar[int] = 3 * (2 * HARMONICS + 1) + 2
     """The number of values that `derive` gives: the series of the pose, the largest misfit, the least margin."""
 
     @property

@@ -53,7 +53,7 @@ class Mechanism:
         self._groups: list[tuple[SolvedGroup, Connections]] = []
         links, pins, first = self.links, self.pins, 0
         for group, connections in zip((linkage.driver, *linkage.groups), self.topology.groups, strict=True):
-            last = first + group.derived
+            last = first + group.derived_count
             solved = group.solve(xp, q, self, derived[first:last])
             first = last
             self._groups.append((solved, connections))

@@ -58,7 +58,7 @@ class LinkageModel(Model):
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
         if hasattr(cls, "Parameters"):
-            cls.derived = cls.linkage(MATH, cls.Parameters(), cls.Inputs()).derived
+            cls.derived_count = cls.linkage(MATH, cls.Parameters(), cls.Inputs()).derived_count
 
     @staticmethod
     def linkage(xp: Any, p: Any, u: Any) -> Linkage:
@@ -74,7 +74,7 @@ class LinkageModel(Model):
     @classmethod
     def state(cls, xp: Any, p: Any, u: Any, q: Any, w: Any) -> MachineState:
         """The machine at crank angle `q` [rad] and speed `w` [rad/s]."""
-        derived = p.derived if cls.derived else ()
+        derived = p.derived if cls.derived_count else ()
         return MachineState(xp, Mechanism(xp, cls.linkage(xp, p, u), q, derived, cls.topology()), w)
 
     @classmethod

@@ -67,7 +67,7 @@ class Kernel:
         lane = casadi.SX.sym("lane", 2)
         weight, seed = (
             casadi.SX.sym("weight", self.rows),
-            casadi.SX.sym("seed", self.size + 1 + model.derived),
+            casadi.SX.sym("seed", self.size + 1 + model.derived_count),
         )
         ratio = p[names.index("ratio")]
         shaft = {"phi": lane[0] * ratio, "w": lane[1] * ratio, "a": casadi.SX(0.0)}
@@ -124,7 +124,7 @@ class Kernel:
         """All parameters and derived numbers of machines, shapes (machines, ..)."""
         p = np.tile(self._p, (len(xs), 1))
         p[:, self._places] = xs
-        if not self._model.derived:
+        if not self._model.derived_count:
             return p, np.zeros((len(xs), 0))
         return p, np.array([np.array(self._derived[0](row)).ravel() for row in p])
 

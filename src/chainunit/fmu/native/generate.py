@@ -55,7 +55,7 @@ def _programs(interface: Interface) -> Iterator[Program]:
     model = interface.model
     (ps, us, xs, ks), p, u, x, outputs, derivatives = interface.trace
     # derived values come last, and only if the model has them
-    more = [ks] if model.derived else []
+    more = [ks] if model.derived_count else []
     point = [ps, us, xs, *more]
     outputs = list(outputs)
 
@@ -95,7 +95,7 @@ def _programs(interface: Interface) -> Iterator[Program]:
             yield one("closed", point, model.constrained_states(casadi_(), p, u, x), "OFTEN")
     if limits := [v for row in model.requirements(casadi_(), p) for v in row]:
         yield one("requirements", [ps, *more], limits)
-    if model.derived:
+    if model.derived_count:
         yield one("derive", [ps], interface.derived)
 
 
@@ -220,7 +220,7 @@ def tables(interface: Interface, guid: str, room: int) -> str:
         "n_u": len(interface.inputs),
         "n_x": len(interface.states),
         "n_y": n_y,
-        "n_k": model.derived,
+        "n_k": model.derived_count,
         "n_z": model.start_problem.unknowns,
         "n_w": room,
         "n_groups": len(group_rows),

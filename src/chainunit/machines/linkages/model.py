@@ -340,7 +340,7 @@ class LinkageDescription(LinkageOutputs):
                 number = k + 1 - behind_driver
                 part = linkage.before(number) if number < len(linkage.groups) else linkage
                 try:
-                    Mechanism(MATH, part, q, derived[: part.derived])
+                    Mechanism(MATH, part, q, derived[: part.derived_count])
                 except (ArithmeticError, ValueError, IndexError):
                     return open_group(each.links, self._at(q), self._gap(linkage, k, derived, q))
         return InputError("the linkage does not close: change its lengths", key="links")
@@ -458,8 +458,8 @@ class LinkageDescription(LinkageOutputs):
             yield margin, LEAST_MARGIN, math.inf
         last = 0
         for each in linkage.groups:
-            last += each.derived
-            if each.derived:
+            last += each.derived_count
+            if each.derived_count:
                 yield derived[last - 2], -math.inf, MOST_MISFIT
         values = self.values(p, u)
         for _, width, sign in self.widths:

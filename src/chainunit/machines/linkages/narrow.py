@@ -69,7 +69,7 @@ def check_triads(linkage: Linkage, derived: Sequence[Any]) -> None:
         in one line.
     """
     for k, group in enumerate(linkage.groups):
-        if isinstance(group, Triad) and not derived[linkage.before(k + 1).derived - 2] <= MOST_MISFIT:
+        if isinstance(group, Triad) and not derived[linkage.before(k + 1).derived_count - 2] <= MOST_MISFIT:
             raise InputError(
                 f"the triad of {group.name} does not close all the way round, or moves too sharply to be followed: "
                 "change its lengths",
