@@ -134,7 +134,7 @@ def _variables(model: type[Model]) -> Iterator[Block]:
     interface: Any = Interface(model, {})
     rows = []
     for causality in ("parameter", "input", "output"):
-        for signal in interface.of(causality):
+        for signal in interface.signals_of(causality):
             v = signal.variable
             start, unit = (
                 f"{v.quantity.start or 0.0:g}{unit_behind(v.unit)}",
