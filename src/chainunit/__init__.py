@@ -58,9 +58,8 @@ else:
 
     def _result_of_capability(name):
         """The class of this name of the result of a method of `Study` that a capability brings; None without one."""
-        parts = import_module(".study.registry", __name__).registered()
-        results = (each.result for part in parts for each in part.study_methods())
-        return next((result for result in results if result.__name__ == name), None)
+        modules = import_module(".capabilities", __name__).modules("study_method")
+        return next((module.RESULT for module in modules if module.RESULT.__name__ == name), None)
 
     def __dir__():
         return sorted({*globals(), *__all__})

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 import typer
 import typer.core
 
-from ..capabilities import commands
+from ..capabilities import modules
 from ..core.errors import InputError, InterruptedRunError, RunError, printable
 from ..core.files import full, written
 from ..report.command_options import BackendOption
@@ -136,8 +136,8 @@ def compare(
     carry_out(TASK, (read_result(first), read_result(second)), output)
 
 
-for command in commands():
-    app.command()(command)
+for module in modules("command"):
+    app.command()(module.COMMAND)
 app.command(cls=ExportCommand)(export)
 app.command("export-ssp")(export_ssp)
 

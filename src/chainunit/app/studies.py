@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
+from ..capabilities import modules
 from ..core.errors import InputError, RemarkWarning, near_name, shown
 from ..core.quantities import Layout
 from ..fmu.backends import Backend
@@ -23,9 +24,9 @@ from ..reading.toml_lines import lines_of
 from ..report import series
 from ..report import study as contents
 from ..report.blocks import Report
-from ..report.capability import capabilities
 from ..report.drawing import drawing
 from ..report.reported_result import ReportedResult
+from ..report.study_task import TASK
 from ..study import config as study_files
 from ..study.config import Config
 from ..study.foreign_machine import ForeignMachine
@@ -228,7 +229,7 @@ class Study:
 class StudyResult(ReportedResult[Config, StudyRecord]):
     """The result of a study. Its `repr` shows the title, the verdicts and the main answers of every run."""
 
-    _command = "study"
+    _task = TASK
 
     @property
     def record(self) -> StudyRecord:
@@ -299,9 +300,8 @@ class StudyResult(ReportedResult[Config, StudyRecord]):
         return [note["text"] for note in self._numbers["notes"]]
 
 
-for _part in capabilities():
-    for _each in _part.study_methods():
-        setattr(Study, _each.method.__name__, _each.method)
+for _module in modules("study_method"):
+    setattr(Study, _module.METHOD.__name__, _module.METHOD)
 
 
 def _plain(value: Any) -> Any:

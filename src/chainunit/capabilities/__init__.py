@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from importlib import import_module
 from importlib.resources import files
 from typing import Any
@@ -21,9 +21,10 @@ NAMES = (
 """The folders of the capabilities, in the order in which their tables, results and sections come."""
 
 
-def commands() -> Iterator[Callable[..., Any]]:
-    """The commands of the folders, as typer takes them: ``COMMAND`` of each module ``command``. Nothing else of a
-    folder is imported, so that the command line answers at once."""
-    for name in NAMES:
-        if files(__name__).joinpath(name, "command.py").is_file():
-            yield import_module(f"{__name__}.{name}.command").COMMAND
+def modules(name: str) -> Iterator[Any]:
+    """The module of this name of each folder that has one: ``command``, whose ``COMMAND`` typer takes, and
+    ``study_method``, with a method of `chainunit.Study` (``METHOD``) and the class of its result (``RESULT``).
+    Nothing else of a folder is imported, so that the command line answers at once."""
+    for folder in NAMES:
+        if files(__name__).joinpath(folder, f"{name}.py").is_file():
+            yield import_module(f"{__name__}.{folder}.{name}")

@@ -1,8 +1,8 @@
-"""Capabilities, as a report knows them: a question, its section, and the command that answers it."""
+"""Capabilities, as a report knows them: a question, its section, and its answer."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol, Self
 
@@ -13,7 +13,6 @@ from ..study.registry import registered
 from .blocks import Block, Source
 from .lines import Line
 from .supplement import Supplement
-from .task import Task
 
 
 @dataclass(frozen=True)
@@ -34,15 +33,6 @@ class AnyStudy(Protocol):
         """A study of the same kind with other `tables` of a study file; paths in them are relative to `source`."""
 
 
-@dataclass(frozen=True)
-class StudyMethod:
-    """A method of `chainunit.Study`, which has the name of the function, and the class of its result, which is public
-    as ``chainunit.NAME``."""
-
-    method: Callable[..., Any]
-    result: type
-
-
 class Capability(StudyCapability):
     """A capability with what it shows: the base of the one that each folder of `chainunit.capabilities` has by the
     name ``CAPABILITY``."""
@@ -58,14 +48,6 @@ class Capability(StudyCapability):
     def answer(self, s: Source, study: StudyRecord) -> Iterator[Block]:
         """Its blocks in the answer of a study."""
         return iter(())
-
-    def tasks(self) -> Mapping[str, Task[Any, Any]]:
-        """Its commands, by name."""
-        return {}
-
-    def study_methods(self) -> Iterable[StudyMethod]:
-        """Its methods of a study from Python."""
-        return ()
 
     def supplement(self, study: StudyRecord) -> Supplement | None:
         """Its additions to the machine in motion."""

@@ -15,14 +15,13 @@ from ..work.progress import quiet
 from . import files, html, terminal
 from .blocks import Report
 from .task import Outcome, Question, Task
-from .tasks import task_named
 
 
 class ReportedResult(Generic[Question, Outcome]):
     """The result of a task. Its `repr` shows the report as text."""
 
-    _command: ClassVar[str]
-    """name of the task"""
+    _task: ClassVar[Task[Any, Any]]
+    """the task of the command of the same name"""
 
     def __init__(self, question: Question, outcome: Outcome, folder: Path | None) -> None:
         self._question, self._outcome, self._folder = question, outcome, folder
@@ -42,7 +41,7 @@ class ReportedResult(Generic[Question, Outcome]):
         WriteError
             for a file that cannot be written; the others are written.
         """
-        task = task_named(cls._command)
+        task = cls._task
         compute = partial(task.outcome, question, progress=progress or quiet, **options)
         if folder is not None:
             with task.claimed(question, Path(folder)) as place:
@@ -57,10 +56,6 @@ class ReportedResult(Generic[Question, Outcome]):
             failure.partial = result
             raise failure
         return result
-
-    @property
-    def _task(self) -> Task[Any, Any]:
-        return task_named(self._command)
 
     @cached_property
     def _report(self) -> Report:

@@ -7,8 +7,7 @@ from typing import Any
 
 from ...recordings.measurands import MEASURANDS
 from ...recordings.table import recording_rules
-from ...report.capability import Capability, StudyMethod
-from ...report.task import Task
+from ...report.capability import Capability
 from ...study.capability import FileReference
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
@@ -72,18 +71,6 @@ class IdentificationCapability(Capability):
         for k, run in enumerate(runs if isinstance(runs, list) else [], 1):
             if isinstance(run, dict):
                 yield FileReference(f"identify.run.{k}.file", run, "file")
-
-    def tasks(self) -> Mapping[str, Task[Any, Any]]:
-        """Its command."""
-        from . import page
-
-        return {"identify": page.TASK}
-
-    def study_methods(self) -> Iterable[StudyMethod]:
-        """Its method of a study from Python."""
-        from .study_method import IdentificationResult, identify
-
-        return (StudyMethod(identify, IdentificationResult),)
 
 
 CAPABILITY = IdentificationCapability()

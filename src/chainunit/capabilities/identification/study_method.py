@@ -10,6 +10,7 @@ from ...report.reported_result import ReportedResult
 from ...study.config import Config
 from ...work.progress import Report as Progress
 from .identification import IdentifiedMachine
+from .page import TASK
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -19,7 +20,7 @@ class IdentificationResult(ReportedResult[Config, IdentifiedMachine]):
     """An identified machine. Its `repr` shows the numbers and the limits of the recordings; `found` is all that the
     fit found."""
 
-    _command = "identify"
+    _task = TASK
 
     @property
     def found(self) -> IdentifiedMachine:
@@ -71,3 +72,6 @@ def identify(
         for a file that cannot be written; the others are written.
     """
     return IdentificationResult.made(study.config, folder, progress)
+
+
+METHOD, RESULT = identify, IdentificationResult

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Iterable
 
-from ...report.capability import Capability, StudyMethod
-from ...report.task import Task
+from ...report.capability import Capability
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
 from ...study.rules import CHAINS, MACHINE_FMU, NEEDS_MODEL, TWO_BARS, Rule
@@ -46,18 +44,6 @@ class OptimizeCapability(Capability):
         return read_wishes(
             table, form, reading.parts.machine, reading.machine, loads, run.crank_speed, by_motor
         )
-
-    def tasks(self) -> Mapping[str, Task[Any, Any]]:
-        """Its command."""
-        from . import page
-
-        return {"optimize": page.TASK}
-
-    def study_methods(self) -> Iterable[StudyMethod]:
-        """Its method of a study from Python."""
-        from .study_method import BestResult, optimize
-
-        return (StudyMethod(optimize, BestResult),)
 
 
 CAPABILITY = OptimizeCapability()

@@ -12,13 +12,13 @@ from ...report.reported_result import ReportedResult
 from ...study.config import Config
 from ...work.progress import Report as Progress
 from .best import Best
-from .page import OptimizedStudy
+from .page import TASK, OptimizedStudy
 
 
 class BestResult(ReportedResult[Config, OptimizedStudy]):
     """The result of a search for the best machine. Its `repr` shows the answer, the parameters and what binds."""
 
-    _command = "optimize"
+    _task = TASK
     _asked: AnyStudy
 
     @property
@@ -79,3 +79,6 @@ def optimize(
     result = BestResult.made(study.config, folder, progress, backend=backend)
     result._asked = study
     return result
+
+
+METHOD, RESULT = optimize, BestResult

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Iterable
 
-from ...report.capability import Capability, StudyMethod
-from ...report.task import Task
+from ...report.capability import Capability
 from ...study.conditions import given, has_entries, has_entry, is_one_of
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
@@ -81,18 +79,6 @@ class SweepCapability(Capability):
         fixed = {"machine.ratio": "follows from the motor's rated speed"} if parts.designation else {}
         quantities = Sweepable.of(reading.machine, values["feed"], values["run"], reading.events)
         return read_plan(reading.form.sweep, values["sweep"], parts.machine, quantities, fixed)
-
-    def tasks(self) -> Mapping[str, Task[Any, Any]]:
-        """Its command."""
-        from . import page
-
-        return {"sweep": page.TASK}
-
-    def study_methods(self) -> Iterable[StudyMethod]:
-        """Its method of a study from Python."""
-        from .study_method import SweepResult, sweep
-
-        return (StudyMethod(sweep, SweepResult),)
 
 
 CAPABILITY = SweepCapability()

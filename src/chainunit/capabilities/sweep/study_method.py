@@ -10,6 +10,7 @@ from ...report.capability import AnyStudy
 from ...report.reported_result import ReportedResult
 from ...study.config import Config
 from ...work.progress import Report as Progress
+from .page import TASK
 from .summary import SweepSummary
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 class SweepResult(ReportedResult[Config, SweepSummary]):
     """The results of a sweep. Its `repr` shows the size of the sweep, the best points and the extremes."""
 
-    _command = "sweep"
+    _task = TASK
 
     @property
     def summary(self) -> SweepSummary:
@@ -76,3 +77,6 @@ def sweep(
         for a file that cannot be written.
     """
     return SweepResult.made(study.config, folder, progress, workers=workers, scheduler=scheduler)
+
+
+METHOD, RESULT = sweep, SweepResult

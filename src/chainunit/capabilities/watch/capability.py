@@ -8,8 +8,7 @@ from typing import Any
 
 from ...core.errors import InputError
 from ...recordings.table import FROM_RECORDING, recording_rules
-from ...report.capability import Capability, Contents, StudyMethod
-from ...report.task import Task
+from ...report.capability import Capability, Contents
 from ...study.analysis import Analysis
 from ...study.capability import Estimates, FileReference
 from ...study.conditions import given
@@ -128,18 +127,6 @@ class WatchCapability(Capability):
         from . import notices_page as notices
 
         return {"observer": Contents("Who notices an overload", notices.blocks, notices.PICTURES.files)}
-
-    def tasks(self) -> Mapping[str, Task[Any, Any]]:
-        """Its command."""
-        from . import page
-
-        return {"watch": page.TASK}
-
-    def study_methods(self) -> Iterable[StudyMethod]:
-        """Its method of a study from Python."""
-        from .study_method import WatchResult, watch
-
-        return (StudyMethod(watch, WatchResult),)
 
 
 CAPABILITY = WatchCapability()

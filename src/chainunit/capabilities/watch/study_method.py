@@ -8,13 +8,14 @@ from ...report.capability import AnyStudy
 from ...report.reported_result import ReportedResult
 from ...study.config import Config
 from ...work.progress import Report as Progress
+from .page import TASK
 from .watch import Alarm, WatchedRecording
 
 
 class WatchResult(ReportedResult[Config, WatchedRecording]):
     """A watched recording. Its `repr` shows the alarms; `watched` has the outputs of the observer at all rows."""
 
-    _command = "watch"
+    _task = TASK
 
     @property
     def watched(self) -> WatchedRecording:
@@ -30,6 +31,19 @@ class WatchResult(ReportedResult[Config, WatchedRecording]):
 def watch(study: AnyStudy, folder: str | Path | None = None, progress: Progress | None = None) -> WatchResult:
     """Run the load observer over the recording of the table [watch].
 
-    Parameters and errors are those of `identify`, without RunError.
+    Parameters
+    ----------
+    folder : the folder to which the files of ``chainunit watch -o`` are written
+    progress : as of `chainunit.Study.run`
+
+    Raises
+    ------
+    InputError
+        for a study without the table [watch], and with a line for each fault of the recording.
+    WriteError
+        for a file that cannot be written; the others are written.
     """
     return WatchResult.made(study.config, folder, progress)
+
+
+METHOD, RESULT = watch, WatchResult
