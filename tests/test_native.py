@@ -167,7 +167,8 @@ def test_an_observer_starts_from_the_speed_of_the_initialization_mode(native, fm
 def jacobian(model, values):
     """Outputs, and derivatives of the states, by inputs and states, by CasADi from the same kernels."""
     interface = Interface(model, {})
-    symbols, _, _, x, outputs, derivatives = interface.trace
+    t = interface.trace
+    symbols, x, outputs, derivatives = t.symbols, t.x, t.outputs, t.derivatives
     _, us, xs, _ = symbols
     states = model.state_layout.values(x) if model.state_layout else []
     rows = casadi.vertcat(*states, *outputs, *derivatives)

@@ -15,7 +15,7 @@ from ..core.engines import casadi_
 from ..core.errors import InputError
 from ..core.model import About, Model
 from ..core.quantities import DISPLAY_UNITS, TYPES, Type, Variable, base_units, written
-from ..core.symbolic_trace import trace
+from ..core.symbolic_trace import Trace, trace
 from .recipe import Experiment, script_of
 from .script import Script
 
@@ -92,11 +92,9 @@ class Interface:
         return [s for s in self.signals if s.causality == causality]
 
     @property
-    def trace(self) -> tuple[list[Any], Any, Any, Any, list[Any], list[Any]]:
-        """The model in symbols: the casadi vectors (p, u, x, derived values); p, u and x as instances of their
-        declarations; the outputs part by part in declared order; and the derivatives of the states."""
-        t = trace(self.model)
-        return t.symbols, t.p, t.u, t.x, t.outputs, t.derivatives
+    def trace(self) -> Trace:
+        """The model in symbols."""
+        return trace(self.model)
 
     @property
     def dependencies(self) -> list[tuple[list[int], list[int]]]:
@@ -108,16 +106,16 @@ class Interface:
     @cached_property
     def _dependencies(self) -> list[tuple[list[int], list[int]]]:
         model = self.model
-        symbols, p, u, x, outputs, derivatives = self.trace
+        t = self.trace
+        rows = rows_at_start = [*t.outputs, *t.derivatives]
         states, start = [], []
-        rows_at_start = [*outputs, *derivatives]
         if model.state_layout:
-            states = model.state_layout.values(x)
-            first = model.start(casadi_(), p, u, rounds=min(2, model.start_problem.rounds))
+            states = model.state_layout.values(t.x)
+            first = model.start(casadi_(), t.p, t.u, rounds=min(2, model.start_problem.rounds))
             start = model.state_layout.values(first)
-            rows_at_start = [*trace(model).outputs_at(first), *model.derivatives(casadi_(), p, u, first)]
-        in_run = self._influences(symbols, [*states, *outputs, *derivatives])
-        at_start = self._influences(symbols, [*start, *rows_at_start])
+            rows_at_start = [*t.outputs_at(first), *model.derivatives(casadi_(), t.p, t.u, first)]
+        in_run = self._influences(t.symbols, [*states, *rows])
+        at_start = self._influences(t.symbols, [*start, *rows_at_start])
         n = len(self.parameters)
         return [
             ([i for i in entries if i >= n], first) for entries, first in zip(in_run, at_start, strict=True)
@@ -136,9 +134,8 @@ class Interface:
 
         if not self.model.derived_count:
             return []
-        symbols, p, *_ = self.trace
-        rows = [casadi.SX(v) for v in self.model.derive(casadi_(), p)]
-        places = {i for row in self._places(symbols[:1], rows) for i in row}
+        rows = [casadi.SX(v) for v in self.model.derive(casadi_(), self.trace.p)]
+        places = {i for row in self._places(self.trace.symbols[:1], rows) for i in row}
         for i in sorted(places):
             if self.parameters[i].quantity.tunable:
                 raise ValueError(
@@ -157,9 +154,9 @@ class Interface:
 
         if not (self.model.state_layout and self.model.controlled):
             return frozenset()
-        _, p, u, x, *_ = self.trace
-        closed = self.model.constrained_states(casadi_(), p, u, x)
-        pairs = zip(self.states, self.model.state_layout.values(x), closed, strict=True)
+        t = self.trace
+        constrained = self.model.constrained_states(casadi_(), t.p, t.u, t.x)
+        pairs = zip(self.states, self.model.state_layout.values(t.x), constrained, strict=True)
         return frozenset(v.name for v, own, met in pairs if not casadi.is_equal(casadi.SX(met), own))
 
     def _influences(self, symbols: list[Any], rows: list[Any]) -> list[list[int]]:

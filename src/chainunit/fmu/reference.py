@@ -127,7 +127,7 @@ def _march(interface: Interface, p: Any) -> Any:
     model = interface.model
     layout = model.state_layout
     assert layout is not None
-    (of_p, of_u, of_x, of_derived), *_, derivatives = interface.trace
+    (of_p, of_u, of_x, of_derived), derivatives = interface.trace.symbols, interface.trace.derivatives
     inputs, since = casadi.SX.sym("u", len(model.input_layout.names)), casadi.SX.sym("since")
     moving = [inputs[k] for k in range(inputs.numel())]
     for place, rate, half in model.extrapolations(moving):
@@ -249,7 +249,7 @@ def _inertia(interface: Interface, torque: str) -> float:
     model, layout = interface.model, interface.model.state_layout
     if layout is None:
         return 1.0
-    symbols, *_, derivatives = interface.trace
+    symbols, derivatives = interface.trace.symbols, interface.trace.derivatives
     speeds = [d for d, v in zip(derivatives, interface.states, strict=True) if v.unit == "rad/s"]
     by = casadi.jacobian(casadi.vertcat(*speeds), symbols[1][model.input_layout.names.index(torque)])
     p = model.with_derived(

@@ -242,12 +242,11 @@ def _influences(model: type[Model]) -> _Influences:
 def _constraints(interface: Interface) -> set[str]:
     import casadi
 
-    (_, us, *_), p, u, x, *_ = interface.trace
-    rows = casadi.vertcat(*interface.model.constrained_states(casadi_(), p, u, x))
+    t = interface.trace
+    rows = casadi.vertcat(*interface.model.constrained_states(casadi_(), t.p, t.u, t.x))
+    depends = casadi.which_depends(rows, t.symbols[1], 1, False)
     names = [v.name for v in interface.inputs]
-    return {
-        name for name, counts in zip(names, casadi.which_depends(rows, us, 1, False), strict=True) if counts
-    }
+    return {name for name, counts in zip(names, depends, strict=True) if counts}
 
 
 class _Plan:

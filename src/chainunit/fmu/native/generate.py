@@ -53,11 +53,11 @@ def _programs(interface: Interface) -> Iterator[Program]:
     import casadi
 
     model = interface.model
-    (ps, us, xs, ks), p, u, x, outputs, derivatives = interface.trace
+    t = interface.trace
+    (ps, us, xs, ks), p, u, x, outputs = t.symbols, t.p, t.u, t.x, list(t.outputs)
     # derived values come last, and only if the model has them
     more = [ks] if model.derived_count else []
     point = [ps, us, xs, *more]
-    outputs = list(outputs)
 
     def one(name: str, arguments: list[Any], results: list[Any], frequency: str = "ONCE") -> Program:
         return Program(name, arguments, [casadi.vertcat(*map(casadi.SX, results))], [0], frequency)
@@ -71,11 +71,11 @@ def _programs(interface: Interface) -> Iterator[Program]:
     if interface.discrete:
         apart.add(len(values) - 1)
     smooth = [casadi.SX(0, 1) if g in apart else group for g, group in enumerate(values)]
-    smooth.append(casadi.vertcat(*derivatives))
+    smooth.append(casadi.vertcat(*t.derivatives))
     slopes = [casadi.jtimes(row, casadi.vertcat(us, xs), casadi.vertcat(du, dx)) for row in smooth]
     yield Program("forward", [ps, us, xs, du, dx, *more], slopes, [*offsets, len(outputs)], "SELDOM")
     if interface.states:
-        yield one("derivatives", point, derivatives, "OFTEN")
+        yield one("derivatives", point, t.derivatives, "OFTEN")
         assert model.state_layout is not None
         unknowns = casadi.SX.sym("z", model.start_problem.unknowns)
         z = casadi.vertsplit(unknowns) if model.start_problem.unknowns else []
