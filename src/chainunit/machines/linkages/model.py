@@ -43,7 +43,7 @@ from .loads import (
     checked_widths,
     extremes_of,
     name_of_load,
-    place_of,
+    parts_of_extreme,
     requirement_of_width,
     widths_of,
 )
@@ -167,7 +167,7 @@ class LinkageDescription(LinkageOutputs):
 
     def _extreme(self, name: str, parts: LinkageParts) -> MotionExtreme:
         """An extreme of the motion, by its name in expressions."""
-        kind, link, point, axis = place_of(name)
+        kind, link, point, axis = parts_of_extreme(name)
         frame, ends = parts.frames[link], self.structure.driver.linear
         at = frame.coordinates(parts.geometry.point(link, point) if point else ZERO)
 
@@ -189,8 +189,9 @@ class LinkageDescription(LinkageOutputs):
             in one line.
         """
         for name in self.extremes:
-            _, link, _, axis = place_of(name)
-            if axis == "angle" and self.link_turns[link][0]:
+            extreme = parts_of_extreme(name)
+            link = extreme.link
+            if extreme.axis == "angle" and self.link_turns[link][0]:
                 raise InputError(
                     f"{name}: {link} turns all the way round, and its angle has no extremes; take those of a "
                     "point, or of a link that swings",
