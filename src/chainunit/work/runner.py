@@ -236,7 +236,7 @@ def _client(workers: int, scheduler: str | None) -> Iterator[Any]:
     """A client of that scheduler, or of as many local processes."""
     with _silent():
         if scheduler is not None:
-            with _client(scheduler) as client:
+            with _connection(scheduler) as client:
                 yield client
         else:
             with _local(workers) as client:
@@ -301,7 +301,7 @@ def _local(workers: int) -> Iterator[Any]:
 
 
 @contextmanager
-def _client(scheduler: str) -> Iterator[Any]:
+def _connection(scheduler: str) -> Iterator[Any]:
     """A client of the scheduler at that address."""
     from distributed import Client
 

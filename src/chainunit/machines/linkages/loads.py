@@ -78,7 +78,7 @@ def _texts(loads: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, str]]:
 
 
 class ExtremeName(NamedTuple):
-    """The parts of the name of an extreme: its `kind` (min, max), its link, its point (empty for the link itself), and
+    """The parts of the name of an extreme: its kind (min, max), its link, its point (empty for the link itself), and
     its axis (x, y, angle)."""
 
     kind: str
