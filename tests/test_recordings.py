@@ -388,7 +388,7 @@ def test_counts_and_times_are_written_in_full(tmp_path):
 
 
 def run(name, file, **more):
-    plan = PlannedRun(name, file, {}, SPEED, -np.inf, np.inf, 293.15, name != "empty", {})
+    plan = PlannedRun(file, {}, SPEED, -np.inf, np.inf, 293.15, name, name != "empty", {})
     return replace(plan, **more)
 
 

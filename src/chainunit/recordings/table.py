@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from pydantic import Field
@@ -11,10 +13,12 @@ from pydantic import Field
 from ..core.errors import InputError, near_name
 from ..core.quantities import Value, declaration, quantity
 from ..reading.lists import Entry, leaves
+from ..reading.tables import instance
 from ..study.conditions import given
 from ..study.entry_values import filled_text
 from ..study.rules import CHAINS, MACHINE_FMU, MOTOR_FMU, Rule
 from .measurands import MEASURANDS
+from .recording import Recording, read_signal
 
 
 @declaration
@@ -42,6 +46,28 @@ FROM_RECORDING: Mapping[str, str] = {
 """By key of a recording, the source of its value if the file leaves the key out."""
 
 
+@dataclass(frozen=True)
+class PlannedRecording:
+    """A recording as a study file names it: its `file`, the heads of its `columns` by quantity, the speed of the
+    crank [rad/s], the part that counts [s], and the temperature of the surroundings [K]."""
+
+    file: Path
+    columns: Mapping[str, str]
+    crank_speed: float
+    begin: float
+    end: float
+    ambient: float
+
+    @property
+    def turn(self) -> float:
+        """Time of a turn of the crank [s]."""
+        return 2.0 * math.pi / self.crank_speed
+
+    def read(self) -> Recording:
+        """The part that counts; errors are those of `chainunit.recordings.recording.read_signal`."""
+        return read_signal(self.file, self.columns, self.begin, self.end)
+
+
 def recording_rules(table: str) -> Iterator[Rule]:
     """The rules of a `table` with recordings, which need models of motor and machine."""
     for condition, words in (
@@ -65,7 +91,23 @@ def read_span(entry: Entry) -> tuple[float, float]:
     return begin, end
 
 
-def read_heads(entry: Entry) -> dict[str, str]:
+def recording_values(entry: Entry, crank_speed: float, source: str) -> dict[str, Any]:
+    """The values of a `PlannedRecording` by name, whose file is named relative to the file `source`; `crank_speed` is
+    the speed where the `entry` does not give its own [rad/s]. An InputError has a line for each fault of the entry."""
+    columns = _read_heads(entry)
+    entry.refuse()
+    given, (begin, end) = entry.given, read_span(entry)
+    return {
+        "file": Path(source).parent / given["file"],
+        "columns": columns,
+        "crank_speed": float(given.get("crank_speed", crank_speed)),
+        "begin": begin,
+        "end": end,
+        "ambient": float(given.get("ambient", instance(RecordingTable, {}).ambient)),
+    }
+
+
+def _read_heads(entry: Entry) -> dict[str, str]:
     """The heads of the columns of a recording by quantity; a fault of the `entry` for each unknown quantity."""
     columns: dict[str, str] = {}
     for quantity_name, head in leaves(entry.given.get("columns", {})):

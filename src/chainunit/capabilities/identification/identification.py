@@ -18,7 +18,7 @@ from ...recordings.inspection import (
 from ...recordings.measurands import MEASURANDS, OF_TERMINALS, SIGNALS, usual_offset
 from ...recordings.problem import Comparison, Problem, RecordedRun, Sensor
 from ...recordings.recorded_drive import drive_of, is_of_shaft, plant_for
-from ...recordings.recording import Recording, read_signal
+from ...recordings.recording import Recording
 from ...recordings.residuals import (
     PriorConflict,
     ResidualTest,
@@ -243,7 +243,7 @@ def read_runs(runs: Sequence[PlannedRun]) -> dict[str, Recording]:
     faults, recordings = Faults(), dict[str, Recording]()
     for run in runs:
         with faults.collected():
-            recording = read_signal(run.file, run.columns, run.begin, run.end)
+            recording = run.read()
             begin, end = recording.time[0], recording.time[-1]
             if run.off is not None and not begin < run.off < end:
                 raise InputError(

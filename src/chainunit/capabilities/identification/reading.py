@@ -6,7 +6,6 @@ import dataclasses
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from ...core.errors import Faults, InputError, near_name
@@ -14,9 +13,8 @@ from ...core.messages import unit_behind
 from ...core.quantities import Layout, Quantity, Variable, named_values
 from ...core.units import split
 from ...reading.lists import Entry, leaves
-from ...reading.tables import instance
 from ...recordings.measurands import MEASURANDS
-from ...recordings.table import read_heads, read_span
+from ...recordings.table import PlannedRecording, read_span, recording_values
 from ...recordings.unknown import Unknown
 from .table import RUNS, SENSORS, SOUGHT, IdentifyTable, RunTable
 
@@ -38,19 +36,12 @@ class SensorKnowledge:
 
 
 @dataclasses.dataclass(frozen=True)
-class PlannedRun:
-    """A recording of the plan: its `file`, the heads of its `columns` by quantity, the speed of the crank [rad/s],
-    the part that counts [s], the temperature of the surroundings [K], whether it has the `feed` that is sought, and
-    the amounts that were added to sought numbers by their full names; the changes of the crank speed (begin and
-    duration [s], speed after it [rad/s]), and the time at which the motor is switched off [s], or None."""
+class PlannedRun(PlannedRecording):
+    """A recording of the plan: its name, whether it has the feed that is sought, and the amounts that were `added` to
+    sought numbers by their full names; the changes of the crank speed (begin and duration [s], speed after it
+    [rad/s]), and the time at which the motor is switched off [s], or None."""
 
     name: str
-    file: Path
-    columns: Mapping[str, str]
-    crank_speed: float
-    begin: float
-    end: float
-    ambient: float
     has_feed: bool
     added: Mapping[str, float]
     speeds: tuple[tuple[float, float, float], ...] = ()
@@ -179,7 +170,7 @@ def _deviation(entry: Entry, variable: Variable, value: float) -> float:
 def _run(
     entry: Entry, name: str, crank_speed: float, known: Mapping[str, tuple[Variable, float]], source: str
 ) -> PlannedRun:
-    given, usual = entry.given, instance(RunTable, {})
+    given = entry.given
     if not _NAME.fullmatch(name):
         words = "must begin with a small letter, and have at most 20 small letters, digits and _"
         entry.wrong("name", name, words)
@@ -199,21 +190,10 @@ def _run(
             continue
         of = Quantity(known[full][0].unit, "amount that was added")
         added[full] = entry.quantity(f"added.{full}", Variable("", of.description, of), value)
-    speeds = list(_speeds(entry))
-    columns = read_heads(entry)
-    entry.refuse()
+    speeds = tuple(_speeds(entry))
+    values = recording_values(entry, crank_speed, source)
     return PlannedRun(
-        name,
-        Path(source).parent / given["file"],
-        columns,
-        float(given.get("crank_speed", crank_speed)),
-        begin,
-        end,
-        float(given.get("ambient", usual.ambient)),
-        given.get("feed", "same") == "same",
-        added,
-        tuple(speeds),
-        off,
+        **values, name=name, has_feed=given.get("feed", "same") == "same", added=added, speeds=speeds, off=off
     )
 
 

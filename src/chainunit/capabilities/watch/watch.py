@@ -24,7 +24,7 @@ from ...recordings.inspection import FEWEST_TURNS, constant_parts, inspect_runs
 from ...recordings.measurands import MEASURANDS, usual_offset
 from ...recordings.problem import MARK_ANGLE, Problem, RecordedRun, Sensor, speed_column
 from ...recordings.recorded_drive import drive_of, is_of_shaft, plant_for
-from ...recordings.recording import Recording, read_signal
+from ...recordings.recording import Recording
 from ...recordings.residuals import (
     PriorConflict,
     ResidualTest,
@@ -250,7 +250,7 @@ def _read_files(plan: WatchPlan) -> tuple[Recording, MachineErrors | None]:
     """The recording, and the errors of the machine where the file of an identification has them."""
     faults, errors, recordings = Faults(), None, list[Recording]()
     with faults.collected():
-        recordings.append(read_signal(plan.file, plan.columns, plan.begin, plan.end))
+        recordings.append(plan.read())
     if plan.identification is not None:
         with faults.collected():
             errors = _read_errors(plan.identification)
