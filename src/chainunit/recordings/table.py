@@ -93,17 +93,17 @@ def read_span(entry: Entry) -> tuple[float, float]:
 
 def recording_values(entry: Entry, crank_speed: float, source: str) -> dict[str, Any]:
     """The values of a `PlannedRecording` by name, whose file is named relative to the file `source`; `crank_speed` is
-    the speed where the `entry` does not give its own [rad/s]. An InputError has a line for each fault of the entry."""
+    the speed where the `entry` gives none [rad/s]. An InputError has a line for each fault of the entry."""
     columns = _read_heads(entry)
     entry.refuse()
-    given, (begin, end) = entry.given, read_span(entry)
+    keys, (begin, end) = entry.given, read_span(entry)
     return {
-        "file": Path(source).parent / given["file"],
+        "file": Path(source).parent / keys["file"],
         "columns": columns,
-        "crank_speed": float(given.get("crank_speed", crank_speed)),
+        "crank_speed": float(keys.get("crank_speed", crank_speed)),
         "begin": begin,
         "end": end,
-        "ambient": float(given.get("ambient", instance(RecordingTable, {}).ambient)),
+        "ambient": float(keys.get("ambient", instance(RecordingTable, {}).ambient)),
     }
 
 
