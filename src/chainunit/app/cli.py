@@ -161,11 +161,11 @@ def schema(
     ] = None,
 ) -> None:
     """Write the JSON Schema of study files, by which an editor completes keys and marks mistakes."""
-    from ..core.files import whole
+    from ..core.files import atomic_file
     from ..study.schema import FILE, json_schema
 
     file = output or Path(FILE)
-    with whole(file) as part:
+    with atomic_file(file) as part:
         part.write_text(json.dumps(json_schema(), indent=1, ensure_ascii=False) + "\n", "utf-8")
     print(f"{file}: schema of study files")
 

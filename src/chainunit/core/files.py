@@ -45,14 +45,14 @@ RESULTS: Mapping[str, _Kind] = {
 """The kinds of results by their commands. All have a file report.html, and the numbers as text, too."""
 PAGE = "report.html"
 written: list[Path] = []
-"""The results that this process wrote by `whole`, in order."""
+"""The results that this process wrote by `atomic_file`, in order."""
 _ledgers: list[Ledger] = []
 """The lists of files of the folders that this process has claimed for a command."""
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
 
 
 @contextmanager
-def whole(file: Path, *, is_result: bool = True) -> Iterator[Path]:
+def atomic_file(file: Path, *, is_result: bool = True) -> Iterator[Path]:
     """A temporary path to write to in place of `file`. It is renamed to `file` at the end, and removed after
     an error. A file that is no result, such as a part of a store, is in no list of files.
 

@@ -21,7 +21,7 @@ from xml.etree.ElementTree import Element, tostring
 from pythonfmu import FmuBuilder
 
 from ..core.errors import InputError
-from ..core.files import folder, whole
+from ..core.files import atomic_file, folder
 from ..core.model import Model
 from ..core.temporary_folders import scratch
 from .companion_files import companion_files
@@ -67,7 +67,7 @@ def export(model: type[Model], file: Path, start: dict[str, float] | None = None
         script.write_text(text)
         raw = _build(script, work / "raw.fmu")
         version = metadata.version("chainunit")
-        with whole(file) as part:
+        with atomic_file(file) as part:
             pack(_contents(raw) | companion_files(interface, version, 2, ("pythonfmu",)), part)
     return file
 

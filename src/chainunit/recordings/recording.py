@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import Faults, InputError, meant, near_name, printable
-from ..core.files import whole
+from ..core.files import atomic_file
 from ..core.units import must_be, of_other_kind, scale
 from ..reading.tables import decoded, file_bytes
 from .measurands import MEASURANDS, SIGNALS, Measurand
@@ -147,7 +147,7 @@ def write_recording(recording: Recording, file: Path) -> None:
     lines = [",".join(f"{name} [{MEASURANDS[name].unit}]" for name in names)]
     lines += (",".join(format(x, form) for x, form in zip(row, forms, strict=True)) for row in rows.tolist())
     content = ("\n".join(lines) + "\n").encode()
-    with whole(file) as part:
+    with atomic_file(file) as part:
         # without a time in its head, the same recording gives the same file
         part.write_bytes(gzip.compress(content, mtime=0) if file.suffix == ".gz" else content)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Generic, Self
 
 from ..core.errors import WriteError
-from ..core.files import whole
+from ..core.files import atomic_file
 from ..core.temporary_folders import in_temporary_folder
 from ..work.progress import Report as Progress
 from ..work.progress import quiet
@@ -110,5 +110,5 @@ def _copy(kept: Path, to: Path) -> None:
         shutil.copytree(kept, to, dirs_exist_ok=True)
         return
     to.parent.mkdir(exist_ok=True)
-    with whole(to) as part:
+    with atomic_file(to) as part:
         shutil.copyfile(kept, part)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from ...core.files import whole
+from ...core.files import atomic_file
 from ...reading.text import shown_in
 from ...recordings.measurands import MEASURANDS
 from ...report import blocks as b
@@ -56,7 +56,7 @@ def _writers(machine: IdentifiedMachine, folder: Path, of_report: list[Writer]) 
     """With the study file of the identified values."""
 
     def study_file() -> list[Path]:
-        with whole(folder / FILE) as part:
+        with atomic_file(folder / FILE) as part:
             head = "" if machine.is_described else WRONG
             text = toml_text(identified_tables(machine, folder), identified_notes(machine), head)
             part.write_text(text, "utf-8")

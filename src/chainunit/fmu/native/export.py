@@ -13,7 +13,7 @@ from importlib import metadata
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
-from ...core.files import folder, whole
+from ...core.files import atomic_file, folder
 from ...core.model import Model
 from ..companion_files import companion_files
 from ..description import model_description, model_description_3
@@ -128,7 +128,7 @@ def export(
         slow = ", the first time about a minute" if compiler.zig and name == "win64" else ""
         report(f"compiling for {name}{slow}")
         contents |= build(compiler, name, fmi, model.name, sources, units)
-    with whole(file) as part:
+    with atomic_file(file) as part:
         pack(contents, part)
     return file
 
