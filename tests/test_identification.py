@@ -366,7 +366,7 @@ def test_a_product_bends_the_distribution():
 
     class Product:
         unknowns = sought = (Unknown.within("a", "1", 2.0, 3.0), Unknown.within("b", "1", 2.0, 2.6))
-        starts, spreads = np.array([2.5, 2.3]), np.array([1.0, 0.6]) / np.sqrt(12.0)
+        start_values, prior_deviations = np.array([2.5, 2.3]), np.array([1.0, 0.6]) / np.sqrt(12.0)
         bounds = np.array([2.0, 2.0]), np.array([3.0, 2.6])
 
         def comparisons(self, z, workers=1):
@@ -395,7 +395,7 @@ def test_a_number_beyond_its_bound_is_held_there():
 
     class Straight:
         unknowns = sought = (Unknown.within("a", "1", 6.0, 20.0), Unknown.within("b", "1", 0.0, 10.0))
-        starts, spreads = np.array([13.0, 5.0]), np.array([14.0, 10.0]) / np.sqrt(12.0)
+        start_values, prior_deviations = np.array([13.0, 5.0]), np.array([14.0, 10.0]) / np.sqrt(12.0)
         bounds = np.array([6.0, 0.0]), np.array([20.0, 10.0])
 
         def comparisons(self, z, workers=1):
@@ -429,7 +429,7 @@ def test_two_numbers_in_a_corner_are_not_held():
 
         class Corner:
             unknowns = sought = tuple(Unknown.within(name, "1", 0.0, 10.0) for name in "ab")
-            starts, spreads = np.array([5.0, 5.0]), np.array([10.0, 10.0]) / np.sqrt(12.0)
+            start_values, prior_deviations = np.array([5.0, 5.0]), np.array([10.0, 10.0]) / np.sqrt(12.0)
             bounds = np.array([0.0, 0.0]), np.array([10.0, 10.0])
 
             def comparisons(self, z, workers=1, data=data, rows=rows):
