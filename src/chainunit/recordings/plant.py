@@ -1,15 +1,16 @@
-"""Plants give the course of a recorded run with exact derivatives. Here are their protocol, and the drive whose motor
-is recorded, simulated whole: control, motor and machine in one loop.
+"""Plants give the course of a recorded run with exact derivatives. Here are their base class, and the drive whose
+motor is recorded, simulated whole: control, motor and machine in one loop.
 """
 
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -110,27 +111,29 @@ class Response:
         return inside
 
 
-class AnyPlant(Protocol):
-    """A plant, whose runs a `chainunit.recordings.problem.Problem` compares with recordings."""
+class AnyPlant(ABC):
+    """A plant with its `machine`, whose runs a `chainunit.recordings.problem.Problem` compares with recordings."""
+
+    may_advance: ClassVar[bool]
+    """whether a simulated machine may get ahead of the recorded one"""
+
+    def __init__(self, machine: Machine) -> None:
+        self.machine = machine
 
     @property
     def ratio(self) -> float:
         """Turns of the motor in a turn of the crank."""
+        return self.machine.ratio
 
-    @property
-    def machine(self) -> Machine:
-        """The machine."""
-
-    @property
-    def may_advance(self) -> bool:
-        """Whether a simulated machine may get ahead of the recorded one."""
-
+    @abstractmethod
     def with_names(self, by: Sequence[str]) -> AnyPlant:
         """The same plant, of which these parameters and inputs are sought."""
 
+    @abstractmethod
     def nuisances(self, run: Overview) -> Iterator[Nuisance]:
         """The numbers that it needs of a run beside the values of parameters and inputs."""
 
+    @abstractmethod
     def respond(
         self, scenario: Scenario, directions: Mapping[str, tuple[str, float]], workers: int = 1
     ) -> Response:
@@ -207,7 +210,7 @@ def free(drive: Drive) -> Drive:
     )
 
 
-class Plant:
+class Plant(AnyPlant):
     """The compiled system of a drive whose motor is recorded.
 
     After the motor was switched off, its rotor turns with the machine, without torque in the air gap; electric
@@ -228,21 +231,12 @@ class Plant:
     may_advance = True
 
     def __init__(self, drive: Drive, measured: Sequence[str], by: Sequence[str]) -> None:
+        super().__init__(drive.machine)
         self._loop = SourcedLoop(drive, measured, by)
         self._drive, self._by = drive, tuple(by)
         self._measured = tuple(measured)
         self._moving = [name for name in measured if name in MOVING]
         self._temperature = f"motor.{drive.motor.temperature}"
-
-    @property
-    def ratio(self) -> float:
-        """Turns of the motor in a turn of the crank."""
-        return self._drive.ratio
-
-    @property
-    def machine(self) -> Machine:
-        """The machine behind the gear."""
-        return self._drive.machine
 
     def with_names(self, by: Sequence[str]) -> Plant:
         """The same plant, of which the parameters and inputs `by` are sought."""

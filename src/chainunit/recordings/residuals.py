@@ -144,7 +144,14 @@ def residual_test(comparison: Comparison, level: float) -> ResidualTest:
     statistic = _over(float(along @ along), noise**2)
     slow = _slow(rest, comparison.angle, level)
     return ResidualTest(
-        comparison.run, comparison.column, statistic, limit, orders_found, noise, *slow[:2], slow[2] * comparison.size
+        comparison.run,
+        comparison.column,
+        statistic,
+        limit,
+        orders_found,
+        noise,
+        *slow[:2],
+        slow[2] * comparison.size,
     )
 
 

@@ -28,7 +28,7 @@ from ..drives.free_rotor import FreeRotor
 from ..machines.machine import Machine
 from ..study.drive import Drive
 from .measurands import COUNTS
-from .plant import ANGLE, CRANK, GUARD, Nuisance, Overview, Response, Scenario, SourcedLoop
+from .plant import ANGLE, CRANK, GUARD, AnyPlant, Nuisance, Overview, Response, Scenario, SourcedLoop
 
 MEASURED = ("crank.tau", "crank.w", "motor.w", "motor.count")
 """Quantities of a machine whose torque is measured behind its motor, of which nothing need be known."""
@@ -57,7 +57,7 @@ def _waves() -> list[tuple[str, int, bool, bool]]:
 WAVES = _waves()
 
 
-class MeasuredShaft:
+class MeasuredShaft(AnyPlant):
     """The machine behind a shaft whose torque is measured.
 
     Parameters
@@ -75,6 +75,7 @@ class MeasuredShaft:
     may_advance = False
 
     def __init__(self, machine: Machine, measured: Sequence[str], by: Sequence[str]) -> None:
+        super().__init__(machine)
         for name in measured:
             if name not in MEASURED:
                 raise InputError(
@@ -87,21 +88,11 @@ class MeasuredShaft:
                 raise InputError(
                     f"{name}: is no parameter or load of the machine, and of the motor nothing is known"
                 )
-        self._machine, self._measured, self._by = machine, tuple(measured), tuple(by)
-
-    @property
-    def ratio(self) -> float:
-        """Turns of the motor in a turn of the crank."""
-        return self._machine.ratio
-
-    @property
-    def machine(self) -> Machine:
-        """The machine behind the shaft."""
-        return self._machine
+        self._measured, self._by = tuple(measured), tuple(by)
 
     def with_names(self, by: Sequence[str]) -> MeasuredShaft:
         """The same plant, of which the parameters and inputs `by` are sought."""
-        return MeasuredShaft(self._machine, self._measured, by)
+        return MeasuredShaft(self.machine, self._measured, by)
 
     def nuisances(self, run: Overview) -> Iterator[Nuisance]:
         """The motion of a steady run; the state at which the motor is switched off, and what then turns with the
@@ -155,9 +146,9 @@ class MeasuredShaft:
         """The torque at the crank along a motion of the crank (angle, speed, acceleration), shape (3, rows), and its
         derivatives by all sought quantities and by the motion: with derivatives that a run does not need, all runs
         share compiled code."""
-        model, ratio = self._machine.model, self.ratio
+        model, ratio = self.machine.model, self.ratio
         own = {name.removeprefix("machine."): x for name, x in values.items() if name.startswith("machine.")}
-        p = self._machine.replace({k: x for k, x in own.items() if k in model.parameter_layout.names}).p
+        p = self.machine.replace({k: x for k, x in own.items() if k in model.parameter_layout.names}).p
         # a sought parameter is an argument, at its value
         given = model.parameter_layout.by_name(p) | {
             k: x for k, x in own.items() if k in model.input_layout.names
@@ -208,7 +199,7 @@ class MeasuredShaft:
 
     @cached_property
     def _free(self) -> SourcedLoop:
-        drive = Drive(FreeRotor, FreeRotor.Parameters(), self._machine)
+        drive = Drive(FreeRotor, FreeRotor.Parameters(), self.machine)
         return SourcedLoop(drive, self._measured, [*self._by, "motor.rotor.J", "motor.rotor.d"])
 
 
