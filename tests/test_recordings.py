@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from synthetic import write_recording
 
 from chainunit import InputError
 from chainunit.capabilities.identification.identification import read_runs
@@ -22,7 +23,6 @@ from chainunit.recordings.recording import (
     Recording,
     read_part,
     read_recording,
-    write_recording,
 )
 from chainunit.study.config import parse
 

@@ -15,10 +15,9 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from synthetic import HiddenRun, Logger, synthetic
+from synthetic import HiddenRun, Logger, synthetic, write_recording
 
 from chainunit.drives.dc_motor import DcMotor
-from chainunit.recordings.recording import write_recording
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 from chainunit.system import Profile

@@ -5,10 +5,12 @@ They are for examples, tests and benches, and no measurements of a real machine.
 
 from __future__ import annotations
 
+import gzip
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +18,7 @@ from scipy.interpolate import CubicSpline
 
 from chainunit.batch.transients import Transients, signal_table
 from chainunit.core.errors import InputError
+from chainunit.core.files import atomic_file
 from chainunit.recordings.measurands import COUNTS, MEASURANDS
 from chainunit.recordings.plant import MOVING, free, source_of
 from chainunit.recordings.problem import JITTER
@@ -201,3 +204,23 @@ def _stretch(
         raise failure
     rows = {output: CubicSpline(result.times[0], result.rows[k, 0])(at) for k, output in enumerate(outputs)}
     return rows, dict(zip(names, map(float, result.states[:, 0]), strict=True))
+
+
+def write_recording(recording: Recording, file: Path) -> None:
+    """Write a recording as `chainunit.recordings.recording.read_recording` takes it, with names and units of the quantities; packed where the name
+    ends with ``.gz``. Times have 15 digits, analog columns seven, counted ones all.
+
+    Raises
+    ------
+    WriteError
+        where the file cannot be written.
+    """
+    rows = np.column_stack([recording.time, *recording.columns.values()])
+    names = ("time", *recording.columns)
+    forms = [".15g" if name == "time" else ".7g" if MEASURANDS[name].analog else ".0f" for name in names]
+    lines = [",".join(f"{name} [{MEASURANDS[name].unit}]" for name in names)]
+    lines += (",".join(format(x, form) for x, form in zip(row, forms, strict=True)) for row in rows.tolist())
+    content = ("\n".join(lines) + "\n").encode()
+    with atomic_file(file) as part:
+        # without a time in its head, the same recording gives the same file
+        part.write_bytes(gzip.compress(content, mtime=0) if file.suffix == ".gz" else content)

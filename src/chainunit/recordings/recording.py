@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import Faults, InputError, meant, near_name, printable
-from ..core.files import atomic_file
 from ..core.units import must_be, of_other_kind, scale
 from ..reading.tables import decoded, file_bytes
 from .measurands import MEASURANDS, SIGNALS, Measurand
@@ -130,26 +129,6 @@ def remedy(quantity: str, heads: Sequence[str]) -> str:
         return ""
     head = printable(name_and_unit(heads[0])[0])
     return f'; name it by the key columns, such as columns = {{ "{quantity}" = "{head}" }}'
-
-
-def write_recording(recording: Recording, file: Path) -> None:
-    """Write a recording as `read_recording` takes it, with names and units of the quantities; packed where the name
-    ends with ``.gz``. Times have 15 digits, analog columns seven, counted ones all.
-
-    Raises
-    ------
-    WriteError
-        where the file cannot be written.
-    """
-    rows = np.column_stack([recording.time, *recording.columns.values()])
-    names = ("time", *recording.columns)
-    forms = [".15g" if name == "time" else ".7g" if MEASURANDS[name].analog else ".0f" for name in names]
-    lines = [",".join(f"{name} [{MEASURANDS[name].unit}]" for name in names)]
-    lines += (",".join(format(x, form) for x, form in zip(row, forms, strict=True)) for row in rows.tolist())
-    content = ("\n".join(lines) + "\n").encode()
-    with atomic_file(file) as part:
-        # without a time in its head, the same recording gives the same file
-        part.write_bytes(gzip.compress(content, mtime=0) if file.suffix == ".gz" else content)
 
 
 def read_part(file: Path, names: Mapping[str, str], begin: float, end: float) -> Recording:
