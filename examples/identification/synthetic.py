@@ -207,8 +207,8 @@ def _stretch(
 
 
 def write_recording(recording: Recording, file: Path) -> None:
-    """Write a recording as `chainunit.recordings.recording.read_recording` takes it, with names and units of the quantities; packed where the name
-    ends with ``.gz``. Times have 15 digits, analog columns seven, counted ones all.
+    """Write a recording as `chainunit.recordings.recording.read_recording` takes it, with names and units of the
+    quantities; packed where the name ends with ``.gz``. Times have 15 digits, analog columns seven, counted ones all.
 
     Raises
     ------
