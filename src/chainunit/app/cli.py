@@ -17,7 +17,7 @@ import typer.core
 from ..capabilities import modules
 from ..core.errors import InputError, InterruptedRunError, RunError, printable
 from ..core.files import full, written
-from ..report.command_options import BackendOption
+from ..report.command_options import BackendOption, OutputFolder
 from ..report.console import carry_out, exit_status, study_file, terminal_console
 from ..work import interrupts
 from .export_command import ExportCommand, export, export_ssp
@@ -82,7 +82,7 @@ def study(
     config: Annotated[
         Path | None, typer.Argument(help="Study file (TOML); without one, the packaged example.")
     ] = None,
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")] = Path("results"),
+    output: OutputFolder = Path("results"),
     check: Annotated[
         bool, typer.Option("--check", help="Also compare every run with the monolithic solution.")
     ] = False,
@@ -172,9 +172,7 @@ def schema(
 
 @app.command()
 def reproduce(
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")] = Path(
-        "reproduction"
-    ),
+    output: OutputFolder = Path("reproduction"),
 ) -> None:
     """Compute every number that the papers print, right or wrong, with the reason; draw their figures.
 
@@ -187,7 +185,7 @@ def reproduce(
 
 @app.command("two-bar-error")
 def two_bar_error(
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")] = Path("two-bar"),
+    output: OutputFolder = Path("two-bar"),
 ) -> None:
     """The error of two rigid bars in place of a hanging chain, over zeta, mu and psi, and where they are good enough.
 
@@ -201,7 +199,7 @@ def two_bar_error(
 @app.command("linkage")
 def linkage_command(
     file: Annotated[Path, typer.Argument(help="Linkage file (TOML).")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")] = Path("linkage"),
+    output: OutputFolder = Path("linkage"),
     speed: Annotated[
         str | None,
         typer.Option("--speed", help='Speed of the driver with its unit; "60 rpm" by default, or "0.1 m/s".'),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import StrEnum
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -19,3 +20,4 @@ BackendOption = Annotated[
     Backend | None,
     typer.Option("--backend", help="FMUs in native code or in Python; native where a C compiler is found."),
 ]
+OutputFolder = Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")]

@@ -7,12 +7,13 @@ from typing import Annotated, Any
 
 import typer
 
+from ...report.command_options import OutputFolder
 from ...report.console import carry_out, study_file, terminal_console
 
 
 def identify(
     config: Annotated[Path, typer.Argument(help="Study file (TOML) with a table [identify].")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")] = Path("identified"),
+    output: OutputFolder = Path("identified"),
 ) -> None:
     """Identify masses, friction and feed of a real machine from recordings of its motor.
 

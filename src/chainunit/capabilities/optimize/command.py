@@ -7,13 +7,13 @@ from typing import Annotated
 
 import typer
 
-from ...report.command_options import BackendOption
+from ...report.command_options import BackendOption, OutputFolder
 from ...report.console import carry_out, study_file
 
 
 def optimize(
     config: Annotated[Path, typer.Argument(help="Study file (TOML) with the table [optimize].")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")] = Path("best"),
+    output: OutputFolder = Path("best"),
     backend: BackendOption = None,
 ) -> None:
     """Search for the best machine: parameters with the least torque, load, power or energy under limits.

@@ -7,12 +7,13 @@ from typing import Annotated
 
 import typer
 
+from ...report.command_options import OutputFolder
 from ...report.console import carry_out, study_file
 
 
 def sweep(
     config: Annotated[Path, typer.Argument(help="Study file (TOML) with a table [sweep].")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")] = Path("sweep"),
+    output: OutputFolder = Path("sweep"),
     workers: Annotated[
         int | None,
         typer.Option(

@@ -7,12 +7,13 @@ from typing import Annotated
 
 import typer
 
+from ...report.command_options import OutputFolder
 from ...report.console import carry_out, study_file
 
 
 def watch(
     config: Annotated[Path, typer.Argument(help="Study file (TOML) with a table [watch].")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")] = Path("watched"),
+    output: OutputFolder = Path("watched"),
 ) -> None:
     """Run the load observer over a recording: feed and force of each side over time, and alarms with their grounds.
 
