@@ -88,6 +88,14 @@ class Comparison:
     rows: Any = None
 
 
+class Interpolated(NamedTuple):
+    """A simulated quantity, shape (n,), its derivatives by the unknowns, shape (n, names), and by time, shape (n,)."""
+
+    values: Any
+    slopes: Any
+    rate: Any
+
+
 class ShownColumn(NamedTuple):
     """A simulated column as its sensor shows it, shape (n,), with its slopes, shape (n, names); by name, its
     derivatives by clock and sensor, and the standard deviation `size` of the measured column."""
@@ -105,9 +113,9 @@ class SimulatedRun:
         self.run, self.response, self.names, self._sizes = run, response, tuple(names), sizes
         self._courses = dict[tuple[str, int], CubicSpline]()
 
-    def interpolate(self, name: str, at: Any, with_slopes: bool = True) -> tuple[Any, Any, Any]:
-        """A simulated quantity at the times `at` [s], shape (n,), its derivatives by `names`, shape (n, names), and
-        by time. Before the first and behind the last simulated time it stands."""
+    def interpolate(self, name: str, at: Any, with_slopes: bool = True) -> Interpolated:
+        """A simulated quantity at the times `at` [s], shape (n,). Before the first and behind the last simulated time
+        it stands."""
         response = self.response
         at = np.clip(at, response.time[0], response.time[-1])
         x, rate = np.empty(len(at)), np.empty(len(at))
@@ -121,7 +129,7 @@ class SimulatedRun:
             x[here], rate[here] = course(inside), course(inside, 1)
             for k in range(slopes.shape[1]):
                 slopes[here, k] = np.interp(inside, time, response.slopes[name][k, rows]) / self._sizes[k]
-        return x, slopes, rate
+        return Interpolated(x, slopes, rate)
 
 
 class Problem:

@@ -162,6 +162,9 @@ class LinkageParts:
             self._side(barrel, turn),
         )
 
+    # joints by their letters: p and q join a link with those before, b and c are the pin between two links, g and h
+    # are guides on links before, s is the slot between two links
+
     def _group(self, group: AssurGroup) -> Group:
         joints = [self.structure.joints[j.name] for j in group.joints]
         if group.kind == "triad":
