@@ -89,7 +89,7 @@ class Comparison:
 
 
 class Interpolated(NamedTuple):
-    """A simulated quantity, shape (n,), its derivatives by the unknowns, shape (n, names), and by time, shape (n,)."""
+    """A simulated quantity, shape (n,), with its derivatives by the unknowns, shape (n, names), and by time."""
 
     values: Any
     slopes: Any
