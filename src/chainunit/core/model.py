@@ -176,7 +176,12 @@ def keep(model: type[Model], *names: str) -> None:
         def reduced(instance: Any, declared: type = declared, name: str = name) -> str | tuple[Any, ...]:
             if type(instance) is not declared:  # of another declaration with these fields
                 return copyreg.__newobj__, (type(instance),), vars(instance)  # type: ignore[attr-defined]
-            return _unpickled, (model, name, Layout(declared).values(instance), getattr(instance, "derived", None))
+            return _unpickled, (
+                model,
+                name,
+                Layout(declared).values(instance),
+                getattr(instance, "derived", None),
+            )
 
         declared.__reduce__ = reduced
 

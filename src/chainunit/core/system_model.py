@@ -101,7 +101,10 @@ class SystemModel(Model):
             z += mine
 
             def states(
-                model: type[Model] = model, parameters: Any = parameters, entries: Any = entries, z: list[Any] = mine
+                model: type[Model] = model,
+                parameters: Any = parameters,
+                entries: Any = entries,
+                z: list[Any] = mine,
             ) -> Any:
                 return model.start_states(xp, parameters, entries, z)
 

@@ -44,7 +44,9 @@ class Interface:
     """The variables of a model's FMU in the order of their value references: parameters, inputs, states
     (each an output), other outputs part by part."""
 
-    def __init__(self, model: type[Model], start: dict[str, float], script: type[Script] | None = None) -> None:
+    def __init__(
+        self, model: type[Model], start: dict[str, float], script: type[Script] | None = None
+    ) -> None:
         """
         Parameters
         ----------

@@ -294,7 +294,9 @@ class ModelInstance:
     def _running(self) -> list[tuple[int, float, float]]:
         """Place, rate and half of the second derivative of each input that follows another one."""
         first = self.references.first_input
-        return [(first + place, rate, half) for place, rate, half in self.model.extrapolations(self._set[first:])]
+        return [
+            (first + place, rate, half) for place, rate, half in self.model.extrapolations(self._set[first:])
+        ]
 
     def _bad_input(self) -> str:
         if self._doubtful:

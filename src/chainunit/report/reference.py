@@ -123,7 +123,8 @@ def reference(
     ]
     sections += [Section(name, f"FMU {name}", tuple(_variables(model))) for name, model in MODELS.items()]
     sections += [
-        Section(f"result-{name}", f"result.json: {name}", (_parts(of),)) for name, of in _results(contents).items()
+        Section(f"result-{name}", f"result.json: {name}", (_parts(of),))
+        for name, of in _results(contents).items()
     ]
     for name, words, options in commands:
         rows = tuple(TableRow((option, words)) for option, words in options)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ...report.capability import AnyStudy
 from ...report.reported_result import ReportedResult
@@ -17,7 +17,6 @@ from .summary import SweepSummary, summary_of
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
-
 
 
 class SweepResult(ReportedResult[Config, SweepFindings]):

@@ -53,7 +53,9 @@ def gap_hint(
     if not isinstance(group, Dyad | RRP):
         return ""
     try:
-        apart = [_apart(group, Mechanism(MATH, before, at, derived[: before.derived_count])) for at in (q, *places)]
+        apart = [
+            _apart(group, Mechanism(MATH, before, at, derived[: before.derived_count])) for at in (q, *places)
+        ]
     except (ArithmeticError, ValueError, IndexError):
         return ""
     if isinstance(group, RRP):

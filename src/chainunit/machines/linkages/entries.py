@@ -43,7 +43,9 @@ class EntryReader(Entry):
         self.refused: set[str] = set()
         self.points: dict[str, dict[str, list[Any]]] = {}
 
-    def table(self, key: str, parent: Mapping[str, Any] | None = None, default: Any = None) -> Mapping[str, Any]:
+    def table(
+        self, key: str, parent: Mapping[str, Any] | None = None, default: Any = None
+    ) -> Mapping[str, Any]:
         """A table; faults where it is none."""
         name = key.rpartition(".")[2]
         given = (self.data if parent is None else parent).get(name, {} if default is None else default)
