@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
-
-from ..reading.text import entry
+from ..reading.results import part, result
 from .analysis import Analysis, Findings, Work
 from .config import Config
 from .drive import Drive
@@ -15,15 +12,11 @@ from .verdict import STEADY
 from .window import Phase, whole_turns
 
 
-@dataclass(frozen=True)
+@result
 class RippleWithout(Findings):
     """The fluctuation of the speed in steady running without feed-forward; None where the crank makes no turn."""
 
-    ripple: float | None
-
-    def as_dict(self) -> dict[str, Any]:
-        """Ready for JSON."""
-        return entry(self.ripple, "1", "percent")
+    ripple: float | None = part("ripple without it", unit="1", kind="percent", inline=True)
 
     def remark(self, study: StudyRecord) -> None:
         """The fluctuation with feed-forward beside it."""

@@ -11,8 +11,14 @@ _PACKAGE = __package__.rpartition(".")[0]
 
 
 def _all_of(home: str, attribute: str) -> tuple[Any, ...]:
-    names = import_module(home).NAMES
-    return tuple(getattr(import_module(f"{home}.{name}"), attribute) for name in names)
+    return tuple(_registered(f"{home}.{name}", attribute) for name in import_module(home).NAMES)
+
+
+def _registered(module: str, attribute: str) -> Any:
+    """The part or capability of a module, or of `capability` in that folder, where the folder itself is imported by
+    the command line and must be light."""
+    home = import_module(module)
+    return getattr(home if hasattr(home, attribute) else import_module(f"{module}.capability"), attribute)
 
 
 @cache

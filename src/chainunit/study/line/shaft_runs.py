@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -13,7 +12,7 @@ import xarray as xr
 from ...core.engines import numpy_
 from ...core.errors import RunError
 from ...drives.cardan import two_joints
-from ...reading.text import entries
+from ...reading.results import part, result
 from ...study.transients import follow
 from ...system import rigid
 from ..analysis import Analysis, Findings, Work
@@ -32,16 +31,12 @@ from .shaft import (
 )
 
 
-@dataclass(frozen=True)
+@result
 class ShaftFindings(Findings):
     """By run, the load of the driveline, and the rainflow cycles of the torque in shaft 2."""
 
-    answers: Mapping[str, ShaftAnswers]
+    answers: Mapping[str, ShaftAnswers] = part("load of the driveline, by run", inline=True)
     cycles: Mapping[str, Cycles]
-
-    def as_dict(self) -> dict[str, Any]:
-        """Ready for JSON."""
-        return {name: entries(answers) for name, answers in self.answers.items()}
 
     def remark(self, study: StudyRecord) -> None:
         """None: the driveline has its remarks, see `remark`, before those of the findings."""
