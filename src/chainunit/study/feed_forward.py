@@ -16,7 +16,9 @@ from .window import Phase, whole_turns
 class RippleWithout(Findings):
     """The fluctuation of the speed in steady running without feed-forward; None where the crank makes no turn."""
 
-    ripple: float | None = part("ripple without it", unit="1", kind="percent", inline=True)
+    ripple: float | None = part(
+        "ripple of the speed in steady running", unit="1", kind="percent", inline=True
+    )
 
     def remark(self, study: StudyRecord) -> None:
         """The fluctuation with feed-forward beside it."""
