@@ -13,6 +13,7 @@ import re
 import shutil
 import subprocess
 from html.parser import HTMLParser
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -482,8 +483,8 @@ def test_a_motor_that_sizing_found_insufficient_is_not_praised(study, monkeypatc
     assert as_dict(study)["verdict"]["motor"]["holds"] == "in part"
     monkeypatch.setattr(judgement, "AMPLE", 0.0)
     assert as_dict(study)["verdict"]["motor"]["holds"] == "true"
-    monkeypatch.setattr(type(study), "insufficient", True)
-    motor = as_dict(study)["verdict"]["motor"]
+    nearest = SimpleNamespace(name="sizing", insufficient="No motor fits.", motor=None, duty=None, keys={})
+    motor = as_dict(dataclasses.replace(study, proposal=nearest))["verdict"]["motor"]
     assert motor["holds"] == "in part" and "insufficient" in motor["text"]
 
 
@@ -602,7 +603,7 @@ def test_a_long_study_is_thinned_out(study, monkeypatch):
 
 def test_the_drive_stands_first_with_its_shares(study):
     result = {**as_dict(study), "sizing": SIZING}
-    text = page_of(study, result)
+    text = page_of(dataclasses.replace(study, findings=study.findings | {"sizing": None}), result)
     reader = Reader(text)
     check_traced(reader, result)
     assert text.index('id="answer"') < text.index('id="sizing"') < text.index('id="plots"')
@@ -633,7 +634,8 @@ def test_no_candidate_fits(study):
     sizing = copy.deepcopy(SIZING)
     sizing["chosen"] = None
     sizing["candidates"] = sizing["candidates"][2:]
-    text = page_of(study, {**as_dict(study), "sizing": sizing})
+    result = {**as_dict(study), "sizing": sizing}
+    text = page_of(dataclasses.replace(study, findings=study.findings | {"sizing": None}), result)
     assert "No candidate fits. The reasons:" in text and "too weak by 31 %" in text
 
 

@@ -9,8 +9,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from event_tables import HEAVY_MACHINE
+from event_tables import HEAVY_MACHINE, demanding
 
+from chainunit.capabilities.sizing import search as sizing
+from chainunit.capabilities.sizing.candidate import Candidate, Criterion, Standing, TrialResult
+from chainunit.capabilities.sizing.duty import duty_of
+from chainunit.capabilities.sizing.inverter import inverter_needs, least_boost, misses_by_a_hair
+from chainunit.capabilities.sizing.preference import ORDER, poles_rank, rank
 from chainunit.drives.catalogue import catalogue
 from chainunit.drives.disc import DENSITY, steel_disc
 from chainunit.drives.gear_ratios import (
@@ -24,15 +29,10 @@ from chainunit.drives.gear_ratios import (
 )
 from chainunit.drives.gearing import START_FACTOR, ordered_torque
 from chainunit.reading.text import number
-from chainunit.study import sizing
-from chainunit.study.candidate import Candidate, Criterion, Standing
 from chainunit.study.catalogue_drive import gear_with
-from chainunit.study.choice import as_chosen
+from chainunit.study.choice import Choice, as_chosen
 from chainunit.study.config import parse
-from chainunit.study.duty import duty_of
-from chainunit.study.inverter import inverter_needs, least_boost, misses_by_a_hair
 from chainunit.study.limits import Check
-from chainunit.study.preference import ORDER, poles_rank, rank
 from chainunit.study.relay import HEAVIER, start_class
 from chainunit.study.rig import Rig
 from chainunit.study.start_runs import exceeded_for, starts_from_all, time_above
@@ -184,8 +184,9 @@ def made(name, power=2200.0, poles=4.0, flywheel=0.0, used=0.5, **more):
     )
     drive = SimpleNamespace(flywheel=flywheel, ratio=50.0, follows=False)
     checks = {"temperature": Check("heat", used, 1.0, "1"), "crank_speed": Check("speed", 0.95, 1.0, "1")}
-    more = {"unit": gear_unit("helical", 50.0), "start_class": 10, "margin": 0.1} | more
-    return Candidate(motor, drive, checks, **more)
+    measured = {name: more.pop(name) for name in ("start_class", "frequency") if name in more}
+    trial = TrialResult(checks, **({"start_class": 10} | measured))
+    return Candidate(motor, drive, trial, **({"unit": gear_unit("helical", 50.0), "margin": 0.1} | more))
 
 
 def ranked(*candidates, larger=2.0):
@@ -291,7 +292,9 @@ def test_a_motor_in_field_weakening_stands_behind_one_at_its_rated_frequency():
     checks = {"start": Check("time to start", 1.0, 2.0, "s")}
     small, large = (
         dataclasses.replace(
-            c, motor=next(m for m in catalogue() if m.designation == name), checks=checks, frequency=f
+            c,
+            motor=next(m for m in catalogue() if m.designation == name),
+            trial=TrialResult(checks, frequency=f),
         )
         for name, f in (("IE3 6-pole 1.1 kW, 90L", 75.0), ("IE3 4-pole 1.5 kW, 90L", 51.5))
     )
@@ -333,7 +336,7 @@ def proposed(more, motor="IE3 4-pole 1.1 kW, 90S", start="direct"):
     config = parse(f'start = "{start}"\n{HEAVY_MACHINE}{more}')
     plate = next(m for m in catalogue() if m.designation == motor)
     turn = SimpleNamespace(crank_torque=np.full(10, 60.0))
-    return config, sizing.proposal(config, plate, SimpleNamespace(normal=turn))
+    return config, sizing.candidate_of(config, plate, SimpleNamespace(normal=turn))
 
 
 def test_a_file_chooses_the_ratios():
@@ -349,11 +352,14 @@ def test_a_file_chooses_the_ratios():
 
 def test_the_kind_of_gear_has_its_efficiency_and_its_unit():
     config, c = proposed('[sizing]\ngear_kind = "worm"\n')
-    assert gear_with(config, c.drive.ratio).efficiency == 0.7 and c.unit.title == "worm gear"
+    assert (
+        gear_with(config, c.drive.ratio, config.plans["sizing"].offer).efficiency == 0.7
+        and c.unit.title == "worm gear"
+    )
     config, _ = proposed('[sizing]\ngear_kind = "worm"\n[gear]\nefficiency = "80 %"\n')
-    assert gear_with(config, 50.0).efficiency == 0.8
+    assert gear_with(config, 50.0, config.plans["sizing"].offer).efficiency == 0.8
     config, c = proposed("[sizing]\n")
-    assert gear_with(config, c.drive.ratio).efficiency == pytest.approx(0.98**3)
+    assert gear_with(config, c.drive.ratio, config.plans["sizing"].offer).efficiency == pytest.approx(0.98**3)
     assert c.unit.title == "three-stage helical gear"
 
 
@@ -383,7 +389,7 @@ def sized(name, tmp_path, monkeypatch, *designations, more="", **demands):
     monkeypatch.setattr(sizing, "catalogue", lambda extra: motors)
     text = (EXAMPLES / f"{name}.toml").read_text("utf-8")
     config = parse(f"{text}\n{more}", str(EXAMPLES / f"{name}.toml"))
-    config = dataclasses.replace(config, sizing=dataclasses.replace(config.sizing, **demands))
+    config = demanding(config, **demands)
     return sizing.size(config, tmp_path, lambda *said: None)
 
 
@@ -444,7 +450,7 @@ def test_the_beam_pump_gets_four_poles_and_one_gear(tmp_path, monkeypatch):
     slowest = max(start.start_time for start in starts)
     assert best.worst_start and not six.worst_start
     assert best.checks["start"].value == pytest.approx(slowest, rel=0.02)
-    assert best.start_class == max(start.start_class for start in starts)
+    assert best.trial.start_class == max(start.start_class for start in starts)
     check_order(result, "beam_pump", tmp_path, monkeypatch, *motors)
 
 
@@ -460,7 +466,7 @@ def test_a_gear_that_the_start_alone_breaks_asks_for_a_soft_start(tmp_path, monk
     # the soft start, computed by itself
     text = (EXAMPLES / "beam_pump.toml").read_text("utf-8")
     config = parse(f'start = "soft"\n{text}', str(EXAMPLES / "beam_pump.toml"))
-    drive = sizing.proposal(config, best.motor, result.duty).drive
+    drive = sizing.candidate_of(config, best.motor, result.duty).drive
     hardest = max(each.gear_torque for each in starts_from_all(Rig(config, drive, None), 3.0))
     words = f'with start = "soft" it fits, and puts {number(hardest, "N.m")} on the gear in a start'
     assert words in result.answer
@@ -477,27 +483,27 @@ def test_an_inverter_takes_the_next_ratio_before_a_larger_motor(tmp_path, monkey
     )
     file = EXAMPLES / "beam_pump.toml"
     config = parse(f'start = "inverter"\n{file.read_text("utf-8")}', str(file))
-    config = dataclasses.replace(config, sizing=dataclasses.replace(config.sizing, candidates=2.0))
+    config = demanding(config, candidates=2.0)
     result = sizing.size(config, tmp_path, lambda *said: None)
     best = result.best
     assert result.chosen_candidate is best and best.motor.designation == "IE3 4-pole 11 kW, 160M"
     assert (best.drive.ratio, best.series) == (185.0, "R80") and best.use <= 0.9
-    bare = sizing.proposal(config, best.motor, duty_of(config, tmp_path, None))
+    bare = sizing.candidate_of(config, best.motor, duty_of(config, tmp_path, None))
     sizing.judge(config, bare, result.duty, None)
     assert bare.drive.ratio == 180.0 and misses_by_a_hair(bare) and 0.9 < bare.sizes["rms_torque"] < 0.95
     # the inverter: boost, current, and no class of a relay
     rated = best.motor.nameplate.rated_current
-    assert best.start_class is None and best.drive.parameters.inverter.boost == 0.05
-    assert best.inverter_current == pytest.approx(max(rated, best.start_current / 1.5))
-    assert "inverter_current" not in best.checks and 0.0 < best.overload_time < 60.0
+    assert best.trial.start_class is None and best.drive.parameters.inverter.boost == 0.05
+    assert best.trial.inverter_current == pytest.approx(max(rated, best.trial.start_current / 1.5))
+    assert "inverter_current" not in best.checks and 0.0 < best.trial.overload_time < 60.0
     w = best.drive.ratio * config.run.crank_speed
-    assert best.speed == pytest.approx(w, rel=0.03) and not best.weakened
+    assert best.trial.speed == pytest.approx(w, rel=0.03) and not best.weakened
     # the frequency is that of the speed asked for, and the compensation of the slip of the mean torque
-    assert w / math.pi < best.frequency < (w / math.pi) * 1.03
+    assert w / math.pi < best.trial.frequency < (w / math.pi) * 1.03
     notes = " ".join(result.notes)
     assert "needs a voltage boost of 5 %" in notes and "electronic motor protection" in notes
-    assert number(best.inverter_current, "A") in notes and "relay of" not in notes
-    chosen = as_chosen(config, best.drive)
+    assert number(best.trial.inverter_current, "A") in notes and "relay of" not in notes
+    chosen = as_chosen(config, Choice(best.drive, proposal=result.proposal(config)))
     assert chosen.gear.efficiency == pytest.approx(0.98**3) and chosen.starter.inverter.boost == 0.05
 
 
@@ -511,7 +517,7 @@ def test_the_least_boost_with_which_it_starts_is_taken():
     def judged(needed):
         def judge(each):
             value = 1.0 if each.drive.parameters.inverter.boost >= needed else None
-            each.checks = {"start": Check("time to start", value, 2.0, "s")}
+            each.trial = TrialResult({"start": Check("time to start", value, 2.0, "s")})
             return each
 
         return judge
@@ -525,7 +531,7 @@ def test_the_least_boost_with_which_it_starts_is_taken():
         def judge(each):
             each = judged(needed)(each)
             if each.drive.parameters.inverter.boost == 0.10:
-                each.checks, each.reason = {}, "its run failed: no step"
+                each.trial, each.reason = TrialResult(), "its run failed: no step"
             return each
 
         return judge
@@ -545,7 +551,7 @@ def test_a_motor_that_fails_from_the_worst_angle_makes_room_for_the_next(monkeyp
 
     def judge(config, c, duty, files, *, worst_start=False):
         time = 5.0 if worst_start and c.power < motors[2].nameplate.power else 1.0
-        c.worst_start, c.checks = worst_start, {"start": Check("time to start", time, 2.0, "s")}
+        c.worst_start, c.trial = worst_start, TrialResult({"start": Check("time to start", time, 2.0, "s")})
 
     monkeypatch.setattr(sizing, "judge", judge)
     monkeypatch.setattr(
@@ -631,7 +637,7 @@ def test_a_motor_that_stalls_without_a_flywheel_is_told_so(tmp_path, monkeypatch
     # the ram meets the workpiece 10 mm above its lower dead centre, on the way down
     turn = result.duty.normal
     hard = turn.angle[np.abs(turn.crank_torque) > 0.5 * result.duty.numbers.torque_peak]
-    assert hard[0] - 0.2 < bare.stall_angle < hard[-1]
+    assert hard[0] - 0.2 < bare.trial.stall_angle < hard[-1]
 
 
 def test_a_candidate_that_leaves_no_margin_is_told_apart():
@@ -654,9 +660,9 @@ def test_the_next_motor_without_a_flywheel_is_found_below_a_gear_that_the_larges
     def judge(config, c, duty, files):
         tried.append(c.power)
         load, hard = (Check("", used, 1.0, "1") for used in (1800.0 / c.power, c.power / 4000.0))
-        c.checks = {"rms_torque": load, "gear_start": hard}
+        c.trial = TrialResult({"rms_torque": load, "gear_start": hard})
 
-    monkeypatch.setattr(sizing, "proposal", bare)
+    monkeypatch.setattr(sizing, "candidate_of", bare)
     monkeypatch.setattr(sizing, "least_boost", lambda config, c, judged: judged(c))
     monkeypatch.setattr(sizing, "judge", judge)
     small = made("small", 550.0, flywheel=0.5)
@@ -667,13 +673,13 @@ def test_the_next_motor_without_a_flywheel_is_found_below_a_gear_that_the_larges
 def test_the_next_motor_without_a_flywheel_gets_its_boost(monkeypatch):
     """A larger motor that starts with a boost of 10 % alone counted as one that does not start."""
     config, small = proposed("[sizing]\nlarger = 1\n", start="inverter")
-    small.checks = {"start": Check("time to start", 1.0, 2.0, "s")}
+    small.trial = TrialResult({"start": Check("time to start", 1.0, 2.0, "s")})
     small.drive = dataclasses.replace(small.drive, flywheel=0.5)
     motors = [m for m in catalogue() if m.nameplate.poles == small.motor.nameplate.poles][:6]
 
     def judge(config, c, duty, files):
         starts = c.drive.parameters.inverter.boost >= 0.1
-        c.checks = {"start": Check("time to start", 1.0 if starts else None, 2.0, "s")}
+        c.trial = TrialResult({"start": Check("time to start", 1.0 if starts else None, 2.0, "s")})
 
     monkeypatch.setattr(sizing, "judge", judge)
     duty = SimpleNamespace(normal=SimpleNamespace(crank_torque=np.full(10, 60.0)))

@@ -17,11 +17,13 @@ from .task import Task
 
 @dataclass(frozen=True)
 class Contents:
-    """The contents of a section: its heading, its blocks (tables, text, figures), and the files of its figures."""
+    """The contents of a section: its heading, its blocks (tables, text, figures), the files of its figures, and
+    whether it comes before the section on the runs."""
 
     heading: str
     blocks: Callable[[Source, StudyRecord], Iterator[Block]]
     pictures: tuple[str, ...] = ()
+    leads: bool = False
 
 
 class Capability(StudyCapability):
@@ -35,6 +37,14 @@ class Capability(StudyCapability):
     def question(self, s: Source, study: StudyRecord) -> Line:
         """The sentence on it in the question of a study; empty where it asks for nothing."""
         return ()
+
+    def head(self, s: Source, study: StudyRecord) -> Iterator[Block]:
+        """Its blocks at the head of the answer of a study, before the verdicts on model and motor."""
+        return iter(())
+
+    def judgements(self, s: Source, study: StudyRecord) -> Iterator[Block]:
+        """Its judgements on a study, behind these verdicts."""
+        return iter(())
 
     def answer(self, s: Source, study: StudyRecord) -> Iterator[Block]:
         """Its blocks in the answer of a study."""

@@ -9,15 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, ClassVar
 
 from ..core.errors import InputError
+from ..fmu.backends import Backend
+from ..work.progress import Report
 from .analysis import Analysis
 from .config import Config
 from .drive import Drive
 from .event_table import RandomEvent
 from .file_reading import FileReading
 from .file_section import FileSection
+from .proposal import DriveProposal
+from .record import StudyRecord
 from .rig import Rig
 from .rules import Rule
 
@@ -41,6 +46,8 @@ class StudyCapability:
 
     tables: ClassVar[Mapping[str, FileSection]] = {}
     """its tables of the study file, by name"""
+    motor_table: ClassVar[str] = ""
+    """the table of these that leaves the choice of the motor to it; at most one capability has such a table"""
 
     def rules(self) -> Iterable[Rule]:
         """The rules of its keys that do not go together with others."""
@@ -72,6 +79,21 @@ class StudyCapability:
     def faults(self, config: Config) -> Iterable[InputError]:
         """Refusals of a plan that does not fit the rest of the study."""
         return ()
+
+    def unused_values(self, config: Config) -> Iterable[str]:
+        """Names of the values of its tables that have no meaning in a study."""
+        return ()
+
+    def drive(
+        self, config: Config, folder: Path, report: Report, backend: Backend | None
+    ) -> DriveProposal | None:
+        """The drive that it chooses; None for a study whose file gives one. The FMUs that it needs are written to
+        `folder`."""
+        return None
+
+    def permitted_temperature(self, config: Config) -> tuple[str, float] | None:
+        """Permitted temperature of the winding of the motor that it chooses [K], after its name in the study file."""
+        return None
 
     def random_events(self, config: Config) -> Mapping[str, RandomEvent]:
         """By the key that states it, the events with ranges that its runs have."""
@@ -113,6 +135,10 @@ class StudyCapability:
 
     def words(self) -> Mapping[str, str]:
         """By name, the words on the numbers of its results, for a comparison of two."""
+        return {}
+
+    def additions(self, study: StudyRecord) -> Mapping[str, Mapping[str, Any]]:
+        """By the name of findings, further parts of their result, which follow from the whole study."""
         return {}
 
     def analyses(self) -> Iterable[type[Analysis]]:

@@ -18,7 +18,7 @@ from ..core.quantities import variables
 from ..reading.text import entry
 from .measures import Answers
 from .registry import registered
-from .sections import CHOICES, SECTIONS
+from .sections import CHOICES, all_sections
 from .shaft import ShaftAnswers
 
 FILE = "result.json"
@@ -211,7 +211,7 @@ def _given_values(data: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
         yield from _leaves(data.get(name), name)
     for table in ("system", "machine", "feed", "motor", "event"):
         yield from _leaves(data.get(table), table)
-    for table, section in SECTIONS.items():
+    for table, section in all_sections().items():
         node = _mapping(data.get(table))
         if section.apart:
             yield from _leaves(node.get("asked"), table)

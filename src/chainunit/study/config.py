@@ -45,7 +45,6 @@ from .sections import (
     Run,
     Starter,
 )
-from .sizing_table import Sizing
 
 
 @dataclasses.dataclass(frozen=True)
@@ -66,7 +65,6 @@ class Config:
     feed_forward: bool
     empty_start: bool
     """whether the feed comes once the machine runs"""
-    sizing: Sizing | None
     plate: CatalogueMotor | None
     """the motor, where the file names one of the catalogue"""
     gear: Transmission
@@ -141,14 +139,20 @@ class Config:
     def permitted_temperature(self) -> tuple[str, float]:
         """Permitted temperature of the winding if the steady turns go on for ever [K], after its name in the
         study file."""
-        if self.sizing is not None:
-            return "sizing.temperature", float(self.sizing.temperature)
+        for part in registered():
+            if (own := part.permitted_temperature(self)) is not None:
+                return own[0], own[1]
         return "run.winding_temperature", float(self.run.winding_temperature)
 
     @property
     def of_catalogue(self) -> bool:
         """Whether the motor is one of the catalogue."""
-        return self.plate is not None or self.sizing is not None
+        return self.plate is not None or self.chooses_motor
+
+    @property
+    def chooses_motor(self) -> bool:
+        """Whether a capability chooses the motor of the catalogue."""
+        return any(self.values.get(part.motor_table) is not None for part in registered())
 
     def table(self, name: str) -> Any:
         """The values of a table of the base or of a capability; None for an optional table that the file does not
@@ -275,7 +279,7 @@ def _with_hints(fault: InputError, unusual: Iterable[Slip]) -> InputError:
 
 _OF_PARTS = ("machine", "ratios", "motor")
 """Tables whose values follow from others, too: `Config` has them as machine and motor."""
-_OWN_TABLES = ("feed", "run", "coupling", "sizing", "gear", "starter", "driveline", "chain")
+_OWN_TABLES = ("feed", "run", "coupling", "gear", "starter", "driveline", "chain")
 """Tables whose values are fields of a `Config`."""
 
 
@@ -296,9 +300,6 @@ def _config(
         for name, each in sections.items()
         if name not in _OF_PARTS
     }
-    if "sizing" in data and "inertia_ratio" not in tables["sizing"]:
-        # a rule for servo drives: time, current and heat of its start limit the inertia of an induction motor
-        of_study["sizing"] = dataclasses.replace(of_study["sizing"], inertia_ratio=math.inf)
     chain, own_motors = values["chain"] if checked.organ == "chain" else None, None
     with faults.collected(), refusal_prefix("catalogue = ", "catalogue"):
         own_motors = beside(checked.catalogue, source) if checked.catalogue else None

@@ -22,6 +22,8 @@ class FileSection:
     optional: bool = False
     keys: Mapping[str, Any] = field(default_factory=dict)
     """other keys than quantities, as pydantic fields with their descriptions"""
+    before: str = ""
+    """table of the base before which it stands; empty for one behind them"""
     title: str = ""
     """title of the table in a report"""
     is_used: Callable[[Any], bool] = lambda config: True

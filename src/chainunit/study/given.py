@@ -100,7 +100,7 @@ def _system(config: Config) -> dict[str, Any]:
     own = {
         name.removeprefix("system."): x for name, x in config.choices.items() if name.startswith("system.")
     }
-    return {name: x for name, x in own.items() if x and (name != "motor" or config.sizing is None)}
+    return {name: x for name, x in own.items() if x and (name != "motor" or not config.chooses_motor)}
 
 
 def _tables(study: StudyRecord) -> Iterator[GivenSection]:

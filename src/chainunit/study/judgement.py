@@ -76,8 +76,8 @@ def _residuals(study: StudyRecord) -> dict[str, float]:
 
 
 def motor_limits(study: StudyRecord) -> dict[str, Check]:
-    """The values of the motor in its start and in steady running beside its limits, by name. For a motor that
-    sizing chose only the temperature is checked here, as sizing checks its starts and its duty."""
+    """The values of the motor in its start and in steady running beside its limits, by name. Of a
+    proposed motor only the temperature is checked here, as its starts and its duty were checked before."""
     steady, start = study.answers.get(STEADY), study.start
     if steady is None or start is None:
         return {}
@@ -137,7 +137,7 @@ def _no_judgement(study: StudyRecord, speed: str) -> str:
 def motor_verdict(study: StudyRecord) -> dict[str, Any] | None:
     """The verdict on the motor, ready for JSON; None without steady running. It is "false" where the motor
     does not reach the speed or becomes too hot. It is "in part" where no reserve of torque is left or known,
-    another limit is exceeded, or sizing found the motor insufficient. The least reserve is given with its
+    another limit is exceeded, or no motor was found that suffices. The least reserve is given with its
     run. Runs whose energy balance is not kept are left out, as they say nothing about the motor."""
     steady, requested = study.answers.get(STEADY), study.config.run.crank_speed
     if steady is None:
@@ -168,7 +168,8 @@ def motor_verdict(study: StudyRecord) -> dict[str, Any] | None:
     else:
         text = f"The motor does NOT reach the speed: {speed} in place of {requested_text}"
     if study.insufficient:
-        text += f"{', but it' if keeps_speed else '; it'} is insufficient by the limits of the sizing"
+        assert study.proposal is not None
+        text += f"{', but it' if keeps_speed else '; it'} is insufficient by the limits of the {study.proposal.name}"
     limits = {} if STEADY in left_out else motor_limits(study)
     excesses = [
         name for name, check in limits.items() if check.utilisation is None or check.utilisation > 1.0

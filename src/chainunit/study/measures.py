@@ -14,7 +14,6 @@ from ..core.quantities import Layout, Value, Variable, declaration, quantity
 from .arrays import peak
 from .drive import AbsentError
 from .limits import reaches
-from .protection import stall
 from .relay import relay_trip
 from .stored import energy_gap, energy_held, stored_shares
 from .verdict import CREEPS
@@ -29,6 +28,17 @@ _STEADY = frozenset({Phase.STEADY})
 _EVENTS = frozenset({Phase.EVENT, Phase.LOADED_START})
 # a start begins at rest, and for a moment its motor gives more torque than it ever does in running
 _AT_SPEED = frozenset({Phase.STEADY, Phase.EVENT})
+
+
+def stall(time: Any, speed: Any, requested: float, share: float = 0.1) -> float | None:
+    """Time [s] from which the speed stays below `share` of the `requested` speed until the end of the run;
+    None where it does not, or only in the last tenth of the run."""
+    below = np.abs(np.asarray(speed)) < share * requested
+    if not below[-1]:
+        return None
+    moving = np.flatnonzero(~below)
+    first = int(moving[-1]) + 1 if moving.size else 0
+    return float(time[first]) if first < 0.9 * len(below) else None
 
 
 def torque_reserve(limit: Any, torque: Any) -> float:

@@ -53,14 +53,14 @@ def start_of(
     report: Callable[[str], None] = lambda what: None,
 ) -> dict[str, float]:
     """Start values of the parameters and inputs of the `model`, by name, with the values of the study: with
-    tuned gains, or with the motor and the ratio that sizing chooses.
+    tuned gains, or with the motor and the ratio that are chosen.
 
     Raises
     ------
     InputError
         where the study has another motor or machine, or no driveline.
     RunError
-        where sizing finds no motor.
+        where no motor is found.
     """
     drive = _drive(config, backend, report)
     if model is CardanDriveline:
@@ -112,7 +112,7 @@ def model_and_start(
     InputError
         see `start_of`, `whole_system` and `chainunit.models.model_named`.
     RunError
-        where sizing finds no motor.
+        where no motor is found.
     """
     if config and is_study_file(name):
         return whole_system(config, backend=backend, report=report)
@@ -132,14 +132,14 @@ def whole_system(
     report: Callable[[str], None] = lambda what: None,
 ) -> tuple[type[Model], dict[str, float]]:
     """The one model of the whole system of a study, and its start values by name: parameters, the speed reference and
-    the loads of normal running. With `sizing` the motor is chosen first.
+    the loads of normal running. Where the file leaves the motor open it is chosen first.
 
     Raises
     ------
     InputError
         where motor or machine is a foreign FMU.
     RunError
-        where sizing finds no motor.
+        where no motor is found.
     """
     drive = _drive(config, backend, report)
     system = study_system(config, drive)
@@ -208,8 +208,8 @@ def _machine(config: Config, model: type[Model], machine: Machine) -> dict[str, 
 def _drive(config: Config, backend: Backend | None, report: Callable[[str], None]) -> Drive:
     with scratch() as folder:
         choice = choose(config, folder, lambda what, done, todo: report(what), backend)
-    if choice.sizing is not None and choice.sizing.chosen_candidate is None:
-        raise RunError(f"[sizing]: {choice.sizing.answer}")
+    if choice.proposal is not None and choice.proposal.insufficient:
+        raise RunError(f"[{choice.proposal.name}]: {choice.proposal.answer}")
     return with_parts_beside(config, choice.drive)
 
 
@@ -220,13 +220,14 @@ def export_study(
     backend: Backend | None = None,
     report: Callable[[str], None] = lambda what: None,
 ) -> str:
-    """Write machine and motor of a study as an SSP package; returns its contents in words. With `sizing` the
-    motor is chosen first. The default experiment is as long as the study's start-up and steady running.
+    """Write machine and motor of a study as an SSP package; returns its contents in words. Where the
+    file leaves the motor open it is chosen first. The default experiment is as long as the study's
+    start-up and steady running.
 
     Raises
     ------
     InputError, RunError
-        see `chainunit.system.ssp.export`; also where sizing finds no motor, or the motor is a foreign FMU.
+        see `chainunit.system.ssp.export`; also where no motor is found, or the motor is a foreign FMU.
     """
     drive = _drive(config, backend, report)
     return export(

@@ -22,6 +22,7 @@ from ..models import MACHINES
 from ..reading.tables import Title, file_form, given_values, merged, packaged, read_table, toml
 from .file_section import FileSection
 from .foreign_machine import foreign_model
+from .registry import registered
 from .sections import CHOICES, SystemTable, sections_of
 
 
@@ -141,7 +142,7 @@ def parts_of(data: Mapping[str, Any], source: str) -> Parts:
         machine = _machine_model(table, source)
     faults.refuse()
     parts = Parts(machine, MOTORS["DcMotor"])
-    if not motor and "motor" not in data and "sizing" not in data:
+    if not motor and "motor" not in data and not motor_is_left(data):
         motor = parts.example.get("system", {}).get("motor", "")
     if not motor:
         return parts
@@ -150,6 +151,11 @@ def parts_of(data: Mapping[str, Any], source: str) -> Parts:
     if motor in MOTORS:
         return Parts(machine, MOTORS[motor])
     return Parts(machine, MOTORS["InductionMotor"], designation=motor)
+
+
+def motor_is_left(data: Mapping[str, Any]) -> bool:
+    """Whether a file leaves the choice of the motor to a capability."""
+    return any(part.motor_table and part.motor_table in data for part in registered())
 
 
 def _machine_model(table: Any, source: str) -> type[MachineModel]:
@@ -257,7 +263,7 @@ def over_example(data: Mapping[str, Any], parts: Parts) -> dict[str, Any]:
         base.pop("ratios", None)
     if parts.motor is not parts_of(base, "").motor:
         base.pop("motor", None)
-    if "motor" in named_table(data, "system") or "sizing" in data or "motor" in data:
+    if "motor" in named_table(data, "system") or motor_is_left(data) or "motor" in data:
         base.get("system", {}).pop("motor", None)
         for name in ("gear", "start", "starter"):
             base.pop(name, None)

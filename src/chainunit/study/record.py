@@ -9,6 +9,7 @@ from typing import Any, Literal, TypeAlias
 import xarray as xr
 
 from ..core.errors import RunError
+from ..drives.catalogue import CatalogueMotor
 from ..drives.speed_control import Tuning
 from ..fmu.backends import Origin
 from ..machines.chain_unit import RodName
@@ -21,11 +22,10 @@ from .drive import Drive
 from .limits import reaches
 from .measures import Answers, not_known
 from .parts import LENGTHS
-from .protection import Alternative, Setting
+from .proposal import DriveProposal
 from .pulls import LeastPull
 from .relay import LIGHT
 from .shaft import Cycles, ShaftAnswers
-from .sizing import SizingResult
 from .statics import DriveStatics
 from .verdict import STEADY, Verdict
 from .window import Phase, Trip, Window, whole_turns
@@ -34,8 +34,6 @@ LOAD_CYCLE = "load_cycle.csv"
 """Name of the file with torque and speed of the motor's shaft in the steady turns."""
 
 
-INSUFFICIENT = "No motor of the catalogue fits; all runs are with the nearest, which is insufficient."
-"""The sentence on a study whose sizing found no motor that fits."""
 SPEED_MISSED = "The motor does not keep the speed asked for."
 """The sentence on a study whose crank does not turn at the requested speed."""
 
@@ -46,10 +44,7 @@ Amount: TypeAlias = (
 
 
 _CHOSEN = ("gear.efficiency", "starter.inverter.boost", SLIP)
-"""Values that sizing chooses where the file leaves them out, see `chainunit.study.choice.as_chosen`."""
-
-Origins: TypeAlias = Literal["file", "example", "declared", "tuned", "catalogue", "sizing"]
-"""The origin of a value."""
+"""Values that follow from a proposed drive where the file leaves them out, see `chainunit.study.choice.as_chosen`."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +104,8 @@ class StudyRecord:
     drive: Drive
     statics: DriveStatics
     tuning: Tuning | None = None
-    sizing: SizingResult | None = None
+    proposal: DriveProposal | None = None
+    """the drive, where a capability chose it"""
     fmus: dict[str, Origin] = field(default_factory=dict)
     """the origin of each FMU"""
     runs: dict[str, xr.Dataset] = field(default_factory=dict)
@@ -135,11 +131,6 @@ class StudyRecord:
     """rainflow cycles of the torque in shaft 2, by run"""
     spreads: dict[str, Spread] = field(default_factory=dict)
     """the spread of each event that rests on an assumption"""
-    setting: Setting | None = None
-    """the recommended safety coupling of a sized drive; None where the file gives a coupling, as that one
-    cuts off the peaks from which the setting follows"""
-    alternatives: tuple[Alternative, ...] = ()
-    """ways to a coupling that a start does not open, where the start is more than running"""
     ripple_without: float | None = None
     """fluctuation of the speed in steady running without the study's feed-forward"""
     relay_class: int = LIGHT
@@ -182,13 +173,12 @@ class StudyRecord:
         """The title of a run for use in sentences."""
         return self.titles.get(run, run.replace("_", " "))
 
-    def origin(self, name: str) -> Origins:
-        """The origin of the value of a quantity, by its name in a study file ("motor.rotor.J"): the file, the
-        example, tuning, the catalogue (by the motor that the file names or that sizing chose), or its
-        declaration."""
+    def origin(self, name: str) -> str:
+        """The origin of the value of a quantity, by its name in a study file ("motor.rotor.J"): "file", "example",
+        "tuned", "catalogue" (by the motor that the file names), the name of a proposal, or "declared"."""
         section, _, parameter = name.partition(".")
-        if name in _CHOSEN and self.sizing is not None and self._of(name) == "declared":
-            return "sizing"
+        if name in _CHOSEN and self.proposal is not None and self._of(name) == "declared":
+            return self.proposal.name
         if name == SLIP and self.config.start == "inverter" and self._of(name) == "declared":
             return "catalogue"
         if section == "motor" and self.tuning is not None and parameter in self.tuning.parameters:
@@ -200,11 +190,11 @@ class StudyRecord:
         if self.config.of_catalogue and (name == "machine.ratio" or section == "motor"):
             name_in_file = self._name_in_file(parameter)
             if not name_in_file:
-                return "catalogue" if self.sizing is None else "sizing"
+                return "catalogue" if self.proposal is None else self.proposal.name
             name = name_in_file
         return self._of(name)
 
-    def _of(self, name: str) -> Origins:
+    def _of(self, name: str) -> str:
         """The origin of a value that only the study file or the example can give."""
         if name in self.config.given:
             return "file"
@@ -213,6 +203,8 @@ class StudyRecord:
     def _name_in_file(self, parameter: str) -> str:
         """The name in a study file of a motor's `parameter`; empty for one that the catalogue sets."""
         config = self.config
+        if self.proposal is not None and parameter in self.proposal.keys:
+            return self.proposal.keys[parameter]
         if parameter == "ratio":
             return "gear.ratio" if self._of("gear.ratio") != "declared" else ""
         group = parameter.partition(".")[0]
@@ -222,9 +214,8 @@ class StudyRecord:
             return ""
         if group in ("soft_start", "inverter"):
             return f"starter.{parameter}"
-        if parameter in ("phi_start", "w_start") or group == "solver":
-            return f"motor.{parameter}"
-        return "sizing.ambient" if parameter == "ambient.T" else ""
+        is_own = parameter in ("phi_start", "w_start", "ambient.T") or group == "solver"
+        return f"motor.{parameter}" if is_own else ""
 
     @property
     def kind(self) -> str:
@@ -265,9 +256,14 @@ class StudyRecord:
         return self.config.steady_begin if self.steady_from is None else self.steady_from
 
     @property
-    def insufficient(self) -> bool:
-        """Whether sizing found no motor that fits, so that all is run with the nearest."""
-        return self.sizing is not None and self.sizing.chosen_candidate is None
+    def plate(self) -> CatalogueMotor | None:
+        """The motor of the catalogue that the file names or that was chosen, if it is one."""
+        return self.config.plate if self.proposal is None else self.proposal.motor
+
+    @property
+    def insufficient(self) -> str:
+        """The sentence on a drive of which none fits, so that all is run with the nearest; empty where one fits."""
+        return "" if self.proposal is None else self.proposal.insufficient
 
     @property
     def not_known(self) -> frozenset[str]:

@@ -65,22 +65,21 @@ def conclude(study: StudyRecord) -> None:
         _on_start(study)
         _on_limits(study)
         _on_steady_running(study, study.answers[STEADY])
-    if study.sizing is not None:
-        for text in study.sizing.notes:
-            note("sizing", "{text}", text=text)
-        if study.insufficient:
-            answer = study.sizing.answer
-            study.warn("insufficient motor", "{answer}. All runs are with it.", answer=answer)
-    if config.coupling is not None and STEADY in study.answers:
-        remark_on_coupling(study, config.coupling.trip_torque)
-    remark_on_rams(study)
+    of_drive = None if study.proposal is None else study.proposal.findings
+    if of_drive is not None:
+        of_drive.remark(study)
+    if config.coupling is not None:
+        if STEADY in study.answers:
+            remark_on_coupling(study, config.coupling.trip_torque)
+        remark_on_rams(study, config.coupling.trip_torque)
     _on_runs(study)
     _on_inverter(study)
     _on_assumptions(study)
     if study.statics.torsion is not None:
         _on_shaft(study)
     for findings in study.findings.values():
-        findings.remark(study)
+        if findings is not of_drive:
+            findings.remark(study)
 
 
 _RATING = ("limit.i", "limit.v", "armature.k")
@@ -96,7 +95,7 @@ def _left_out(study: StudyRecord) -> Iterator[str]:
         yield f"coupling.trip_torque ({number(coupling.trip_torque, 'N.m', full=False)})"
     if config.plate is not None and "system.motor" in config.of_example:
         yield f"the motor ({config.plate.designation})"
-    elif config.sizing is None and config.foreign is None:
+    elif study.proposal is None and config.foreign is None:
         values = study.drive.motor.parameter_layout.by_name(study.drive.parameters)
         units = {v.name: v.unit for v in study.drive.motor.parameter_layout.variables}
         names = [name for name in _RATING if f"motor.{name}" in config.of_example]
@@ -352,7 +351,7 @@ def _on_inverter(study: StudyRecord) -> None:
         )
         study.note("slip compensation", compensated if slip else without, slip=(slip, "Hz/(N.m)"))
     limit = study.config.starter.overload
-    ordered = study.sizing.best.inverter_current if study.sizing else None
+    ordered = study.proposal and study.proposal.inverter_current
     rated_current, whose = (
         (ordered, "to be ordered") if ordered else (rated_current, "with the rated current of the motor")
     )
@@ -455,9 +454,6 @@ def _on_shaft(study: StudyRecord) -> None:
     line, modes = study.drive.line, study.statics.torsion
     assert modes is not None
     warn, note = study.warn, study.note
-    if study.sizing is not None:
-        rigid = "Sizing took the shafts as rigid and the driveline as massless; the runs include it."
-        note("sized without line", rigid)
     if line.d2 == 0.0 and line.d3 == 0.0:
         text = "The driveline has no damping: a vibration, once excited, does not decay; give d2 and d3."
         note("undamped line", text)

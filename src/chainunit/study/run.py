@@ -24,8 +24,6 @@ from .bearings import pin_loads
 from .chain import study_chain
 from .choice import as_chosen, choose, with_parts_beside
 from .config import Config
-from .coupling import recommended_setting
-from .coupling_alternatives import alternatives
 from .event import Event
 from .event_torques import from_event_on
 from .measures import read_answers, read_measure
@@ -65,18 +63,20 @@ def run_study(
     Raises
     ------
     InputError
-        for a communication step that is too long for the driveline, a catalogue that sizing cannot use,
+        for a communication step that is too long for the driveline, a catalogue from which no motor can be chosen,
         random overloads for which the drive has no inputs, and a foreign motor that does not fit or cannot
         save its state.
     """
     with shown_in(config.units):
         choice = choose(config, folder / "fmu", report, backend)
-        config = as_chosen(config, choice.drive)
+        config = as_chosen(config, choice)
         drive = with_parts_beside(config, choice.drive)
         if check and drive.outsiders:
             titles = " and ".join(drive.outsiders)
             raise InputError(f"--check: the equations of {titles} are not known; leave --check out")
-        study = StudyRecord(config, drive, statics(config, drive), choice.tuning, choice.sizing)
+        study = StudyRecord(config, drive, statics(config, drive), choice.tuning, choice.proposal)
+        if choice.proposal is not None:
+            study.findings[choice.proposal.name] = choice.proposal.findings
         unmade = Rig(config, drive, {})
         for part in registered():
             part.check_runs(config, unmade)
@@ -92,8 +92,6 @@ def run_study(
         try:
             runner.run(check, lambda: drive.coasting(folder / "fmu", backend))
             _analyse(study, Work(runner.rig, report, folder, scheduler, runner.stop), needs_runs=True)
-            study.setting = recommended_setting(study)
-            study.alternatives = alternatives(study, runner.rig, report)
         except RunError as error:
             if error.partial is not None:
                 study.runs["unfinished"] = error.partial
@@ -101,7 +99,6 @@ def run_study(
         except KeyboardInterrupt:
             # Ctrl-C came between two runs, or in a run that is not a co-simulation
             study.failure = InterruptedRunError("interrupted")
-        study.setting = study.setting or recommended_setting(study)
         if drive.chain is not None and not isinstance(study.failure, InterruptedRunError):
             _chains(study, files["machine"], report)
         conclude(study)
@@ -261,7 +258,7 @@ class Runner:
             )
 
     def _relay(self, run: xr.Dataset) -> None:
-        """Record the trip class of the relay that the start-up needs; that of a motor chosen by sizing holds from
+        """Record the trip class of the relay that the start-up needs; that of a proposed drive holds from
         every crank angle."""
         study, drive = self.study, self.rig.drive
         assert study.start is not None
@@ -271,8 +268,8 @@ class Runner:
         rise = run.sel(time=slice(None, time))
         current = rise[f"motor.{drive.motor.current}"].values
         study.relay_class = start_class(rise["time"].values, current, rated)
-        if study.sizing is not None:
-            study.relay_class = max(study.relay_class, study.sizing.best.start_class or 0)
+        if study.proposal is not None:
+            study.relay_class = max(study.relay_class, study.proposal.start_class)
 
     def _event(self, simulation: Simulation, event: Event, begin: float, before: float) -> Transient:
         stop = begin + event.follow(self.study.config.turn)

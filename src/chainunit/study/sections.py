@@ -21,7 +21,6 @@ from ..mechanism.models import MachineModel
 from ..system import NAMES
 from .file_section import FileSection
 from .registry import registered
-from .sizing_table import SIZING_KEYS, Sizing
 
 
 @declaration
@@ -257,15 +256,6 @@ class ForeignMotor:
 SECTIONS: Mapping[str, FileSection] = {
     "run": FileSection(Run, title="Run"),
     "coupling": FileSection(Coupling, optional=True, title="Safety coupling"),
-    "sizing": FileSection(
-        Sizing,
-        optional=True,
-        keys=SIZING_KEYS,
-        title="Demands on the motor",
-        apart=True,
-        follows={"inertia_ratio": "none"},
-        order=(("poles_least", ">=", "poles_most"), ("ambient", ">", "temperature")),
-    ),
     "gear": FileSection(
         Transmission,
         default=KINDS["gear"],
@@ -310,7 +300,11 @@ SECTIONS: Mapping[str, FileSection] = {
 @cache
 def all_sections() -> dict[str, FileSection]:
     """The tables of a study file, those of the capabilities included, by name; without those of machine and motor."""
-    return dict(SECTIONS) | {name: each for part in registered() for name, each in part.tables.items()}
+    own = {name: each for part in registered() for name, each in part.tables.items()}
+    tables: dict[str, FileSection] = {}
+    for table, section in SECTIONS.items():
+        tables |= {name: each for name, each in own.items() if each.before == table} | {table: section}
+    return tables | own
 
 
 def sections_of(machine: type[MachineModel], motor: type[Motor]) -> dict[str, FileSection]:

@@ -9,6 +9,7 @@ from ...report.capability import Capability
 from ...report.task import Task
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
+from ...study.parts import motor_is_left
 from ...study.rules import CHAINS, MACHINE_FMU, NEEDS_MODEL, TWO_BARS, Rule
 from .table import FIELDS, Optimize, read_wishes
 from .wishes import Wishes
@@ -41,7 +42,7 @@ class OptimizeCapability(Capability):
         if "optimize" not in reading.data:
             return None
         loads, run = reading.values["feed"], reading.values["run"]
-        by_motor = bool(reading.parts.designation or "sizing" in reading.data)
+        by_motor = bool(reading.parts.designation or motor_is_left(reading.data))
         table, form = reading.values["optimize"], reading.form.optimize
         return read_wishes(
             table, form, reading.parts.machine, reading.machine, loads, run.crank_speed, by_motor

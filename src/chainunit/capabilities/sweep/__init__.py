@@ -10,7 +10,7 @@ from ...report.task import Task
 from ...study.conditions import given, has_entries, has_entry, is_one_of
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
-from ...study.rules import CHAINS, MACHINE_FMU, MOTOR_FMU, NEEDS_MODEL, TWO_BARS, Rule
+from ...study.rules import CHAINS, MACHINE_FMU, MOTOR_FMU, NEEDS_MODEL, TWO_BARS, Rule, motor_is_chosen
 from .plan import SweepPlan
 from .reading import Sweepable, read_plan
 from .table import FIELDS, MEASURES_OF_SWEEP, MOST_RESULTS, MOST_VALUES, SWEPT, SweepTable
@@ -55,7 +55,7 @@ class SweepCapability(Capability):
         """It varies one drive, of which the models are known."""
         yield Rule("sweep", MACHINE_FMU, NEEDS_MODEL)
         yield Rule(
-            "sweep", given("sizing"), "varies one drive, and [sizing] tries many; leave out one of the two"
+            "sweep", motor_is_chosen(), "varies one drive, and [sizing] tries many; leave out one of the two"
         )
         yield Rule(
             "sweep.points",

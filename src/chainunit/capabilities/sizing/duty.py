@@ -12,18 +12,19 @@ from typing import Any
 
 import numpy as np
 
-from ..core.quantities import Value, declaration, quantity
-from ..drives.motor import Motor
-from ..fmu.backends import Backend
-from ..machines.chain_unit import SIDES, SideName
-from ..reading.text import entries
-from ..system.instance import Fmu
-from .chain import HIGH
-from .chain import duty as chain_duty
-from .config import Config
-from .cycle import Cycle, cycle, energy_swing, needed_inertia
-from .drive import Drive
-from .one_sided import all_on_one
+from ...core.quantities import Value, declaration, quantity
+from ...drives.motor import Motor
+from ...fmu.backends import Backend
+from ...machines.chain_unit import SIDES, SideName
+from ...reading.text import entries
+from ...study.chain import HIGH
+from ...study.chain import duty as chain_duty
+from ...study.config import Config
+from ...study.cycle import Cycle, cycle, energy_swing, needed_inertia
+from ...study.drive import Drive
+from ...study.one_sided import all_on_one
+from ...system.instance import Fmu
+from .table import plan_of
 
 
 def rms(*parts: tuple[float, Any]) -> float:
@@ -70,7 +71,7 @@ class Duty:
 
 
 def duty_of(config: Config, folder: Path, backend: Backend | None) -> Duty:
-    """The duty of a study with `sizing`; chains are run by an FMU that is written to `folder`."""
+    """The duty of a study with [sizing]; chains are run by an FMU that is written to `folder`."""
     feed, w = config.feed, config.run.crank_speed
     loads = {side: all_on_one(side, feed) for side in SIDES if side in config.machine.model.sides}
     normal = cycle(config.machine, w, feed)
@@ -101,8 +102,8 @@ def cycle_numbers(
 ) -> CycleNumbers:
     """The numbers of a duty. With all feed on one side the RMS torque is that of the heavier side, and the
     peak the larger of both sides."""
-    assert config.sizing is not None
-    w, share = config.run.crank_speed, config.sizing.one_sided_share
+    w, demands = config.run.crank_speed, plan_of(config).demands
+    share = demands.one_sided_share
     inertia = normal.outputs.J * config.machine.ratio**2
     mean = float(np.mean(normal.crank_torque))
     cases = [(1.0, normal.crank_torque)]
@@ -120,6 +121,6 @@ def cycle_numbers(
         inertia_wanted=needed_inertia(
             float(np.quantile([energy_swing(turn) for turn in np.atleast_2d(normal.crank_torque)], HIGH)),
             w,
-            config.sizing.fluctuation,
+            demands.fluctuation,
         ),
     )

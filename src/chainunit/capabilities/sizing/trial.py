@@ -13,21 +13,19 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..core.engines import MATH
-from ..drives.catalogue import CatalogueMotor
-from ..drives.induction_motor import volts_per_hertz
-from ..drives.motor import T_RATED
-from ..machines.chain_unit import SideName
-from ..system import Simulation
-from .arrays import peak
-from .config import Config
-from .drive import Drive
-from .duty import Duty, rms
-from .limits import Check, heating, keeping_speed, starting
-from .measures import time_to_start
-from .relay import start_class
-from .rig import PATIENCE, Rig
-from .start_runs import (
+from ...core.engines import MATH
+from ...drives.catalogue import CatalogueMotor
+from ...drives.induction_motor import volts_per_hertz
+from ...drives.motor import T_RATED
+from ...machines.chain_unit import SideName
+from ...study.arrays import peak
+from ...study.config import Config
+from ...study.drive import Drive
+from ...study.limits import Check, heating, keeping_speed, starting
+from ...study.measures import time_to_start
+from ...study.relay import start_class
+from ...study.rig import PATIENCE, Rig
+from ...study.start_runs import (
     OVERLOADED,
     StartNumbers,
     exceeded_for,
@@ -36,9 +34,13 @@ from .start_runs import (
     starts_from_all,
     time_above,
 )
-from .torques import DutyPeak, all_feed_on, at_gear, duty_peak
-from .verdict import CREEPS, SETTLING, STEADY
-from .window import BURNT, is_settled
+from ...study.torques import DutyPeak, all_feed_on, at_gear, duty_peak
+from ...study.verdict import CREEPS, SETTLING, STEADY
+from ...study.window import BURNT, is_settled
+from ...system import Simulation
+from .candidate import TrialResult
+from .duty import Duty, rms
+from .table import Sizing, plan_of
 
 _GAP = "motor.air_gap_tau"
 _STANDS = 0.25
@@ -166,19 +168,17 @@ class Trial:
     def breakdown_torque(self) -> float:
         """Breakdown torque of the motor [N m] at its permitted temperature and at the frequency at which it
         runs: above the corner frequency the voltage of an inverter does not rise any more."""
-        assert self.config.sizing is not None
         p = self.drive.fmu_parameters
         voltage = float(volts_per_hertz(MATH, p, self.frequency)) if self.drive.follows else 1.0
-        T = self.config.sizing.temperature
+        T = self._demands.temperature
         return float(self.drive.motor.largest_torque(p, T, voltage * p.supply.V, self.frequency))
 
     @cached_property
     def temperature(self) -> float:
         """Final temperature of the winding if the duty with its starts goes on for ever [K]; `BURNT` where
         there is none."""
-        assert self.config.sizing is not None
         steady, extra = self._heat
-        mean = steady + self.config.sizing.starts_per_hour * extra / 3600.0
+        mean = steady + self._demands.starts_per_hour * extra / 3600.0
         p, motor = self.drive.fmu_parameters, self.drive.motor
         return min(BURNT, motor.settled_temperature(p, mean, self._ran_at, self.speed))
 
@@ -186,15 +186,12 @@ class Trial:
     def permitted_starts(self) -> float:
         """Starts per hour that the winding permits; for a motor on the line at most those that the catalogue
         permits."""
-        assert self.config.sizing is not None
         p, plate = self.drive.fmu_parameters, self.motor.nameplate
-        warm, cold = (
-            1.0 + p.stator.alpha * (T - T_RATED) for T in (self.config.sizing.temperature, self._ran_at)
-        )
+        warm, cold = (1.0 + p.stator.alpha * (T - T_RATED) for T in (self._demands.temperature, self._ran_at))
         # the runs are short and their winding is as cold as the surroundings; a warm winding has larger
         # losses
         running, start = (warm / cold * heat for heat in self._heat)
-        starts = permitted_starts(p, running, start, self._cooling, self.config.sizing.temperature)
+        starts = permitted_starts(p, running, start, self._cooling, self._demands.temperature)
         if plate.starts and self.config.start == "direct":
             # the number of starts in the catalogue is that of the bare rotor
             total = p.rotor.J + float(np.mean(self.drive.load_inertia(self.steady)))
@@ -223,6 +220,10 @@ class Trial:
         return steady, max(0.0, *extra)
 
     @property
+    def _demands(self) -> Sizing:
+        return plan_of(self.config).demands
+
+    @property
     def _running(self) -> tuple[xr.Dataset, ...]:
         """The runs of running: steady, with all feed on each side, and those in which the feed comes or moves."""
         return (self.steady, *(run for _, run in self.shifts), *self.one_sided.values())
@@ -230,17 +231,31 @@ class Trial:
     @property
     def _cases(self) -> list[tuple[float, xr.Dataset]]:
         """The runs of the duty, each with its share of the time."""
-        assert self.config.sizing is not None
         if self.heavier is None:
             return [(1.0, self.steady)]
-        share = float(self.config.sizing.one_sided_share)
+        share = float(self._demands.one_sided_share)
         return [(1.0 - share, self.steady), (share, self.one_sided[self.heavier])]
+
+    def result(self) -> TrialResult:
+        """Its results."""
+        is_started = self.start_time is not None
+        return TrialResult(
+            checks=self.checks(),
+            start_class=self.start_class,
+            start_current=self.start_current,
+            overload_time=self.overload_time,
+            inverter_current=self.inverter_current,
+            speed=self.speed if is_started else None,
+            frequency=self.frequency if is_started else None,
+            duty=self.duty,
+            fluctuation=self.fluctuation,
+            stall_angle=self.stall_angle,
+        )
 
     def checks(self) -> dict[str, Check]:
         """Each value beside its limit, by name; the value is None where the machine does not get up to
         speed."""
-        demands, plate, p = self.config.sizing, self.motor.nameplate, self.drive.fmu_parameters
-        assert demands is not None
+        demands, plate, p = self._demands, self.motor.nameplate, self.drive.fmu_parameters
 
         def at_speed(check: Check) -> Check:
             return check if self.start_time is not None else dataclasses.replace(check, value=None)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterator
 
-from ..reading.text import number
+from ...reading.text import number
+from ...study.config import Config
 from .candidate import Candidate
-from .config import Config
 
 BOOSTS = (0.05, 0.10, 0.15)
 """Shares of the voltage at frequency zero that are tried, in this order."""
@@ -52,25 +52,26 @@ def misses_by_a_hair(c: Candidate) -> bool:
 
 def inverter_needs(best: Candidate, config: Config) -> Iterator[str]:
     """What the inverter has to be, and what it has to be set to."""
-    boost = best.drive.parameters.inverter.boost
+    boost, trial = best.drive.parameters.inverter.boost, best.trial
     if "starter.inverter.boost" not in config.given and best.starts:
         text = f"The inverter needs a voltage boost of {_percent(boost)} at frequency zero (starter.inverter.boost)"
         less = "; with less the motor does not start the machine from every crank angle"
         yield f"{text}{less if boost > BOOSTS[0] else ''}."
-    if best.inverter_current is not None and best.start_current is not None:
+    ordered, highest = trial.inverter_current, trial.start_current
+    if ordered is not None and highest is not None:
         rated, overload = float(best.motor.nameplate.rated_current), _percent(config.starter.overload)
         text = f"The inverter carries {overload} of its rated current for up to 60 s (starter.overload)"
-        if best.inverter_current <= rated:
+        if ordered <= rated:
             yield f"{text}: one with the rated current of the motor suffices, also for the start."
         else:
             yield (
-                f"{text}. The start takes up to {number(best.start_current, 'A')}, "
-                f"{best.start_current / rated:.2g} times the rated current of the motor, and more than this current "
-                f"for {number(best.overload_time, 's')}: order one of at least {number(best.inverter_current, 'A')}."
+                f"{text}. The start takes up to {number(highest, 'A')}, "
+                f"{highest / rated:.2g} times the rated current of the motor, and more than this current "
+                f"for {number(trial.overload_time, 's')}: order one of at least {number(ordered, 'A')}."
             )
     if best.weakened:
         yield (
-            f"The motor runs at {number(best.frequency, 'Hz')}, above its rated "
+            f"The motor runs at {number(trial.frequency, 'Hz')}, above its rated "
             f"{number(best.motor.nameplate.frequency, 'Hz')}: in field weakening, where its breakdown torque falls "
             "with the square of the frequency; gear.ratio or sizing.ratios lead there."
         )

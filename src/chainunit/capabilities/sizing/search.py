@@ -2,38 +2,37 @@
 
 First the cycle is computed by inverse dynamics. Then every candidate is simulated: a start
 under load, steady running, and steady running with all feed on one side. Each check is a utilisation, value
-over limit. Hand formulas (RMS torque, flywheel, relay) are here and in `protection`; all else is read from
-the runs.
+over limit. The hand formulas (RMS torque, flywheel) are here; all else is read from the runs.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
 
-from ..core.errors import InputError, InterruptedRunError, RunError
-from ..core.native.compilers import compiler
-from ..drives.catalogue import CatalogueMotor, catalogue
-from ..drives.gear_ratios import UNITS, gear_unit, next_ratio, ratio_on_offer
-from ..fmu.backends import Backend
-from ..reading.text import entries, number
-from ..work.progress import Report
-from .candidate import Candidate, Standing
-from .catalogue_drive import catalogue_drive, check_ratios, is_of_a_gear, with_wheel
-from .chain import HIGH
-from .config import Config
+from ...core.errors import InputError, InterruptedRunError, RunError
+from ...core.native.compilers import compiler
+from ...drives.catalogue import CatalogueMotor, catalogue
+from ...drives.gear_ratios import UNITS, gear_unit, nearest, next_ratio, ratio_on_offer
+from ...fmu.backends import Backend
+from ...reading.text import number
+from ...study.catalogue_drive import catalogue_drive, with_wheel
+from ...study.chain import HIGH
+from ...study.config import Config
+from ...study.drive import Drive
+from ...study.limits import SPEED_DEVIATION
+from ...study.relay import HEAVIEST, LIGHT, class_words
+from ...study.sections import SOFTER
+from ...work.progress import Report
+from .candidate import Candidate, TrialResult
 from .duty import CycleNumbers, Duty, duty_of
+from .findings import SizingFindings
 from .inverter import inverter_needs, least_boost, misses_by_a_hair
-from .limits import SPEED_DEVIATION
-from .preference import ORDER, choice, poles_rank, rank
-from .relay import HEAVIEST, LIGHT, class_words
-from .sections import SOFTER
-from .sizing_table import SIZING_KEYS
+from .preference import choice, poles_rank, rank
+from .table import plan_of
 from .trial import try_motor
 
 _EVENED = ("speed", "rms_torque", "peak_torque", "temperature")
@@ -49,91 +48,14 @@ _TOLERANCE = SPEED_DEVIATION - 0.005
 deviation is for the slip in the run."""
 
 
-@dataclass
-class SizingResult:
-    """Cycle, candidates in the order of their rank, and the chosen candidate."""
-
-    config: Config
-    duty: Duty
-    candidates: list[Candidate]
-    notes: list[str]
-    motors: int
-    """number of motors of the catalogue with a permitted number of poles; `candidates` are those that were
-    tried"""
-    weak: int = 0
-    """number of motors that were left out, as their rated power does not give the mean power of the cycle with the
-    margin"""
-
-    @property
-    def chosen_candidate(self) -> Candidate | None:
-        """The candidate that was chosen, if one fits."""
-        return self.candidates[0] if self.candidates[0].verdict is Standing.CHOSEN else None
-
-    @property
-    def best(self) -> Candidate:
-        """The candidate that the study goes on with: the chosen one, or the nearest where none fits."""
-        return self.candidates[0]
-
-    @property
-    def answer(self) -> str:
-        """The result of sizing, in a sentence; with the words of `rank`."""
-        count = f"{len(self.candidates)} of {self.motors} were tried"
-        if self.weak:
-            count += f", {self.weak} {'is' if self.weak == 1 else 'are'} too weak by the nameplate"
-        best = f"{self.best.motor.designation}: {self.best.reason}"
-        return (
-            f"{best} ({count})"
-            if self.chosen_candidate
-            else f"no motor of the catalogue fits ({count}); {best}"
-        )
-
-    @property
-    def trade(self) -> tuple[Candidate, Candidate] | None:
-        """The smallest motor that fits with a flywheel, and the next larger one that fits without; None where
-        the candidates do not have both."""
-        fitting = [c for c in self.candidates if c.fits]
-        fitting.sort(key=lambda c: (not c.keeps_margin, c.power, poles_rank(c.motor.nameplate.poles)))
-        with_one = next((c for c in fitting if c.drive.flywheel), None)
-        if with_one is None:
-            return None
-        bare = (c for c in fitting if not c.drive.flywheel and c.power >= with_one.power)
-        without = next(bare, None)
-        return None if without is None else (with_one, without)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Ready for JSON, each number with its unit."""
-        best = self.best
-        assert self.config.sizing is not None
-        return {
-            "asked": entries(self.config.sizing, with_titles=True) | _words_asked(self.config),
-            **self.duty.as_dict(),
-            "flywheel": entries(best.flywheel_numbers(), with_titles=True),
-            "tried": {"value": len(self.candidates), "unit": "1"},
-            "motors": {"value": self.motors, "unit": "1"},
-            "weak": {"value": self.weak, "unit": "1"},
-            "candidates": [c.as_dict() for c in self.candidates],
-            "order": [words.format(larger=f"{self.config.sizing.larger:g}") for words in ORDER.values()],
-            "trade": None if self.trade is None else [self.candidates.index(c) for c in self.trade],
-            "chosen": self.candidates.index(self.chosen_candidate) if self.chosen_candidate else None,
-            "nearest": None if self.chosen_candidate else self.candidates.index(best),
-            "notes": self.notes,
-        }
-
-
-def _words_asked(config: Config) -> dict[str, Any]:
-    """The words and lists of the table [sizing], by key, without empty ones."""
-    words = {key: config.choices[f"sizing.{key}"] for key in SIZING_KEYS}
-    return {key: x for key, x in words.items() if x}
-
-
-def size(config: Config, folder: Path, report: Report, backend: Backend | None = None) -> SizingResult:
+def size(config: Config, folder: Path, report: Report, backend: Backend | None = None) -> SizingFindings:
     """Choose a motor of the catalogue for the study. At least `sizing.candidates` motors are tried, from
     small to large, and then more until one fits with the margin, and none that follows could be preferred to
     it, or the catalogue ends.
 
     Parameters
     ----------
-    config : a study with `sizing`
+    config : a study with [sizing]
     folder : where the FMUs are written
     report, backend : see `chainunit.study.run.run_study`
 
@@ -142,8 +64,7 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
     InputError
         for a catalogue that cannot be read, or that has no motor with the requested numbers of poles.
     """
-    limits = config.sizing
-    assert limits is not None
+    limits = plan_of(config).demands
     motors = [
         m for m in catalogue(config.catalogue) if limits.poles_least <= m.nameplate.poles <= limits.poles_most
     ]
@@ -182,7 +103,36 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
         if c.remedy
     ]
     notes += _needs(candidates[0], config)
-    return SizingResult(config, duty, candidates, notes, len(motors), len(motors) - len(strong))
+    return SizingFindings(plan_of(config), duty, candidates, notes, len(motors), len(motors) - len(strong))
+
+
+def check_ratios(config: Config, motors: Sequence[CatalogueMotor]) -> None:
+    """Refuse `sizing.ratios` with which none of the `motors`, the smallest first, keeps the speed of the crank on the
+    line, at any slip up to the rated one. An inverter keeps the speed with any ratio.
+
+    Raises
+    ------
+    InputError
+        with the ratios that are needed.
+    """
+    ratios, w = plan_of(config).ratios, config.run.crank_speed
+    if not ratios or config.start == "inverter" or "gear.ratio" in config.given:
+        return
+    needed: dict[float, float] = {}
+    for plate in (motor.nameplate for motor in motors):
+        least, most = plate.speed / w, plate.synchronous / w
+        if any((1.0 - SPEED_DEVIATION) * least <= x <= (1.0 + SPEED_DEVIATION) * most for x in ratios):
+            return
+        needed.setdefault(plate.poles, least)
+    wanted = sorted((ratio, poles) for poles, ratio in needed.items())
+    near, _ = min(wanted, key=lambda each: abs(math.log(each[0] / nearest(each[0], ratios))))
+    words = " or ".join(f"{number(ratio, '1', digits=2)} ({poles:g} poles)" for ratio, poles in wanted)
+    raise InputError(
+        f"sizing.ratios: no ratio on offer brings the crank to {number(w, 'rad/s', 'speed')} with a motor of the "
+        f"catalogue: about {words} is needed, the nearest on offer is {nearest(near, ratios):g}; add such a ratio, "
+        "change run.crank_speed, or take an inverter (start)",
+        "sizing.ratios",
+    )
 
 
 def _search(
@@ -195,8 +145,7 @@ def _search(
 ) -> list[Candidate]:
     """The candidates that `size` tries of the `motors`, in the order of their rank. The start of the best one is that
     from the worst crank angle; a candidate that fails in it makes room for the next."""
-    limits = config.sizing
-    assert limits is not None
+    limits = plan_of(config).demands
     candidates: list[Candidate] = []
     files: Mapping[str, Path] | None = {}
     rest = iter(motors)
@@ -210,7 +159,7 @@ def _search(
     while not candidates or not is_over():
         while following is not None and not is_over():
             report(f"simulating {following.designation}", float(len(candidates)), float(len(motors)))
-            candidate = proposal(config, following, duty)
+            candidate = candidate_of(config, following, duty)
             if compiler() is not None and backend != "python" and not candidate.drive.outsiders:
                 files = None  # the candidates run on the compiled system
             elif not files:
@@ -238,7 +187,7 @@ def _remedy(config: Config, c: Candidate, duty: Duty, files: Mapping[str, Path] 
     if config.start != "direct":
         return SOFTER[config.start]
     config = dataclasses.replace(config, start="soft")
-    soft = proposal(config, c.motor, duty, c.drive.ratio)
+    soft = candidate_of(config, c.motor, duty, c.drive.ratio)
     soft.drive = dataclasses.replace(soft.drive, flywheel=c.drive.flywheel)
     judge(config, soft, duty, files, worst_start=True)
     if not soft.fits:
@@ -257,10 +206,10 @@ def _tried(config: Config, bare: Candidate, duty: Duty, files: Mapping[str, Path
     candidate = tried(bare)
     if not bare.drive.follows or "gear.ratio" in config.given or not misses_by_a_hair(candidate):
         return candidate
-    above = next_ratio(bare.drive.ratio, config.choices["sizing.ratios"])
+    above = next_ratio(bare.drive.ratio, plan_of(config).ratios)
     if above is None:
         return candidate
-    other = tried(proposal(config, bare.motor, duty, above))
+    other = tried(candidate_of(config, bare.motor, duty, above))
     return other if other.keeps_margin else candidate
 
 
@@ -268,31 +217,31 @@ def _from_all_angles(
     config: Config, candidates: list[Candidate], duty: Duty, files: Mapping[str, Path] | None
 ) -> None:
     """Rank the candidates, with the start of the best one from all crank angles."""
-    assert config.sizing is not None
+    larger = plan_of(config).demands.larger
 
     def judged(c: Candidate) -> Candidate:
         judge(config, c, duty, files, worst_start=True)
         return c
 
-    rank(candidates, config.sizing.larger)
+    rank(candidates, larger)
     while candidates[0].fits and not candidates[0].worst_start:
         candidates[0] = least_boost(config, candidates[0], judged)
-        rank(candidates, config.sizing.larger)
+        rank(candidates, larger)
 
 
 def _needs(best: Candidate, config: Config) -> Iterator[str]:
     """What has to be ordered beside the usual parts: a relay for a heavy start or the settings of the inverter, a
     second gear unit."""
-    if best.start_class and best.start_class > LIGHT:
-        relay = f"{'of ' if best.start_class <= HEAVIEST else ''}{class_words(best.start_class)}"
+    if best.trial.start_class and best.trial.start_class > LIGHT:
+        relay = f"{'of ' if best.trial.start_class <= HEAVIEST else ''}{class_words(best.trial.start_class)}"
         yield f"The start takes an overload relay {relay}; one of class {LIGHT} may trip in it."
     if best.drive.follows:
         yield from inverter_needs(best, config)
     if best.unit is None:
-        largest = UNITS[config.choices["sizing.gear_kind"]][-1]
+        largest = UNITS[plan_of(config).gear_kind][-1]
         end = (
             f"even of makers with large ratios ends at about {largest.made:g}"
-            if is_of_a_gear(config)
+            if is_made(config)
             else (f"ends at about {largest.largest:g}")
         )
         yield f"A ratio of {best.drive.ratio:g} takes two gear units: a {largest.title} {end}."
@@ -305,7 +254,7 @@ def _is_settled(candidates: list[Candidate], following: CatalogueMotor, larger: 
     if not keeping:
         return False
     best, _ = choice(keeping, larger)
-    is_light = best.unit is not None and (best.start_class or 0) <= LIGHT and not best.drive.flywheel
+    is_light = best.unit is not None and (best.trial.start_class or 0) <= LIGHT and not best.drive.flywheel
     if (
         is_light
         and not best.weakened
@@ -343,7 +292,7 @@ def _without_flywheel(
     least = None
     while rest:
         middle = len(rest) // 2
-        candidate = least_boost(config, proposal(config, rest[middle], duty), judged)
+        candidate = least_boost(config, candidate_of(config, rest[middle], duty), judged)
         if candidate.keeps_margin:
             least = candidate
         too_weak = any(candidate.exceeds(name) for name in candidate.checks if name not in _WORSE_WITH_POWER)
@@ -453,21 +402,29 @@ def too_heavy(c: Candidate) -> bool:
     )
 
 
-def proposal(config: Config, motor: CatalogueMotor, duty: Duty, chosen: float | None = None) -> Candidate:
+def candidate_of(config: Config, motor: CatalogueMotor, duty: Duty, chosen: float | None = None) -> Candidate:
     """A candidate without a flywheel, with the `chosen` ratio, or that which the file gives, or the ratio on offer
     that is nearest to the one at which the crank has its speed."""
-    limits, kind, series = config.sizing, config.choices["sizing.gear_kind"], ""
-    assert limits is not None
-    torque = duty.normal.crank_torque
-    ratios = config.choices["sizing.ratios"]
-    drive = catalogue_drive(config, motor, torque, limits.ambient, chosen)
+    plan, series = plan_of(config), ""
+
+    def with_ratio(ratio: float | None) -> Drive:
+        return catalogue_drive(
+            config, motor, duty.normal.crank_torque, plan.demands.ambient, ratio, plan.offer
+        )
+
+    drive = with_ratio(chosen)
     if chosen is not None:
-        series = "own list" if ratios else "R80"
+        series = "own list" if plan.ratios else "R80"
     elif "gear.ratio" not in config.given:
-        ratio, series = ratio_on_offer(drive.ratio, config.choices["sizing.ratio_series"], ratios, _TOLERANCE)
-        drive = catalogue_drive(config, motor, torque, limits.ambient, ratio)
-    unit = gear_unit(kind, drive.ratio, is_given=is_of_a_gear(config))
-    return Candidate(motor, drive, {}, limits.margin, unit, series)
+        ratio, series = ratio_on_offer(drive.ratio, plan.ratio_series, plan.ratios, _TOLERANCE)
+        drive = with_ratio(ratio)
+    unit = gear_unit(plan.gear_kind, drive.ratio, is_given=is_made(config))
+    return Candidate(motor, drive, margin=plan.demands.margin, unit=unit, series=series)
+
+
+def is_made(config: Config) -> bool:
+    """Whether the ratios are those of gears that there are: the file gives one, or a list of them."""
+    return "gear.ratio" in config.given or plan_of(config).offer.is_made
 
 
 def judge(
@@ -478,18 +435,11 @@ def judge(
     *,
     worst_start: bool = False,
 ) -> None:
-    """Try a candidate and fill in its checks; with `worst_start` its start is that from the worst crank angle."""
+    """Try a candidate and fill in its results; with `worst_start` its start is that from the worst crank angle."""
     c.worst_start = worst_start
     try:
-        trial = try_motor(config, c.motor, c.drive, duty, files, worst_start=worst_start)
+        c.trial = try_motor(config, c.motor, c.drive, duty, files, worst_start=worst_start).result()
     except InterruptedRunError:
         raise
     except RunError as error:
-        c.checks, c.reason = {}, f"its run failed: {error}"
-        return
-    c.checks, c.fluctuation = trial.checks(), trial.fluctuation
-    c.duty, c.stall_angle = trial.duty, trial.stall_angle
-    c.start_class, c.start_current = trial.start_class, trial.start_current
-    c.inverter_current, c.overload_time = trial.inverter_current, trial.overload_time
-    if trial.start_time is not None:
-        c.speed, c.frequency = trial.speed, trial.frequency
+        c.trial, c.reason = TrialResult(), f"its run failed: {error}"
