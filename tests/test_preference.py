@@ -15,6 +15,7 @@ from chainunit.capabilities.sizing import search as sizing
 from chainunit.capabilities.sizing.candidate import Candidate, Criterion, Standing, TrialResult
 from chainunit.capabilities.sizing.duty import duty_of
 from chainunit.capabilities.sizing.inverter import inverter_needs, least_boost, misses_by_a_hair
+from chainunit.capabilities.sizing.motor_trials import MotorTrials
 from chainunit.capabilities.sizing.preference import ORDER, poles_rank, rank
 from chainunit.drives.catalogue import catalogue
 from chainunit.drives.disc import DENSITY, steel_disc
@@ -336,7 +337,7 @@ def proposed(more, motor="IE3 4-pole 1.1 kW, 90S", start="direct"):
     config = parse(f'start = "{start}"\n{HEAVY_MACHINE}{more}')
     plate = next(m for m in catalogue() if m.designation == motor)
     turn = SimpleNamespace(crank_torque=np.full(10, 60.0))
-    return config, sizing.candidate_of(config, plate, SimpleNamespace(normal=turn))
+    return config, MotorTrials(config, SimpleNamespace(normal=turn)).candidate(plate)
 
 
 def test_a_file_chooses_the_ratios():
@@ -364,16 +365,16 @@ def test_the_kind_of_gear_has_its_efficiency_and_its_unit():
 
 
 def test_a_heavy_start_and_a_second_gear_are_named():
-    config = parse(f"{HEAVY_MACHINE}[sizing]\n")
-    assert [*sizing._needs(made("a"), config)] == []
-    (relay,) = sizing._needs(made("a", start_class=20), config)
+    trials = MotorTrials(parse(f"{HEAVY_MACHINE}[sizing]\n"), SimpleNamespace())
+    assert [*sizing._needs(made("a"), trials)] == []
+    (relay,) = sizing._needs(made("a", start_class=20), trials)
     assert relay == "The start takes an overload relay of class 20; one of class 10 may trip in it."
-    (relay,) = sizing._needs(made("a", start_class=HEAVIER), config)
+    (relay,) = sizing._needs(made("a", start_class=HEAVIER), trials)
     assert "heavier than class 30" in relay
-    (gear,) = sizing._needs(made("a", unit=None), config)
+    (gear,) = sizing._needs(made("a", unit=None), trials)
     assert gear.endswith("takes two gear units: a three-stage helical gear ends at about 250.")
     # a ratio that the file gives takes two only beyond all that makers have in one unit, and the reason is told
-    given = parse(f"{HEAVY_MACHINE}[sizing]\n[gear]\nratio = 400\n")
+    given = dataclasses.replace(trials, config=parse(f"{HEAVY_MACHINE}[sizing]\n[gear]\nratio = 400\n"))
     (gear,) = sizing._needs(made("a", unit=gear_unit("helical", 400.0, is_given=True)), given)
     assert gear.endswith("a three-stage helical gear even of makers with large ratios ends at about 350.")
     assert [*sizing._needs(made("a", unit=gear_unit("helical", 300.0, is_given=True)), given)] == []
@@ -466,7 +467,7 @@ def test_a_gear_that_the_start_alone_breaks_asks_for_a_soft_start(tmp_path, monk
     # the soft start, computed by itself
     text = (EXAMPLES / "beam_pump.toml").read_text("utf-8")
     config = parse(f'start = "soft"\n{text}', str(EXAMPLES / "beam_pump.toml"))
-    drive = sizing.candidate_of(config, best.motor, result.duty).drive
+    drive = MotorTrials(config, result.duty).candidate(best.motor).drive
     hardest = max(each.gear_torque for each in starts_from_all(Rig(config, drive, None), 3.0))
     words = f'with start = "soft" it fits, and puts {number(hardest, "N.m")} on the gear in a start'
     assert words in result.answer
@@ -488,8 +489,8 @@ def test_an_inverter_takes_the_next_ratio_before_a_larger_motor(tmp_path, monkey
     best = result.best
     assert result.chosen_candidate is best and best.motor.designation == "IE3 4-pole 11 kW, 160M"
     assert (best.drive.ratio, best.series) == (185.0, "R80") and best.use <= 0.9
-    bare = sizing.candidate_of(config, best.motor, duty_of(config, tmp_path, None))
-    sizing.judge(config, bare, result.duty, None)
+    bare = MotorTrials(config, duty_of(config, tmp_path, None)).candidate(best.motor)
+    MotorTrials(config, result.duty).judged(bare)
     assert bare.drive.ratio == 180.0 and misses_by_a_hair(bare) and 0.9 < bare.sizes["rms_torque"] < 0.95
     # the inverter: boost, current, and no class of a relay
     rated = best.motor.nameplate.rated_current
@@ -549,17 +550,16 @@ def test_a_motor_that_fails_from_the_worst_angle_makes_room_for_the_next(monkeyp
     """The search goes on behind it, up to a motor that starts from every angle."""
     motors = [m for m in catalogue() if m.nameplate.poles == 4.0][:5]
 
-    def judge(config, c, duty, files, *, worst_start=False):
+    def judged(self, c, *, worst_start=False):
         time = 5.0 if worst_start and c.power < motors[2].nameplate.power else 1.0
         c.worst_start, c.trial = worst_start, TrialResult({"start": Check("time to start", time, 2.0, "s")})
+        return c
 
-    monkeypatch.setattr(sizing, "judge", judge)
-    monkeypatch.setattr(
-        sizing, "with_flywheel", lambda config, c, duty, files: judge(config, c, duty, files) or c
-    )
+    monkeypatch.setattr(MotorTrials, "judged", judged)
+    monkeypatch.setattr(MotorTrials, "with_flywheel", judged)
     config, _ = proposed("[sizing]\ncandidates = 1\n")
     duty = SimpleNamespace(normal=SimpleNamespace(crank_torque=np.full(10, 60.0)))
-    best, *others = sizing._search(config, motors, duty, Path(), lambda *said: None, None)
+    best, *others = sizing._search(MotorTrials(config, duty), motors, lambda *said: None)
     assert best.motor is motors[2] and best.fits and best.worst_start
     assert sorted(c.power for c in others) == [m.nameplate.power for m in motors[:2]] and not any(
         c.fits for c in others
@@ -628,7 +628,7 @@ def test_a_motor_that_stalls_without_a_flywheel_is_told_so(tmp_path, monkeypatch
     (c,) = result.candidates
     assert result.chosen_candidate is None
     bare = dataclasses.replace(c, drive=dataclasses.replace(c.drive, flywheel=0.0))
-    sizing.judge(parse(PRESS, str(EXAMPLES / "linkages" / "press.toml")), bare, result.duty, None)
+    MotorTrials(parse(PRESS, str(EXAMPLES / "linkages" / "press.toml")), result.duty).judged(bare)
     rank(alone := [bare], 2.0)
     assert "without a flywheel it stalls at 2" in alone[0].reason and "deg" in alone[0].reason
     assert c.reason.endswith("and no flywheel that sizing.inertia_ratio = 2 permits carries it through")
@@ -654,19 +654,19 @@ def test_the_next_motor_without_a_flywheel_is_found_below_a_gear_that_the_larges
     motors = [m for m in catalogue() if m.nameplate.poles == 4.0][:9]
     tried = []
 
-    def bare(config, motor, duty):
+    def bare(self, motor):
         return made(motor.designation, motor.nameplate.power)
 
-    def judge(config, c, duty, files):
+    def judged(self, c, **options):
         tried.append(c.power)
         load, hard = (Check("", used, 1.0, "1") for used in (1800.0 / c.power, c.power / 4000.0))
         c.trial = TrialResult({"rms_torque": load, "gear_start": hard})
+        return c
 
-    monkeypatch.setattr(sizing, "candidate_of", bare)
-    monkeypatch.setattr(sizing, "least_boost", lambda config, c, judged: judged(c))
-    monkeypatch.setattr(sizing, "judge", judge)
+    monkeypatch.setattr(MotorTrials, "candidate", bare)
+    monkeypatch.setattr(MotorTrials, "with_least_boost", judged)
     small = made("small", 550.0, flywheel=0.5)
-    found = sizing._without_flywheel(config, motors, [small], SimpleNamespace(), None)
+    found = sizing._without_flywheel(MotorTrials(config, SimpleNamespace()), motors, [small])
     assert found.power == 2200.0 and len(tried) <= 4
 
 
@@ -677,12 +677,13 @@ def test_the_next_motor_without_a_flywheel_gets_its_boost(monkeypatch):
     small.drive = dataclasses.replace(small.drive, flywheel=0.5)
     motors = [m for m in catalogue() if m.nameplate.poles == small.motor.nameplate.poles][:6]
 
-    def judge(config, c, duty, files):
+    def judged(self, c, **options):
         starts = c.drive.parameters.inverter.boost >= 0.1
         c.trial = TrialResult({"start": Check("time to start", 1.0 if starts else None, 2.0, "s")})
+        return c
 
-    monkeypatch.setattr(sizing, "judge", judge)
+    monkeypatch.setattr(MotorTrials, "judged", judged)
     duty = SimpleNamespace(normal=SimpleNamespace(crank_torque=np.full(10, 60.0)))
-    found = sizing._without_flywheel(config, motors, [small], duty, None)
+    found = sizing._without_flywheel(MotorTrials(config, duty), motors, [small])
     larger = [m for m in motors if m.nameplate.power > small.power]
     assert found.motor is larger[0] and found.drive.parameters.inverter.boost == 0.1

@@ -15,9 +15,11 @@ from event_tables import HEAVY_MACHINE, demanding, event_line
 from systems import component
 from typer.testing import CliRunner
 
+from chainunit.capabilities.sizing import motor_trials
 from chainunit.capabilities.sizing import search as sizing
 from chainunit.capabilities.sizing.candidate import Criterion, Standing, TrialResult
 from chainunit.capabilities.sizing.duty import duty_of, rms
+from chainunit.capabilities.sizing.motor_trials import MotorTrials, torque_evening_inertia
 from chainunit.capabilities.sizing.trial import Trial, permitted_starts, try_motor
 from chainunit.core.engines import MATH
 from chainunit.core.errors import InputError, InterruptedRunError
@@ -158,12 +160,13 @@ def wheel_of(monkeypatch, wanted, inertia, sizes):
     their limits with a flywheel; there are 0.25 kg m2 on the shaft, and `inertia` at the crank."""
     trials = []
 
-    def judge(config, candidate, duty, files):
+    def judged(self, candidate):
         trials.append(candidate.drive.flywheel)
         used = sizes(candidate.drive.flywheel)
         candidate.trial = TrialResult({name: Check(name, share, 1.0, "1") for name, share in used.items()})
+        return candidate
 
-    monkeypatch.setattr(sizing, "judge", judge)
+    monkeypatch.setattr(MotorTrials, "judged", judged)
     # of the mean alone, so that the range follows from the speed
     numbers = SimpleNamespace(
         inertia_wanted=wanted, inertia_mean=inertia, torque_mean=1.0, torque_rms=1.0, torque_peak=1.0
@@ -172,7 +175,7 @@ def wheel_of(monkeypatch, wanted, inertia, sizes):
     plate = SimpleNamespace(torque=10.0, synchronous=105.0, speed=100.0)
     bare = sizing.Candidate(SimpleNamespace(nameplate=plate), Wheeled())
     config = SimpleNamespace(run=SimpleNamespace(crank_speed=2.0), start="direct")
-    return sizing.with_flywheel(config, bare, SimpleNamespace(numbers=numbers), {}), trials
+    return MotorTrials(config, SimpleNamespace(numbers=numbers)).with_flywheel(bare), trials
 
 
 def test_the_inertia_that_evens_the_torque():
@@ -185,9 +188,7 @@ def test_the_inertia_that_evens_the_torque():
     motor = SimpleNamespace(nameplate=plate)
 
     def inertia(**checks):
-        return sizing.torque_evening_inertia(
-            sizing.Candidate(motor, Wheeled(), TrialResult(checks)), numbers, 2.0
-        )
+        return torque_evening_inertia(sizing.Candidate(motor, Wheeled(), TrialResult(checks)), numbers, 2.0)
 
     J = inertia(rms_torque=Check("", 8.0, 7.0, "N.m"))
     assert 32.0 / (1.0 + (2.0 * J / 2.0) ** 2) == pytest.approx(13.0)
@@ -286,7 +287,7 @@ def test_peaks_are_of_both_sides(sized, tmp_path):
 def test_the_crank_turns_as_asked(sized, tmp_path, series, tolerance):
     """With the exact ratio; with a preferred one nearly."""
     config = parse(f'{HEAVY}ratio_series = "{series}"\n')
-    drive = sizing.candidate_of(config, sized.chosen_candidate.motor, sized.duty).drive
+    drive = MotorTrials(config, sized.duty).candidate(sized.chosen_candidate.motor).drive
     files, _ = drive.export(tmp_path)
     with Rig(config, drive, files).from_rest() as simulation:
         simulation.run(8.0, 1e-3)
@@ -486,9 +487,9 @@ def test_above_the_corner_an_inverter_has_less_torque(tmp_path, monkeypatch):
     lighter = dataclasses.replace(
         c, drive=dataclasses.replace(c.drive, flywheel=(1.0 - step) * c.drive.flywheel)
     )
-    sizing.judge(config, lighter, outcome.duty, None)
+    MotorTrials(config, outcome.duty).judged(lighter)
     assert lighter.sizes["peak_torque"] > 0.9
-    monkeypatch.setattr(sizing, "torque_evening_inertia", lambda *of: 0.0)
+    monkeypatch.setattr(motor_trials, "torque_evening_inertia", lambda *of: 0.0)
     (light,) = sizing.size(config, tmp_path, lambda *said: None).candidates
     assert light.verdict is Standing.INSUFFICIENT and "peak torque" in light.reason
     assert light.drive.flywheel < 0.1 * c.drive.flywheel
@@ -498,7 +499,7 @@ def test_the_peak_torque_is_that_of_the_feed_that_moves_too(tmp_path, monkeypatc
     """A motor that breaks down while the feed moves to one side stalls there."""
     config = one_candidate("", fluctuation=0.9)
     duty = duty_of(config, tmp_path, None)
-    c = sizing.candidate_of(config, small(1)[0], duty)
+    c = MotorTrials(config, duty).candidate(small(1)[0])
     trial = try_motor(config, c.motor, c.drive, duty, None)
     assert len(trial.shifts) >= 2
     longest = max(trial.shifts, key=lambda shift: np.max(np.abs(shift[1]["motor.air_gap_tau"].values)))[1]

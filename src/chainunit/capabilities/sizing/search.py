@@ -2,50 +2,38 @@
 
 First the cycle is computed by inverse dynamics. Then every candidate is simulated: a start
 under load, steady running, and steady running with all feed on one side. Each check is a utilisation, value
-over limit. The hand formulas (RMS torque, flywheel) are here; all else is read from the runs.
+over limit.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from ...core.errors import InputError, InterruptedRunError, RunError
+from ...core.errors import InputError
 from ...core.native.compilers import compiler
 from ...drives.catalogue import CatalogueMotor, catalogue
-from ...drives.gear_ratios import UNITS, gear_unit, nearest, next_ratio, ratio_on_offer
+from ...drives.gear_ratios import UNITS, nearest
 from ...fmu.backends import Backend
 from ...reading.text import number
-from ...study.catalogue_drive import catalogue_drive, with_wheel
 from ...study.chain import HIGH
 from ...study.config import Config
-from ...study.drive import Drive
 from ...study.limits import SPEED_DEVIATION
 from ...study.relay import HEAVIEST, LIGHT, class_words
 from ...study.sections import SOFTER
 from ...work.progress import Report
-from .candidate import Candidate, TrialResult
-from .duty import CycleNumbers, Duty, duty_of
+from .candidate import Candidate
+from .duty import Duty, duty_of
 from .findings import SizingFindings
-from .inverter import inverter_needs, least_boost, misses_by_a_hair
+from .inverter import inverter_needs
+from .motor_trials import MotorTrials
 from .preference import choice, poles_rank, rank
 from .table import plan_of
-from .trial import try_motor
 
-_EVENED = ("speed", "rms_torque", "peak_torque", "temperature")
-"""Checks that a flywheel improves: it evens the speed, and with it the torque of a varying load."""
-_WORSE_WITH_INERTIA = ("start", "inertia")
-"""Checks that a flywheel makes worse."""
 _WORSE_WITH_POWER = ("gear_start",)
 """Checks that a larger motor makes worse."""
-_SMALL = 0.1
-"""Inertia of a flywheel, relative to all other inertia, below which it hardly evens the speed."""
-_TOLERANCE = SPEED_DEVIATION - 0.005
-"""Relative deviation of the crank speed up to which a ratio of a series is taken; the rest of the permitted
-deviation is for the slip in the run."""
 
 
 def size(config: Config, folder: Path, report: Report, backend: Backend | None = None) -> SizingFindings:
@@ -96,13 +84,13 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
             f"{number(power, 'W')}: the largest were tried."
         )
         strong = [m for m in motors if m.nameplate.power == motors[-1].nameplate.power]
-    candidates = _search(config, strong, duty, folder, report, backend)
+    candidates = _search(_trials(config, strong[0], duty, folder, report, backend), strong, report)
     notes += [
         f"{c.motor.designation} would be preferred, but for its start: {c.reason}."
         for c in candidates[1:]
         if c.remedy
     ]
-    notes += _needs(candidates[0], config)
+    notes += _needs(candidates[0], MotorTrials(config, duty))
     return SizingFindings(plan_of(config), duty, candidates, notes, len(motors), len(motors) - len(strong))
 
 
@@ -135,113 +123,89 @@ def check_ratios(config: Config, motors: Sequence[CatalogueMotor]) -> None:
     )
 
 
-def _search(
-    config: Config,
-    motors: list[CatalogueMotor],
-    duty: Duty,
-    folder: Path,
-    report: Report,
-    backend: Backend | None,
-) -> list[Candidate]:
+def _trials(
+    config: Config, motor: CatalogueMotor, duty: Duty, folder: Path, report: Report, backend: Backend | None
+) -> MotorTrials:
+    """The trials of motors such as this one: on the compiled system where there is a compiler."""
+    trials = MotorTrials(config, duty)
+    drive = trials.candidate(motor).drive
+    if compiler() is not None and backend != "python" and not drive.outsiders:
+        return trials
+    files, _ = drive.export(folder, backend, lambda what: report(what, 0.0, 1.0))
+    return dataclasses.replace(trials, files=files)
+
+
+def _search(trials: MotorTrials, motors: list[CatalogueMotor], report: Report) -> list[Candidate]:
     """The candidates that `size` tries of the `motors`, in the order of their rank. The start of the best one is that
     from the worst crank angle; a candidate that fails in it makes room for the next."""
-    limits = plan_of(config).demands
+    demands = trials.plan.demands
     candidates: list[Candidate] = []
-    files: Mapping[str, Path] | None = {}
     rest = iter(motors)
     following = next(rest, None)
 
     def is_over() -> bool:
         if following is None:
             return True
-        return len(candidates) >= limits.candidates and _is_settled(candidates, following, limits.larger)
+        return len(candidates) >= demands.candidates and _is_settled(candidates, following, demands.larger)
 
     while not candidates or not is_over():
         while following is not None and not is_over():
             report(f"simulating {following.designation}", float(len(candidates)), float(len(motors)))
-            candidate = candidate_of(config, following, duty)
-            if compiler() is not None and backend != "python" and not candidate.drive.outsiders:
-                files = None  # the candidates run on the compiled system
-            elif not files:
-                files, _ = candidate.drive.export(folder, backend, partial(_exporting, report))
-            candidates.append(_tried(config, candidate, duty, files))
+            candidates.append(trials.best_of(following))
             following = next(rest, None)
-        _from_all_angles(config, candidates, duty, files)
+        _from_all_angles(trials, candidates)
     if candidates[0].fits and candidates[0].drive.flywheel:
         report("a larger motor without a flywheel", 0.0, 1.0)
-        if (larger := _without_flywheel(config, motors, candidates, duty, files)) is not None:
+        if (larger := _without_flywheel(trials, motors, candidates)) is not None:
             candidates.append(larger)
-            _from_all_angles(config, candidates, duty, files)
+            _from_all_angles(trials, candidates)
     hard = [c for c in candidates if c.breaks_gear]
-    best, _ = choice([candidates[0], *hard], limits.larger) if hard else (candidates[0], {})
+    best, _ = choice([candidates[0], *hard], demands.larger) if hard else (candidates[0], {})
     if best.breaks_gear:
         report("a softer start", 0.0, 1.0)
-        best.remedy = _remedy(config, best, duty, files)
-        rank(candidates, limits.larger)
+        best.remedy = _remedy(trials, best)
+        rank(candidates, demands.larger)
     return candidates
 
 
-def _remedy(config: Config, c: Candidate, duty: Duty, files: Mapping[str, Path] | None) -> str:
+def _remedy(trials: MotorTrials, c: Candidate) -> str:
     """What makes a candidate fit whose start alone is too hard for the gear: on the line it is tried with a soft
     starter."""
-    if config.start != "direct":
-        return SOFTER[config.start]
-    config = dataclasses.replace(config, start="soft")
-    soft = candidate_of(config, c.motor, duty, c.drive.ratio)
+    start = trials.config.start
+    if start != "direct":
+        return SOFTER[start]
+    softly = dataclasses.replace(trials, config=dataclasses.replace(trials.config, start="soft"))
+    soft = softly.candidate(c.motor, c.drive.ratio)
     soft.drive = dataclasses.replace(soft.drive, flywheel=c.drive.flywheel)
-    judge(config, soft, duty, files, worst_start=True)
-    if not soft.fits:
+    if not softly.judged(soft, worst_start=True).fits:
         return SOFTER["direct"]
-    start = soft.checks["gear_start"]
-    return f'with start = "soft" it fits, and puts {number(start.value, start.unit)} on the gear in a start'
+    check = soft.checks["gear_start"]
+    return f'with start = "soft" it fits, and puts {number(check.value, check.unit)} on the gear in a start'
 
 
-def _tried(config: Config, bare: Candidate, duty: Duty, files: Mapping[str, Path] | None) -> Candidate:
-    """The candidate with the least flywheel, and with an inverter with the least boost. Where it then misses its
-    limits by a hair, it gets the ratio above, as an inverter keeps the speed of the crank with either ratio."""
-
-    def tried(c: Candidate) -> Candidate:
-        return least_boost(config, c, lambda each: with_flywheel(config, each, duty, files))
-
-    candidate = tried(bare)
-    if not bare.drive.follows or "gear.ratio" in config.given or not misses_by_a_hair(candidate):
-        return candidate
-    above = next_ratio(bare.drive.ratio, plan_of(config).ratios)
-    if above is None:
-        return candidate
-    other = tried(candidate_of(config, bare.motor, duty, above))
-    return other if other.keeps_margin else candidate
-
-
-def _from_all_angles(
-    config: Config, candidates: list[Candidate], duty: Duty, files: Mapping[str, Path] | None
-) -> None:
+def _from_all_angles(trials: MotorTrials, candidates: list[Candidate]) -> None:
     """Rank the candidates, with the start of the best one from all crank angles."""
-    larger = plan_of(config).demands.larger
-
-    def judged(c: Candidate) -> Candidate:
-        judge(config, c, duty, files, worst_start=True)
-        return c
-
+    larger = trials.plan.demands.larger
     rank(candidates, larger)
     while candidates[0].fits and not candidates[0].worst_start:
-        candidates[0] = least_boost(config, candidates[0], judged)
+        candidates[0] = trials.with_least_boost(candidates[0], worst_start=True)
         rank(candidates, larger)
 
 
-def _needs(best: Candidate, config: Config) -> Iterator[str]:
+def _needs(best: Candidate, trials: MotorTrials) -> Iterator[str]:
     """What has to be ordered beside the usual parts: a relay for a heavy start or the settings of the inverter, a
     second gear unit."""
-    if best.trial.start_class and best.trial.start_class > LIGHT:
-        relay = f"{'of ' if best.trial.start_class <= HEAVIEST else ''}{class_words(best.trial.start_class)}"
+    relay_class = best.trial.start_class or 0
+    if relay_class > LIGHT:
+        relay = f"{'of ' if relay_class <= HEAVIEST else ''}{class_words(relay_class)}"
         yield f"The start takes an overload relay {relay}; one of class {LIGHT} may trip in it."
     if best.drive.follows:
-        yield from inverter_needs(best, config)
+        yield from inverter_needs(best, trials.config)
     if best.unit is None:
-        largest = UNITS[plan_of(config).gear_kind][-1]
+        largest = UNITS[trials.plan.gear_kind][-1]
         end = (
             f"even of makers with large ratios ends at about {largest.made:g}"
-            if is_made(config)
+            if trials.is_made
             else (f"ends at about {largest.largest:g}")
         )
         yield f"A ratio of {best.drive.ratio:g} takes two gear units: a {largest.title} {end}."
@@ -265,11 +229,7 @@ def _is_settled(candidates: list[Candidate], following: CatalogueMotor, larger: 
 
 
 def _without_flywheel(
-    config: Config,
-    motors: list[CatalogueMotor],
-    candidates: list[Candidate],
-    duty: Duty,
-    files: Mapping[str, Path] | None,
+    trials: MotorTrials, motors: list[CatalogueMotor], candidates: list[Candidate]
 ) -> Candidate | None:
     """The next larger motor that fits without a flywheel, of the best candidate's number of poles; None where
     the candidates have one, or the `motors` none."""
@@ -283,163 +243,13 @@ def _without_flywheel(
         for m in motors
         if m.nameplate.poles == poles and m.nameplate.power > best.power and m.designation not in tried
     ]
-
-    def judged(c: Candidate) -> Candidate:
-        judge(config, c, duty, files)
-        return c
-
     # a larger motor runs more evenly, but puts more on the gear in its start: the largest may not fit
     least = None
     while rest:
         middle = len(rest) // 2
-        candidate = least_boost(config, candidate_of(config, rest[middle], duty), judged)
+        candidate = trials.with_least_boost(trials.candidate(rest[middle]))
         if candidate.keeps_margin:
             least = candidate
         too_weak = any(candidate.exceeds(name) for name in candidate.checks if name not in _WORSE_WITH_POWER)
         rest = rest[middle + 1 :] if too_weak else rest[:middle]
     return least
-
-
-def _exporting(report: Report, what: str) -> None:
-    report(what, 0.0, 1.0)
-
-
-def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[str, Path] | None) -> Candidate:
-    """The candidate with the least flywheel, to about a tenth, that keeps the permitted fluctuation and the
-    limits of torque and temperature. It has no flywheel where none is needed, or where it exceeds a limit
-    that no flywheel improves. If such a flywheel exceeds another limit, it is the flywheel that comes nearest
-    to all limits. A motor that stalls in the peak of the cycle may run with a flywheel, which carries it through.
-
-    The largest flywheel that is tried is that of the hand formulas for speed and torque. It is on the safe
-    side for the speed, as the formula leaves out that a motor's torque falls with speed, which evens the
-    speed, too. None is tried where this flywheel is a small part of the other inertia."""
-    there = bare.drive.rotor_inertia + duty.numbers.inertia_mean / bare.drive.ratio**2
-    trials: list[Candidate] = []
-
-    def trial_with(flywheel: float) -> Candidate:
-        candidate = dataclasses.replace(bare, drive=with_wheel(config, bare.drive, flywheel))
-        judge(config, candidate, duty, files)
-        trials.append(candidate)
-        return candidate
-
-    def heavy_enough(candidate: Candidate) -> bool:
-        if candidate.checks and not candidate.starts:
-            # it stalls for want of inertia, unless it starts with less
-            return any(c.starts for c in trials if c.drive.flywheel < candidate.drive.flywheel)
-        return too_heavy(candidate) or is_even(candidate)
-
-    first = trial_with(0.0)
-    mean = duty.numbers.torque_mean / bare.drive.ratio
-    if heavy_enough(first) or mean > bare.motor.nameplate.torque:
-        return first
-    inertia = duty.numbers.inertia_wanted / bare.drive.ratio**2 / (1.0 - bare.margin)
-    whole = max(inertia, torque_evening_inertia(first, duty.numbers, config.run.crank_speed)) - there
-    if whole < _SMALL * there:
-        return first
-    below = 0.0
-    for share in (0.03, 0.1, 0.3, 1.0):
-        if heavy_enough(trial_with(share * whole)):
-            break
-        below = share
-    else:
-        return _nearest(trials)
-    for _ in range(3):
-        middle = 0.5 * (below + share)
-        if heavy_enough(trial_with(middle * whole)):
-            share = middle
-        else:
-            below = middle
-    solutions = [c for c in trials if is_even(c) and not too_heavy(c)]
-    return min(solutions, key=lambda c: c.drive.flywheel) if solutions else _nearest(trials)
-
-
-def _nearest(trials: list[Candidate]) -> Candidate:
-    """The trial that comes nearest to all limits; where none starts, the one without a flywheel."""
-    best = min(trials, key=lambda c: c.violation)
-    best.heaviest = max(c.drive.flywheel for c in trials)
-    best.bound = next((c.checks["inertia"].limit for c in trials if c.exceeds("inertia")), None)
-    return best
-
-
-def torque_evening_inertia(c: Candidate, numbers: CycleNumbers, crank_speed: float) -> float:
-    """Inertia on the motor's shaft [kg m2] that brings the RMS and peak torque of a candidate down to their
-    limits, by hand; 0 where it exceeds neither limit, or where the mean torque alone exceeds one.
-
-    A motor whose torque falls by D [N m s/rad] with speed gives 1/sqrt(1 + (n w J/D)^2) of the n-th harmonic
-    of the load, with the crank speed w [rad/s]. The factor of the first harmonic is taken for all, which is
-    on the safe side."""
-    plate, ratio = c.motor.nameplate, c.drive.ratio
-    mean, rms = numbers.torque_mean / ratio, numbers.torque_rms / ratio
-    peak = max(numbers.torque_peak, numbers.torque_peak_one_sided or 0.0) / ratio
-    limits = {
-        name: (1.0 - c.margin) * c.checks[name].limit
-        for name in ("rms_torque", "peak_torque")
-        if c.exceeds(name)
-    }
-    # the parts of load and limit above the mean
-    beyond = []
-    if "rms_torque" in limits:
-        beyond.append((rms**2 - mean**2, limits["rms_torque"] ** 2 - mean**2))
-    if "peak_torque" in limits:
-        beyond.append(((peak - mean) ** 2, max(0.0, limits["peak_torque"] - mean) ** 2))
-    square = max((load / bound for load, bound in beyond if bound > 0.0), default=0.0)
-    slope = plate.torque / (plate.synchronous - plate.speed)
-    return float(slope / crank_speed * math.sqrt(max(0.0, square - 1.0)))
-
-
-def is_even(c: Candidate) -> bool:
-    """Whether the candidate keeps every limit that a flywheel improves, with the margin."""
-    return not any(map(c.exceeds, _EVENED))
-
-
-def too_heavy(c: Candidate) -> bool:
-    """Whether the candidate exceeds a limit that a flywheel makes worse, or its run failed."""
-    # a winding that is too hot from running alone permits no starts, too
-    return (
-        not c.checks
-        or any(map(c.exceeds, _WORSE_WITH_INERTIA))
-        or (c.exceeds("starts") and not c.exceeds("temperature"))
-    )
-
-
-def candidate_of(config: Config, motor: CatalogueMotor, duty: Duty, chosen: float | None = None) -> Candidate:
-    """A candidate without a flywheel, with the `chosen` ratio, or that which the file gives, or the ratio on offer
-    that is nearest to the one at which the crank has its speed."""
-    plan, series = plan_of(config), ""
-
-    def with_ratio(ratio: float | None) -> Drive:
-        return catalogue_drive(
-            config, motor, duty.normal.crank_torque, plan.demands.ambient, ratio, plan.offer
-        )
-
-    drive = with_ratio(chosen)
-    if chosen is not None:
-        series = "own list" if plan.ratios else "R80"
-    elif "gear.ratio" not in config.given:
-        ratio, series = ratio_on_offer(drive.ratio, plan.ratio_series, plan.ratios, _TOLERANCE)
-        drive = with_ratio(ratio)
-    unit = gear_unit(plan.gear_kind, drive.ratio, is_given=is_made(config))
-    return Candidate(motor, drive, margin=plan.demands.margin, unit=unit, series=series)
-
-
-def is_made(config: Config) -> bool:
-    """Whether the ratios are those of gears that there are: the file gives one, or a list of them."""
-    return "gear.ratio" in config.given or plan_of(config).offer.is_made
-
-
-def judge(
-    config: Config,
-    c: Candidate,
-    duty: Duty,
-    files: Mapping[str, Path] | None,
-    *,
-    worst_start: bool = False,
-) -> None:
-    """Try a candidate and fill in its results; with `worst_start` its start is that from the worst crank angle."""
-    c.worst_start = worst_start
-    try:
-        c.trial = try_motor(config, c.motor, c.drive, duty, files, worst_start=worst_start).result()
-    except InterruptedRunError:
-        raise
-    except RunError as error:
-        c.trial, c.reason = TrialResult(), f"its run failed: {error}"
