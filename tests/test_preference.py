@@ -304,8 +304,7 @@ def test_a_motor_in_field_weakening_stands_behind_one_at_its_rated_frequency():
     assert ranking == [large, small] and small.weakened and not large.weakened
     assert small.criterion is Criterion.FIELD and "75.0 Hz in field weakening" in small.reason
     assert "runs at 51.5 Hz, where IE3 6-pole 1.1 kW, 90L" in large.reason
-    config, _ = proposed("[sizing]\n", start="inverter")
-    assert any("75.0 Hz, above its rated 50.0 Hz" in note for note in inverter_needs(small, config))
+    assert any("75.0 Hz, above its rated 50.0 Hz" in note for note in inverter_needs(small, 1.5, False))
 
 
 @pytest.mark.parametrize("length, held", [(120.0, 12.0), (59.0, 0.0)])
@@ -513,7 +512,7 @@ PUMP_MOTORS = "IE3 4-pole 11 kW, 160M", "IE3 4-pole 15 kW, 160L"
 
 def test_the_least_boost_with_which_it_starts_is_taken():
     """5 %, then 10 and 15; a boost that the file gives is kept."""
-    config, c = proposed("[sizing]\n", start="inverter")
+    _, c = proposed("[sizing]\n", start="inverter")
 
     def judged(needed):
         def judge(each):
@@ -524,7 +523,7 @@ def test_the_least_boost_with_which_it_starts_is_taken():
         return judge
 
     for needed, taken in ((0.0, 0.05), (0.08, 0.10), (0.12, 0.15), (0.3, 0.05)):
-        best = least_boost(config, c, judged(needed))
+        best = least_boost(c, judged(needed), False)
         assert best.drive.parameters.inverter.boost == taken and best.starts is (needed < 0.2)
     # a run that fails with a higher boost hides neither the first trial nor the boost behind it
 
@@ -537,13 +536,14 @@ def test_the_least_boost_with_which_it_starts_is_taken():
 
         return judge
 
-    assert least_boost(config, c, failing(0.12)).drive.parameters.inverter.boost == 0.15
-    first = least_boost(config, c, failing(0.3))
+    assert least_boost(c, failing(0.12), False).drive.parameters.inverter.boost == 0.15
+    first = least_boost(c, failing(0.3), False)
     assert first.drive.parameters.inverter.boost == 0.05 and first.checks
-    (boost, _) = inverter_needs(least_boost(config, c, judged(0.12)), config)
+    (boost, _) = inverter_needs(least_boost(c, judged(0.12), False), 1.5, False)
     assert boost.startswith("The inverter needs a voltage boost of 15 % ") and "with less" in boost
     given, c = proposed("[starter.inverter]\nboost = 0.08\n[sizing]\n", start="inverter")
-    assert least_boost(given, c, judged(0.3)).drive.parameters.inverter.boost == 0.08
+    is_given = MotorTrials(given, SimpleNamespace()).has_given_boost
+    assert is_given and least_boost(c, judged(0.3), is_given).drive.parameters.inverter.boost == 0.08
 
 
 def test_a_motor_that_fails_from_the_worst_angle_makes_room_for_the_next(monkeypatch):

@@ -397,7 +397,8 @@ def test_ratios_with_which_no_motor_keeps_the_speed_are_refused_before_any_run(t
     with pytest.raises(InputError, match=r"about 50 \(4 poles\) is needed, the nearest on offer is 7;"):
         sizing.size(parse(slow), tmp_path, report)
     for more in ('start = "inverter"\n' + slow, slow + "[gear]\nratio = 62\n", slow.replace("7]", "52]")):
-        sizing.check_ratios(parse(more), catalogue())
+        with pytest.raises(AssertionError, match="the machine at constant speed"):
+            sizing.size(parse(more), tmp_path, report)
 
 
 def test_without_a_fit_the_study_goes_on_with_the_nearest(tmp_path, monkeypatch):

@@ -24,7 +24,7 @@ from ...study.cycle import Cycle, cycle, energy_swing, needed_inertia
 from ...study.drive import Drive
 from ...study.one_sided import all_on_one
 from ...system.instance import Fmu
-from .table import plan_of
+from .table import Sizing, plan_of
 
 
 def rms(*parts: tuple[float, Any]) -> float:
@@ -87,7 +87,8 @@ def duty_of(config: Config, folder: Path, backend: Backend | None) -> Duty:
             one_sided = {side: chain_duty(fmu, drive, w, case) for side, case in loads.items()}
         finally:
             fmu.close()
-    return Duty(normal, one_sided, heavier, cycle_numbers(config, normal, one_sided, heavier))
+    demands, ratio = plan_of(config).demands, config.machine.ratio
+    return Duty(normal, one_sided, heavier, cycle_numbers(demands, w, ratio, normal, one_sided, heavier))
 
 
 def _peak(cycle: Cycle) -> float:
@@ -98,13 +99,17 @@ def _peak(cycle: Cycle) -> float:
 
 
 def cycle_numbers(
-    config: Config, normal: Cycle, one_sided: Mapping[SideName, Cycle], heavier: SideName | None
+    demands: Sizing,
+    crank_speed: float,
+    ratio: float,
+    normal: Cycle,
+    one_sided: Mapping[SideName, Cycle],
+    heavier: SideName | None,
 ) -> CycleNumbers:
-    """The numbers of a duty. With all feed on one side the RMS torque is that of the heavier side, and the
-    peak the larger of both sides."""
-    w, demands = config.run.crank_speed, plan_of(config).demands
-    share = demands.one_sided_share
-    inertia = normal.outputs.J * config.machine.ratio**2
+    """The numbers of a duty at that speed of the crank [rad/s], with the `ratio` of the gear. With all feed on one
+    side the RMS torque is that of the heavier side, and the peak the larger of both sides."""
+    w, share = crank_speed, demands.one_sided_share
+    inertia = normal.outputs.J * ratio**2
     mean = float(np.mean(normal.crank_torque))
     cases = [(1.0, normal.crank_torque)]
     if heavier is not None:

@@ -54,6 +54,11 @@ class MotorTrials:
         return "gear.ratio" in self.config.given
 
     @property
+    def has_given_boost(self) -> bool:
+        """Whether the file gives the boost of the inverter."""
+        return "starter.inverter.boost" in self.config.given
+
+    @property
     def is_made(self) -> bool:
         """Whether the ratios are those of gears that there are: the file gives one, or a list of them."""
         return self.has_given_ratio or self.plan.offer.is_made
@@ -89,19 +94,19 @@ class MotorTrials:
 
     def with_least_boost(self, c: Candidate, *, worst_start: bool = False) -> Candidate:
         """The judged candidate, with an inverter with the least boost with which it starts."""
-        return least_boost(self.config, c, partial(self.judged, worst_start=worst_start))
+        return least_boost(c, partial(self.judged, worst_start=worst_start), self.has_given_boost)
 
     def best_of(self, motor: CatalogueMotor) -> Candidate:
         """The candidate with the least flywheel, and with an inverter with the least boost. Where it then misses its
         limits by a hair, it gets the ratio above, as an inverter keeps the speed of the crank with either ratio."""
-        bare = self.candidate(motor)
-        candidate = least_boost(self.config, bare, self.with_flywheel)
+        bare, is_given = self.candidate(motor), self.has_given_boost
+        candidate = least_boost(bare, self.with_flywheel, is_given)
         if not bare.drive.follows or self.has_given_ratio or not misses_by_a_hair(candidate):
             return candidate
         above = next_ratio(bare.drive.ratio, self.plan.ratios)
         if above is None:
             return candidate
-        other = least_boost(self.config, self.candidate(motor, above), self.with_flywheel)
+        other = least_boost(self.candidate(motor, above), self.with_flywheel, is_given)
         return other if other.keeps_margin else candidate
 
     def with_flywheel(self, bare: Candidate) -> Candidate:

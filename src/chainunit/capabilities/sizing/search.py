@@ -62,7 +62,8 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
             f"sizing.poles_least = {limits.poles_least:g}, sizing.poles_most = {limits.poles_most:g}: the catalogue "
             "has no motor with so many poles"
         )
-    check_ratios(config, motors)
+    if config.start != "inverter" and "gear.ratio" not in config.given:
+        check_ratios(plan_of(config).ratios, config.run.crank_speed, motors)
     report("the machine at constant speed", 0.0, 1.0)
     duty = duty_of(config, folder, backend)
     numbers = duty.numbers
@@ -94,18 +95,18 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
     return SizingFindings(plan_of(config), duty, candidates, notes, len(motors), len(motors) - len(strong))
 
 
-def check_ratios(config: Config, motors: Sequence[CatalogueMotor]) -> None:
-    """Refuse `sizing.ratios` with which none of the `motors`, the smallest first, keeps the speed of the crank on the
-    line, at any slip up to the rated one. An inverter keeps the speed with any ratio.
+def check_ratios(ratios: Sequence[float], crank_speed: float, motors: Sequence[CatalogueMotor]) -> None:
+    """Refuse `sizing.ratios` with which none of the `motors`, the smallest first, keeps the speed of the crank
+    [rad/s] on the line, at any slip up to the rated one. An inverter keeps the speed with any ratio.
 
     Raises
     ------
     InputError
         with the ratios that are needed.
     """
-    ratios, w = plan_of(config).ratios, config.run.crank_speed
-    if not ratios or config.start == "inverter" or "gear.ratio" in config.given:
+    if not ratios:
         return
+    w = crank_speed
     needed: dict[float, float] = {}
     for plate in (motor.nameplate for motor in motors):
         least, most = plate.speed / w, plate.synchronous / w
@@ -200,7 +201,7 @@ def _needs(best: Candidate, trials: MotorTrials) -> Iterator[str]:
         relay = f"{'of ' if relay_class <= HEAVIEST else ''}{class_words(relay_class)}"
         yield f"The start takes an overload relay {relay}; one of class {LIGHT} may trip in it."
     if best.drive.follows:
-        yield from inverter_needs(best, trials.config)
+        yield from inverter_needs(best, trials.config.starter.overload, trials.has_given_boost)
     if best.unit is None:
         largest = UNITS[trials.plan.gear_kind][-1]
         end = (
