@@ -59,6 +59,7 @@ def test_the_list_names_the_folders():
     folders = {path.name for path in (PACKAGE / "capabilities").iterdir() if (path / "__init__.py").exists()}
     assert folders == set(NAMES) and len(NAMES) == len(folders)
     assert [part.name for part in registered()] == list(NAMES)
+    assert len([part for part in registered() if part.motor_table]) <= 1
 
 
 def test_nothing_outside_a_folder_imports_from_it():
