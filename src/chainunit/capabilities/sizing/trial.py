@@ -131,11 +131,10 @@ class Trial:
         permitted. None on the line, or without a start."""
         if not self.drive.follows or self.start_current is None:
             return None
-        name = f"motor.{self.drive.motor.current}"
         highest = max(self.start_current, self._peak_current(*self._running))
         lasting = [exceeded_for(*self._start_currents, OVERLOADED), *(s.long_current for s in self.starts)]
-        duty = rms(*((share, run[name].values) for share, run in self._cases))
         rated = float(self.motor.nameplate.rated_current)
+        duty = self._rms(f"motor.{self.drive.motor.current}")
         return max(rated, duty, highest / self.config.starter.overload, *lasting)
 
     @cached_property
@@ -219,6 +218,10 @@ class Trial:
         extra += [start.heat - after * start.followed for start in self.starts]
         return steady, max(0.0, *extra)
 
+    def _rms(self, name: str) -> float:
+        """RMS of a variable over the duty."""
+        return rms(*((share, run[name].values) for share, run in self._cases))
+
     @property
     def _demands(self) -> Sizing:
         return plan_of(self.config).demands
@@ -257,12 +260,6 @@ class Trial:
         speed."""
         demands, plate, p = self._demands, self.motor.nameplate, self.drive.fmu_parameters
 
-        def at_speed(check: Check) -> Check:
-            return check if self.start_time is not None else dataclasses.replace(check, value=None)
-
-        def check(title: str, value: float, limit: float, unit: str, kind: str = "") -> Check:
-            return at_speed(Check(title, value, limit, unit, kind))
-
         start = starting(self.start_time, plate)
         if self.drive.follows:
             start = dataclasses.replace(start, limit=1.0 + 1.2 * self.config.run.ramp)
@@ -273,33 +270,23 @@ class Trial:
         )
         breakdown = self.breakdown_torque / demands.breakdown_margin
         requested_speed = self.drive.ratio * self.config.run.crank_speed
+        peak_torque = max(peak(run[_GAP]) for run in self._running)
+        too_hot = "no start is permitted, as running alone is too hot"
         checks = {
             "start": start,
-            "rms_torque": check(
-                "RMS torque",
-                rms(*((share, run[_GAP].values) for share, run in self._cases)),
-                plate.torque * weaker * math.sqrt(min(1.0, cooling)),
-                "N.m",
+            "rms_torque": Check(
+                "RMS torque", self._rms(_GAP), plate.torque * weaker * math.sqrt(min(1.0, cooling)), "N.m"
             ),
-            "peak_torque": check(
-                "peak torque",
-                max(peak(run[_GAP]) for run in self._running),
-                breakdown,
-                "N.m",
+            "peak_torque": Check("peak torque", peak_torque, breakdown, "N.m"),
+            "temperature": heating(self.temperature, p.ambient.T, demands.temperature),
+            "starts": Check(
+                "starts per hour", demands.starts_per_hour, self.permitted_starts, "1", forbidden=too_hot
             ),
-            "temperature": at_speed(heating(self.temperature, p.ambient.T, demands.temperature)),
-            "starts": at_speed(
-                Check(
-                    "starts per hour",
-                    demands.starts_per_hour,
-                    self.permitted_starts,
-                    "1",
-                    forbidden="no start is permitted, as running alone is too hot",
-                )
-            ),
-            "crank_speed": at_speed(keeping_speed(self.speed, requested_speed)),
-            "speed": check("speed fluctuation", self.fluctuation, demands.fluctuation, "1", "percent"),
+            "crank_speed": keeping_speed(self.speed, requested_speed),
+            "speed": Check("speed fluctuation", self.fluctuation, demands.fluctuation, "1", "percent"),
         }
+        if self.start_time is None:
+            checks = {name: dataclasses.replace(check, value=None) for name, check in checks.items()}
         if math.isfinite(demands.inertia_ratio):
             inertia = float(np.max(self.drive.load_inertia(self.steady)))
             ratio = (inertia + p.rotor.J - plate.J) / plate.J
