@@ -100,15 +100,12 @@ class Trial:
         first = start_class(time[starting], current[starting], self.motor.nameplate.rated_current)
         return max(first, *(start.start_class for start in self.starts), 0)
 
-    def _peak_current(self, *runs: xr.Dataset) -> float:
-        return max(peak(run[f"motor.{self.drive.motor.current}"].values) for run in runs)
-
     @cached_property
     def start_current(self) -> float | None:
         """Largest current in a start [A]; None without a start."""
         if self.start_time is None:
             return None
-        return max([self._peak_current(self.start), *(start.current for start in self.starts)])
+        return max([peak(self._start_currents[1]), *(start.current for start in self.starts)])
 
     @cached_property
     def overload_time(self) -> float | None:
@@ -131,11 +128,11 @@ class Trial:
         permitted. None on the line, or without a start."""
         if not self.drive.follows or self.start_current is None:
             return None
-        highest = max(self.start_current, self._peak_current(*self._running))
+        name = f"motor.{self.drive.motor.current}"
+        highest = max(self.start_current, *(peak(run[name].values) for run in self._running))
         lasting = [exceeded_for(*self._start_currents, OVERLOADED), *(s.long_current for s in self.starts)]
         rated = float(self.motor.nameplate.rated_current)
-        duty = self._rms(f"motor.{self.drive.motor.current}")
-        return max(rated, duty, highest / self.config.starter.overload, *lasting)
+        return max(rated, self._rms(name), highest / self.config.starter.overload, *lasting)
 
     @cached_property
     def speed(self) -> float:
