@@ -38,6 +38,16 @@ class FileReference:
     """whether it is a recording, which has to be there"""
 
 
+@dataclass(frozen=True)
+class Estimates:
+    """Estimated numbers of a study: their `values` by full name, the `covariance` of their errors in this order,
+    shape (numbers, numbers), and the name of the `file` that holds both, beside the study file."""
+
+    values: Mapping[str, float]
+    covariance: Any
+    file: str
+
+
 class StudyCapability:
     """A capability; each method has a default for a capability that has no such thing."""
 
@@ -138,8 +148,12 @@ class StudyCapability:
         return {}
 
     def additions(self, study: StudyRecord) -> Mapping[str, Mapping[str, Any]]:
-        """By the name of findings, further parts of their result, which follow from the whole study."""
+        """By name, parts of the result that follow from the whole study, ready for JSON; they stand in place of those
+        of findings of the same name."""
         return {}
+
+    def take_estimates(self, config: Config, estimates: Estimates, tables: dict[str, Any]) -> None:
+        """Write into its `tables` of the study file with estimated numbers what follows from their errors."""
 
     def analyses(self) -> Iterable[type[Analysis]]:
         """Its analyses of a study."""

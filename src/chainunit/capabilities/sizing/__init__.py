@@ -80,11 +80,11 @@ class SizingCapability(Capability):
         return None if plan is None else ("sizing.temperature", float(plan.demands.temperature))
 
     def additions(self, study: StudyRecord) -> Mapping[str, Mapping[str, Any]]:
-        """The gear to order, and the protection."""
+        """The findings with the gear to order and the protection."""
         from .result import additions
 
         found = study.findings.get(self.name)
-        return {} if found is None else {self.name: additions(study, found)}
+        return {} if found is None else {self.name: found.as_dict() | additions(study, found)}
 
     def analyses(self) -> Iterable[type[Analysis]]:
         """The protection of the drive."""
