@@ -132,10 +132,9 @@ def compare(
 
     Writes report.html, comparison.json and comparison.md into the output folder.
     """
-    from ..report.comparison import TASK
-    from ..study.comparison import read_result
+    from ..report.tasks import task_named
 
-    carry_out(TASK, (read_result(first), read_result(second)), output)
+    carry_out(task_named("compare"), (first, second), output)
 
 
 @app.command()

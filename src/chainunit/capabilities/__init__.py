@@ -9,5 +9,6 @@ NAMES = (
     "optimize",
     "identification",
     "sweep",
+    "comparison",
 )
 """The folders of the capabilities, in the order in which their tables, results and sections come."""

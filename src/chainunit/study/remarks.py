@@ -57,8 +57,8 @@ def conclude(study: StudyRecord) -> None:
         )
     if study.answers:
         study.verdict = replace(model_verdict(study), step=config.run.step)
-        for line in study.verdict.details(study.titles):
-            study.warn("model", "{line}", line=line)
+        for topic, line in study.verdict.details(study.titles):
+            study.warn(f"model {topic}", "{line}", line=line)
     if config.chain is not None:
         _on_chains(study, config.chain)
     if STEADY in study.answers:

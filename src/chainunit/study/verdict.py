@@ -226,8 +226,8 @@ class Verdict:
         # a remedy for several faults is named once
         return "; ".join((line, *why, *dict.fromkeys(filter(None, remedies)))) + "."
 
-    def details(self, titles: Mapping[str, str]) -> list[str]:
-        """A line for each topic: the runs, by their `titles`, with their numbers."""
+    def details(self, titles: Mapping[str, str]) -> list[tuple[str, str]]:
+        """The topics, each with its line: the runs, by their `titles`, with their numbers."""
         lines = []
         for topic, (_, begin, _) in _TOPICS.items():
             runs: dict[str, list[str]] = {}
@@ -241,13 +241,13 @@ class Verdict:
                     runs.setdefault(reason.run, []).append(reason.numbers)
             for limit, where in limits.items():
                 of = "; ".join(titles.get(run, run) for run in where if run)
-                lines.append(f"{limit}{of and f': {of}'}.")
+                lines.append((topic, f"{limit}{of and f': {of}'}."))
             each = [
                 f"{titles.get(run, run)} ({', '.join(sizes)})" if run else ", ".join(sizes)
                 for run, sizes in runs.items()
             ]
             if each:
-                lines.append(f"{begin}: {'; '.join(each)}.")
+                lines.append((topic, f"{begin}: {'; '.join(each)}."))
         return lines
 
     def as_dict(self) -> dict[str, Any]:
