@@ -37,10 +37,10 @@ from chainunit.capabilities.identification.synthetic import HiddenRun, Logger, s
 from chainunit.capabilities.identification.unknown import Unknown
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor
+from chainunit.machines.api import ChainUnitOfChains
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
-from chainunit.study.sections import ChainOrgans
 
 RODS = [f"{side}.{rod}_mass" for side in ("left", "right") for rod in ("wall", "web")]
 BODIES = [f"{body}.{x}" for body in ("crank", "coupler", "rocker") for x in ("m", "I")]
@@ -143,10 +143,11 @@ def drive(kind: str, wrong: str = "") -> Drive:
     if wrong.startswith("crank"):
         machine = machine.replace(r=1.02 * machine.by_name["r"])
     induction = layout.from_names(INDUCTION, InductionMotor.Parameters())
-    chain = ChainOrgans() if wrong == "chains" else None
+    if wrong == "chains":
+        machine = ChainUnitOfChains(machine.p)
     if kind == "im":
-        return Drive(InductionMotor, induction, machine, chain=chain)
-    return Drive(DcMotor, config.motor, machine, chain=chain)
+        return Drive(InductionMotor, induction, machine)
+    return Drive(DcMotor, config.motor, machine)
 
 
 @lru_cache(maxsize=16)

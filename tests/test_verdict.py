@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from chainunit.capabilities.chains.judgement import chains
 from chainunit.study.pulls import LeastPull
 from chainunit.study.verdict import (
     CRANK_GOOD,
     RESIDUAL,
     ROCKER_GOOD,
     ROCKER_GOOD_EMPTY,
-    chains,
     outsider,
     rigid_links,
     two_bars,
@@ -35,7 +35,7 @@ CALLED = {"steady": "steady running", "jam_left": "a lump jams"}
 
 
 def bars(speed=1.0, mode=5.0, slack=4.5, pulls=PULLED, residuals=KEPT, **more):
-    return two_bars(speed, mode, slack, pulls, residuals, **more)
+    return two_bars(speed, mode, slack, pulls, residuals, finer='take organ = "chain"', **more)
 
 
 def below(x):

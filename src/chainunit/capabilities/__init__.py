@@ -1,6 +1,7 @@
 """Capabilities: each folder answers one question, and its name in this list registers it."""
 
 NAMES = (
+    "chains",
     "sides",
     "blade",
     "random_overloads",

@@ -17,11 +17,16 @@ from .task import Task
 
 @dataclass(frozen=True)
 class Contents:
-    """The contents of a section: its heading, its blocks (tables, text, figures), and the files of its figures."""
+    """The contents of a section: its heading, its blocks (tables, text, figures), the files of its figures, and its
+    place."""
 
     heading: str
     blocks: Callable[[Source, StudyRecord], Iterator[Block]]
     pictures: tuple[str, ...] = ()
+    analysis: str = ""
+    """name of its analysis, if the section has another name"""
+    comes_first: bool = False
+    """whether it stands before the turn at constant speed"""
 
 
 class Capability(StudyCapability):
@@ -29,7 +34,7 @@ class Capability(StudyCapability):
     name ``CAPABILITY``."""
 
     def contents(self) -> Mapping[str, Contents]:
-        """The sections of a study's report on its findings, by the name of the analysis."""
+        """The sections of a study's report on its findings, by name: that of the analysis."""
         return {}
 
     def question(self, s: Source, study: StudyRecord) -> Line:
@@ -38,6 +43,10 @@ class Capability(StudyCapability):
 
     def answer(self, s: Source, study: StudyRecord) -> Iterator[Block]:
         """Its blocks in the answer of a study."""
+        return iter(())
+
+    def warnings(self, s: Source) -> Iterator[Block]:
+        """Its warnings beside those of the study, to stand at the head of a report."""
         return iter(())
 
     def tasks(self) -> Mapping[str, Task[Any, Any]]:

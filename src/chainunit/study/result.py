@@ -169,14 +169,11 @@ def _spread(study: StudyRecord, name: str) -> dict[str, Any]:
 
 def _parts(study: StudyRecord) -> dict[str, Any]:
     """The parts of the result that only some studies have."""
-    config = study.config
     parts = {name: findings.as_dict() for name, findings in study.findings.items()}
     if study.sizing:
         parts["sizing"] = study.sizing.as_dict() | {"gear": _gear(study), "protection": _protection(study)}
     if study.statics.torsion is not None:
         parts |= _driveline(study)
-    if config.chain:
-        parts["chain"] = study.chain.as_dict() if study.chain else {}
     return parts
 
 

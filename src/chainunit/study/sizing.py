@@ -25,12 +25,12 @@ from ..reading.text import entries, number
 from ..work.progress import Report
 from .candidate import Candidate, Standing
 from .catalogue_drive import catalogue_drive, check_ratios, is_of_a_gear, with_wheel
-from .chain import HIGH
 from .config import Config
 from .duty import CycleNumbers, Duty, duty_of
 from .inverter import inverter_needs, least_boost, misses_by_a_hair
 from .limits import SPEED_DEVIATION
 from .preference import ORDER, choice, poles_rank, rank
+from .quantiles import HIGH
 from .relay import HEAVIEST, LIGHT, class_words
 from .sections import SOFTER
 from .sizing_table import SIZING_KEYS
@@ -161,7 +161,7 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
         "Catalogue data are typical; iron losses are not in the motor model.",
         "The gear's losses act as viscous drag on the motor shaft, with the mean power that its efficiency costs.",
     ]
-    if config.chain is not None:
+    if config.machine.in_place:
         notes.append(
             f"Peaks of the cycle and the flywheel are those of single turns, {100 * HIGH:g} % quantile over all "
             "turns of all starts of the chains."

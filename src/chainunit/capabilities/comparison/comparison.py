@@ -17,7 +17,7 @@ from ...core.quantities import variables
 from ...reading.text import entry
 from ...study.measures import Answers
 from ...study.registry import registered
-from ...study.sections import CHOICES, all_sections
+from ...study.sections import all_choices, all_sections
 from ...study.shaft import ShaftAnswers
 
 FILE = "result.json"
@@ -205,7 +205,7 @@ def _is_number(node: Any) -> bool:
 
 def _given_values(data: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
     """The given values of a result, by their names in a study file: entries, texts, switches and lists."""
-    for name in CHOICES:
+    for name in all_choices():
         yield from _leaves(data.get(name), name)
     for table in ("system", "machine", "feed", "motor", "event"):
         yield from _leaves(data.get(table), table)

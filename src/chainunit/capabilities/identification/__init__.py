@@ -18,7 +18,7 @@ from ...study.drive import Drive
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
 from ...study.parts import named_table
-from ...study.rules import CHAINS, MACHINE_FMU, MOTOR_FMU, Rule, has_sides
+from ...study.rules import MACHINE_FMU, MOTOR_FMU, Rule, has_sides, other_models
 from .measurands import MEASURANDS
 from .observer_table import ObserverTable
 from .reading import IdentificationPlan, WatchPlan, read_identification, read_watch
@@ -104,7 +104,7 @@ class IdentificationCapability(Capability):
             (MOTOR_FMU, "motor is an FMU"),
             (given("sizing"), "motor is not known before it is chosen"),
             (given("driveline"), "driveline stands between motor and machine"),
-            (CHAINS, "organs are chains"),
+            *((other.on, other.words) for other in other_models()),
         )
         for name in ("identify", "watch"):
             for condition, words in unfit:

@@ -204,7 +204,7 @@ class SweepSummary:
         """The limits of the crank speed for two bars as organs, of the study's machine and feed, each with the number
         of points beyond it; only those that a point passes, and none where no result depends on the organs."""
         config, plan, task = self.findings.config, self.findings.plan, self.findings.task
-        if config.chain is not None:
+        if config.machine.in_place:
             return []
         units = ["N"] if plan.measures else [self.variables[name].unit for name in plan.quantities]
         empties = bool(plan.event) and config.events[plan.event].empties
