@@ -11,6 +11,7 @@ import xarray as xr
 from event_tables import event_line
 from reports import said_of, write
 
+from chainunit.reading.results import as_data
 from chainunit.study.config import parse
 from chainunit.study.judgement import motor_verdict
 from chainunit.study.measures import STARTED
@@ -136,7 +137,7 @@ step = 0.002
     assert study.failure is None
     words = "tuned to the inertia with each flywheel"
     assert (words in said_of(study)) is told
-    assert study.findings["flywheels"].as_dict()["retuned"] is told
+    assert as_data(study.findings["flywheels"])["retuned"] is told
 
 
 HEAVY = """

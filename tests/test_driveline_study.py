@@ -20,7 +20,7 @@ from chainunit import InputError
 from chainunit.app import cli
 from chainunit.capabilities.torsion import analysis as torsion_findings
 from chainunit.capabilities.torsion import page as torsion_report
-from chainunit.capabilities.torsion.analysis import TorsionAnalysis, as_dict
+from chainunit.capabilities.torsion.analysis import TorsionAnalysis
 from chainunit.capabilities.torsion.line import Rotation, analyse
 from chainunit.capabilities.torsion.page import PICTURES
 from chainunit.capabilities.torsion.table import TorsionTable
@@ -29,6 +29,7 @@ from chainunit.core.quantities import Layout
 from chainunit.drives import shafts, torsion
 from chainunit.drives.cardan import Cardan, Twist, frozen_frequency, two_joints
 from chainunit.drives.torsion import rigid, settling_time, simulate, steady, with_damping_ratio
+from chainunit.reading.results import as_data
 from chainunit.reading.text import number
 from chainunit.report import blocks, figure
 from chainunit.study import config, parts, remarks
@@ -463,7 +464,7 @@ def test_numbers_are_those_of_the_former_program():
         bend_high=math.radians(35.0),
     )
     rotation = Rotation(speed=run["speed"], load=run["load"])
-    now = as_dict(analyse(line, rotation, table, damping_ratios=(0.01, 0.03)))
+    now = as_data(analyse(line, rotation, table, damping_ratios=(0.01, 0.03)))
 
     def compare(old, new):
         if isinstance(old, dict):
@@ -549,7 +550,7 @@ def test_ranges_of_the_natural_frequency_say_over_what_they_are():
     band = found.analysis.band
     assert high[1] - low[0] > 2.0 * (band.largest - band.least)
     study.findings["torsion"] = found
-    source = blocks.Source({"torsion": found.as_dict()})
+    source = blocks.Source({"torsion": as_data(found)})
     shown = list(torsion_report.blocks(source, study))
     table = next(each for each in shown if isinstance(each, blocks.Table) and "ranges" in each.title)
     rows = {row.cells[0]: [cell.value for cell in row.cells[1:]] for row in table.rows if row.cells[2]}

@@ -218,7 +218,7 @@ def test_a_study_can_be_repeated_from_its_result(text, tmp_path):
     for name, plan in study.config.plans.items():
         event = getattr(plan, "event", None)
         if name == "random_overloads":
-            assert again.plans[name].event.as_dict() == event.as_dict()
+            assert again.plans[name].event.identity() == event.identity()
             assert again.plans[name].table == plan.table
         else:
             assert again.plans[name] == plan, name
@@ -262,4 +262,4 @@ def test_a_current_that_an_inverter_hardly_gives_has_a_note(tmp_path):
         assert [remark.runs for remark in notes] == ([noted] if noted else [])
         if noted:
             assert "own current limit is not in the model" in notes[0].text and "(4.50)" in notes[0].text
-            assert notes[0].quantities["jam_left.current_peak"] == (4.5 * rated, "A")
+            assert notes[0].quantities["jam_left.current_peak"][:2] == (4.5 * rated, "A")

@@ -28,6 +28,7 @@ from chainunit.capabilities.random_overloads import runs as monte_carlo
 from chainunit.core.errors import RunError
 from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
+from chainunit.reading.results import as_data
 from chainunit.reading.text import number as shown
 from chainunit.report.blocks import Source
 from chainunit.report.terminal import plain_line
@@ -198,10 +199,10 @@ def test_answers_hang_together(killed):
     assert 0 < float(runs["trips"].sum()) < result.runs
     np.testing.assert_array_equal(runs["crank_torque_peak"] > runs["trip_torque"], runs["trips"] > 0.5)
     assert ((runs["drawn_force"] >= 4000.0) & (runs["drawn_force"] <= 9000.0)).all()
-    sides = {side: runs["value"] for side, runs in result.as_dict()["sides"].items()}
+    sides = {side: runs["value"] for side, runs in as_data(result)["sides"].items()}
     assert sides == {"left": int((runs["side"] == 1).sum()), "right": int((runs["side"] == 2).sum())}
     assert min(sides.values()) > 0 and sum(sides.values()) == RUNS
-    outcome = result.as_dict()["quantiles"]
+    outcome = as_data(result)["quantiles"]
     share = outcome["trips"]["share"]
     assert share["unit"] == "1" and share["low"]["value"] < share["value"] < share["high"]["value"]
 
@@ -215,12 +216,14 @@ def test_quantiles_have_intervals_or_are_left_out(killed):
         values = 100.0 + k % 97 + 1e-3 * k
         runs = runs.assign(crank_torque_peak=("run", values))
         result = monte_carlo.MonteCarloResult(runs, killed[0], "cs")
-        sizes = result.quantiles()["crank_torque_peak"]
+        sizes = result.quantiles["crank_torque_peak"]
         assert list(sizes) == entries
         for name, each in sizes.items():
-            assert each == quantiles.quantile(list(values), float(name[1:]) / 100.0)
+            assert dataclasses.replace(each, unit="") == quantiles.quantile(
+                list(values), float(name[1:]) / 100.0
+            )
             assert each.low < each.value < each.high
-        entry = result.as_dict()["quantiles"]["crank_torque_peak"][entries[-1]]
+        entry = as_data(result)["quantiles"]["crank_torque_peak"][entries[-1]]
         assert entry["low"] == {"value": sizes[entries[-1]].low, "unit": "N.m"}
         assert bool(result.shortage) == (number < 368)
     remark = monte_carlo.MonteCarloResult(few.isel(run=slice(0, 30)), killed[0], "cs").shortage
@@ -310,14 +313,14 @@ def test_a_run_that_fails_is_a_result(killed, tmp_path, monkeypatch):
     monkeypatch.setattr(Rig, "follow", fails)
     result = monte_carlo.run(task, tmp_path, lambda *said: None, workers=1)
     assert result.reasons == {2: "machine: it broke"} and result.failures == 1 and result.method == "cs"
-    assert result.as_dict()["failed"]["value"] == 1 and len(result.values("event")) == 4
+    assert as_data(result)["failed"]["value"] == 1 and len(result.values("event")) == 4
     got, wanted = result.dataset, opened(killed[0]).dataset
     for name in monte_carlo.Layout(monte_carlo.Sample).names:
         assert np.isnan(got[name][2]), name
         np.testing.assert_array_equal(got[name][[0, 1, 3, 4]], wanted[name][[0, 1, 3, 4]])
     np.testing.assert_array_equal(got["drawn_force"], wanted["drawn_force"][:5])
     # of four runs there is no quantile
-    assert result.quantiles()["crank_torque_peak"] == {}
+    assert result.quantiles["crank_torque_peak"] == {}
 
 
 def test_a_damaged_batch_is_computed_anew_and_told(killed, tmp_path):
@@ -327,7 +330,7 @@ def test_a_damaged_batch_is_computed_anew_and_told(killed, tmp_path):
     reports = []
     result = monte_carlo.run(task_of(killed[0]), tmp_path, lambda *said: reports.append(said[1:]), workers=1)
     assert (result.earlier_runs, result.damaged_batches) == (48, 1)
-    assert result.as_dict()["damaged_batches"]["value"] == 1
+    assert as_data(result)["damaged_batches"]["value"] == 1
     assert reports == [(0, 50), (48, 50), (50, 50)] and content(copy) == content(store)
 
 
@@ -383,9 +386,7 @@ def test_a_current_at_its_limit_and_damaged_batches_are_noted(current, told):
     drive = choose(parse(""), Path(), lambda *said: None).drive
     assert drive.parameters.limit.i == 4.4
     quantiles = {"current_peak": {"q50": Estimate(2.0, 1.0, 3.0), "q95": Estimate(current, 4.0, 4.4)}}
-    random = SimpleNamespace(
-        quantiles=lambda: quantiles, shortage="", damaged_batches=1, file=Path("out/runs.zarr")
-    )
+    random = SimpleNamespace(quantiles=quantiles, shortage="", damaged_batches=1, file_name="runs.zarr")
     notes = {}
     study = SimpleNamespace(drive=drive, note=lambda kind, words, **of: notes.update({kind: of}))
     monte_carlo.MonteCarloResult.remark(random, study)

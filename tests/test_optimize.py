@@ -24,7 +24,7 @@ from chainunit.capabilities.optimize.kernel import Kernel, pieces, symbols_of
 from chainunit.capabilities.optimize.page import optimum_report
 from chainunit.capabilities.optimize.program import AngleProgram
 from chainunit.capabilities.optimize.requirements import Requirements
-from chainunit.capabilities.optimize.result import as_dict, units_of
+from chainunit.capabilities.optimize.result import best_machine, units_of
 from chainunit.capabilities.optimize.search import Search
 from chainunit.capabilities.optimize.table import wishes_of
 from chainunit.capabilities.optimize.wishes import TurnLimit
@@ -34,6 +34,7 @@ from chainunit.core.native.compilers import compiler
 from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
+from chainunit.reading.results import as_data
 from chainunit.report.terminal import plain
 from chainunit.study import config as study_files
 from chainunit.study.cycle_quantities import cycle_quantity, evaluate
@@ -100,7 +101,7 @@ def test_derivatives_through_derived_numbers(monkeypatch):
     monkeypatch.setattr(kernels, "native_kernel", lambda *_: None)
     machine = Machine(KnifeDrive)
     kernel, _ = kernel_of(machine, ["crank_torque", "blade.y"], ["r", "ab", "o3d"])
-    assert machine.model.derived
+    assert machine.model.derived_count
     check_derivatives(kernel, machine, machine.model.Feed(), ["r", "ab", "o3d"], 3.0, angles=5)
 
 
@@ -126,7 +127,7 @@ def check_derivatives(kernel, machine, feed, free, speed, angles=12, torque=0, k
         assert np.max((np.abs(by_difference - slopes[:, k]) / size)[smooth]) < 1e-5
         row = np.einsum("rl,rfl->f", weights, slope_above - slope_below) / (2.0 * step)
         assert np.max(np.abs(row - bend[k])) < 1e-5 * np.max(np.abs(bend))
-    at = kernel.by_angle(x, q, w, np.zeros(angles, int))
+    at = kernel.derivatives_by_angle(x, q, w, np.zeros(angles, int))
     np.testing.assert_allclose(at[1], slopes[0, n], rtol=1e-10, atol=1e-8)
     alone = np.zeros_like(weights)
     alone[0, 3] = 1.0
@@ -231,7 +232,7 @@ def test_sensitivities_are_those_of_perturbed_problems(best):
             continue
         step = 1e-3 * abs(each.value)
         text = TABLE
-        if each.is_bound:
+        if each.name in best.wishes.free:
             free = dict(best.wishes.free)
             low, high = free[each.name]
             free[each.name] = (low + step, high) if each.side == "min" else (low, high + step)
@@ -676,14 +677,14 @@ def test_a_speed_beyond_the_limit_of_the_organs_is_told(best):
     """The limit of the best machine, not that of today's."""
     config = study_files.parse(TABLE)
     feed, answer = best.wishes.feed, best.machine
-    (organ,) = as_dict(best, config)["organs"]
+    (organ,) = as_data(best_machine(best, config))["organs"]
     limit = ROCKER_GOOD * answer.chain_modes(feed.left, feed.right).frequency[0]
     assert (
         organ["topic"] == "rocker torque" and organ["limit"]["value"] == pytest.approx(limit) and limit < 3.0
     )
     assert "the limit of the best machine is" in plain(optimum_report(best, config))
     slow = _with(best, wishes=_with(best.wishes, crank_speed=0.9 * limit))
-    assert as_dict(slow, config)["organs"] == []
+    assert best_machine(slow, config).organs == []
 
 
 def test_in_python(best):

@@ -595,7 +595,7 @@ def test_one_sided_feed_and_a_loaded_soft_start_are_normal_duty(tmp_path, monkey
     assert study.sizing.best.duty.run == "all_feed_on_the_right"
     (warning,) = [warning for warning in study.warnings if warning.kind == "gear passed"]
     assert "the gear's permitted 450 N m" in warning.text and study.title_of("jam_right") in warning.text
-    assert warning.runs == ("jam_right",) and warning.quantities["passed"] == (450.0, "N.m")
+    assert warning.runs == ("jam_right",) and warning.quantities["passed"][:2] == (450.0, "N.m")
 
 
 @pytest.mark.parametrize(

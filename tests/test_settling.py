@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from chainunit.reading.results import as_data
 from chainunit.study.analysis import Work
 from chainunit.study.catalogue_drive import catalogue_drive
 from chainunit.study.config import parse
@@ -153,4 +154,4 @@ def test_the_loss_of_the_gear_stands_beside_the_net_power(mill):
     (note,) = study.notes
     assert note.quantities["share"][0] == loss.share and "efficiency of 94.0 %" in note.text
     assert "swings energy to and fro" in note.text and "without load (gear.d)" in note.text
-    assert findings.as_dict()["without_load"] == {"value": loss.without_load, "unit": "W"}
+    assert as_data(findings)["without_load"] == {"value": loss.without_load, "unit": "W"}

@@ -21,6 +21,7 @@ from chainunit import EMPTY, ChainUnitMachine, SideLoads
 from chainunit.capabilities.sides.analysis import factors_for, sides_over_speed
 from chainunit.core.ledger import NAME, Ledger
 from chainunit.machines.chain_unit import Feed
+from chainunit.reading.results import as_data
 from chainunit.report import study as study_report
 from chainunit.study.cycle import cycle
 from chainunit.study.one_sided import alone, overload_factors
@@ -507,12 +508,12 @@ def test_each_side_alone_over_the_speed():
             assert sides.peaks[f"{torque}_{side}"] == pytest.approx(reference, rel=1e-12)
             excess = reference - [p[torque] for p in both]
             before = np.flatnonzero(excess[1:] * excess[:-1] < 0.0)
-            at = sides.crossings()[torque][side]
+            at = [each.value for each in sides.crossings[torque][side]]
             crossed += len(at)
             assert len(at) == len(before)
             assert np.all(sides.speed[before] < at) and np.all(at < sides.speed[before + 1])
             assert np.interp(at, sides.speed, excess) == pytest.approx(0.0, abs=1e-9)
-            values = sides.as_dict()["crossings"][torque][side]
+            values = as_data(sides)["crossings"][torque][side]
             assert values == [{"value": speed, "unit": "rad/s", "kind": "speed"} for speed in at]
     assert crossed
 

@@ -92,7 +92,7 @@ def test_events_and_parameters_are_pickled():
     for instance in (machine.p, model.Feed(press_force=3.0), model.Inputs(phi=1.0)):
         assert pickle.loads(pickle.dumps(instance)) == instance
     drawn = read_random_event({"type": "surge", "input": "press_force"}, "monte_carlo.event")
-    assert drawn.ranges == {"factor": (1.5, 4.0)} and drawn.as_dict()["input"] == "press_force"
+    assert drawn.ranges == {"factor": (1.5, 4.0)} and drawn.identity()["input"] == "press_force"
 
 
 @pytest.mark.parametrize(

@@ -623,7 +623,7 @@ def test_tables_fit_into_80_columns_with_whole_names(spread):
         lines = plain(result._report, 80).splitlines()
         tables = [line for line in lines if line.startswith(("┃", "│"))]
         assert max(map(len, tables)) <= 80 and "…" not in "".join(tables)
-        for name in result.summary.variables:
+        for name in result._outcome.variables:
             assert any(name in line for line in tables), name
 
 
@@ -638,7 +638,7 @@ def test_energy_is_shown_in_kilowatt_hours():
 
 def test_the_page_of_a_sweep_begins_with_the_influences(spread):
     """A rank correlation lies between -1 and 1, and so do the ticks of its axis."""
-    report = sweep_page.report(spread.summary)
+    report = sweep_page.report(spread._outcome)
     assert report.sections[0].name == "influences" and report.sections[0].blocks
     for figure in sweep_figures.tornado(spread.summary):
         for *_, panel in figure.all_panels():

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from chainunit.capabilities.chains.judgement import chains
+from chainunit.reading.results import as_data
 from chainunit.study.pulls import LeastPull
 from chainunit.study.verdict import (
     CRANK_GOOD,
@@ -68,7 +69,7 @@ def test_a_rod_of_which_only_an_end_is_pushed_is_no_slack_rod():
     """A heavy web whose lower end is pushed, with a mean pull of 1.1 kN at least: a chain stays taut there."""
     heavy = {"web": LeastPull(-341.0, "B", 1100.0), "wall": LeastPull(900.0, "B", 1500.0)}
     verdict = bars(pulls={"steady": heavy, "jam_left": heavy})
-    assert verdict.holds == "in part" and verdict.caveat == ""
+    assert verdict.holds == "in part" and verdict.caveat is None
     assert verdict.text.endswith("; an end of a bar is pushed, where a chain sags, in steady running, too.")
     ((topic, line),) = verdict.details(CALLED)
     assert topic == "end pushed" and line == (
@@ -76,7 +77,7 @@ def test_a_rod_of_which_only_an_end_is_pushed_is_no_slack_rod():
         "that pin and hardly the torques: steady running (web end pull at B -341 N); a lump jams (web end "
         "pull at B -341 N)."
     )
-    assert [(r["topic"], r["quantity"], r["place"]) for r in verdict.as_dict()["reasons"]] == [
+    assert [(r["topic"], r["quantity"], r["place"]) for r in as_data(verdict)["reasons"]] == [
         ("end pushed", "web_pull", "B")
     ] * 2
     # once the mean pull is lost, the end is no news
@@ -101,7 +102,7 @@ def test_the_speed_is_the_one_that_the_crank_has():
     slow = bars(30.0, 50.0, 4.58, actual=1.57)
     assert "two bars, the crank at 1.57 rad/s, judged at the 30.0 rad/s asked for; " in slow.text
     assert slow.details(CALLED)[0] == ("slack speed", "A web goes slack from a crank speed of 4.58 rad/s on.")
-    data = slow.as_dict()
+    data = as_data(slow)
     assert (data["speed"]["value"], data["reached"]["value"]) == (30.0, 1.57)
     assert "asked" not in bars(3.0, actual=2.999).text
     _, rest = bars(1.57, 50.0, 0.0).details(CALLED)[0]
@@ -123,9 +124,9 @@ def test_each_reason_has_its_own_remedy():
 
 def test_what_rests_on_a_model_that_does_not_hold_carries_a_caveat():
     spoiled = bars(pulls=PULLED | {"steady": least(-1.0, 1.0)})
-    assert spoiled.caveat == spoiled.as_dict()["caveat"] == "for two bars, which do not hold here"
-    assert bars().caveat == "" and bars().as_dict()["caveat"] is None
-    assert bars(pulls=PULLED | {"jam_left": least(-1.0, 1.0)}).caveat == ""
+    assert spoiled.caveat == as_data(spoiled)["caveat"] == "for two bars, which do not hold here"
+    assert bars().caveat is None and as_data(bars())["caveat"] is None
+    assert bars(pulls=PULLED | {"jam_left": least(-1.0, 1.0)}).caveat is None
 
 
 def test_the_speed_against_modes_and_slack():
@@ -166,7 +167,7 @@ def test_a_shorter_step_is_no_advice_for_a_crank_that_stalls():
 
 def test_of_a_machine_that_is_not_known_only_the_energy_balance_is_judged():
     kept, lost = (outsider(3.0, {"steady": share}) for share in (1e-6, 1.0))
-    assert (kept.holds, kept.caveat) == ("true", "") and kept.as_dict()["model"] is None
+    assert (kept.holds, kept.caveat) == ("true", None) and as_data(kept)["model"] is None
     assert kept.text == (
         "The machine is an FMU whose own model is not known; its energy balance holds: the crank at 3.00 rad/s."
     )
@@ -208,7 +209,7 @@ def test_words_and_data():
         "wall mean pull -26.2 N); a lump jams (wall mean pull -995 N).",
         "The rocker torque of two bars is good to 10 % only up to a crank speed of 2.00 rad/s.",
     )
-    data = verdict.as_dict()
+    data = as_data(verdict)
     assert data["holds"] == "in part" and data["speed"] == {"value": 3.0, "unit": "rad/s", "kind": "speed"}
     assert data["reasons"][2] == {
         "topic": "pushed",

@@ -18,7 +18,6 @@ locked rotor to the cold motor. The steady temperature in rated running is there
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -29,7 +28,7 @@ import numpy as np
 
 from ..core.engines import MATH, Dual, dual, slope, value
 from ..core.errors import Faults, InputError
-from ..core.quantities import Layout, Value, declaration, quantity, violations
+from ..core.quantities import Layout, Value, complaint, declaration, quantity, violations
 from .induction_motor import InductionMotor, Parameters, Steady, breakdown, steady
 from .motor import T_RATED
 
@@ -178,35 +177,34 @@ def check(nameplate: Nameplate, assumptions: Assumptions = TYPICAL) -> None:
         with a line for each: the quantity, its value, the allowed range.
     """
     faults = Faults()
-    faults.add(map(_of_column, violations(LAYOUT, nameplate)))
+    pairs = zip(LAYOUT.variables, LAYOUT.values(nameplate), strict=True)
+    faults.add(InputError(complaint(v, x), v.name) for v, x in pairs if not v.quantity.admits(x))
     faults.add(map(InputError, violations(Layout(Assumptions), assumptions)))
     faults.refuse()
-    faults.add(map(_of_column, _contradictions(nameplate, assumptions)))
+    contradictions = _contradictions(nameplate, assumptions)
+    faults.add(InputError(f"{column} = {words}", column) for column, words in contradictions)
     faults.refuse()
 
 
-def _of_column(line: str) -> InputError:
-    """The refusal of a value; its key is the name at the begin of the line."""
-    return InputError(line, re.split("[ :]", line)[0])
-
-
-def _contradictions(n: Nameplate, assumptions: Assumptions) -> Iterator[str]:
-    """A line for each value that contradicts others; it begins with the name of the value."""
+def _contradictions(n: Nameplate, assumptions: Assumptions) -> Iterator[tuple[str, str]]:
+    """Each value that contradicts others: its name, and its value with the reason."""
     low, high = ((1.0 + sign * LARGEST_RESIDUAL) * n.implied_current for sign in (-1.0, 1.0))
     if n.current and not low < n.current < high:
         yield (
-            f"current = {n.current:g} A: power, voltage, efficiency and power factor make it {n.implied_current:.4g} "
-            f"A; must be > {low:.4g} and < {high:.4g} A, or be left out"
+            "current",
+            f"{n.current:g} A: power, voltage, efficiency and power factor make it {n.implied_current:.4g} "
+            f"A; must be > {low:.4g} and < {high:.4g} A, or be left out",
         )
     if n.poles % 2.0:
-        yield f"poles = {n.poles:g}: must be an even number (number of poles)"
+        yield "poles", f"{n.poles:g}: must be an even number (number of poles)"
         return
     low, high = (1.0 - LARGEST_SLIP) * n.synchronous, n.synchronous
     if not low < n.speed < high:
         rev = [x * 60.0 / _TURN for x in (n.speed, low, high)]
         yield (
-            f"speed = {n.speed:g} rad/s ({rev[0]:g} rev/min): with poles = {n.poles:g} at {n.frequency:g} Hz it "
-            f"must be > {low:g} and < {high:g} rad/s, the synchronous speed ({rev[1]:g} and {rev[2]:g} rev/min)"
+            "speed",
+            f"{n.speed:g} rad/s ({rev[0]:g} rev/min): with poles = {n.poles:g} at {n.frequency:g} Hz it "
+            f"must be > {low:g} and < {high:g} rad/s, the synchronous speed ({rev[1]:g} and {rev[2]:g} rev/min)",
         )
         return
     # the efficiency with no losses but slip and friction
@@ -214,14 +212,16 @@ def _contradictions(n: Nameplate, assumptions: Assumptions) -> Iterator[str]:
     real = n.power / (n.apparent_power * n.power_factor)
     if not max(real, n.efficiency) < most:
         yield (
-            f"efficiency = {max(real, n.efficiency):.4g}: a slip of {n.slip:.3g} and friction of "
-            f"{assumptions.friction:g} of the power leave at most {most:.4g}; must be < {most:.4g}"
+            "efficiency",
+            f"{max(real, n.efficiency):.4g}: a slip of {n.slip:.3g} and friction of "
+            f"{assumptions.friction:g} of the power leave at most {most:.4g}; must be < {most:.4g}",
         )
     most = n.locked_current_ratio * n.apparent_power / (n.torque * n.synchronous)
     if not n.locked_torque_ratio < most:
         yield (
-            f"locked_torque_ratio = {n.locked_torque_ratio:g}: takes more than the whole power of the locked-rotor "
-            f"current; must be < {most:.3g}"
+            "locked_torque_ratio",
+            f"{n.locked_torque_ratio:g}: takes more than the whole power of the locked-rotor "
+            f"current; must be < {most:.3g}",
         )
 
 

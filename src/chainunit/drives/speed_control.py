@@ -7,33 +7,22 @@ its zero lies at a fifth of the crossover.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from ..core.errors import InputError
-from ..reading.text import entry
+from ..reading.results import part, result
 
 
-@dataclass(frozen=True)
+@result
 class Tuning:
     """Gains and their margins; `parameters` names the gains as the motor's parameters."""
 
     parameters: dict[str, float]
-    phase_margin: float
-    """[deg]"""
-    crossover: float
-    """crossover of the speed loop [rad/s]"""
-    current_crossover: float | None = None
-    """crossover of an inner current loop [rad/s]"""
-
-    def as_dict(self) -> dict[str, Any]:
-        """Ready for JSON."""
-        margins = {
-            "phase_margin": (self.phase_margin, "deg"),
-            "crossover": (self.crossover, "rad/s"),
-            "current_crossover": (self.current_crossover, "rad/s"),
-        }
-        return {name: entry(x, unit) for name, (x, unit) in margins.items() if x is not None}
+    phase_margin: float = part("phase margin of the speed loop", unit="deg")
+    crossover: float = part("crossover of the speed loop", unit="rad/s")
+    current_crossover: float | None = part(
+        "crossover of an inner current loop", unit="rad/s", optional=True, default=None
+    )
 
 
 def tune(armature: Any, inertia: float, bandwidth: float = 300.0, crossover_share: float = 0.1) -> Tuning:
@@ -80,20 +69,19 @@ def _open_loop(
     return (kp + ki / s) * _current_loop(armature, current) * armature.k / (inertia * s)
 
 
-@dataclass(frozen=True)
+@result
 class Loop:
     """The linearised speed loop of a motor with one inertia at its shaft."""
 
-    inertia: float
-    """[kg m2]"""
-    phase_margin: float
-    """[deg]"""
-    crossover: float
-    """[rad/s]"""
-    largest_deviation: float
-    """largest deviation of the motor speed after a step of the load torque [(rad/s)/(N m)]"""
-    settling: float
-    """time until the deviation stays below a twentieth of the largest one [s]"""
+    inertia: float = part("inertia at the motor's shaft", unit="kg.m2")
+    phase_margin: float = part("phase margin", unit="deg")
+    crossover: float = part("crossover", unit="rad/s")
+    largest_deviation: float = part(
+        "largest deviation of the motor speed after a step of the load torque",
+        unit="rad/(N.m.s)",
+        name="deviation",
+    )
+    settling: float = part("time until the deviation stays below a twentieth of the largest one", unit="s")
     frequency: Any
     """[rad/s], shape (n,)"""
     gain: Any

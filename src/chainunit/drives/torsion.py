@@ -21,12 +21,14 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ..core.engines import Dual, dual, numpy_, value
 from ..core.integrators import rk4
+from ..core.quantities import quantity
+from ..reading.results import derived, part, result
 from ..work.progress import Progress
 from .cardan import Cardan, Twist, frozen_frequency, middle_angle, two_joints
 
@@ -36,6 +38,8 @@ STEPS_PER_PERIOD = 32
 STEPS_PER_HARMONIC = 12
 """Steps per period of each harmonic of the ratio i23."""
 
+ROUNDOFF_TORQUE = 1e-6
+"""Torque up to which it is roundoff [N m]."""
 _ITERATIONS = 12
 _AGAIN = 8  # iterations from a neighbour, which is near
 _WALKS = (1, 1, 6)
@@ -122,28 +126,36 @@ class _LineRates:
         return x
 
 
-class SteadyMotion(NamedTuple):
-    """Steady motions at n points; NaN where none was found."""
+@result
+class SteadyMotion:
+    """Steady motions at n points, with arrays of shape (n,); NaN where none was found."""
 
-    exists: Any
-    """whether a steady motion was found, bool, (n,)"""
+    exists: Any = part("whether a steady motion was found", name="found")
     start: Any
     """phi1, w1, phi4, w4 where phi1 = 0 [rad, rad/s], (4, n)"""
-    drive: Any
-    """torque on J1 that keeps the mean speed [N.m], (n,)"""
-    largest2: Any
-    """largest elastic torque c2 (phi1 - phi2) of shaft 2 over the turn [N.m], (n,)"""
-    least2: Any
-    largest3: Any
-    least3: Any
-    multiplier: Any
-    """larger absolute value of the two torsional Floquet multipliers of half a turn, common speed held [1], (n,)"""
-    growth: Any
-    """rate of growth of a small torsional disturbance [1/s], negative where it decays, (n,)"""
-    frequency: Any
-    """frequency of the damped torsional vibration [rad/s], (n,): the branch next to k at i23 = 1"""
-    free_growth: Any
-    """rate of growth with constant torques, the fastest one without the shift along the orbit [1/s], (n,)"""
+    drive: Any = part("torque on J1 that keeps the mean speed", unit="N.m", name="drive_torque")
+    largest2: Any = part(
+        "largest elastic torque c2 (phi1 - phi2) of shaft 2 over the turn", unit="N.m", name="largest_torque2"
+    )
+    least2: Any = part("least elastic torque of shaft 2", unit="N.m", name="least_torque2")
+    largest3: Any = part("largest elastic torque of shaft 3", unit="N.m", name="largest_torque3")
+    least3: Any = part("least elastic torque of shaft 3", unit="N.m", name="least_torque3")
+    multiplier: Any = part(
+        "larger absolute value of the two torsional Floquet multipliers of half a turn, common speed held",
+        unit="1",
+        name="largest_multiplier",
+    )
+    growth: Any = quantity("1/s", "rate of growth of a small torsional disturbance, negative where it decays")
+    frequency: Any = quantity(
+        "rad/s",
+        "frequency of the damped torsional vibration: the branch next to k at i23 = 1",
+        kind="frequency",
+    )
+    free_growth: Any = part(
+        "rate of growth with constant torques, the fastest one without the shift along the orbit",
+        unit="1/s",
+        name="growth_with_constant_torque",
+    )
     monodromy: Any
     """monodromy matrix of phi1, w1, phi4, w4 over half a turn with constant torques, (4, 4, n)"""
 
@@ -152,15 +164,21 @@ class SteadyMotion(NamedTuple):
         """Whether a torsional disturbance grows, bool, (n,); False where nothing was found."""
         return self.multiplier > 1.0 + _NOISE
 
-    @property
+    @derived("N.m", name="peak_torque2")
     def peak2(self) -> Any:
-        """Largest torque of shaft 2, either way [N.m], (n,)."""
+        """Largest torque of shaft 2, either way."""
         return np.maximum(np.abs(self.largest2), np.abs(self.least2))
 
-    @property
+    @derived("N.m", name="peak_torque3")
     def peak3(self) -> Any:
-        """Largest torque of shaft 3, either way [N.m], (n,)."""
+        """Largest torque of shaft 3, either way."""
         return np.maximum(np.abs(self.largest3), np.abs(self.least3))
+
+    @classmethod
+    def joined(cls, motions: Sequence[SteadyMotion], order: Any) -> SteadyMotion:
+        """All points of some motions, in this order."""
+        columns = zip(*(vars(motion).values() for motion in motions), strict=True)
+        return cls(*(np.concatenate(each, axis=-1)[..., order] for each in columns))
 
 
 def steady(
@@ -189,12 +207,12 @@ def steady(
                 continue
             beside, q = gaps + side, _pick(p, gaps)
             guess = np.concatenate([motion.start[:, beside], motion.drive[None, beside]])
-            for part in range(1, walk + 1):
-                there = speed[beside] + part / walk * (speed[gaps] - speed[beside])
+            for stage in range(1, walk + 1):
+                there = speed[beside] + stage / walk * (speed[gaps] - speed[beside])
                 again = _all(q, there, load[gaps], guess, chunk, _AGAIN, _nothing)
                 guess = np.concatenate([again.start, again.drive[None]])
-            for whole, new in zip(motion, again, strict=True):
-                whole[..., gaps] = new
+            for name, whole in vars(motion).items():
+                whole[..., gaps] = getattr(again, name)
     progress(1.0)
     return motion
 
@@ -214,7 +232,7 @@ def _all(
         )
         before += share
     back = np.argsort(order, kind="stable")
-    return SteadyMotion(*(np.concatenate(each, -1)[..., back] for each in zip(*parts, strict=True)))
+    return SteadyMotion.joined(parts, back)
 
 
 def _shoot(
@@ -273,7 +291,7 @@ def _shoot(
         exists=exists,
         start=x,
         drive=drive,
-        **extremes,
+        **{name: np.where(np.abs(x) < ROUNDOFF_TORQUE, 0.0, x) for name, x in extremes.items()},
         multiplier=multiplier,
         growth=np.log(multiplier) / period,
         frequency=_branch(angle, k * period) / period,
@@ -331,14 +349,14 @@ def with_damping_ratio(p: Cardan, ratio: float) -> Cardan:
     return dataclasses.replace(p, d2=2.0 * ratio * p.c2 / k, d3=2.0 * ratio * p.c3 / k)
 
 
-class SimulatedPeaks(NamedTuple):
-    """Peaks of the last half turns of a time simulation at n speeds."""
+@result
+class SimulatedPeaks:
+    """Peaks of the last half turns of a time simulation at n speeds, with arrays of shape (n,)."""
 
-    speed: Any
-    """mean speed over these half turns [rad/s], (n,)"""
-    peak2: Any
-    """largest elastic torque of shaft 2, either way [N.m], (n,)"""
-    peak3: Any
+    asked_speed: Any = quantity("rad/s", "speed at which the line should run", kind="speed")
+    speed: Any = quantity("rad/s", "mean speed over these half turns", kind="speed")
+    peak2: Any = part("largest elastic torque of shaft 2, either way", unit="N.m", name="peak_torque2")
+    peak3: Any = part("largest elastic torque of shaft 3, either way", unit="N.m", name="peak_torque3")
 
 
 def settling_time(p: Cardan, share: float = 1e-3) -> float:
@@ -413,14 +431,15 @@ def simulate(
         if step % 50 == 0:
             progress(step / whole)
     progress(1.0)
-    return SimulatedPeaks((end - begin) / (half_turns * period), peak2, peak3)
+    return SimulatedPeaks(speed, (end - begin) / (half_turns * period), peak2, peak3)
 
 
-class RigidPeaks(NamedTuple):
-    """Largest torques of shafts 2 and 3 of the line with rigid shafts [N.m], each (n,)."""
+@result
+class RigidPeaks:
+    """Largest torques of the line with rigid shafts, each of shape (n,)."""
 
-    peak2: Any
-    peak3: Any
+    peak2: Any = part("largest torque of shaft 2 of the rigid line", unit="N.m", name="rigid_torque2")
+    peak3: Any = part("largest torque of shaft 3 of the rigid line", unit="N.m", name="rigid_torque3")
 
 
 def rigid(p: Cardan, speed: Any, load: float, points: int = 720) -> RigidPeaks:

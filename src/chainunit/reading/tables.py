@@ -11,7 +11,6 @@ import math
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
@@ -33,6 +32,7 @@ from ..core.errors import InputError, near_name, printable, shown
 from ..core.messages import unit_behind
 from ..core.quantities import Layout, Quantity, Variable, complaint, variables
 from . import toml_lines
+from .results import InUnit, derived, part, result
 from .toml_faults import syntax_faults
 
 T = TypeVar("T")
@@ -114,29 +114,33 @@ def option_value(name: str, text: str, unit: str, description: str) -> float:
         raise InputError(str(error)) from None
 
 
-@dataclass(frozen=True)
-class Slip:
-    """A value that no machine of this kind has, so that a slip of the unit is likely. `meant` is the probable
-    value, in the form of a study file, or empty."""
+@result
+class UnusualValue:
+    """A value that no machine of this kind has, so that a mistaken unit is likely."""
 
     variable: Variable
     value: float
-    meant: str
+    meant: str | None = part("the probable value, in the form of a study file")
 
-    def as_dict(self) -> dict[str, Any]:
-        """Ready for JSON; `said` is the remark in words."""
-        return {
-            "name": self.variable.name,
-            "given": {"value": self.value, "unit": self.variable.unit},
-            "meant": self.meant or None,
-            "said": str(self),
-        }
+    @derived()
+    def name(self) -> str:
+        """Name of the value."""
+        return self.variable.name
+
+    @derived()
+    def given(self) -> InUnit:
+        """The value."""
+        return InUnit(self.value, self.variable.unit)
+
+    @derived()
+    def said(self) -> str:
+        """The remark in words."""
+        return str(self)
 
     @property
     def sentence(self) -> str:
         """The remark as a sentence with a full stop."""
-        said = str(self)
-        return said if said.endswith("?") else f"{said}."
+        return str(self) if self.meant else f"{self}."
 
     def __str__(self) -> str:
         v, (low, high) = self.variable, self.variable.quantity.usual or (0.0, 0.0)
@@ -146,11 +150,11 @@ class Slip:
         return f"{v.name} = {self.value:g}{unit}: is unusual ({v.description}; {usual}){hint}"
 
 
-def slips(
+def unusual_values(
     declared: Mapping[str, type],
     data: Mapping[str, Any],
     usual: Mapping[str, tuple[float, float]] = MappingProxyType({}),
-) -> Iterator[Slip]:
+) -> Iterator[UnusualValue]:
     """The unusual values in the sections of a checked file. `declared` has the declaration of each section by
     its name. `usual` has, by the name of a quantity, the usual sizes that replace the declared ones."""
     for section, of in declared.items():
@@ -165,19 +169,19 @@ def slips(
                 )
                 value = to_number(variable, given)
                 if not variable.quantity.is_usual(value):
-                    yield Slip(variable, value, _meant(variable, given))
+                    yield UnusualValue(variable, value, _meant(variable, given))
 
 
-def _meant(variable: Variable, given: Any) -> str:
-    """The given number with the unit in which it is allowed and usual; empty where there is no such unit."""
+def _meant(variable: Variable, given: Any) -> str | None:
+    """The given number with the unit in which it is allowed and usual; None where there is no such unit."""
     parts = units.split(str(given))
     if parts is None or not math.isfinite(parts[0]):
-        return ""
+        return None
     for unit in units.fitting(variable.unit, variable.kind):
         value = units.convert(parts[0], unit, variable.unit, variable.kind)
         if variable.quantity.admits(value) and variable.quantity.is_usual(value):
             return f"{parts[0]:.15g} {unit}"
-    return ""
+    return None
 
 
 def _kind(variable: Variable) -> str:
@@ -234,7 +238,7 @@ def read_table(form: type[BaseModel], table: Mapping[str, Any], prefix: str = ""
     try:
         return form.model_validate(dict(table))
     except ValidationError as error:
-        raise InputError.of(refusals(error, form, prefix)) from error
+        raise InputError.joined(refusals(error, form, prefix)) from error
 
 
 def given_values(section: BaseModel) -> dict[str, Any]:
@@ -354,7 +358,7 @@ def toml(text: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except ValueError as error:  # TOMLDecodeError, and numbers that are too long
-        raise InputError.of(syntax_faults(text, error)) from error
+        raise InputError.joined(syntax_faults(text, error)) from error
     except RecursionError as error:
         raise InputError("no valid TOML: tables or lists are nested too deeply") from error
 
@@ -388,7 +392,7 @@ def in_file(source: str, lines_of: Callable[[], Mapping[str, int]]) -> Iterator[
 
         # faults of another file that this file names come last
         ordered = sorted(error.faults, key=lambda fault: (fault.placed, line_of(fault)))
-        raise InputError.of(
+        raise InputError.joined(
             [
                 fault
                 if fault.placed

@@ -30,7 +30,7 @@ from ..core.quantities import DISPLAY_UNITS, Layout, finite
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _THIN = "\u202f"  # between thousands
 _SPACE = "\u00a0"  # before a unit
-_PERCENT = 10.0
+MOST_PERCENT = 10.0
 """Largest share that is shown in %. A larger one is "over 1000 %"; a larger used share is a multiple."""
 _NOTHING = 5e-5
 """A share below this value is shown as 0."""
@@ -177,12 +177,12 @@ def _share(value: float, kind: str, digits: int, full: bool) -> tuple[str, str]:
         return "stands" if value < 1.005 else "turns back", ""
     if abs(value) < _NOTHING:
         value = 0.0
-    if abs(value) <= _PERCENT:
+    if abs(value) <= MOST_PERCENT:
         return digits_text(100.0 * value, digits, full=full), "%"
     if kind == "used":
         much = value <= _TIMES
         return (digits_text(value, digits) if much else f"over {digits_text(_TIMES)}"), "times"
-    return f"{'over ' if value > 0.0 else 'below −'}{digits_text(100.0 * _PERCENT)}", "%"
+    return f"{'over ' if value > 0.0 else 'below −'}{digits_text(100.0 * MOST_PERCENT)}", "%"
 
 
 def forms(
@@ -212,6 +212,11 @@ def entry(value: float | None, unit: str, kind: str = "") -> dict[str, Any]:
     """A number as a result holds it: with its unit, and its kind if it has one; None where it is not
     finite."""
     return {"value": finite(value), "unit": unit} | ({"kind": kind} if kind else {})
+
+
+def difference_entry(x: float | None, unit: str) -> dict[str, Any]:
+    """The entry of a number that is no temperature itself, such as a standard deviation."""
+    return entry(x, unit, "difference" if unit == "K" else "")
 
 
 def array_entry(x: Any, unit: str, kind: str = "") -> dict[str, Any]:

@@ -1,18 +1,18 @@
-"""Capabilities, as a report knows them: a question, its section, and the command that answers it."""
+"""Capabilities, as a report knows them: a question, its section, and its answer."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol, Self
 
 from ..study.capability import StudyCapability
+from ..study.config import Config
 from ..study.record import StudyRecord
 from ..study.registry import registered
 from .blocks import Block, Source
 from .lines import Line
 from .supplement import Supplement
-from .task import Task
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,15 @@ class Contents:
     """name of its analysis, if the section has another name"""
     comes_first: bool = False
     """whether it stands before the turn at constant speed"""
+
+
+class AnyStudy(Protocol):
+    """A study from Python, `chainunit.Study`, as a capability knows it."""
+
+    config: Config
+
+    def of_tables(self, tables: dict[str, Any], source: str) -> Self:
+        """A study of the same kind with other `tables` of a study file; paths in them are relative to `source`."""
 
 
 class Capability(StudyCapability):
@@ -48,10 +57,6 @@ class Capability(StudyCapability):
     def warnings(self, s: Source) -> Iterator[Block]:
         """Its warnings beside those of the study, to stand at the head of a report."""
         return iter(())
-
-    def tasks(self) -> Mapping[str, Task[Any, Any]]:
-        """Its commands, by name."""
-        return {}
 
     def supplement(self, study: StudyRecord) -> Supplement | None:
         """Its additions to the machine in motion."""

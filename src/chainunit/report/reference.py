@@ -1,11 +1,11 @@
-"""The reference: all keys of study files and catalogues, the variables of all FMUs, and the commands, as tables that
-follow from the declarations."""
+"""The reference: all keys of study files and catalogues, the variables of all FMUs, the results, and the commands, as
+tables that follow from the declarations."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Iterator
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, get_type_hints
 
 from ..core.errors import InputError, near_name
 from ..core.messages import unit_behind
@@ -13,6 +13,8 @@ from ..core.model import Model
 from ..core.quantities import written
 from ..fmu.description import Interface
 from ..models import MODELS
+from ..reading.results import documented, results_in
+from ..study.analyses import all_analyses
 from ..study.keys import Key, KeyTable, catalogue_columns, key_tables
 from .blocks import Block, Report, Section, Table, TableRow, Text, heads
 
@@ -106,8 +108,11 @@ def _row(key: Key) -> TableRow:
     return TableRow((key.name, key.left_out or key.follows or "-", key.allowed or "-", key.description))
 
 
-def reference(commands: Iterable[tuple[str, str, Iterable[tuple[str, str]]]]) -> Report:
-    """The whole reference; each of the `commands` has a name, a description, and options with their help."""
+def reference(
+    commands: Iterable[tuple[str, str, Iterable[tuple[str, str]]]], contents: Mapping[str, type | None]
+) -> Report:
+    """The whole reference; each of the `commands` has a name, a description, and options with their help, and
+    `contents` the declared content of the result.json of some."""
     sections = [
         Section(
             f"{table.name}-{table.of}",
@@ -117,6 +122,10 @@ def reference(commands: Iterable[tuple[str, str, Iterable[tuple[str, str]]]]) ->
         for table in (*key_tables(), catalogue_columns())
     ]
     sections += [Section(name, f"FMU {name}", tuple(_variables(model))) for name, model in MODELS.items()]
+    sections += [
+        Section(f"result-{name}", f"result.json: {name}", (_parts(of),))
+        for name, of in _results(contents).items()
+    ]
     for name, words, options in commands:
         rows = tuple(TableRow((option, words)) for option, words in options)
         sections.append(
@@ -129,12 +138,25 @@ def reference(commands: Iterable[tuple[str, str, Iterable[tuple[str, str]]]]) ->
     return Report("Reference", "reference", {}, (), tuple(sections))
 
 
+def _results(contents: Mapping[str, type | None]) -> dict[str, type]:
+    """The declared results by their names: those of the analyses of a study, and those of other commands."""
+    returned = ((each.name, get_type_hints(each.find)["return"]) for each in all_analyses())
+    found = {name: results_in(hint)[1] for name, hint in returned}
+    return {name: of for name, of in (found | dict(contents)).items() if of is not None}
+
+
+def _parts(of: type) -> Table:
+    """A row for each part of a result."""
+    rows = (TableRow((name, unit or "-", words)) for name, unit, words in documented(of))
+    return Table(tuple(rows), heads("name", "unit", "meaning"), numeric=False)
+
+
 def _variables(model: type[Model]) -> Iterator[Block]:
     """The table of the variables of an FMU of that model."""
     interface: Any = Interface(model, {})
     rows = []
     for causality in ("parameter", "input", "output"):
-        for signal in interface.of(causality):
+        for signal in interface.signals_of(causality):
             v = signal.variable
             start, unit = (
                 f"{v.quantity.start or 0.0:g}{unit_behind(v.unit)}",

@@ -1,7 +1,7 @@
 """A task: what a command computes, reports and leaves in a folder.
 
-The command line (`chainunit.app.console.carry_out`) and Python (`chainunit.app.results.ReportedResult`) take the same
-steps by it: they claim the folder, clear it, compute, report and write.
+The command line (`chainunit.report.console`) and Python (`chainunit.report.reported_result`) take the same steps by
+it: they claim the folder, clear it, compute, report and write.
 """
 
 from __future__ import annotations
@@ -58,6 +58,8 @@ class Task(Generic[Question, Outcome]):
     """the error that ended the computation early; what was computed before this error is reported and written"""
     shortfall: Callable[[Outcome], str | None] = lambda outcome: None
     """None where the outcome is what was sought, else a sentence for the terminal, or "": the exit status is 1"""
+    content: type | None = None
+    """the declared content of its result.json"""
     tells_remarks: bool = False
     """whether a terminal has the remarks of the report already, as those on the study file"""
 

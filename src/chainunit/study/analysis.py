@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from ..work.progress import Report
 
@@ -22,12 +22,8 @@ if TYPE_CHECKING:
 
 
 class Findings(ABC):
-    """What an analysis found."""
-
-    @abstractmethod
-    def as_dict(self) -> dict[str, Any]:
-        """The findings ready for JSON, each number with its unit: the part of the result under the name of
-        the analysis."""
+    """What an analysis found: a declared result (`chainunit.reading.results`), whose data are the part of result.json
+    under the name of the analysis."""
 
     @property
     def store(self) -> Path | None:

@@ -11,6 +11,7 @@ from ..core.quantities import Value, declaration, quantity
 from ..drives.catalogue import CatalogueMotor
 from ..drives.disc import Disc, steel_disc
 from ..drives.gear_ratios import GearUnit
+from ..reading.results import as_data
 from ..reading.text import entries, number
 from .drive import Drive
 from .limits import Check
@@ -235,5 +236,5 @@ class Candidate:
             "verdict": self.verdict,
             "criterion": self.criterion,
             "reason": self.reason,
-            "checks": {name: check.as_dict() for name, check in self.checks.items()},
+            "checks": as_data(self.checks),
         }

@@ -72,6 +72,8 @@ class CycleQuantity:
     combine: Callable[[Sequence[Any], Any, CycleBasis], Any]
     kind: str = ""
     """how people show it, see `chainunit.reading.text`"""
+    reduction: str = ""
+    """name of the reduction of its column; of a quantity that is no single reduction, its own name"""
 
 
 def _installed_power(values: Sequence[Any], w: Any, basis: CycleBasis) -> Any:
@@ -140,12 +142,13 @@ def cycle_quantity(name: str, model: type[Model]) -> CycleQuantity:
     words = f"{_WORDS[reduction]}, {variable.description}"
     if reduction == RANGE:
         pair = (Integrand(column, "max"), Integrand(column, "min"))
-        return CycleQuantity(name, variable.unit, words, pair, _difference)
-    return CycleQuantity(name, variable.unit, words, (Integrand(column, reduction),), _only)
+        return CycleQuantity(name, variable.unit, words, pair, _difference, reduction=reduction)
+    one = (Integrand(column, reduction),)
+    return CycleQuantity(name, variable.unit, words, one, _only, reduction=reduction)
 
 
 def _named(name: str, model: type[Model]) -> CycleQuantity:
-    of = partial(CycleQuantity, name, *NAMED[name])
+    of = partial(CycleQuantity, name, *NAMED[name], reduction=name)
     if name == "installed_power":
         return of((Integrand("tau", "rms"), Integrand("tau", "peak")), _installed_power)
     if name == "energy_per_year":

@@ -107,8 +107,8 @@ class RandomEvent:
         sides = (self.side,) if self.side or not self.of.has_side else SIDES
         return [self.event(side, {name: high for name, (_, high) in self.ranges.items()}) for side in sides]
 
-    def as_dict(self) -> dict[str, Any]:
-        """All values on which a drawn event depends, ready for JSON."""
+    def identity(self) -> dict[str, Any]:
+        """All values on which a drawn event depends."""
         fixed = Layout(type(self.p)).by_name(self.p)
         own = {"input": self.of.acts_on[0]} if self.of.has_input else {}
         return {"type": self.of.kind, **own, "side": self.side, "p": fixed, "ranges": dict(self.ranges)}

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
-
 import numpy as np
 
 from ..core.quantities import Value, declaration, quantity
-from ..reading.text import entries, number
+from ..reading.results import part, result
+from ..reading.text import number
 from .analysis import Analysis, Findings, Work
 from .config import Config
 from .drive import Drive
@@ -32,16 +30,12 @@ class GearLoss:
     share: Value = quantity("1", "whole loss over the mean power that the machine takes", kind="percent")
 
 
-@dataclass(frozen=True)
+@result
 class GearFindings(Findings):
     """The loss of the gear, and its efficiency while the motor drives."""
 
-    loss: GearLoss
+    loss: GearLoss = part(inline=True)
     efficiency: float
-
-    def as_dict(self) -> dict[str, Any]:
-        """Ready for JSON."""
-        return entries(self.loss)
 
     def remark(self, study: StudyRecord) -> None:
         """The loss beside the power of the machine, and its parts."""

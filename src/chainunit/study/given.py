@@ -8,7 +8,8 @@ from typing import Any
 
 from ..core.quantities import variables
 from ..drives.line_table import Damping
-from ..reading.text import entries, entry
+from ..reading.results import as_data
+from ..reading.text import entry
 from .config import Config
 from .record import StudyRecord
 from .registry import registered
@@ -49,9 +50,10 @@ class GivenSection:
         names = [name for name in quantities if name not in self.unused_names]
         return [*(prefix + name for name in names), *(prefix + key for key in self.choices)]
 
-    def as_dict(self) -> dict[str, Any]:
-        """Ready for JSON, each number with its unit."""
-        own = {} if self.values is None else entries(self.values)
+    @property
+    def data(self) -> dict[str, Any]:
+        """The values as a result has them."""
+        own = {} if self.values is None else as_data(self.values)
         own = {name: x for name, x in own.items() if name not in self.unused_names}
         ranges = {name: {**own[name], "value": list(ends)} for name, ends in self.ranges.items()}
         return own | ranges | {key: _choice(value) for key, value in self.choices.items()}

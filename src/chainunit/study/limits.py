@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import Any
 
 from ..drives.nameplate import Nameplate
-from ..reading.text import entry, number
+from ..reading.results import OWN, derived, part, result
+from ..reading.text import MOST_PERCENT, number
 from .config import Config
 from .drive import Drive
 from .window import BURNT
@@ -18,6 +17,8 @@ SPEED_DEVIATION = 0.03
 speed."""
 
 
+_HARDLY_OVER = 1.005
+"""Used share of a limit below which it reads as 100 %."""
 _AT_LIMIT = 1e-3
 """Relative distance within which a current is at its limit."""
 
@@ -28,19 +29,19 @@ def limit_reached(drive: Drive, currents: Iterable[float]) -> float | None:
     return limit if limit is not None and any(i >= (1.0 - _AT_LIMIT) * limit for i in currents) else None
 
 
-@dataclass(frozen=True)
+@result
 class Check:
     """A value beside its limit, in one unit."""
 
-    title: str
-    value: float | None
-    limit: float
+    title: str = part("the limited quantity")
+    value: float | None = part("its value", unit=OWN)
+    limit: float = part("its limit", unit=OWN)
     unit: str
     kind: str = ""
     forbidden: str = ""
     """the reason, in words, why the limit is 0"""
 
-    @property
+    @derived("1", "used")
     def utilisation(self) -> float | None:
         """value/limit; None where the candidate does not get so far that there is a value. It is infinite for
         any value where nothing is permitted."""
@@ -60,23 +61,19 @@ class Check:
         """Words on a limit that is exceeded."""
         if self.limit <= 0.0 and self.forbidden:
             return self.forbidden
-        share = number(self.utilisation, "1", "used")
-        if share.startswith("100 %") and self.utilisation is not None:
+        if self.utilisation is not None and self.utilisation < _HARDLY_OVER:
             # the numbers would read as if the limit were kept
             value, limit = (number(x, self.unit, self.kind, 5, full=False) for x in (self.value, self.limit))
             above = number(self.utilisation - 1.0, "1", "percent", 1, full=False)
             return f"{self.title} {value}, {above} above the permitted {limit}"
         value, limit = (number(x, self.unit, self.kind, full=False) for x in (self.value, self.limit))
-        return f"{self.title} {value}, {share}{' of' if share.endswith('%') else ''} the permitted {limit}"
+        share, multiple = number(self.utilisation, "1", "used"), (self.utilisation or 0.0) > MOST_PERCENT
+        return f"{self.title} {value}, {share}{'' if multiple else ' of'} the permitted {limit}"
 
-    def as_dict(self) -> dict[str, Any]:
-        """Ready for JSON."""
-        return {
-            "title": self.title,
-            "utilisation": entry(self.utilisation, "1", "used"),
-            "value": entry(self.value, self.unit, self.kind),
-            "limit": entry(self.limit, self.unit, self.kind),
-        } | ({"forbidden": self.forbidden} if self.limit <= 0.0 and self.over and self.forbidden else {})
+    @derived(name="forbidden", optional=True)
+    def reason(self) -> str | None:
+        """The reason why nothing is permitted, where something is used."""
+        return self.forbidden if self.limit <= 0.0 and self.over and self.forbidden else None
 
 
 def heating(temperature: float, ambient: float, permitted: float) -> Check:

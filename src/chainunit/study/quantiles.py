@@ -12,12 +12,11 @@ interval). A few runs determine these differences badly, so the largest differen
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ..reading.text import entry
+from ..reading.results import Estimate
 
 LESS_ALIKE = 0.9
 """Confidence that the values of one run are no more alike than assumed."""
@@ -28,21 +27,6 @@ HIGH = 0.95
 ALIKE = 0.05
 """Values of several runs that differ by less than this share of their median count as alike, as in a motion
 that repeats itself: then nothing is random, and the interval holds all values."""
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """A number that is estimated from random runs, and the interval that holds the true number with
-    `CONFIDENCE`."""
-
-    value: float
-    low: float
-    high: float
-
-    def as_dict(self, unit: str, kind: str = "") -> dict[str, Any]:
-        """Ready for JSON."""
-        ends = {name: entry(x, unit, kind) for name, x in (("low", self.low), ("high", self.high))}
-        return entry(self.value, unit, kind) | ends
 
 
 def quantile(values: Any, q: float) -> Estimate | None:

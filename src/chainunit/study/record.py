@@ -12,7 +12,8 @@ from ..core.errors import RunError
 from ..drives.speed_control import Tuning
 from ..fmu.backends import Origin
 from ..machines.chain_unit import RodName
-from ..reading.text import entry, number
+from ..reading.results import InUnit, part, result
+from ..reading.text import number
 from . import verdict
 from .catalogue_drive import SLIP
 from .config import Config
@@ -51,40 +52,31 @@ Origins: TypeAlias = Literal["file", "example", "declared", "tuned", "catalogue"
 """The origin of a value."""
 
 
-@dataclass(frozen=True)
+@result
 class Remark:
     """A remark that the reader needs beside the numbers: a `warning` of a fault or of a demand that is not
-    met, or a `note` on an assumption behind the numbers. `kind` names its subject, `runs` the runs that it is
-    about."""
+    met, or a `note` on an assumption behind the numbers."""
 
     severity: Literal["warning", "note"]
-    kind: str
-    text: str
-    """the text of the remark"""
-    runs: tuple[str, ...] = ()
-    quantities: Mapping[str, Amount] = field(default_factory=dict)
-    """the numbers of the text; a number of one run among several is named ``run.quantity``"""
+    kind: str = part("the subject of the remark")
+    text: str = part("the remark, a sentence")
+    runs: tuple[str, ...] = part("the runs that it is about", default=())
+    quantities: Mapping[str, InUnit] = part(
+        "the numbers of the text; a number of one run among several is named ``run.quantity``",
+        default_factory=dict,
+    )
 
     @classmethod
     def of(
         cls, severity: Literal["warning", "note"], kind: str, text: str, /, *runs: str, **parts: Amount | str
     ) -> Remark:
         """Make a remark; its `text` has the names of the `parts` (amounts and words) in braces."""
-        amounts = {name: part for name, part in parts.items() if not isinstance(part, str)}
-        words = {name: part if isinstance(part, str) else number(*part) for name, part in parts.items()}
-        return cls(severity, kind, text.format_map(words), runs, amounts)
+        amounts = {name: InUnit(*x[:3]) for name, x in parts.items() if not isinstance(x, str)}
+        said = text.format_map({name: x if isinstance(x, str) else number(*x) for name, x in parts.items()})
+        return cls(severity, kind, said[:1].upper() + said[1:], runs, amounts)
 
     def __str__(self) -> str:
-        return self.text[:1].upper() + self.text[1:]
-
-    def as_dict(self) -> dict[str, Any]:
-        """Ready for JSON."""
-        return {
-            "kind": self.kind,
-            "text": str(self),
-            "runs": list(self.runs),
-            "quantities": {name: entry(*amount[:3]) for name, amount in self.quantities.items()},
-        }
+        return self.text
 
 
 @dataclass

@@ -8,6 +8,7 @@ from typing import Any
 from .. import __version__
 from ..core.quantities import variables
 from ..drives.catalogue import CatalogueMotor
+from ..reading.results import as_data
 from ..reading.text import entries, entry, number, shown_in, turning
 from .coupling import coupling_sentence, way_words, why_none
 from .gear_order import gear_order
@@ -60,9 +61,9 @@ def _as_dict(study: StudyRecord) -> dict[str, Any]:
         "status": f"failed: {study.failure}" if study.failure else "complete",
         "failure": str(study.failure) if study.failure else None,
         "verdict": {"model": _on_model(study), "motor": motor_verdict(study)},
-        "warnings": [remark.as_dict() for remark in study.warnings],
-        "notes": [remark.as_dict() for remark in study.notes],
-        "slips": [slip.as_dict() for slip in config.slips],
+        "warnings": as_data(study.warnings),
+        "notes": as_data(study.notes),
+        "slips": as_data(config.unusual),
         **(given := _given_values(study)),
         **_statics(study),
         **_runs(study),
@@ -74,7 +75,7 @@ def _as_dict(study: StudyRecord) -> dict[str, Any]:
 def _on_model(study: StudyRecord) -> dict[str, Any] | None:
     if study.verdict is None:
         return None
-    verdict = study.verdict.as_dict()
+    verdict = as_data(study.verdict)
     return verdict | {"text": turning(verdict["text"], study.turning)}
 
 
@@ -86,7 +87,7 @@ def _given_values(study: StudyRecord) -> dict[str, Any]:
     values: dict[str, Any] = {"event": {}, "motor": _motor(study)}
     for section in sections:
         if section.name != "motor":
-            _put(values, section.place, section.as_dict())
+            _put(values, section.place, section.data)
     origins = {name: origin for name in names if (origin := study.origin(name)) != "declared"}
     return {"origins": origins} | values
 
@@ -102,17 +103,8 @@ def _statics(study: StudyRecord) -> dict[str, Any]:
     """The results that need no co-simulation."""
     statics = study.statics
     return {
-        "speed_loop": {
-            name: {
-                "inertia": entry(loop.inertia, "kg.m2"),
-                "phase_margin": entry(loop.phase_margin, "deg"),
-                "crossover": entry(loop.crossover, "rad/s"),
-                "deviation": entry(loop.largest_deviation, "rad/(N.m.s)"),
-                "settling": entry(loop.settling, "s"),
-            }
-            for name, loop in statics.loops.items()
-        },
-        "control": study.tuning.as_dict()
+        "speed_loop": as_data(statics.loops),
+        "control": as_data(study.tuning)
         if study.tuning
         else study.drive.motor.control
         if study.drive.follows
@@ -169,7 +161,7 @@ def _spread(study: StudyRecord, name: str) -> dict[str, Any]:
 
 def _parts(study: StudyRecord) -> dict[str, Any]:
     """The parts of the result that only some studies have."""
-    parts = {name: findings.as_dict() for name, findings in study.findings.items()}
+    parts = as_data(study.findings)
     if study.sizing:
         parts["sizing"] = study.sizing.as_dict() | {"gear": _gear(study), "protection": _protection(study)}
     if study.statics.torsion is not None:

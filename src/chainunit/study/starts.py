@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
+from ..core.quantities import quantity
 from ..drives.gearing import START_FACTOR
-from ..reading.text import entries, entry, number
+from ..reading.results import derived, part, result
+from ..reading.text import number
 from .analysis import Analysis, Findings, Work
 from .config import Config
 from .drive import Drive
@@ -18,17 +19,16 @@ from .start_runs import StartNumbers, longest_start, starts_from_all
 from .torques import at_gear
 
 
-@dataclass(frozen=True)
+@result
 class StartFindings(Findings):
-    """The starts, the largest torque of `running` at the output of the gear [N m], the permitted torque of the gear
-    in a start [N m], infinite where none is given, and the run in which running puts most on the gear."""
+    """The starts from several crank angles."""
 
-    starts: tuple[StartNumbers, ...]
-    running: float
-    limit: float
-    running_in: str
+    starts: tuple[StartNumbers, ...] = part("the starts", name="from")
+    running: float = quantity("N.m", "largest torque of running at the output of the gear")
+    limit: float = quantity("N.m", "permitted torque of the gear in a start, infinite where none is given")
+    running_in: str = part("the run in which running puts most on the gear")
 
-    @property
+    @derived()
     def worst(self) -> StartNumbers:
         """The start with the largest torque at the output of the gear."""
         return max(self.starts, key=lambda start: start.gear_torque)
@@ -43,16 +43,10 @@ class StartFindings(Findings):
         """The starts in which the crank does not come to its speed."""
         return [start for start in self.starts if start.start_time is None]
 
-    def as_dict(self) -> dict[str, Any]:
-        """Ready for JSON."""
-        return {
-            "from": [entries(start) for start in self.starts],
-            "worst": entries(self.worst),
-            "running": entry(self.running, "N.m"),
-            "running_in": self.running_in,
-            "over_running": entry(self.worst.gear_torque / self.running, "1"),
-            "limit": entry(self.limit, "N.m"),
-        }
+    @derived("1")
+    def over_running(self) -> float:
+        """The largest torque of a start over that of running."""
+        return float(self.worst.gear_torque / self.running)
 
     def remark(self, study: StudyRecord) -> None:
         """Warn of a start that the gear does not carry, or that puts much more on it than running does, and of angles
@@ -61,7 +55,7 @@ class StartFindings(Findings):
         numbers: dict[str, Any] = {
             "torque": (worst.gear_torque, "N.m"),
             "running": (self.running, "N.m"),
-            "over": (worst.gear_torque / self.running, "1"),
+            "over": (self.over_running, "1"),
             "angle": (worst.angle, "rad"),
         }
         if worst.gear_torque > self.limit:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any
 
 import numpy as np
 
 from ..core.quantities import Value, declaration, quantity
-from ..reading.text import array_entry, entries
+from ..reading.results import derived, part, result
 from .analysis import Analysis, Findings, Work
 from .arrays import peak
 from .cycle import Cycle, cycle, energy_swing, no_feed
@@ -48,7 +47,17 @@ class Reaction:
     angle_free: Value = quantity("rad", "crank angle of it")
 
 
-@dataclass(frozen=True)
+@result
+class TurnCourse:
+    """The course of a turn, at one of `EVERY` crank angles."""
+
+    angle: Any = quantity("rad", "crank angle")
+    torque: Any = quantity("N.m", "crank torque")
+    torque_free: Any = quantity("N.m", "crank torque, without feed")
+    inertia: Any = quantity("kg.m2", "inertia reflected to the crank")
+
+
+@result
 class TurnFindings(Findings):
     """The turn with the feed (`loaded`) and without it (`free`), its numbers, and the reactions by the titles
     of the pins."""
@@ -57,22 +66,14 @@ class TurnFindings(Findings):
     free: Cycle
     inertia: Any
     """inertia at the crank [kg m2], shape (POINTS,)"""
-    numbers: Turn
-    pins: dict[str, Reaction]
+    numbers: Turn = part(inline=True)
+    pins: dict[str, Reaction] = part("largest reactions, by the title of the pin")
 
-    def as_dict(self) -> dict[str, Any]:
-        """Ready for JSON."""
-        curves = {
-            "angle": (self.loaded.angle, "rad"),
-            "torque": (self.loaded.crank_torque, "N.m"),
-            "torque_free": (self.free.crank_torque, "N.m"),
-            "inertia": (self.inertia, "kg.m2"),
-        }
-        return {
-            **entries(self.numbers),
-            "pins": {title: entries(reaction) for title, reaction in self.pins.items()},
-            "over_turn": {name: array_entry(x[::EVERY], unit) for name, (x, unit) in curves.items()},
-        }
+    @derived()
+    def over_turn(self) -> TurnCourse:
+        """The course over the turn."""
+        curves = (self.loaded.angle, self.loaded.crank_torque, self.free.crank_torque, self.inertia)
+        return TurnCourse(*(x[::EVERY] for x in curves))
 
     def remark(self, study: StudyRecord) -> None:
         """No remarks: the numbers are enough."""

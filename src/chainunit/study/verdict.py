@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Literal, NamedTuple
 
+from ..core.quantities import quantity
 from ..machines.chain_unit import RodName
-from ..reading.text import entry, number
+from ..reading.results import OWN, derived, part, result
+from ..reading.text import number
 from .pulls import LeastPull
 
 ROCKER_GOOD, ROCKER_GOOD_EMPTY, CRANK_GOOD = 0.4, 0.2, 0.6
@@ -93,28 +95,28 @@ _UP_TO = {
 """By kind of fault at a crank speed: the line that names its limit."""
 
 
-@dataclass(frozen=True)
+@result
 class Reason:
     """A quantity that exceeds a limit of the model. `topic` is the key of its words; `run` is the run in
     which it does (empty for the machine itself, at its crank speed)."""
 
-    topic: str
-    quantity: str
-    value: float
-    limit: float
+    topic: str = part("kind of fault")
+    quantity: str = part("the quantity")
+    value: float = part("its value", unit=OWN)
+    limit: float = part("its limit", unit=OWN)
     unit: str
-    run: str = ""
+    run: str = part("the run; empty for the machine itself", default="")
     kind: str = ""
     grave: bool = False
     """whether it makes every number of normal running wrong"""
-    place: str = ""
-    """the pin at which it is, if it is at one"""
+    rod: str = ""
+    """the kind of rod that is pushed"""
+    place: str | None = part("the pin at which it is, if it is at one", default=None)
 
     @property
     def numbers(self) -> str:
         """The value in words, with the limit if that is not 0, which the words of the topic give."""
-        rod, _, pull = self.quantity.partition("_")
-        rod = f"{rod} {'mean' if pull == 'mean_pull' else 'end'} pull " if pull.endswith("pull") else ""
+        rod = f"{self.rod} {'mean' if self.topic == 'pushed' else 'end'} pull " if self.rod else ""
         rod += f"at {self.place} " if self.place else ""
         value, limit = (number(x, self.unit, self.kind, beside=False) for x in (self.value, self.limit))
         return f"{rod}{value}{f', limit {limit}' if self.limit else ''}"
@@ -127,17 +129,16 @@ class Reason:
         return _UP_TO[self.topic].format(_speed(self.limit))
 
 
-@dataclass(frozen=True)
+@result
 class Verdict:
     """Whether the model holds, and the reasons where it does not, or not everywhere."""
 
-    subject: Subject
-    model: str
-    """the model in words: of the organs of a chain unit, or of the links of another machine; empty if it is
-    not known"""
-    speed: float
-    """crank speed at which the model is judged [rad/s]"""
-    reasons: tuple[Reason, ...] = ()
+    subject: Subject = part("the judged model")
+    model: str | None = part(
+        "the model in words: of the organs of a chain unit, or of the links of another machine, if it is known"
+    )
+    speed: float = quantity("rad/s", "crank speed at which the model is judged", kind="speed")
+    reasons: tuple[Reason, ...] = part("the limits that are exceeded", default=())
     actual: float | None = None
     """crank speed in the runs [rad/s], if the model is judged at the requested speed instead; else None"""
     step: float | None = None
@@ -149,7 +150,7 @@ class Verdict:
     titles: Mapping[str, str] = field(default_factory=dict)
     """the titles of runs that only this verdict knows"""
 
-    @property
+    @derived()
     def holds(self) -> Holds:
         """ "false" where the numbers of normal running are wrong, "in part" where those of an overload or some
         numbers are."""
@@ -185,18 +186,18 @@ class Verdict:
         halvings = math.floor(math.log(worst / RESIDUAL, 4.0)) + 1
         return f': run.step = "{1e3 * self.step / 2.0**halvings:.3g} ms"'
 
-    @property
-    def caveat(self) -> str:
-        """Words to add to results of a model that does not hold; empty where it holds, or holds in part."""
+    @derived()
+    def caveat(self) -> str | None:
+        """Words to add to results of a model that does not hold; None where it holds, or holds in part."""
         if self.holds != "false":
-            return ""
+            return None
         return (
             f"for {self.model}, which do not hold here"
             if self.model
             else "the energy balance does not hold here"
         )
 
-    @property
+    @derived()
     def text(self) -> str:
         """The verdict in a line."""
         holds = {"true": "holds", "in part": "holds in part", "false": "does not hold"}[self.holds]
@@ -243,28 +244,10 @@ class Verdict:
                 lines.append((topic, f"{begin}: {'; '.join(each)}."))
         return lines
 
-    def as_dict(self) -> dict[str, Any]:
-        """Ready for JSON."""
-        return {
-            "subject": self.subject,
-            "model": self.model or None,
-            "holds": self.holds,
-            "caveat": self.caveat or None,
-            "text": self.text,
-            "speed": entry(self.speed, "rad/s", "speed"),
-            "reached": entry(self.speed if self.actual is None else self.actual, "rad/s", "speed"),
-            "reasons": [
-                {
-                    "topic": r.topic,
-                    "quantity": r.quantity,
-                    "run": r.run,
-                    "place": r.place or None,
-                    "value": entry(r.value, r.unit, r.kind),
-                    "limit": entry(r.limit, r.unit, r.kind),
-                }
-                for r in self.reasons
-            ],
-        }
+    @derived("rad/s", "speed")
+    def reached(self) -> float:
+        """Crank speed in the runs."""
+        return self.speed if self.actual is None else self.actual
 
 
 _HALVINGS = 3
@@ -301,19 +284,19 @@ def _where(runs: Collection[str]) -> str:
     return f", in {', '.join(places[:-1])}{' and in ' if places[1:] else ''}{places[-1]}"
 
 
-@dataclass(frozen=True)
+@result
 class SpeedLimit:
-    """A limit of the crank speed for two bars as a model of the organs [rad/s]; `topic` as in `Reason`."""
+    """A limit of the crank speed for two bars as a model of the organs."""
 
-    topic: str
-    speed: float
+    topic: str = part("kind of limit, as of a reason")
+    speed: float = part("crank speed", unit="rad/s", kind="speed", name="limit")
     grave: bool = False
 
     def passed(self, speed: Any) -> Any:
         """Whether each crank speed [rad/s] is beyond the limit, shape of `speed`."""
         return speed >= self.speed if self.topic == "slack speed" else speed > self.speed
 
-    @property
+    @derived(name="text")
     def words(self) -> str:
         """The begin of a sentence on speeds beyond it."""
         return TOPICS[self.topic].begin
@@ -372,10 +355,14 @@ def two_bars(
         for rod, pull in rods.items():
             if pull.mean < 0.0:
                 reasons.append(
-                    Reason("pushed", f"{rod}_mean_pull", pull.mean, 0.0, "N", run, grave=run == STEADY)
+                    Reason(
+                        "pushed", f"{rod}_mean_pull", pull.mean, 0.0, "N", run, rod=rod, grave=run == STEADY
+                    )
                 )
             elif pull.end < 0.0:
-                reasons.append(Reason("end pushed", f"{rod}_pull", pull.end, 0.0, "N", run, place=pull.pin))
+                reasons.append(
+                    Reason("end pushed", f"{rod}_pull", pull.end, 0.0, "N", run, rod=rod, place=pull.pin)
+                )
     passed = passed_limits(speed_limits(slack_speed, mode), speed)
     reasons += [_at_speed(each.topic, speed, each.speed, grave=each.grave) for each in passed]
     if all(each.topic == "slack speed" for each in passed):
@@ -403,7 +390,7 @@ def outsider(speed: float, residuals: Mapping[str, float], *, actual: float | No
     ----------
     speed, actual, residuals : see `rigid_links`
     """
-    return Verdict("energy balance", "", speed, tuple(balance_faults(residuals)), actual)
+    return Verdict("energy balance", None, speed, tuple(balance_faults(residuals)), actual)
 
 
 def balance_faults(residuals: Mapping[str, float]) -> list[Reason]:

@@ -5,7 +5,6 @@ The mechanics are in `machines.knife_drive`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,8 @@ import numpy as np
 from ...core.errors import InputError
 from ...core.quantities import Value, declaration, quantity
 from ...machines.knife_drive import Stack
-from ...reading.text import array_entry, entries, number
+from ...reading.results import derived, part, result
+from ...reading.text import number
 from ...study.analysis import Analysis, Findings, Work
 from ...study.config import Config
 from ...study.cycle import Cycle, cycle
@@ -38,14 +38,24 @@ class Cutting:
     losses: Value = quantity("J", "losses of the pins in a turn, cutting")
 
 
-@dataclass(frozen=True)
+@result
+class BladeCourse:
+    """Position and tilt of the blade over a turn."""
+
+    angle: Any = quantity("rad", "crank angle")
+    x: Any = quantity("m", "middle of the cutting edge, x")
+    y: Any = quantity("m", "middle of the cutting edge, y")
+    tilt: Any = quantity("rad", "tilt of the blade")
+
+
+@result
 class BladeFindings(Findings):
     """The turn with the cut, and its numbers; position and tilt of the blade are arrays over the crank
     angle."""
 
     turn: Cycle
     stack: Stack
-    numbers: Cutting
+    numbers: Cutting = part(inline=True)
 
     @property
     def blade(self) -> Any:
@@ -58,17 +68,11 @@ class BladeFindings(Findings):
         """Crank angle at which the blade is highest [rad]."""
         return float(self.turn.angle[np.argmax(self.blade.y)])
 
-    def as_dict(self) -> dict[str, Any]:
-        """Ready for JSON."""
-        blade = self.blade
-        curves = {
-            "angle": (self.turn.angle, "rad"),
-            "x": (blade.x, "m"),
-            "y": (blade.y, "m"),
-            "tilt": (blade.tilt, "rad"),
-        }
-        over_turn = {name: array_entry(x[::EVERY], unit) for name, (x, unit) in curves.items()}
-        return {**entries(self.numbers), "over_turn": over_turn}
+    @derived()
+    def over_turn(self) -> BladeCourse:
+        """The course over the turn."""
+        curves = (self.turn.angle, self.blade.x, self.blade.y, self.blade.tilt)
+        return BladeCourse(*(x[::EVERY] for x in curves))
 
     def remark(self, study: StudyRecord) -> None:
         """Warn where the blade does not pass through the whole stack; note the assumptions behind the work of

@@ -36,7 +36,7 @@ from ...study.record import StudyRecord
 from ...system.instance import Fmu, Instance
 from ...work.interrupts import stoppable
 from ...work.progress import Progress, Report
-from .result import Band, ChainResult, SpeedNumbers
+from .result import Band, ChainResult, CriticalSpeed, RodSlack, SpeedNumbers
 from .table import ChainOrgans
 
 SETTLE = 5
@@ -292,11 +292,12 @@ def study_chain(
     critical = []
     if modes is not None:
         for mode, frequency in enumerate(modes.frequency[:4], 1):
-            critical += [(mode, order, float(frequency) / order) for order in (1, 2)]
+            critical += [CriticalSpeed(mode, order, float(frequency) / order) for order in (1, 2)]
     speeds = np.linspace(chain.sweep_lowest, chain.sweep_highest, int(chain.sweep_points)).tolist()
     if speeds:
         # the resonance itself is added to the grid
-        speeds += [w for _, _, w in critical[:1] if chain.sweep_lowest < w < chain.sweep_highest]
+        lowest = [each.speed for each in critical[:1]]
+        speeds += [w for w in lowest if chain.sweep_lowest < w < chain.sweep_highest]
     spacing = (chain.sweep_highest - chain.sweep_lowest) / max(1, len(speeds) - 2)
     others = sorted({w for w in speeds if abs(w - own) > 1e-9 * own})
     failures: dict[float, str] = {}
@@ -322,15 +323,21 @@ def study_chain(
             except RunError as error:
                 failures[w] = str(error)
     rows.sort(key=lambda n: float(n.speed))
+    walls, webs = rods_of(drive)
+    names = [f"{part} {k + 1}" for part, count in (("wall", walls), ("web", webs)) for k in range(count)]
     result = ChainResult(
         own=mine,
         sweep=tuple(rows),
         avoid=tuple(bands(rows, _rocker_at_rest(drive, feed), 0.5 * spacing)),
         critical=tuple(critical),
-        slack_by_rod=by_rod,
+        slack_by_rod={
+            side: [RodSlack(name, float(share)) for name, share in zip(names, shares, strict=True)]
+            for side, shares in by_rod.items()
+        },
         starts=int(chain.starts),
         turns=int(chain.turns),
-        rods=rods_of(drive),
+        walls=walls,
+        webs=webs,
         failures=failures,
     )
     return result, interruption

@@ -158,8 +158,8 @@ def _critical(s: b.Source, chain: Mapping[str, Any], study: StudyRecord) -> Iter
     yield b.Table(tuple(rows), b.heads("", *orders), title=title, form="long")
     found: ChainResult = study.findings["chain"]
     inside = [
-        s.line(f"{{{path}.{places[mode][order]}.speed}} (mode {mode}, order {order})")
-        for mode, order, _ in sorted(found.within_sweep(), key=lambda each: each[2])
+        s.line(f"{{{path}.{places[each.mode][each.order]}.speed}} (mode {each.mode}, order {each.order})")
+        for each in sorted(found.within_sweep(), key=lambda each: each.speed)
     ]
     if inside:
         yield b.Text(line("Critical speeds within the sweep: ", join(inside), f". {_ORDERS}"), form="short")
@@ -175,13 +175,16 @@ def _over_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
     # the least distance of 5 % keeps labels apart on a narrow screen, too
     words: list[fig.Item] = [
         fig.Mark(
-            at, words=f"mode {mode}" + (f", order {order}" if order > 1 else ""), look="thin", upright=True
+            each.speed,
+            words=f"mode {each.mode}" + (f", order {each.order}" if each.order > 1 else ""),
+            look="thin",
+            upright=True,
         )
-        for mode, order, at in result.within_sweep(0.05)
+        for each in result.within_sweep(0.05)
     ]
     marks: list[fig.Item] = [
         *(fig.Shade(band.low, band.high, "to avoid") for band in result.avoid),
-        *(fig.Mark(at, look="thin") for _, _, at in result.within_sweep()),
+        *(fig.Mark(each.speed, look="thin") for each in result.within_sweep()),
         fig.Mark(result.own.speed, "the study's speed", look=2),
     ]
 

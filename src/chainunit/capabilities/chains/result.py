@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
 
 from ...core.quantities import Value, declaration, quantity
-from ...reading.text import entries, entry, number
+from ...reading.results import derived, part, result
+from ...reading.text import number
 from ...study.analysis import Findings
 from ...study.quantiles import CONFIDENCE, HIGH
 from ...study.record import StudyRecord
@@ -53,13 +52,13 @@ class SpeedNumbers:
     energy_residual: Value = quantity("1", "largest energy residual of an organ over the energy moved")
 
 
-@dataclass(frozen=True)
+@result
 class Band:
-    """Speeds to avoid [rad/s], and why."""
+    """Speeds to avoid, and why."""
 
-    low: float
-    high: float
-    why: str
+    low: float = part("from this crank speed", unit="rad/s", kind="speed", name="from")
+    high: float = part("up to this crank speed", unit="rad/s", kind="speed", name="to")
+    why: str = part("the reason")
 
     def __str__(self) -> str:
         """The range in words; a single speed in a study without a sweep."""
@@ -67,80 +66,71 @@ class Band:
         return " to ".join(number(end, "rad/s", "speed", 4, full=False, beside=False) for end in ends)
 
 
-@dataclass(frozen=True)
+@result
+class CriticalSpeed:
+    """A crank speed at which a natural frequency of an organ is a multiple of it."""
+
+    mode: int = part("mode of the organ, from the lowest frequency on", unit="1")
+    order: int = part("the frequency of the mode over the crank speed", unit="1")
+    speed: float = part("crank speed", unit="rad/s", kind="speed")
+
+
+@result
+class RodSlack:
+    """The share of the time in which a rod is slack."""
+
+    rod: str = part("name of the rod")
+    share: float = part("share of the time in which it is slack", unit="1", kind="percent", inline=True)
+
+
+@result
 class ChainResult(Findings):
     """The study's own speed, the sweep in rising order, and its conclusions."""
 
-    own: SpeedNumbers
-    sweep: tuple[SpeedNumbers, ...]
-    avoid: tuple[Band, ...]
-    critical: tuple[tuple[int, int, float], ...]
-    """(mode, order, crank speed [rad/s]): at this speed `order` times the crank speed is a natural
-    frequency"""
-    slack_by_rod: Mapping[str, Any]
-    """by side: share of the time in which each rod is slack, from A1 on, at the study's own speed"""
-    starts: int
-    turns: int
-    rods: tuple[int, int]
+    walls: int = part("number of rods of the wall", unit="1", name="rods_of_wall")
+    webs: int = part("number of rods of the web", unit="1", name="rods_of_web")
+    starts: int = part("starts at each speed", unit="1")
+    turns: int = part("turns that are evaluated of each start", unit="1")
+    own: SpeedNumbers = part("at the study's own speed", name="own_speed")
+    sweep: tuple[SpeedNumbers, ...] = part("over the speeds of the sweep")
+    avoid: tuple[Band, ...] = part("the speeds to avoid")
+    critical: tuple[CriticalSpeed, ...] = part("the critical speeds", name="critical_speeds")
+    slack_by_rod: Mapping[str, list[RodSlack]] = part(
+        "by side, the rods from A1 on, at the study's own speed"
+    )
     failures: Mapping[float, str]
     """by crank speed [rad/s], the reason why the speed is missing in the sweep"""
 
-    @property
-    def resonance(self) -> float | None:
-        """Crank speed that equals the lowest natural frequency of an organ [rad/s]; None without weight."""
-        return next((speed for mode, order, speed in self.critical if mode == order == 1), None)
+    @derived("1", "percent")
+    def quantile(self) -> float:
+        """The quantile of the peaks that is given beside the median."""
+        return HIGH
 
-    @property
+    @derived("1", "percent")
+    def confidence(self) -> float:
+        """The confidence of its interval."""
+        return CONFIDENCE
+
+    @derived("rad/s", "speed")
+    def resonance(self) -> float | None:
+        """Crank speed that equals the lowest natural frequency of an organ; None without weight."""
+        return next((each.speed for each in self.critical if each.mode == each.order == 1), None)
+
+    @derived("1", "percent", name="distance_to_resonance")
     def distance(self) -> float | None:
         """Distance of the study's speed from the resonance, relative to it: negative below."""
         return None if self.resonance is None else float(self.own.speed / self.resonance - 1.0)
 
-    def within_sweep(self, apart: float = 0.0) -> list[tuple[int, int, float]]:
+    def within_sweep(self, apart: float = 0.0) -> list[CriticalSpeed]:
         """The critical speeds within the sweep, low orders first. A speed is left out if its distance to an
         earlier one is less than the share `apart` of the width of the sweep."""
         low, high = self.sweep[0].speed, self.sweep[-1].speed
-        speeds: list[tuple[int, int, float]] = []
-        for each in sorted(self.critical, key=lambda speed: (speed[1], speed[0])):
-            clear = all(abs(each[2] - other[2]) >= apart * (high - low) for other in speeds)
-            if low <= each[2] <= high and clear:
+        speeds: list[CriticalSpeed] = []
+        for each in sorted(self.critical, key=lambda speed: (speed.order, speed.mode)):
+            clear = all(abs(each.speed - other.speed) >= apart * (high - low) for other in speeds)
+            if low <= each.speed <= high and clear:
                 speeds.append(each)
         return speeds
-
-    def rod_name(self, k: int) -> str:
-        """The name of rod `k`, counted from 0 at A1."""
-        wall, _ = self.rods
-        return f"wall {k + 1}" if k < wall else f"web {k - wall + 1}"
-
-    def as_dict(self) -> dict[str, Any]:
-        """Ready for JSON, each number with its unit."""
-
-        def pure(value: float | None, kind: str = "") -> dict[str, Any]:
-            return entry(value, "1", kind)
-
-        return {
-            "rods_of_wall": pure(self.rods[0]),
-            "rods_of_web": pure(self.rods[1]),
-            "starts": pure(self.starts),
-            "turns": pure(self.turns),
-            "quantile": pure(HIGH, "percent"),
-            "confidence": pure(CONFIDENCE, "percent"),
-            "own_speed": entries(self.own),
-            "resonance": entry(self.resonance, "rad/s", "speed"),
-            "distance_to_resonance": pure(self.distance, "percent"),
-            "sweep": [entries(numbers) for numbers in self.sweep],
-            "avoid": [
-                {"from": entry(b.low, "rad/s", "speed"), "to": entry(b.high, "rad/s", "speed"), "why": b.why}
-                for b in self.avoid
-            ],
-            "critical_speeds": [
-                {"mode": pure(mode), "order": pure(order), "speed": entry(speed, "rad/s", "speed")}
-                for mode, order, speed in self.critical
-            ],
-            "slack_by_rod": {
-                side: [{"rod": self.rod_name(k), **pure(share, "percent")} for k, share in enumerate(shares)]
-                for side, shares in self.slack_by_rod.items()
-            },
-        }
 
     def remark(self, study: StudyRecord) -> None:
         """No remarks: they stand with those on the model."""

@@ -5,15 +5,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from ...core.quantities import Layout
-from ...reading.text import entries, entry, number
+from ...reading.results import derived, part, result
+from ...reading.text import number
 from ...study.analysis import Analysis, Findings, Work
 from ...study.catalogue_drive import with_wheel
 from ...study.choice import tune
@@ -39,7 +39,7 @@ _WORSE = 1.1
 is called worse."""
 
 
-@dataclass
+@result(frozen=False)
 class FlywheelFindings(Findings):
     """The flywheels by their inertia, the `least` one that keeps the `permitted` fluctuation, if there is
     one, and the inputs of the hand formula: the `swing` of the energy in a turn [J], the speed of the motor
@@ -47,17 +47,22 @@ class FlywheelFindings(Findings):
 
     own: float
     """flywheel of the study [kg m2]"""
-    permitted_fluctuation: float
     swing: float
     speed: float
     bare: float
     mean_torque: float
     """mean torque of the machine at the motor's shaft, at constant speed [N m]"""
-    wheels: list[Wheel] = field(default_factory=list)
+    permitted_fluctuation: float = part(
+        "permitted ripple of the speed", unit="1", kind="percent", name="permitted"
+    )
+    wheels: list[Wheel] = part("the flywheels that are compared", name="compared", default_factory=list)
     least: Wheel | None = None
     is_searched: bool = False
-    is_retuned: bool = False
-    """whether the gains of the speed control differ, as they are tuned to the inertia with each flywheel"""
+    is_retuned: bool = part(
+        "whether the gains of the speed control differ, as they are tuned to the inertia with each flywheel",
+        name="retuned",
+        default=False,
+    )
 
     def by_hand(self, flywheel: float) -> float:
         """Fluctuation with that flywheel [kg m2] where the drive gives a constant torque."""
@@ -67,7 +72,7 @@ class FlywheelFindings(Findings):
         """Whether a flywheel keeps the permitted fluctuation and exceeds no other limit."""
         return wheel.keeps(self.permitted_fluctuation) and not wheel.excesses
 
-    @property
+    @derived("kg.m2", name="by_hand")
     def flywheel_by_hand(self) -> float:
         """Flywheel that keeps the permitted fluctuation by the hand formula [kg m2]; 0 where none is needed."""
         return needed_inertia(self.swing, self.speed, self.permitted_fluctuation, self.bare)
@@ -86,15 +91,10 @@ class FlywheelFindings(Findings):
         special = (("given", wheel.flywheel == self.own), ("least", wheel is self.least))
         return ", ".join(word for word, so in (*special, ("stalls", wheel.stalls)) if so)
 
-    def as_dict(self) -> dict[str, Any]:
-        """Ready for JSON."""
-        return {
-            "compared": [entries(wheel.answers) | {"stalls": wheel.stalls} for wheel in self.wheels],
-            "least": None if self.least is None else entries(self.least.answers),
-            "permitted": entry(self.permitted_fluctuation, "1", "percent"),
-            "retuned": self.is_retuned,
-            "by_hand": entry(self.flywheel_by_hand, "kg.m2"),
-        }
+    @derived(name="least")
+    def least_answers(self) -> FlywheelAnswers | None:
+        """The answers with the least flywheel that keeps the permitted fluctuation."""
+        return None if self.least is None else self.least.answers
 
     def remark(self, study: StudyRecord) -> None:
         """Add the troubles with their remedies, and a note on the least flywheel."""
@@ -426,15 +426,19 @@ def _on_line(findings: FlywheelFindings, study: StudyRecord) -> None:
 def _on_heavier(findings: FlywheelFindings, study: StudyRecord) -> None:
     """Warn of flywheels with which the speed fluctuates more than with a lighter one."""
     running = [wheel for wheel in findings.wheels if wheel.answers.speed_ripple is not None]
-    amounts: dict[str, Amount] = {
-        f"{heavier.flywheel:g}.speed_ripple": (heavier.answers.speed_ripple, "1", "percent")
+    worse = [
+        (heavier.flywheel, heavier.answers.speed_ripple)
         for lighter, heavier in pairwise(running)
         if heavier.answers.speed_ripple
         > max(findings.permitted_fluctuation, _WORSE * lighter.answers.speed_ripple)
-    }
-    if amounts:
-        sizes = [(float(name.rpartition(".")[0]), amount) for name, amount in amounts.items()]
-        where = ", ".join(f"{number(size, 'kg.m2')} ({number(*amount)})" for size, amount in sizes)
+    ]
+    if worse:
+        where = ", ".join(
+            f"{number(size, 'kg.m2')} ({number(ripple, '1', 'percent')})" for size, ripple in worse
+        )
+        amounts: dict[str, Amount] = {
+            f"{size:g}.speed_ripple": (ripple, "1", "percent") for size, ripple in worse
+        }
         text = "the speed fluctuates more, not less, with the heavier flywheel of {where}: the drive swings with it."
         study.warn("heavier flywheel worse", text, where=where, **amounts)
 

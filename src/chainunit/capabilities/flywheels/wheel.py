@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import xarray as xr
 
 from ...core.quantities import Value, declaration, quantity
+from ...reading.results import derived, part, result
 from ...study.limits import Check
 from ...study.measures import same_measure
 from ...study.window import closes
@@ -41,12 +41,12 @@ class FlywheelAnswers:
     residual: Value = quantity("1", "energy residual", kind="percent")
 
 
-@dataclass(frozen=True)
+@result
 class Wheel:
     """A flywheel with its run. `turns` are the steady turns, or the whole run where the crank makes none;
     `checks` are the limits of the motor, by name."""
 
-    answers: FlywheelAnswers
+    answers: FlywheelAnswers = part(inline=True)
     turns: xr.Dataset
     checks: Mapping[str, Check]
 
@@ -55,7 +55,7 @@ class Wheel:
         """[kg m2]"""
         return float(self.answers.flywheel)
 
-    @property
+    @derived()
     def stalls(self) -> bool:
         """Whether the machine starts, and then stands or creeps under its load."""
         return self.answers.start_time is not None and self.answers.speed_ripple is None

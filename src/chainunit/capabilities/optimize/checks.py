@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from ...core.quantities import quantity
 from ...fmu.backends import Backend, export
 from ...machines.machine import Machine
+from ...reading.results import result
 from ...study.cycle_quantities import CycleQuantity, evaluate
 from ...system.instance import Fmu, Instance
 from ...work.interrupts import stoppable
@@ -28,14 +30,13 @@ _STEP = 1e-3
 """Step of the FMU at each angle [s]: its outputs follow from its inputs alone."""
 
 
-@dataclass(frozen=True)
+@result
 class Neighbours:
-    """Machines near the best one: how many were computed, how many of them meet all limits, and how many meet them
-    and are better."""
+    """Machines near the best one."""
 
-    number: int
-    feasible: int
-    better: int
+    number: int = quantity("1", "number of machines that were computed")
+    feasible: int = quantity("1", "number of those that meet all limits")
+    better: int = quantity("1", "number of those that meet them and are better")
 
 
 def around(search: Search, x: Any) -> Any:

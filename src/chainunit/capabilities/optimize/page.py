@@ -8,8 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.files import whole
+from ...core.files import atomic_file
 from ...fmu.backends import Backend
+from ...reading.results import as_data
+from ...reading.text import shown_in
 from ...report import blocks as b
 from ...report import figure as fig
 from ...report.lines import Line, Name, line
@@ -18,7 +20,7 @@ from ...study.config import Config
 from ...study.study_file import toml_text
 from ...work.progress import Report as Progress
 from .best import Best, find_best
-from .result import as_dict, best_tables, units_of
+from .result import BestMachine, best_machine, best_tables, units_of
 from .table import wishes_of
 from .words import conflict_sentences
 
@@ -29,7 +31,9 @@ FILE = "best.toml"
 
 def optimum_report(best: Best, config: Config) -> b.Report:
     """The report on a search."""
-    result = as_dict(best, config)
+    units = units_of(best, config)
+    with shown_in(units):
+        result = as_data(best_machine(best, config))
     s = b.Source(result)
     sections = [b.Section("parameters", "Parameters and limits", tuple(_machine(s, best)))]
     if best.met:
@@ -44,7 +48,7 @@ def optimum_report(best: Best, config: Config) -> b.Report:
         tuple(_opening(s, best)),
         tuple(sections),
         source=s.line("Study file: {source} · chainunit {chainunit}"),
-        units=units_of(best, config),
+        units=units,
         opening_title="The answer",
         status="complete" if best.met else "no machine found",
     )
@@ -92,7 +96,7 @@ def _writers(outcome: OptimizedStudy, folder: Path, of_report: list[Writer]) -> 
 
     def study_file() -> list[Path]:
         text = toml_text(best_tables(best, config, folder))
-        with whole(folder / FILE) as part:
+        with atomic_file(folder / FILE) as part:
             part.write_text(text, "utf-8")
         return [folder / FILE]
 
@@ -103,6 +107,7 @@ TASK: Task[Config, OptimizedStudy] = Task(
     "optimize",
     _compute,
     lambda outcome: optimum_report(outcome.best, outcome.config),
+    content=BestMachine,
     files=(*PICTURES, FILE),
     accept=_accept,
     writers=_writers,

@@ -2,29 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ... import __version__
-from ...core.quantities import finite
-from ...reading.text import Units, array_entry, entry, shown_in
+from ...core.quantities import narrowed, quantity
+from ...reading.results import OWN, InUnit, part, result
+from ...reading.text import Units
 from ...study.config import Config
+from ...study.cycle_quantities import CycleBasis
+from ...study.heading import Heading
 from ...study.organ_limits import limits_of_organs
 from ...study.study_file import changed_tables
-from ...study.verdict import passed_limits
+from ...study.verdict import SpeedLimit, passed_limits
 from .best import Best
-from .checks import STEPS
+from .checks import STEPS, Neighbours
+from .search import Effort
 from .wishes import TurnLimit
 from .words import (
+    Binding,
     bindings,
     clearances,
     conflict_sentences,
     idle_sentence,
     neighbours_sentence,
-    sentence,
     starts_sentence,
 )
 
@@ -35,10 +38,147 @@ _SMALL = 100.0
 """Power below which powers are shown in W [W]."""
 
 
-def as_dict(best: Best, config: Config) -> dict[str, Any]:
-    """All results, ready for JSON, each number with its unit."""
-    with shown_in(units_of(best, config)):
-        return _as_dict(best, config)
+@result
+class TodayAndBest:
+    """A number of today's machine and of the best one, or of the nearest one, and its limits."""
+
+    today: float = part("its value today", unit=OWN)
+    best: float = part("its value of the best machine, or of the nearest one", unit=OWN)
+    low: float | None = part("its lower limit", unit=OWN, name="min")
+    high: float | None = part("its upper limit", unit=OWN, name="max")
+    unit: str
+    kind: str
+
+
+@result
+class FreeParameter(TodayAndBest):
+    """A free parameter of the machine."""
+
+    title: str = part("its meaning")
+
+
+@result
+class WebPull(TodayAndBest):
+    """The least pull in the webs up to the slack-free speed."""
+
+    missed: bool = part("whether the limits are not met")
+
+
+@result
+class SoughtQuantity(FreeParameter, WebPull):
+    """An objective or a limited quantity."""
+
+    fmu: float | None = part("its value by the FMU of the best machine", unit=OWN)
+    fmu_deviation: float | None = quantity("1", "deviation of the FMU, as a share")
+
+
+@result
+class WhyNone:
+    """Why no machine meets all limits."""
+
+    limits: tuple[str, ...] = part("the limits that conflict")
+    alone: tuple[str, ...] = part("those that are impossible alone")
+    together: tuple[str, ...] = part("those that are impossible together")
+    bounds: list[str] = part("the bounds that hold the nearest machine")
+    sentences: list[str] = part("the reason in words")
+
+
+@result
+class StartsOfSearch:
+    """The starts of a search."""
+
+    text: str = part("the starts in words")
+    number: int = quantity("1", "number of starts")
+    moved: int = quantity("1", "number of those that were moved until the machine can be assembled")
+    feasible: int = quantity("1", "number of those that ended at a machine that meets all limits")
+    agree: int = quantity("1", "number of those that reached the best value")
+    values: InUnit = part("the values that the feasible ones reached, in rising order")
+    effort: Effort = part(inline=True)
+
+
+@result
+class NeighbourCheck:
+    """Machines near the best one."""
+
+    text: str = part("the comparison in words")
+    held: list[str] = part("objectives that are held")
+    steps: tuple[float, ...] = quantity("1", "distances, as shares of the distance between the bounds")
+    numbers: Neighbours = part(inline=True)
+
+
+@result
+class FrontMachine:
+    """A machine of the front of two objectives."""
+
+    chosen: bool = part("whether it is the best machine of the result")
+    values: Mapping[str, InUnit] = part("the objectives")
+    parameters: Mapping[str, InUnit] = part("the free parameters")
+
+
+@result
+class BestMachine:
+    """The result of a search for the best machine: the content of its result.json."""
+
+    heading: Heading = part(inline=True)
+    status: str = part("whether a machine meets all limits")
+    objectives: list[str] = part("the objectives")
+    speed: float = quantity("rad/s", "crank speed", kind="speed")
+    clearance: float = quantity("1", "distance from where the machine no longer turns", kind="percent")
+    slack_free_speed: float | None = quantity(
+        "rad/s", "crank speed up to which no web goes slack", kind="speed"
+    )
+    basis: CycleBasis = part(inline=True)
+    parameters: Mapping[str, FreeParameter] = part("the free parameters")
+    without_effect: list[str] = part("free parameters without any effect, which keep their values")
+    without_effect_words: str = part("a sentence on them")
+    quantities: Mapping[str, SoughtQuantity] = part("objectives and limited quantities")
+    least_pull: WebPull | None = part("least pull in the webs, where it is limited")
+    organs: list[SpeedLimit] = part("limits of two bars as organs that the best machine passes")
+    bindings: list[Binding] = part("limits and bounds that bind, the strongest first")
+    clearances: list[str] = part("requirements of the model whose distance binds")
+    conflict: WhyNone | None = part("why no machine meets all limits")
+    starts: StartsOfSearch = part("the starts")
+    neighbours: NeighbourCheck | None = part("machines near the best one")
+    front: list[FrontMachine] = part("the front of two objectives")
+    over_turn: Mapping[str, InUnit] = part("crank angle and crank torque of today's and of the best machine")
+
+
+def best_machine(best: Best, config: Config) -> BestMachine:
+    """The result of a search as data; its sentences have the units of `shown_in`."""
+    wishes, objective = best.wishes, best.wishes.objectives[0]
+    return BestMachine(
+        heading=Heading.of(config),
+        status="complete" if best.met else CONFLICT,
+        objectives=[q.name for q in wishes.objectives],
+        speed=wishes.crank_speed,
+        clearance=wishes.clearance,
+        slack_free_speed=wishes.slack_free_speed or None,
+        basis=narrowed(wishes.basis, CycleBasis),
+        parameters=dict(_parameters(best)),
+        without_effect=list(best.idle),
+        without_effect_words=idle_sentence(best),
+        quantities={name: _quantity(best, name) for name in best.quantities},
+        # in comparison with the weight of the webs a millionth of a newton is none
+        least_pull=best.pulls and WebPull(*best.pulls, 0.0, None, "N", "", not best.pulls[1] >= -1e-6),
+        organs=_organs(best),
+        bindings=bindings(best) if best.met else [],
+        clearances=clearances(best) if best.met else [],
+        conflict=_conflict(best),
+        starts=StartsOfSearch(
+            text=starts_sentence(best),
+            number=best.starts,
+            moved=best.moved,
+            feasible=best.feasible,
+            agree=best.agree,
+            values=InUnit(best.values, objective.unit),
+            effort=best.effort,
+        ),
+        neighbours=None if best.neighbours is None else _neighbours(best, best.neighbours),
+        front=_front(best),
+        over_turn={
+            name: InUnit(y[::EVERY], "rad" if name == "angle" else "N.m") for name, y in best.turns.items()
+        },
+    )
 
 
 def best_tables(best: Best, config: Config, folder: Path) -> dict[str, Any]:
@@ -69,161 +209,64 @@ def _limit_of(best: Best, name: str) -> TurnLimit | None:
     return next((each for each in best.wishes.limits if each.name == name), None)
 
 
-def _as_dict(best: Best, config: Config) -> dict[str, Any]:
-    wishes = best.wishes
-    variables = {v.name: v for v in wishes.machine.model.parameter_layout.variables}
-    x = (
-        best.answer.x
-        if best.answer is not None
-        else best.conflict.nearest.x
-        if best.conflict
-        else wishes.today
-    )
-    return {
-        "chainunit": __version__,
-        "title": config.title,
-        "source": config.source,
-        "report": dict(config.labels),
-        "status": "complete" if best.met else CONFLICT,
-        "objectives": [q.name for q in wishes.objectives],
-        "speed": entry(wishes.crank_speed, "rad/s", "speed"),
-        "clearance": entry(wishes.clearance, "1", "percent"),
-        "slack_free_speed": entry(wishes.slack_free_speed or None, "rad/s", "speed"),
-        "operating_hours": entry(wishes.basis.operating_hours, "1"),
-        "overload": entry(wishes.basis.overload, "1"),
-        "parameters": {
-            name: {"title": v.description}
-            | {
-                key: entry(float(number), v.unit, v.kind)
-                for key, number in zip(("today", "best", "min", "max"), numbers, strict=True)
-            }
-            for name, numbers in _parameters(best, x)
-            for v in (variables[name],)
-        },
-        "without_effect": list(best.idle),
-        "without_effect_words": idle_sentence(best),
-        "quantities": {name: _quantity(best, name) for name in best.quantities},
-        "least_pull": _pull(best),
-        "organs": _organs(best),
-        "bindings": _bindings(best),
-        "clearances": clearances(best) if best.met else [],
-        "conflict": _conflict(best),
-        "starts": _starts(best),
-        "neighbours": _neighbours(best),
-        "front": _front(best),
-        "over_turn": {
-            name: array_entry(y[::EVERY], "rad" if name == "angle" else "N.m")
-            for name, y in best.turns.items()
-        },
-    }
-
-
-def _parameters(best: Best, x: Any) -> Iterator[tuple[str, tuple[float, ...]]]:
-    """Each free parameter with its values today and in the answer, and its bounds."""
+def _parameters(best: Best) -> Iterator[tuple[str, FreeParameter]]:
+    """Each free parameter by its name."""
     wishes, by_name = best.wishes, best.wishes.machine.by_name
-    for name, today, value in zip(wishes.names, wishes.today, x, strict=True):
-        yield name, (today, value, *wishes.free[name])
-    for name, bounds in best.idle.items():
-        yield name, (by_name[name], by_name[name], *bounds)
+    x = wishes.today
+    if best.answer is not None:
+        x = best.answer.x
+    elif best.conflict:
+        x = best.conflict.nearest.x
+    numbers = {
+        name: (today, value, *wishes.free[name])
+        for name, today, value in zip(wishes.names, wishes.today, x, strict=True)
+    } | {name: (by_name[name], by_name[name], *bounds) for name, bounds in best.idle.items()}
+    variables = {v.name: v for v in wishes.machine.model.parameter_layout.variables}
+    for name, own in numbers.items():
+        v = variables[name]
+        today, value, low, high = map(float, own)
+        yield name, FreeParameter(today, value, low, high, v.unit, v.kind, v.description)
 
 
-def _quantity(best: Best, name: str) -> dict[str, Any]:
-    q = best.quantities[name]
-    limit = _limit_of(best, name)
-    fmu = best.fmu.get(name)
-    return {
-        "title": q.description,
-        "today": entry(best.today[name], q.unit, q.kind),
-        "best": entry(best.found[name], q.unit, q.kind),
-        "min": entry(limit.low if limit else None, q.unit, q.kind),
-        "max": entry(limit.high if limit else None, q.unit, q.kind),
-        "missed": limit is not None and limit.is_missed(best.found[name]),
-        "fmu": entry(fmu.fmu if fmu else None, q.unit, q.kind),
-        "fmu_deviation": entry(fmu.deviation if fmu else None, "1"),
-    }
+def _quantity(best: Best, name: str) -> SoughtQuantity:
+    q, limit, fmu = best.quantities[name], _limit_of(best, name), best.fmu.get(name)
+    return SoughtQuantity(
+        title=q.description,
+        today=best.today[name],
+        best=best.found[name],
+        low=limit.low if limit else None,
+        high=limit.high if limit else None,
+        missed=limit is not None and limit.is_missed(best.found[name]),
+        fmu=fmu.fmu if fmu else None,
+        fmu_deviation=fmu.deviation if fmu else None,
+        unit=q.unit,
+        kind=q.kind,
+    )
 
 
-def _pull(best: Best) -> dict[str, Any] | None:
-    """The least pull in the webs up to the slack-free speed, and its limit."""
-    if best.pulls is None:
-        return None
-    numbers = {"today": best.pulls[0], "best": best.pulls[1], "min": 0.0, "max": None}
-    # in comparison with the weight of the webs a millionth of a newton is none
-    missed = not best.pulls[1] >= -1e-6
-    return {name: entry(finite(x), "N") for name, x in numbers.items()} | {"missed": missed}
-
-
-def _organs(best: Best) -> list[dict[str, Any]]:
+def _organs(best: Best) -> list[SpeedLimit]:
     """The limits of the crank speed for two bars as organs that the best machine passes."""
     wishes = best.wishes
     if best.machine is None:
         return []
     limits = limits_of_organs(best.machine, wishes.feed, [q.unit for q in best.quantities.values()])
-    return [
-        {"topic": each.topic, "text": each.words, "limit": entry(each.speed, "rad/s", "speed")}
-        for each in passed_limits(limits, wishes.crank_speed)
-    ]
+    return passed_limits(limits, wishes.crank_speed)
 
 
-def _bindings(best: Best) -> list[dict[str, Any]]:
-    if not best.met:
-        return []
-    objective = best.wishes.objectives[0]
-    return [
-        {
-            "name": each.name,
-            "side": each.side,
-            "value": entry(each.value, each.unit),
-            "step": entry(each.step, each.unit),
-            "change": entry(each.change, objective.unit),
-            "text": sentence(best, each),
-        }
-        for each in bindings(best)
-    ]
-
-
-def _conflict(best: Best) -> dict[str, Any] | None:
-    if best.conflict is None:
+def _conflict(best: Best) -> WhyNone | None:
+    own = best.conflict
+    if own is None:
         return None
-    return {
-        "limits": list(best.conflict.names),
-        "alone": list(best.conflict.alone),
-        "together": list(best.conflict.together),
-        "bounds": [f"{name}.{side}" for name, side in best.conflict.bounds],
-        "sentences": list(conflict_sentences(best)),
-    }
+    bounds = [f"{name}.{side}" for name, side in own.bounds]
+    return WhyNone(own.names, tuple(own.alone), own.together, bounds, list(conflict_sentences(best)))
 
 
-def _starts(best: Best) -> dict[str, Any]:
-    objective = best.wishes.objectives[0]
-    return {
-        "text": starts_sentence(best),
-        "number": entry(float(best.starts), "1"),
-        "moved": entry(float(best.moved), "1"),
-        "feasible": entry(float(best.feasible), "1"),
-        "agree": entry(float(best.agree), "1"),
-        "values": array_entry(best.values, objective.unit),
-        "programs": entry(float(best.effort.programs), "1"),
-        "iterations": entry(float(best.effort.iterations), "1"),
-        "evaluations": entry(float(best.effort.evaluations), "1"),
-    }
+def _neighbours(best: Best, own: Neighbours) -> NeighbourCheck:
+    held = [q.name for q in best.wishes.objectives[1:]]
+    return NeighbourCheck(neighbours_sentence(best), held, STEPS, own)
 
 
-def _neighbours(best: Best) -> dict[str, Any] | None:
-    if best.neighbours is None:
-        return None
-    own = best.neighbours
-    return {
-        "text": neighbours_sentence(best),
-        "held": [q.name for q in best.wishes.objectives[1:]],
-        "steps": array_entry(STEPS, "1"),
-        "number": entry(float(own.number), "1"),
-        "feasible": entry(float(own.feasible), "1"),
-        "better": entry(float(own.better), "1"),
-    }
-
-
-def _front(best: Best) -> list[dict[str, Any]]:
+def _front(best: Best) -> list[FrontMachine]:
     if not best.front:
         return []
     names, objectives = best.wishes.names, best.wishes.objectives
@@ -233,15 +276,10 @@ def _front(best: Best) -> list[dict[str, Any]]:
     chosen = best.front[int(np.argmin(np.max(distances, axis=1)))]
     units = {v.name: v.unit for v in best.wishes.machine.model.parameter_layout.variables}
     return [
-        {
-            "chosen": point is chosen,
-            "values": {
-                q.name: entry(value, q.unit)
-                for q, value in zip(best.wishes.objectives, point.values, strict=True)
-            },
-            "parameters": {
-                name: entry(float(x), units[name]) for name, x in zip(names, point.x, strict=True)
-            },
-        }
+        FrontMachine(
+            point is chosen,
+            {q.name: InUnit(value, q.unit) for q, value in zip(objectives, point.values, strict=True)},
+            {name: InUnit(float(x), units[name]) for name, x in zip(names, point.x, strict=True)},
+        )
         for point in best.front
     ]

@@ -137,7 +137,7 @@ class RowMaker:
             return own | {"upper": factor * bound, "aux": aux}
 
         column = q.integrands[0].column
-        reduction = q.name.partition("(")[0]
+        reduction = q.reduction
         if reduction == "max":
             self.rows += [PointRow(**less(), column=k) for k in self.columns.upper(column)]
         elif reduction == "peak":
@@ -171,7 +171,7 @@ class RowMaker:
         """Rows by which a quantity is at least `bound`."""
         own: dict[str, Any] = {"owner": owner, "side": "min", "scale": scale, "upper": -bound}
         column = q.integrands[0].column
-        reduction = q.name.partition("(")[0]
+        reduction = q.reduction
         if reduction == "min":
             self.rows += [PointRow(**own, column=k, factor=-1.0) for k in self.columns.lower(column)]
         elif reduction in ("mean", "rms"):
@@ -186,7 +186,7 @@ class RowMaker:
     def exactly(self, q: CycleQuantity, owner: str, scale: float, bound: float) -> None:
         """The row by which a quantity is equal to `bound`."""
         first = len(self.rows)
-        if q.name.partition("(")[0] in ("mean", "rms", "energy_per_year", "installed_power"):
+        if q.reduction in ("mean", "rms", "energy_per_year", "installed_power"):
             self.at_least(q, owner, scale, bound)
             self.rows[first] = _equal(self.rows[first])
             return

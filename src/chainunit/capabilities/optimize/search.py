@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ...core.errors import InputError, RunError
+from ...reading.results import part, result
 from ...study.cycle_quantities import CycleQuantity
 from .extremes import MOST_ANGLES, TurnValues, grid, peaks_of, stationary
 from .ipopt import Solution, solve
@@ -54,14 +55,15 @@ class Answer:
     """by the name of a limit, the share of its scale by which it is missed; of an elastic program"""
 
 
-@dataclass
+@result(frozen=False)
 class Effort:
     """The work of a search."""
 
-    programs: int = 0
-    iterations: int = 0
-    evaluations: int = 0
-    """turns of a machine that were computed with derivatives"""
+    programs: int = part("number of programs", unit="1", default=0)
+    iterations: int = part("number of their iterations", unit="1", default=0)
+    evaluations: int = part(
+        "number of turns of a machine that were computed with derivatives", unit="1", default=0
+    )
 
 
 class Search:
@@ -325,7 +327,7 @@ class Search:
         for row in program.rows:
             if not isinstance(row, PointRow):
                 continue
-            for w in [part * space.slack_speed for part in CHECKED] if row.slack else [space.speed]:
+            for w in [share * space.slack_speed for share in CHECKED] if row.slack else [space.speed]:
                 if w not in values:
                     values[w] = space.kernel.values(x, q, np.full(FINE, w))[:, 0]
                 offset = program.offset(z, row)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
+from ...reading.results import OWN, InUnit, part, result
 from ...reading.text import number
 from .best import Best
 from .effects import no_effect
@@ -26,24 +26,19 @@ _ACTIVE = 1e-6
 """Least change of the objective, as a share of it, by a step of a limit that binds."""
 
 
-@dataclass(frozen=True)
+@result
 class Binding:
-    """A limit or bound that binds: its name, its side ("min" or "max"), its value, the change of the objective by
-    one unit of it (`slope`), and the change by a `step`."""
+    """A limit or bound that binds."""
 
-    name: str
-    side: str
-    value: float
+    name: str = part("name of the limit, or of the parameter")
+    side: str = part('"min" or "max"')
+    value: float = part("its value", unit=OWN)
+    step: float = part("a step of it", unit=OWN)
+    change: InUnit = part("change of the objective by a step")
+    text: str = part("the change in words")
     unit: str
     slope: float
-    step: float
-    step_words: str
-    is_bound: bool
-
-    @property
-    def change(self) -> float:
-        """Change of the objective by a step of the limit."""
-        return self.slope * self.step
+    """change of the objective by one unit"""
 
 
 def step_of(unit: str) -> tuple[float, str]:
@@ -52,7 +47,7 @@ def step_of(unit: str) -> tuple[float, str]:
 
 
 def bindings(best: Best) -> list[Binding]:
-    """What binds, the strongest first: limits, the slack-free speed, and bounds of parameters."""
+    """The limits, the slack-free speed and the bounds of parameters that bind, the strongest first."""
     assert best.answer is not None
     wishes, found = best.wishes, []
     size = abs(best.answer.value) or 1.0
@@ -61,36 +56,27 @@ def bindings(best: Best) -> list[Binding]:
         if name in limits:
             limit = limits[name]
             value = limit.low if side == "min" else limit.high
-            unit = limit.quantity.unit
+            found.append(_binding(best, name, side, value, limit.quantity.unit, slope))
         elif name == SLACK:
             # the limit is a pull of 0: its slope is that by the pull
-            value, unit = 0.0, "N"
-        else:
-            continue
-        found.append(_binding(name, side, value, unit, slope, False))
+            found.append(_binding(best, name, side, 0.0, "N", slope))
     units = {v.name: v.unit for v in wishes.machine.model.parameter_layout.variables}
     for (name, side), slope in best.answer.at_bounds.items():
-        value = wishes.free[name][side == "max"]
-        found.append(_binding(name, side, value, units[name], slope, True))
-    active = [each for each in found if abs(each.change) > _ACTIVE * size]
-    return sorted(active, key=lambda each: -abs(each.change))
+        found.append(_binding(best, name, side, wishes.free[name][side == "max"], units[name], slope))
+    active = [each for each in found if abs(each.change.value) > _ACTIVE * size]
+    return sorted(active, key=lambda each: -abs(each.change.value))
 
 
-def _binding(name: str, side: str, value: Any, unit: str, slope: float, is_bound: bool) -> Binding:
-    step, words = step_of(unit)
-    return Binding(name, side, float(value), unit, slope, step, words, is_bound)
-
-
-def sentence(best: Best, each: Binding) -> str:
-    """A binding in words: ``1 mm more of r.max lowers peak(crank_torque) by 0.3 N m``."""
-    objective = best.wishes.objectives[0]
-    amount = number(abs(each.change), objective.unit, objective.kind)
-    verb = "lowers" if each.change < 0.0 else "raises"
-    others = best.wishes.objectives[1:]
+def _binding(best: Best, name: str, side: str, value: Any, unit: str, slope: float) -> Binding:
+    """A binding with its words: ``1 mm more of r.max lowers peak(crank_torque) by 0.3 N m``."""
+    objective, *others = best.wishes.objectives
+    step, step_words = step_of(unit)
+    change = slope * step
+    verb, amount = "lowers" if change < 0.0 else "raises", number(abs(change), objective.unit, objective.kind)
     held = "".join(f", with {q.name} held at {number(best.found[q.name], q.unit, q.kind)}" for q in others)
-    if each.name == SLACK:
-        return f"{each.step_words} of web mean pull at that speed {verb} {objective.name} by {amount}{held}"
-    return f"{each.step_words} more of {each.name}.{each.side} {verb} {objective.name} by {amount}{held}"
+    more = "of web mean pull at that speed" if name == SLACK else f"more of {name}.{side}"
+    text = f"{step_words} {more} {verb} {objective.name} by {amount}{held}"
+    return Binding(name, side, float(value), step, InUnit(change, objective.unit), text, unit, slope)
 
 
 def clearances(best: Best) -> list[str]:

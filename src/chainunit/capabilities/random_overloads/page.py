@@ -8,7 +8,7 @@ from ...core.quantities import Layout
 from ...report import blocks as b
 from ...report.lines import Line, join, line
 from ...study.record import StudyRecord
-from .runs import Sample
+from .runs import ENDS, Sample
 
 _LARGEST, _ENDS = (
     "crank_torque_peak",
@@ -43,7 +43,7 @@ _METHODS: dict[str, str] = {
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The table of the quantiles of random overloads, and how they were run."""
     quantiles = {name: sizes for name, sizes in s.result["monte_carlo"]["quantiles"].items() if sizes}
-    descriptions = {v.name: v.description.removeprefix("1 where ") for v in Layout(Sample).variables}
+    descriptions = {v.name: v.description for v in Layout(Sample).variables} | ENDS
     columns = list(dict.fromkeys(k for sizes in quantiles.values() for k in sizes))
 
     def cell(name: str, k: str) -> Line:

@@ -23,7 +23,7 @@ from ...core.native.compilers import compiler
 from ...core.quantities import Layout, Value, declaration, quantity, variables
 from ...core.temporary_folders import remove_folder, temporary_folder
 from ...machines.chain_unit import SIDES, SideName
-from ...reading.text import entry
+from ...reading.results import Estimate, derived, part, result
 from ...study.analysis import Findings
 from ...study.block_runs import BlockRuns, EventRun, EventSimulation, RunPoint
 from ...study.config import Config
@@ -32,7 +32,7 @@ from ...study.event import AnySide, Event
 from ...study.event_table import RandomEvent
 from ...study.limits import limit_reached
 from ...study.measures import MEASURES, read_measure, same_measure
-from ...study.quantiles import CONFIDENCE, Estimate, quantile, runs_needed, share
+from ...study.quantiles import CONFIDENCE, quantile, runs_needed, share
 from ...study.record import StudyRecord
 from ...study.rig import Rig
 from ...study.window import Phase, Window
@@ -44,6 +44,10 @@ from .table import plan_of
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+ENDS = {"stalls": "the crank stands at the end of the run", "trips": "the safety coupling opens"}
+"""By switch of a run, its meaning."""
 
 
 @declaration
@@ -58,8 +62,8 @@ class Sample:
     current_peak: Value = same_measure("current_peak")
     rocker_torque_peak: Value = same_measure("rocker_torque_peak")
     speed_least: Value = same_measure("speed_least")
-    stalls: Value = quantity("1", "1 where the crank stands at the end of the run")
-    trips: Value = quantity("1", "1 where the safety coupling opens")
+    stalls: Value = quantity("1", f"1 where {ENDS['stalls']}")
+    trips: Value = quantity("1", f"1 where {ENDS['trips']}")
 
 
 BATCH, COSIMULATED_BATCH = 512, 16
@@ -114,7 +118,7 @@ class RandomTask:
             "start": drive.graph.values,
             "feed": asdict(config.feed),
             "run": asdict(config.run),
-            "event": plan_of(config).event.as_dict(),
+            "event": plan_of(config).event.identity(),
             "monte_carlo": {k: v for k, v in asdict(plan_of(config).table).items() if k != "runs"},
             "coupling": asdict(config.coupling) if config.coupling else None,
             "steady": self.steady,
@@ -292,25 +296,35 @@ _OUTCOMES = {
 """By quantity of a random run, the words on the share of the runs that end so."""
 
 
-@dataclass(frozen=True)
+@result
 class MonteCarloResult(Findings):
     """The results of the runs, by the names of `result_variables`, over the dimension ``run``; and their store."""
 
     dataset: xr.Dataset
     file: Path
-    method: str
-    """see `RandomTask.method`"""
+    method: str = part("how the runs are made: compiled, or by the FMUs as cs or me")
     earlier_runs: int = 0
     """number of runs that the store had before"""
-    damaged_batches: int = 0
-    """number of batches that were damaged in the store; their runs were computed anew"""
+    damaged_batches: int = part(
+        "number of batches that were damaged in the store; their runs were computed anew", unit="1", default=0
+    )
 
     @property
     def store(self) -> Path:
         """The store of the runs."""
         return self.file
 
-    @property
+    @derived(name="file")
+    def file_name(self) -> str:
+        """Name of the store of the runs."""
+        return self.file.name
+
+    @derived("1", "percent")
+    def confidence(self) -> float:
+        """Confidence of the intervals."""
+        return CONFIDENCE
+
+    @derived("1")
     def runs(self) -> int:
         """Number of runs."""
         return int(self.dataset.sizes["run"])
@@ -320,6 +334,7 @@ class MonteCarloResult(Findings):
         values = self.dataset[name].values
         return [float(x) for x in values[~np.isnan(values)]]
 
+    @derived()
     def quantiles(self) -> dict[str, dict[str, Estimate]]:
         """Quantiles of every answer, and shares of the runs that stall or trip, each with its interval. A
         quantile is left out where there are too few runs for its interval."""
@@ -329,15 +344,17 @@ class MonteCarloResult(Findings):
             if not values or v.name in ("event", "crank_angle"):
                 continue
             if v.name in ("stalls", "trips"):
-                estimates_of[v.name] = {"share": share(sum(x > 0.5 for x in values), len(values))}
+                of_runs = share(sum(x > 0.5 for x in values), len(values))
+                estimates_of[v.name] = {"share": replace(of_runs, unit="1", kind="percent")}
                 continue
             estimates = {f"q{100 * q:.0f}": quantile(values, q) for q in QUANTILES}
-            estimates_of[v.name] = {name: each for name, each in estimates.items() if each is not None}
+            known = {name: each for name, each in estimates.items() if each is not None}
+            estimates_of[v.name] = {name: replace(each, unit=v.unit) for name, each in known.items()}
         return estimates_of
 
     def remark(self, study: StudyRecord) -> None:
         """Warn of runs that end badly, and note what limits the numbers."""
-        note, shares = study.note, self.quantiles()
+        note, shares = study.note, self.quantiles
         for name, words in _OUTCOMES.items():
             share = shares.get(name, {}).get("share")
             if share is not None and share.value > 0.0:
@@ -361,7 +378,7 @@ class MonteCarloResult(Findings):
             note(
                 "runs made anew",
                 "overloads at random: {text}.",
-                text=made_anew(self.damaged_batches, "runs", self.file.name),
+                text=made_anew(self.damaged_batches, "runs", self.file_name),
             )
 
     @property
@@ -374,7 +391,7 @@ class MonteCarloResult(Findings):
         each = ", ".join(f"the {100 * q:.0f} % quantile takes {runs_needed(q)}" for q in omissions)
         return f"{count} runs are too few for some quantiles: {each} (monte_carlo.runs)."
 
-    @property
+    @derived("1")
     def sides(self) -> dict[SideName, int]:
         """Number of runs by the side of the event; empty for an event without a side."""
         sides = self.dataset["side"].values
@@ -385,27 +402,10 @@ class MonteCarloResult(Findings):
         """Why a run failed, by its number."""
         return {k: words for k, words in enumerate(texts(self.dataset["failed"])) if words}
 
-    @property
+    @derived("1", name="failed")
     def failures(self) -> int:
         """Number of runs that failed."""
         return len(self.reasons)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Ready for JSON, each number with its unit."""
-        units, kinds = {v.name: v.unit for v in Layout(Sample).variables}, {"share": ("1", "percent")}
-        return {
-            "runs": entry(self.runs, "1"),
-            "sides": {side: entry(runs, "1") for side, runs in self.sides.items()},
-            "failed": entry(self.failures, "1"),
-            "method": self.method,
-            "damaged_batches": entry(self.damaged_batches, "1"),
-            "file": self.file.name,
-            "quantiles": {
-                name: {k: each.as_dict(*kinds.get(k, (units[name],))) for k, each in sizes.items()}
-                for name, sizes in self.quantiles().items()
-            },
-            "confidence": entry(CONFIDENCE, "1", "percent"),
-        }
 
 
 def job_of(task: RandomTask) -> Job:

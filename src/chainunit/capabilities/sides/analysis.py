@@ -4,7 +4,6 @@ model."""
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ import numpy as np
 from ...core.quantities import Value, declaration, quantity
 from ...machines.api import ChainUnitMachine
 from ...machines.chain_unit import SIDES, Feed, SideName
-from ...reading.text import array_entry, entries, entry
+from ...reading.results import InUnit, derived, part, result
 from ...study.analysis import Analysis, Findings, Work
 from ...study.arrays import peak
 from ...study.config import Config
@@ -21,6 +20,14 @@ from ...study.drive import Drive
 from ...study.one_sided import OverloadFactors, cycle_alone, overload_factors
 from ...study.organ_limits import slack_and_mode
 from ...study.record import StudyRecord
+
+
+@result
+class Factor:
+    """An overload factor."""
+
+    value: Any = part("the factor", unit="1", inline=True)
+    use: str = part("the question that it answers", name="for")
 
 
 def factors_for(factors: Mapping[SideName, OverloadFactors]) -> dict[str, str]:
@@ -36,40 +43,35 @@ def factors_for(factors: Mapping[SideName, OverloadFactors]) -> dict[str, str]:
     }
 
 
-@dataclass(frozen=True)
+@result
 class Sides:
-    """Cycle maxima of the torques [N m] over crank speed [rad/s], each of shape (speeds,), of rocker and
-    crank, with both organs (`rocker_both`), only the left one, or only the right one."""
+    """Both organs against one alone over the crank speed."""
 
-    speed: Any
-    peaks: Mapping[str, Any]
+    speed: Any = quantity("rad/s", "crank speeds")
+    peaks: Mapping[str, Any] = part(
+        "cycle maxima of the torques of rocker and crank, with both organs (`rocker_both`), only the left one, or "
+        "only the right one",
+        unit="N.m",
+        inline=True,
+    )
 
-    def crossings(self) -> dict[str, dict[SideName, list[float]]]:
-        """Crank speeds at which the torque of one side alone equals that of both [rad/s], interpolated
-        linearly, by torque ("rocker", "crank") and side."""
-        speeds: dict[str, dict[SideName, list[float]]] = {}
+    @derived()
+    def crossings(self) -> dict[str, dict[SideName, list[InUnit]]]:
+        """Crank speeds at which the torque of one side alone equals that of both, interpolated linearly, by torque
+        ("rocker", "crank") and side."""
+        speeds: dict[str, dict[SideName, list[InUnit]]] = {}
         for torque in _TORQUES:
             speeds[torque] = {}
             for side in SIDES:
                 excess = self.peaks[f"{torque}_{side}"] - self.peaks[f"{torque}_both"]
                 at = np.flatnonzero(np.diff(np.sign(excess)) != 0)
                 slope = np.diff(excess)[at]
-                speeds[torque][side] = [
-                    float(self.speed[k] - excess[k] * (self.speed[k + 1] - self.speed[k]) / d)
+                roots = (
+                    self.speed[k] - excess[k] * (self.speed[k + 1] - self.speed[k]) / d
                     for k, d in zip(at, slope, strict=True)
-                ]
+                )
+                speeds[torque][side] = [InUnit(float(w), "rad/s", "speed") for w in roots]
         return speeds
-
-    def as_dict(self) -> dict[str, Any]:
-        """Ready for JSON, with units."""
-        return {
-            "speed": array_entry(self.speed, "rad/s"),
-            **{name: array_entry(x, "N.m") for name, x in self.peaks.items()},
-            "crossings": {
-                torque: {side: [entry(w, "rad/s", "speed") for w in speeds] for side, speeds in of.items()}
-                for torque, of in self.crossings().items()
-            },
-        }
 
 
 _TORQUES = ("rocker", "crank")
@@ -111,26 +113,23 @@ class Limits:
     margin: Value = quantity("1", "least |sin| of the transmission angles over the turn")
 
 
-@dataclass(frozen=True)
+@result
 class OrganFindings(Findings):
     """The torques that the organs of a chain unit cause at constant speed: one side against both, also over
     the speed, and the limits of two bars."""
 
     factors: dict[SideName, OverloadFactors]
     """overload factors, by side"""
-    sides: Sides
-    limits: Limits
+    sides: Sides = part("one side against both over the crank speed", name="sides_over_speed")
+    limits: Limits = part("the limits of two bars as a model")
 
-    def as_dict(self) -> dict[str, Any]:
-        """Ready for JSON."""
+    @derived()
+    def overload_factors(self) -> dict[SideName, dict[str, Factor]]:
+        """Overload factors, by side, each with its use."""
         uses = factors_for(self.factors)
         return {
-            "overload_factors": {
-                side: {name: factor | {"for": uses[name]} for name, factor in entries(factors).items()}
-                for side, factors in self.factors.items()
-            },
-            "limits": entries(self.limits),
-            "sides_over_speed": self.sides.as_dict(),
+            side: {name: Factor(x, uses[name]) for name, x in vars(factors).items()}
+            for side, factors in self.factors.items()
         }
 
     def remark(self, study: StudyRecord) -> None:

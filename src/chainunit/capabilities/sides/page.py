@@ -81,7 +81,9 @@ def _sides(s: b.Source, study: StudyRecord) -> fig.Figure:
     def items(of: str) -> Iterator[fig.Item]:
         for look, (which, name) in enumerate(words.items()):
             yield fig.Curve(name, sides.speed, sides.peaks[f"{of}_{which}"], look)
-        yield from (fig.Mark(at, look="thin") for speeds in sides.crossings()[of].values() for at in speeds)
+        yield from (
+            fig.Mark(at.value, look="thin") for speeds in sides.crossings[of].values() for at in speeds
+        )
         yield fig.Mark(study.config.run.crank_speed, "normal running")
         if mode is not None and _GOOD[of] * mode < sides.speed[-1]:
             yield fig.Shade(_GOOD[of] * mode, float(sides.speed[-1]), "two bars may be off by more than 10 %")

@@ -88,7 +88,7 @@ def _map(summary: SweepSummary, name: str) -> fig.Figure:
     }
     part = dataset.isel(order).transpose(up.name, across.name)
     x, y, z = part[across.name].values, part[up.name].values, part[name].values
-    v, levels = summary.variables[name], _levels(part[name].values)
+    v, levels = summary.findings.variables[name], _levels(part[name].values)
     names = tuple(
         f"{number(low, v.unit, v.kind, full=False, beside=False)} to "
         f"{number(high, v.unit, v.kind, full=False, beside=False)}"
@@ -98,7 +98,7 @@ def _map(summary: SweepSummary, name: str) -> fig.Figure:
     items += _infeasible(summary, x, y, part["reason"].values)
     items.append(fig.Curve("the study", [across.centre], [up.centre], 1, "o", has_line=False))
     if summary.best and name == plan.best:
-        k = np.unravel_index(summary.best[0], plan.shape)
+        k = np.unravel_index(summary.findings.passed.best[0], plan.shape)
         at = [float(each.values[int(i)]) for each, i in zip(plan.parameters, k, strict=True)]
         items.append(fig.Curve(plan.best_is, [at[0]], [at[1]], 3, "s", has_line=False))
     ends = [{"low": float(axis[0]), "high": float(axis[-1])} for axis in (x, y)]
@@ -133,7 +133,7 @@ def _curves(summary: SweepSummary) -> Iterator[fig.Figure]:
     for k, some in enumerate(_pieces(names, _MOST_ROWS)):
         rows = (
             (
-                _axis(summary.variables[name]),
+                _axis(summary.findings.variables[name]),
                 [
                     fig.Curve(
                         name, x, part[name].values[order], 0, "o" if len(x) <= 40 else "", in_legend=False
@@ -212,9 +212,9 @@ def distribution(summary: SweepSummary) -> Iterator[fig.Figure]:
             items: list[fig.Item] = [fig.Curve("share of the points below", x, shares, in_legend=False)]
             items += [fig.Mark(q, "5 %, 95 %", axis="y", look="thin") for q in (0.05, 0.95)]
             if name in summary.nominal:
-                items.append(fig.Mark(summary.nominal[name], "at the values of the study"))
+                items.append(fig.Mark(summary.nominal[name].value, "at the values of the study"))
             y = fig.Axis("share below", "1", "percent", low=0.0, high=1.0)
-            panels.append(fig.Panel(_axis(summary.variables[name]), y, tuple(items)))
+            panels.append(fig.Panel(_axis(summary.findings.variables[name]), y, tuple(items)))
         rows = _in_pairs(panels)
         yield fig.Figure(
             f"spread-{k}" if k else "spread",

@@ -7,6 +7,7 @@ from numbers import Integral
 from pathlib import Path
 
 from ...core.errors import InputError, shown
+from ...reading.results import as_data
 from ...reading.text import shown_in
 from ...report import blocks as b
 from ...report.lines import Line, Name, Number, capital, join, line
@@ -14,18 +15,18 @@ from ...report.task import Task
 from ...study.config import Config
 from ...work.progress import Report as Progress
 from . import figures as sweep_figures
-from .points import run_sweep
-from .summary import SweepSummary
+from .points import SweepFindings, run_sweep
+from .summary import MOST_GAPS, SweepSummary, summary_of
 
 _MOST_COLUMNS = 8
 """Columns of a table on the terminal."""
 
 
-def report(summary: SweepSummary) -> b.Report:
+def report(findings: SweepFindings) -> b.Report:
     """The report on a sweep."""
-    s = b.Source(summary.as_dict())
-    findings = summary.findings
     with shown_in(findings.config.units):
+        summary = summary_of(findings)
+        s = b.Source(as_data(summary))
         sections = (
             b.Section("influences", "Which parameter moves what", tuple(_influences(s, summary))),
             b.Section("best", "Points in order", tuple(_best(s, summary))),
@@ -54,19 +55,19 @@ def _compute(
     *,
     workers: int | None = None,
     scheduler: str | None = None,
-) -> SweepSummary:
+) -> SweepFindings:
     """Run the sweep of a study; a store in the folder that fits is continued. Errors are those of `run_sweep`, and an
     InputError for a number of workers that is none."""
     if workers is not None and (
         isinstance(workers, bool) or not isinstance(workers, Integral) or workers < 1
     ):
         raise InputError(f"workers = {shown(workers)}: must be a whole number >= 1")
-    return SweepSummary(run_sweep(config, folder, progress, workers, scheduler))
+    return run_sweep(config, folder, progress, workers, scheduler)
 
 
-def _store_in(summary: SweepSummary, folder: Path) -> Path:
+def _store_in(findings: SweepFindings, folder: Path) -> Path:
     """The store of all points, which is written while the sweep runs."""
-    return folder / summary.findings.outcome.file.name
+    return folder / findings.outcome.file.name
 
 
 def _opening(s: b.Source) -> Iterator[b.Block]:
@@ -174,9 +175,9 @@ def _influences(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
     if any(shares):
         title += "; in brackets the share of the variance that the parameter explains alone"
     yield b.Table(tuple(rows), (b.Column("parameter"), *_columns(list(table))), title=title)
-    wide = [name for name, gap in summary.undefined.items() if gap]
+    wide = [name for name, gap in summary.gaps.items() if gap > MOST_GAPS]
     if wide:
-        worst = max(wide, key=lambda name: s.value(f"gaps.{name}") or 0.0)
+        worst = max(wide, key=lambda name: summary.gaps[name])
         words = "No shares of the variance: up to {gap} of the points have no value, and the parameters of the others"
         yield b.Text(s.line(f"{words} are not independent.", gap=s.number(f"gaps.{worst}")), "note")
     elif not all(shares):
@@ -192,7 +193,7 @@ def _influences(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
 
 
 def _spread_heading(summary: SweepSummary) -> str:
-    return "Spread by tolerances and ranges" if summary.evenly else "Spread by tolerances"
+    return "Spread by tolerances and ranges" if summary.spread.evenly else "Spread by tolerances"
 
 
 def _spread(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
@@ -224,9 +225,9 @@ def _spread(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
     columns = (b.Column("result"), *of_study, *(b.Column(f"{key.removeprefix('q')} %") for key in quantiles))
     groups = ((1, 2, 3), tuple(range(4, len(columns))))
     yield b.Table(tuple(rows), columns, title="Spread of the results and their quantiles", groups=groups)
-    if summary.evenly:
-        ranges = join(map(Name, summary.evenly))
-        words = " has no tolerance" if len(summary.evenly) == 1 else " have no tolerance"
+    if summary.spread.evenly:
+        ranges = join(map(Name, summary.spread.evenly))
+        words = " has no tolerance" if len(summary.spread.evenly) == 1 else " have no tolerance"
         yield b.Text(
             line(ranges, words, ": the spread counts each of their values as equally frequent."), "note"
         )
@@ -294,12 +295,13 @@ def _basis(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
     yield b.Text(s.line("All points: {store} (Zarr)."), "fine", "long")
 
 
-TASK: Task[Config, SweepSummary] = Task(
+TASK: Task[Config, SweepFindings] = Task(
     "sweep",
     _compute,
     report,
+    content=SweepSummary,
     files=("sweep_*.png",),
-    writers=lambda summary, folder, of_report: [*of_report, lambda: [_store_in(summary, folder)]],
-    kept=lambda summary, folder: [_store_in(summary, folder)],
-    shortfall=lambda summary: None if summary.feasible else "",
+    writers=lambda findings, folder, of_report: [*of_report, lambda: [_store_in(findings, folder)]],
+    kept=lambda findings, folder: [_store_in(findings, folder)],
+    shortfall=lambda findings: None if findings.passed.counts[0] else "",
 )

@@ -7,21 +7,22 @@ import json
 import math
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from enum import Enum
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ... import __version__
 from ...batch.evaluate import ReasonKind, StateReason, reasons_of
-from ...core.composition import reference
 from ...core.errors import InputError
-from ...core.quantities import Layout
+from ...core.quantities import Layout, Quantity, Variable
+from ...core.system_description import reference
 from ...machines.machine import Machine
+from ...reading.results import InUnit
 from ...study.block_runs import BlockRuns, Cause
 from ...study.choice import choose
 from ...study.config import Config
@@ -248,6 +249,21 @@ def job_of(task: SweepTask) -> Job:
     )
 
 
+BEST = 10
+"""Number of best points."""
+_PART = 2**18
+
+
+class PassedPoints(NamedTuple):
+    """The points of a sweep as they went by: `counts` by the code of their reason; by result that has values, the
+    numbers of the points with its least and its largest value (`extremes`); the numbers of the `best` points, the
+    best first."""
+
+    counts: tuple[int, ...]
+    extremes: Mapping[str, tuple[int, int]]
+    best: tuple[int, ...]
+
+
 @dataclass(frozen=True)
 class SweepFindings:
     """The results of a sweep, in the store of `outcome`."""
@@ -267,6 +283,20 @@ class SweepFindings:
         return (*self.plan.quantities, *self.plan.measures)
 
     @cached_property
+    def variables(self) -> dict[str, Variable]:
+        """Parameters and results by name."""
+        own = {each.name: each.variable for each in self.plan.parameters}
+        for each in self.task.quantities:
+            of_turn = Quantity(each.unit, each.description, kind=each.kind)
+            own[each.name] = Variable(each.name, each.description, of_turn)
+        measures = {v.name: v for v in Layout(Answers).variables}
+        return own | {name: measures[name] for name in self.plan.measures}
+
+    def in_unit(self, name: str, value: float | None) -> InUnit:
+        """A value of a parameter or result, with its unit."""
+        return InUnit(value, self.variables[name].unit, self.variables[name].kind)
+
+    @cached_property
     def points(self) -> xr.Dataset:
         """All points over the dimension ``point``, by the names of the study: parameters, results and ``reason``. The
         values are read when they are used."""
@@ -275,6 +305,36 @@ class SweepFindings:
         dataset = self.outcome.dataset.rename(names)
         dataset["reason"].attrs["reasons"] = [str(reason) for reason in self.task.reasons]
         return dataset.set_coords([each.name for each in plan.parameters])
+
+    def parts(self, names: Sequence[str]) -> Iterator[tuple[int, xr.Dataset]]:
+        """The variables `names` of all points in parts, each with the number of its first point."""
+        points = self.points[[*names]]
+        for begin in range(0, points.sizes["point"], _PART):
+            yield begin, points.isel(point=slice(begin, begin + _PART)).load()
+
+    @cached_property
+    def passed(self) -> PassedPoints:
+        """Reasons, extremes and best points of all points."""
+        plan, sign = self.plan, -1.0 if self.plan.best_is == "largest" else 1.0
+        counts = np.zeros(len(self.task.reasons), np.int64)
+        ends: dict[str, list[tuple[float, int]]] = {name: [] for name in self.results}
+        best: list[tuple[float, int]] = []
+        for begin, part in self.parts([*self.results, "reason"]):
+            counts += np.bincount(part["reason"].values, minlength=len(counts))
+            for name in self.results:
+                x = part[name].values
+                if np.isfinite(x).any():
+                    ends[name] += [(float(x[k]), begin + int(k)) for k in (np.nanargmin(x), np.nanargmax(x))]
+            x = sign * part[plan.best].values
+            order = np.argsort(x, kind="stable")[:BEST]
+            best += [(float(x[k]), begin + int(k)) for k in order if np.isfinite(x[k])]
+            best = sorted(best)[:BEST]
+        extremes = {
+            name: (min(of)[1], max(of, key=lambda each: (each[0], -each[1]))[1])
+            for name, of in ends.items()
+            if of
+        }
+        return PassedPoints(tuple(map(int, counts)), extremes, tuple(k for _, k in best))
 
     @cached_property
     def dataset(self) -> xr.Dataset:

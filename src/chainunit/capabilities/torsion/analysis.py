@@ -1,18 +1,15 @@
-"""The torsion of a cardan line in rotation as an analysis of a study: the analysis of the study's line, its
-remarks, and its numbers for a file."""
+"""The torsion of a cardan line in rotation as an analysis of a study: the analysis of the study's line, and its
+remarks."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from ...core.errors import InputError
 from ...drives.cardan import ORDERS, frequency_band
-from ...drives.torsion import SteadyMotion
-from ...reading.text import array_entry, entries
+from ...reading.results import part, result
 from ...study.analysis import Analysis, Findings, Work
 from ...study.config import Config
 from ...study.drive import Drive
@@ -22,8 +19,6 @@ from ...study.verdict import STEADY
 from .line import DRIFT, LineAnalysis, Rotation, analyse
 from .table import TorsionPlan
 
-ROUNDOFF_TORQUE = 1e-6
-"""torque up to which it is roundoff [N.m]"""
 SLOW = 1.0 / 6.0
 """Ratio of the shaft's speed to the natural frequency below which no order of the joints comes near a
 resonance."""
@@ -88,15 +83,11 @@ def _torque(x: float) -> Amount:
     return float(x), "N.m", "", 4
 
 
-@dataclass(frozen=True)
+@result
 class TorsionFindings(Findings):
     """The findings of the analysis."""
 
-    analysis: LineAnalysis
-
-    def as_dict(self) -> dict[str, Any]:
-        """See `Findings`; null without a steady motion."""
-        return as_dict(self.analysis)
+    analysis: LineAnalysis = part(inline=True)
 
     def remark(self, study: StudyRecord) -> None:
         """Add the remarks and notes on the torsion to the study."""
@@ -259,12 +250,12 @@ class TorsionFindings(Findings):
                 damping=(analysis.damping_ratio, "1"),
             )
         elif not np.all(analysis.on_speed):
-            off = analysis.simulated_speed[~analysis.on_speed]
+            off = analysis.simulation.asked_speed[~analysis.on_speed]
             yield Remark.of(
                 "note",
                 "speed lost",
                 f"The slow control of the time simulation lost the speed at {len(off)} of "
-                f"{len(analysis.simulated_speed)} speeds, {{low}} to {{high}}; they are not drawn.",
+                f"{len(analysis.simulation.asked_speed)} speeds, {{low}} to {{high}}; they are not drawn.",
                 low=_speed(off.min()),
                 high=_speed(off.max()),
             )
@@ -274,85 +265,3 @@ class TorsionFindings(Findings):
             "The resonance curve is for lasting running at each speed; a run-up that passes quickly stays below "
             "it.",
         )
-
-
-def _speeds(x: Any) -> dict[str, Any]:
-    return array_entry(x, "rad/s", "speed")
-
-
-def _frequency(x: Any) -> dict[str, Any]:
-    return array_entry(x, "rad/s", "frequency")
-
-
-def _motion(m: SteadyMotion) -> dict[str, Any]:
-    torques = {
-        f"{end}_torque{shaft}": getattr(m, f"{end}{shaft}")
-        for shaft in (2, 3)
-        for end in ("peak", "least", "largest")
-    }
-    return {
-        "found": m.exists.tolist(),
-        **{
-            name: array_entry(np.where(np.abs(x) < ROUNDOFF_TORQUE, 0.0, x), "N.m")
-            for name, x in torques.items()
-        },
-        "drive_torque": array_entry(m.drive, "N.m"),
-        "growth": array_entry(m.growth, "1/s"),
-        "largest_multiplier": array_entry(m.multiplier, "1"),
-        "growth_with_constant_torque": array_entry(m.free_growth, "1/s"),
-        "frequency": _frequency(m.frequency),
-    }
-
-
-def as_dict(analysis: LineAnalysis) -> dict[str, Any]:
-    """Ready for JSON, each number with its unit; null without a steady motion."""
-    band, simulation = analysis.band, analysis.simulation
-    return {
-        "line": entries(analysis.line),
-        "running": entries(analysis.rotation),
-        **entries(analysis.ranges),
-        "damping_ratio": array_entry(analysis.damping_ratio, "1"),
-        "natural_frequency": {
-            "even": _frequency(analysis.at_even),
-            "least": _frequency(band.least),
-            "largest": _frequency(band.largest),
-            "over_both_turns": _frequency(analysis.span),
-            "at_ratio_zero": _frequency(band.at_zero),
-            "at_ratio_infinite": _frequency(band.at_infinity),
-        },
-        "sensitivity": {name: array_entry(x, "1") for name, x in analysis.sensitivity.items()},
-        "ratio": {
-            "least": array_entry(np.min(analysis.ratio), "1"),
-            "largest": array_entry(np.max(analysis.ratio), "1"),
-        },
-        "excitation": {f"order {n}": array_entry(x, "rad") for n, x in analysis.excitation.items()},
-        "crossings": {f"speed = k/{n}": _speeds(ends) for n, ends in analysis.crossings().items()},
-        "operating": {"static_torque2": array_entry(analysis.static2, "N.m"), **_motion(analysis.operating)},
-        "resonance": {
-            "speed": _speeds(analysis.speed),
-            **_motion(analysis.steady),
-            "peaks": {
-                "speed": _speeds([at for at, _ in analysis.resonances()]),
-                "torque2": array_entry([peak for _, peak in analysis.resonances()], "N.m"),
-            },
-            "rigid_torque2": array_entry(analysis.rigid.peak2, "N.m"),
-            "rigid_torque3": array_entry(analysis.rigid.peak3, "N.m"),
-            "unstable": _speeds(analysis.unstable_ranges()),
-            "no_steady_motion": _speeds(analysis.missing_ranges()),
-        },
-        "simulation": None
-        if simulation is None
-        else {
-            "asked_speed": _speeds(analysis.simulated_speed),
-            "speed": _speeds(simulation.speed),
-            "peak_torque2": array_entry(simulation.peak2, "N.m"),
-            "peak_torque3": array_entry(simulation.peak3, "N.m"),
-        },
-        "stability": {
-            "joint": analysis.map.joint,
-            "speed": _speeds(analysis.map.speed),
-            "bend": array_entry(analysis.map.bend, "rad"),
-            "damping_ratio": array_entry(analysis.map.ratio, "1"),
-            "growth": array_entry(analysis.map.growth, "1/s"),
-        },
-    }

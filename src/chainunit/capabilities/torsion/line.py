@@ -36,6 +36,7 @@ from ...drives.torsion import (
     steady,
     with_damping_ratio,
 )
+from ...reading.results import derived, part, result
 from ...study.arrays import stretches
 from ...work.progress import Progress, Report
 from .table import TorsionTable
@@ -82,32 +83,83 @@ def speeds(low: float, high: float, k: float, points: int) -> Any:
     return np.interp(np.linspace(0.0, cumulative[-1], points), cumulative, fine)
 
 
-@dataclasses.dataclass(frozen=True)
+@result
 class StabilityMap:
     """Growth of torsional disturbances over speed, bend and damping ratio."""
 
-    speed: Any
-    """[rad/s], (speeds,)"""
-    bend: Any
-    """[rad], (bends,)"""
-    ratio: tuple[float, ...]
-    """damping ratios"""
-    joint: str
-    """the bend that the map varies: "alpha1", "alpha2" or "both"; the other bend is that of the line"""
-    growth: Any
-    """[1/s], (ratios, bends, speeds); NaN without a steady motion"""
+    speed: Any = quantity("rad/s", "speeds", kind="speed")
+    bend: Any = quantity("rad", "bends")
+    ratio: tuple[float, ...] = part("damping ratios", unit="1", name="damping_ratio")
+    joint: str = part(
+        'the bend that the map varies: "alpha1", "alpha2" or "both"; the other bend is that of the line'
+    )
+    growth: Any = quantity("1/s", "growth, by damping ratio, bend and speed; NaN without a steady motion")
     unstable: Any
     """bool, of the same shape"""
 
 
-@dataclasses.dataclass(frozen=True)
+@result
+class Ends:
+    """Least and largest value of a ratio."""
+
+    least: float = quantity("1", "least value")
+    largest: float = quantity("1", "largest value")
+
+
+@result
+class NaturalFrequency:
+    """The natural frequency of torsion."""
+
+    even: float = quantity("rad/s", "natural frequency at i23 = 1", kind="frequency")
+    least: float = quantity("rad/s", "least one over a turn of the shaft", kind="frequency")
+    largest: float = quantity("rad/s", "largest one over a turn of the shaft", kind="frequency")
+    over_both_turns: tuple[float, float] = quantity(
+        "rad/s", "least and largest one over a turn of the shaft and a turn of the machine", kind="frequency"
+    )
+    at_ratio_zero: float = quantity("rad/s", "natural frequency at i23 = 0", kind="frequency")
+    at_ratio_infinite: float = quantity("rad/s", "natural frequency at i23 = infinity", kind="frequency")
+
+
+@result
+class NormalRunning:
+    """The steady motion in normal running."""
+
+    static_torque2: float = quantity("N.m", "largest torque of shaft 2 from the load alone, without inertia")
+    motion: SteadyMotion = part(inline=True)
+
+
+@result
+class Peaks:
+    """The peaks of a resonance curve, in order of the speed."""
+
+    speed: list[float] = quantity("rad/s", "speeds of the peaks", kind="speed")
+    torque2: list[float] = quantity("N.m", "largest torque of shaft 2 at them")
+
+
+@result
+class Resonance:
+    """The steady motion over the speed."""
+
+    speed: Any = quantity("rad/s", "speeds", kind="speed")
+    motion: SteadyMotion = part(inline=True)
+    peaks: Peaks = part("peaks of the torque of shaft 2")
+    rigid: RigidPeaks = part(inline=True)
+    unstable: list[tuple[float, float]] = quantity(
+        "rad/s", "ranges in which a torsional disturbance grows", kind="speed"
+    )
+    no_steady_motion: list[tuple[float, float]] = quantity(
+        "rad/s", "ranges without a steady motion of the period of half a turn", kind="speed"
+    )
+
+
+@result
 class LineAnalysis:
     """The behaviour of a line with a cardan shaft in rotation."""
 
-    line: Cardan
-    rotation: Rotation
-    ranges: TorsionTable
-    damping_ratio: float
+    line: Cardan = part("the line, as two inertias with the shafts between them")
+    rotation: Rotation = part("speed and load of normal running", name="running")
+    ranges: TorsionTable = part(inline=True)
+    damping_ratio: float = quantity("1", "damping ratio of the line")
     band: FrequencyBand
     """natural frequency over a turn of the shaft, with the inertia J4 of `line`"""
     span: tuple[float, float]
@@ -122,16 +174,16 @@ class LineAnalysis:
     """i23 over `angle`"""
     frequency: Any
     """natural frequency at each fixed `angle` [rad/s]"""
-    sensitivity: dict[str, float]
+    sensitivity: dict[str, float] = part(
+        "relative change of the natural frequency by that of an inertia or a stiffness", unit="1"
+    )
     speed: Any
     """speeds of `steady` and `rigid` [rad/s], (speeds,)"""
     steady: SteadyMotion
     rigid: RigidPeaks
     operating: SteadyMotion
-    simulation: SimulatedPeaks | None
-    simulated_speed: Any
-    """speeds at which the line should run in the time simulation [rad/s]"""
-    map: StabilityMap
+    simulation: SimulatedPeaks | None = part("the time simulation, where transients die out")
+    map: StabilityMap = part("stability over speed, bend and damping", name="stability")
 
     @property
     def slowest(self) -> float:
@@ -157,7 +209,7 @@ class LineAnalysis:
     def on_speed(self) -> Any:
         """Whether each point of the time simulation kept its speed, an array of bool."""
         assert self.simulation is not None
-        return np.abs(self.simulation.speed / self.simulated_speed - 1.0) < LOST
+        return np.abs(self.simulation.speed / self.simulation.asked_speed - 1.0) < LOST
 
     def crossings(self) -> dict[int, tuple[float, float]]:
         """By n, the range of speeds (from, to) at which order n meets the natural frequency k, or 2 speed = 2
@@ -185,6 +237,42 @@ class LineAnalysis:
         peak = self.steady.peak2
         return [(float(self.speed[j]), float(peak[j])) for j in _peaks(peak)]
 
+    @derived()
+    def natural_frequency(self) -> NaturalFrequency:
+        """The natural frequency of torsion."""
+        band = self.band
+        return NaturalFrequency(
+            self.at_even, band.least, band.largest, self.span, band.at_zero, band.at_infinity
+        )
+
+    @derived(name="ratio")
+    def ratio_ends(self) -> Ends:
+        """The ratio i23 over a turn of the shaft."""
+        return Ends(np.min(self.ratio), np.max(self.ratio))
+
+    @derived("rad", name="excitation")
+    def orders(self) -> dict[str, float]:
+        """Amplitude of phi3 - phi2 by order."""
+        return {f"order {n}": x for n, x in self.excitation.items()}
+
+    @derived("rad/s", "speed", name="crossings")
+    def crossing_speeds(self) -> dict[str, tuple[float, float]]:
+        """Range of speeds at which order n meets the natural frequency k, or 2 speed = 2 k/n."""
+        return {f"speed = k/{n}": ends for n, ends in self.crossings().items()}
+
+    @derived(name="operating")
+    def operation(self) -> NormalRunning:
+        """The steady motion in normal running."""
+        return NormalRunning(self.static2, self.operating)
+
+    @derived()
+    def resonance(self) -> Resonance:
+        """The steady motion over the speed."""
+        found = self.resonances()
+        peaks = Peaks([speed for speed, _ in found], [torque for _, torque in found])
+        unstable, missing = self.unstable_ranges(), self.missing_ranges()
+        return Resonance(self.speed, self.steady, peaks, self.rigid, unstable, missing)
+
 
 def _peaks(curve: Any) -> Any:
     """Indices of the inner maxima with a prominence of at least 2 %, which is above the ripple of torques
@@ -206,8 +294,7 @@ def _refine(line: Cardan, load: float, speed: Any, curve: SteadyMotion) -> tuple
     more = np.setdiff1d(np.concatenate(near), speed)
     addition = steady(line, more, load)
     order = np.argsort(np.concatenate([speed, more]))
-    whole = (np.concatenate([a, b], axis=-1)[..., order] for a, b in zip(curve, addition, strict=True))
-    return np.concatenate([speed, more])[order], SteadyMotion(*whole)
+    return np.concatenate([speed, more])[order], SteadyMotion.joined([curve, addition], order)
 
 
 def _ranges(x: Any, inside: Any) -> list[tuple[float, float]]:
@@ -260,7 +347,6 @@ def analyse(
         rigid=rigid(line, speed, rotation.load),
         operating=operating,
         simulation=simulation,
-        simulated_speed=speed[::SIMULATED],
         map=stability_map(
             line,
             speeds(*ends, k, int(table.speeds)),

@@ -1,0 +1,210 @@
+"""Who notices an event: thermal relay, safety coupling, current limit and load observer of a study, and the load that
+the rocker has carried by then."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ...core.quantities import Value, declaration, quantity
+from ...machines.chain_unit import SIDES
+from ...reading.results import derived, part, result
+from ...study.analysis import Analysis, Findings, Work
+from ...study.arrays import peak
+from ...study.config import Config
+from ...study.drive import Drive
+from ...study.event_torques import from_event_on
+from ...study.organ_limits import slack_and_mode
+from ...study.record import StudyRecord
+
+AT_LIMIT = 0.99
+"""Share of the limit of its current from which a motor counts as at the limit."""
+CHAINS_GOOD = 0.72
+"""Crank speed, in parts of the lowest resonance of the chains, up to which the observer tells a fifth of the feed
+from the motion of the chains (docs/identification.md)."""
+DEVICES = {
+    "thermal_relay": "thermal relay",
+    "safety_coupling": "safety coupling",
+    "current_limit": "current limit",
+    "observer": "load observer",
+}
+"""The devices that may notice an event, with their titles."""
+
+
+@declaration
+class Notice:
+    """How a device notices an event. Where it does not, `time` is None, and `carried` is that of the whole run."""
+
+    time: Value = quantity("s", "time from the event to the notice")
+    carried: Value = quantity(
+        "1", "largest rocker torque from the event to the notice, in parts of that of normal running"
+    )
+
+
+@declaration
+class Observed:
+    """The estimates of the observer in the steady turns. An imbalance is left less right."""
+
+    imbalance: Value = quantity("kg", "estimated imbalance of the feed, mean")
+    error: Value = quantity("kg", "error of the estimated imbalance of the feed, largest")
+    threshold: Value = quantity("kg", "threshold of the imbalance of the feed, median")
+    force_threshold: Value = quantity("N", "threshold of the imbalance of the processing forces, median")
+    rocker_torque: Value = quantity("N.m", "rocker torque, largest")
+
+
+@result
+class ObserverFindings(Findings):
+    """The `notices` by event and device; by event the side that the observer names first, empty where it names none,
+    and the loaded side; and the estimates in normal running."""
+
+    notices: Mapping[str, Mapping[str, Notice]] = part("when each device notices an event")
+    named: Mapping[str, str]
+    loaded: Mapping[str, str]
+    steady: Observed = part("the estimates in normal running")
+    alarm_in_start: float | None = quantity("s", "time of the first alarm before running is steady")
+    alarms_in_steady: bool
+    resonance: float | None
+    """speed in parts of the lowest resonance of the chains, where the organs are chains"""
+
+    @derived()
+    def sides(self) -> dict[str, dict[str, str | None]]:
+        """By event, the side that the observer names first, and the loaded one."""
+        return {
+            run: {"named": self.named[run] or None, "loaded": self.loaded[run] or None}
+            for run in self.notices
+        }
+
+    def remark(self, study: StudyRecord) -> None:
+        """Warn of false alarms and of wrong sides, and of chains in place of the bars that the observer knows."""
+        if self.alarms_in_steady:
+            study.warn(
+                "observer alarms in normal running",
+                "The load observer raises an alarm in normal running, where it estimates an imbalance of the feed of "
+                "{imbalance} (threshold {threshold}): its alarms in the events tell nothing.",
+                imbalance=(self.steady.imbalance, "kg"),
+                threshold=(self.steady.threshold, "kg"),
+            )
+        elif self.alarm_in_start is not None:
+            study.note(
+                "observer in the start",
+                "The load observer raises an alarm in the start, at t = {time}: hold its alarms back until running "
+                "is steady.",
+                time=(self.alarm_in_start, "s"),
+            )
+        wrong = [run for run, side in self.named.items() if side and self.loaded[run] not in ("", side)]
+        if wrong:
+            study.warn(
+                "observer names the wrong side",
+                "The load observer first names the side that is not loaded: {where}.",
+                *wrong,
+                where="; ".join(map(study.title_of, wrong)),
+            )
+        if self.resonance is not None:
+            (study.warn if self.resonance > CHAINS_GOOD else study.note)(
+                "observer of two bars",
+                "The organs are chains, and the load observer knows two bars: in normal running its imbalance of the "
+                "feed is wrong by {error} at most. The crank turns at {share} times the lowest resonance of the "
+                "chains; up to {good} times it tells a fifth of the feed from the motion of the chains.",
+                error=(self.steady.error, "kg"),
+                share=(self.resonance, "1"),
+                good=(CHAINS_GOOD, "1"),
+            )
+
+
+class ObserverAnalysis(Analysis):
+    """Who notices the events of a study with a load observer."""
+
+    name = "observer"
+    needs_runs = True
+
+    @staticmethod
+    def applies(config: Config, drive: Drive) -> bool:
+        """Whether the study has an observer."""
+        return drive.observer is not None
+
+    @staticmethod
+    def find(study: StudyRecord, work: Work) -> ObserverFindings | None:
+        """The notices, from the runs that the study has made; None without steady running. A start under load is left
+        out: the observer learns the loads in it."""
+        if "steady" not in study.answers:
+            return None
+        steady, begin = study.steady, study.steady_begin
+        normal = peak(steady["machine.rocker.tau"].values)
+        after = {
+            name: from_event_on(study, name)
+            for name in study.event
+            if name in study.answers and not study.config.events[name].from_rest
+        }
+        start = study.runs["start_up"].sel(time=slice(None, begin))
+        alarm = _first(start, np.abs(start["observer.alarm"].values) > 0.5)
+        return ObserverFindings(
+            {name: dict(_notices(study, name, run, normal)) for name, run in after.items()},
+            {name: _side(run) for name, run in after.items()},
+            {name: study.config.events[name].loaded_side for name in after},
+            _observed(steady, normal),
+            alarm,
+            bool(np.any(np.abs(steady["observer.alarm"].values) > 0.5)),
+            _resonance(study),
+        )
+
+
+def _observed(steady: xr.Dataset, normal: float) -> Observed:
+    estimate = steady["observer.imbalance.feed"].values
+    left, right = (steady[f"machine.{side}.material_mass"].values for side in SIDES)
+    return Observed(
+        imbalance=float(np.mean(estimate)),
+        error=peak(estimate - (left - right)),
+        threshold=float(np.median(steady["observer.imbalance.feed_threshold"].values)),
+        force_threshold=float(np.median(steady["observer.imbalance.force_threshold"].values)),
+        rocker_torque=normal,
+    )
+
+
+def _resonance(study: StudyRecord) -> float | None:
+    if not study.drive.machine.in_place:
+        return None
+    _, mode = slack_and_mode(study.drive.chain_unit, study.config.feed)
+    return study.config.run.crank_speed / mode
+
+
+def _first(run: xr.Dataset, is_noticed: Any) -> float | None:
+    """The time of the first row at which something is noticed [s]."""
+    rows = np.flatnonzero(is_noticed)
+    return float(run["time"][rows[0]]) if rows.size else None
+
+
+def _side(run: xr.Dataset) -> str:
+    """The side of the first alarm; empty without an alarm."""
+    alarm = run["observer.alarm"].values
+    rows = np.flatnonzero(np.abs(alarm) > 0.5)
+    return ("left" if alarm[rows[0]] > 0.0 else "right") if rows.size else ""
+
+
+def _notices(study: StudyRecord, name: str, run: xr.Dataset, normal: float) -> Iterator[tuple[str, Notice]]:
+    """The notice of each device that the drive has, by its name. `run` is that of the event from its begin on."""
+    begin, answers = study.event[name], study.answers[name]
+    time, torque = run["time"].values - begin, np.abs(run["machine.rocker.tau"].values)
+    for device, noticed in _times(study, run, begin, answers):
+        # a row that is nearer than a millionth of a step is that of the notice
+        until = time[-1] if noticed is None else noticed + 1e-6 * study.config.run.step
+        yield device, Notice(time=noticed, carried=float(np.max(torque[time <= until])) / normal)
+
+
+def _times(
+    study: StudyRecord, run: xr.Dataset, begin: float, answers: Any
+) -> Iterator[tuple[str, float | None]]:
+    """The time from the event to the notice of each device that the drive has [s]."""
+    drive, motor = study.drive, study.drive.motor
+    if drive.rated_current is not None:
+        yield "thermal_relay", answers.thermal_trip_time
+    if study.config.coupling is not None:
+        yield "safety_coupling", answers.coupling_trip_time
+    limit = motor.current_limit(drive.parameters)
+    if limit is not None:
+        first = _first(run, np.abs(run[f"motor.{motor.current}"].values) >= AT_LIMIT * limit)
+        yield "current_limit", None if first is None else first - begin
+    first = _first(run, np.abs(run["observer.alarm"].values) > 0.5)
+    yield "observer", None if first is None else first - begin

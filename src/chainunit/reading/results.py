@@ -1,0 +1,234 @@
+"""Results, declared once: their data for a file, and their documentation, follow from the declaration.
+
+A result is a dataclass. Its field is in the data where it is declared: a number, or an array of numbers, by
+`quantity` with its unit, anything else by `part`. A property is in the data where it is `derived`. All other fields
+and properties are means of the computation. A mapping, a sequence or a nested result has data by the same rules.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import typing
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache, partial
+from pathlib import Path
+from typing import Any, NamedTuple, dataclass_transform
+
+from ..core.quantities import group, quantity
+from .text import array_entry, entry
+
+OWN = "own"
+"""Unit of a part whose unit and kind are the fields `unit` and `kind` of the same result; it may have no kind."""
+
+
+class InUnit(NamedTuple):
+    """A number, or an array, whose unit, kind and title are known only when it is computed."""
+
+    value: Any
+    unit: str
+    kind: str = ""
+    title: str = ""
+
+
+@dataclasses.dataclass(frozen=True)
+class Estimate:
+    """A number that is estimated from random runs, and the interval that holds the true number; all in one unit."""
+
+    value: float
+    low: float
+    high: float
+    unit: str = ""
+    kind: str = ""
+
+
+class ResultPart(NamedTuple):
+    """A declared part of a result: the `attribute` that holds it, and its name in the data."""
+
+    attribute: str
+    name: str
+    description: str
+    unit: str = ""
+    """unit of its numbers; empty for a part that is no number, or whose numbers have units of their own"""
+    kind: str = ""
+    inline: bool = False
+    """whether the parts of its value stand among those of the result"""
+    titled: bool = False
+    """whether its numbers have their descriptions in the data"""
+    optional: bool = False
+    """whether it is left out where it is None"""
+
+
+def part(
+    description: str = "",
+    *,
+    unit: str = "",
+    kind: str = "",
+    name: str = "",
+    inline: bool = False,
+    titled: bool = False,
+    optional: bool = False,
+    default: Any = dataclasses.MISSING,
+    default_factory: Any = dataclasses.MISSING,
+) -> Any:
+    """A field that is in the data of a result, see `ResultPart`; its name there is that of the field unless `name`
+    gives another."""
+    own = ResultPart("", name, description, unit, kind, inline, titled, optional)
+    if default_factory is not dataclasses.MISSING:
+        return dataclasses.field(default_factory=default_factory, metadata={"part": own})
+    return dataclasses.field(default=default, metadata={"part": own})
+
+
+@dataclass_transform(frozen_default=True, field_specifiers=(quantity, group, part))
+def result(cls: Any = None, *, frozen: bool = True) -> Any:
+    """Make `cls` a result: a dataclass with declared parts."""
+    return partial(result, frozen=frozen) if cls is None else dataclasses.dataclass(frozen=frozen)(cls)
+
+
+class _Derived(property):
+    """A property that is in the data of a result."""
+
+    part: ResultPart
+
+
+def derived(
+    unit: str = "", kind: str = "", *, name: str = "", titled: bool = False, optional: bool = False
+) -> Callable[[Callable[[Any], Any]], Any]:
+    """A decorator for a property that is in the data of a result, see `ResultPart`. Its docstring is the
+    description."""
+
+    def declared(function: Callable[[Any], Any]) -> Any:
+        own = _Derived(function)
+        words = " ".join((function.__doc__ or "").split()).removesuffix(".")
+        words = words[:1].lower() + words[1:]
+        own.part = ResultPart(
+            function.__name__, name or function.__name__, words, unit, kind, titled=titled, optional=optional
+        )
+        return own
+
+    return declared
+
+
+@cache
+def parts(of: Any) -> tuple[ResultPart, ...]:
+    """The declared parts of a result: its fields, then its properties. Those of a group have its name before
+    theirs."""
+    own = []
+    for field in dataclasses.fields(of):
+        if "quantity" in field.metadata:
+            q = field.metadata["quantity"]
+            own.append(ResultPart(field.name, field.name, q.description, q.unit, q.kind))
+        elif "group" in field.metadata:
+            for each in parts(field.metadata["of"]):
+                attribute, name = (f"{field.name}.{x}" for x in (each.attribute, each.name))
+                words = f"{field.metadata['group']}: {each.description}"
+                own.append(each._replace(attribute=attribute, name=name, description=words))
+        elif "part" in field.metadata:
+            given = field.metadata["part"]
+            own.append(given._replace(attribute=field.name, name=given.name or field.name))
+    members = {name: x for base in reversed(of.__mro__) for name, x in vars(base).items()}
+    return (*own, *(x.part for x in members.values() if isinstance(x, _Derived)))
+
+
+def as_data(x: Any, *, titled: bool = False) -> Any:
+    """A result, or a mapping or sequence of results, as a file in JSON has it: each number as an entry with its unit.
+
+    Parameters
+    ----------
+    titled : whether each declared number has its description as its title
+
+    Raises
+    ------
+    TypeError
+        for a number without a unit, and for a value that is no result.
+    """
+    return _data(x, "", "", titled)
+
+
+def _data(x: Any, unit: str, kind: str, titled: bool) -> Any:
+    if isinstance(x, InUnit):
+        return _number(x.value, x.unit, x.kind) | ({"title": x.title} if x.title else {})
+    if isinstance(x, Estimate):
+        ends = {end: entry(getattr(x, end), x.unit, x.kind) for end in ("low", "high")}
+        return entry(x.value, x.unit, x.kind) | ends
+    if isinstance(x, Mapping):
+        return {str(key): _data(each, unit, kind, titled) for key, each in x.items()}
+    if unit:
+        return _number(x, unit, kind)
+    if dataclasses.is_dataclass(x) and parts(type(x)):  # type: ignore[arg-type]
+        return _table(x, titled)
+    if hasattr(x, "tolist"):
+        x = x.tolist()
+    if isinstance(x, list | tuple | frozenset):
+        return [_data(each, "", "", titled) for each in x]
+    if isinstance(x, Path):
+        return str(x)
+    if x is None or isinstance(x, str | bool | int):
+        return x
+    raise TypeError(f"{x!r} has no declared unit, and no declared parts")
+
+
+def _table(x: Any, titled: bool) -> dict[str, Any]:
+    data: dict[str, Any] = {}
+    of: Any = type(x)
+    for each in parts(of):
+        value = x
+        for attribute in each.attribute.split("."):
+            value = getattr(value, attribute)
+        if value is None and each.optional:
+            continue
+        unit, kind = (x.unit, getattr(x, "kind", "")) if each.unit == OWN else (each.unit, each.kind)
+        own = _data(value, unit, kind, titled or each.titled)
+        if each.inline:
+            data |= own
+        else:
+            title = {"title": each.description} if titled and unit and "value" in own else {}
+            data[each.name] = own | title if title else own
+    return data
+
+
+def _number(x: Any, unit: str, kind: str) -> dict[str, Any]:
+    is_array = isinstance(x, list | tuple) or bool(getattr(x, "ndim", 0))
+    return array_entry(x, unit, kind) if is_array else entry(x, unit, kind)
+
+
+def documented(of: type, prefix: str = "") -> Iterator[tuple[str, str, str]]:
+    """Name in the data, unit and description of each number and text of a result, with those of the results in it. In
+    a name ``*`` stands for the key of a mapping, and ``#`` for the place in a sequence."""
+    for each in parts(of):
+        steps, inner = results_in(_annotated(of, each.attribute))
+        own = prefix if each.inline else f"{prefix}{each.name}."
+        name = f"{own.removesuffix('.')}{steps}".removeprefix(".")
+        if inner is None or each.unit:
+            yield name, each.unit.replace(OWN, ""), each.description
+        else:
+            yield from documented(inner, name and f"{name}.")
+
+
+def _annotated(of: type, attribute: str) -> Any:
+    """The type of a part; None for that of a group, which is a number."""
+    for base in of.__mro__:
+        member: Any = vars(base).get(attribute)
+        if isinstance(member, _Derived):
+            hint = member.fget.__annotations__["return"]
+        else:
+            hint = vars(base).get("__annotations__", {}).get(attribute)
+        if hint is not None:
+            # other annotations of the class may have names that only a type checker knows
+            alone = type("Alone", (), {"__annotations__": {"x": hint}, "__module__": base.__module__})
+            return typing.get_type_hints(alone)["x"]
+    return None
+
+
+def results_in(hint: Any) -> tuple[str, Any]:
+    """The steps from a value of this type to the results in it, and their class; None where it has none."""
+    if hasattr(hint, "__dataclass_fields__"):
+        return "", hint if parts(hint) else None
+    found = [results_in(each) for each in typing.get_args(hint)]
+    steps, inner = next(
+        (each for each in found if each[1] is not None),
+        max(found, key=lambda each: each[0], default=("", None)),
+    )
+    outer = typing.get_origin(hint)
+    if isinstance(outer, type) and issubclass(outer, Mapping):
+        return f".*{steps}", inner
+    return (f".#{steps}" if outer in (list, tuple) and inner is not None else steps), inner
