@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -26,21 +27,23 @@ from typing import Any
 import numpy as np
 from figures import parser, save, table
 
-from chainunit.capabilities.identification.fit import fit
-from chainunit.capabilities.identification.plant import Plant
 from chainunit.capabilities.identification.posterior import posterior
-from chainunit.capabilities.identification.problem import Problem, RecordedRun, Sensor
-from chainunit.capabilities.identification.residuals import check_residuals, strained_priors, strains
-from chainunit.capabilities.identification.shaft import MeasuredShaft
-from chainunit.capabilities.identification.suspicion import suspicions
-from chainunit.capabilities.identification.synthetic import HiddenRun, Logger, synthetic
-from chainunit.capabilities.identification.unknown import Unknown
+from chainunit.capabilities.identification.score_tests import score_tests
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor
 from chainunit.machines.chain_unit import ChamberForces
+from chainunit.recordings.fit import fit
+from chainunit.recordings.plant import Plant
+from chainunit.recordings.problem import Problem, RecordedRun, Sensor
+from chainunit.recordings.residuals import prior_conflicts, residual_tests, sensor_conflicts
+from chainunit.recordings.shaft import MeasuredShaft
+from chainunit.recordings.unknown import Unknown
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 from chainunit.study.sections import ChainOrgans
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "examples" / "identification"))
+from synthetic import HiddenRun, Logger, synthetic
 
 RODS = [f"{side}.{rod}_mass" for side in ("left", "right") for rod in ("wall", "web")]
 BODIES = [f"{body}.{x}" for body in ("crank", "coupler", "rocker") for x in ("m", "I")]
@@ -210,24 +213,24 @@ def result(trial: str, k: int) -> dict[str, Any]:
     asked = problem(of)
     began = time.perf_counter()
     best = fit(asked)
-    suspects = suspicions(asked, best)
+    suspects = score_tests(asked, best)
     figures = {
         "kind": of.kind, "angle": of.angle, "rate": of.rate, "wrong": of.wrong, "rounds": best.rounds,
         "checks": [
             {"run": c.run, "column": c.column, "statistic": c.statistic, "noise": c.noise, "is_noise": c.is_noise}
-            for c in check_residuals(best)
+            for c in residual_tests(best)
         ],
-        "strains": [each.name for each in (*strains(asked, best), *strained_priors(asked.sought, best))],
+        "strains": [each.name for each in (*sensor_conflicts(asked, best), *prior_conflicts(asked.sought, best))],
         "suspicions": {each.name: (each.change, each.deviation) for each in suspects},
-        "suspicious": [each.name for each in suspects if each.is_suspicious],
+        "suspicious": [each.name for each in suspects if each.is_rejected],
     }  # fmt: skip
     around = posterior(asked, best)
-    figures["held"] = around.held
+    figures["held"] = around.active_bounds
     if trial not in OTHERS:
         figures["numbers"] = [
             {
                 "name": m.name, "true": of.values[m.name], "value": m.value, "deviation": m.deviation, "low": m.low,
-                "high": m.high, "spread": m.spread, "fitted": float(x), "bound": float(s),
+                "high": m.high, "spread": m.prior_deviation, "fitted": float(x), "bound": float(s),
             }
             for m, x, s in zip(around.marginals, best.z, best.deviations, strict=False)
         ]  # fmt: skip

@@ -8,6 +8,7 @@ from pathlib import Path
 import typer.main
 
 from chainunit.app.cli import app
+from chainunit.capabilities import modules
 from chainunit.report.markdown import markdown
 from chainunit.report.reference import reference
 
@@ -39,7 +40,9 @@ def text() -> str:
         "`chainunit keys [TABLE]` shows the same on the terminal;\n`chainunit schema` writes a JSON Schema by which "
         "editors complete and check a study file.\n"
     )
-    return head + markdown(reference(commands()), ()).removeprefix("# Reference\n")
+    tasks = [module.RESULT._task for module in modules("study_method")]
+    contents = {task.name: task.content for task in tasks}
+    return head + markdown(reference(commands(), contents), ()).removeprefix("# Reference\n")
 
 
 if __name__ == "__main__":

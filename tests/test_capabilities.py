@@ -51,10 +51,6 @@ print(json.dumps({"properties": list(properties), "refused": refused}))
 """
 
 
-OUTSIDE = {"app/identifications.py", "app/identify_command.py", "app/studies.py", "app/sweeps.py"}
-"""Modules that still name types of a folder, or its words: none may be added."""
-
-
 def test_the_list_names_the_folders():
     folders = {path.name for path in (PACKAGE / "capabilities").iterdir() if (path / "__init__.py").exists()}
     assert folders == set(NAMES) and len(NAMES) == len(folders)
@@ -72,7 +68,7 @@ def test_nothing_outside_a_folder_imports_from_it():
             target = [*parts[: len(parts) - node.level], *(node.module or "").split(".")]
             if target[0] == "capabilities" and len(target) > 1 and target[1] != own:
                 outside.add("/".join(parts))
-    assert outside == OUTSIDE
+    assert outside == set()
 
 
 @pytest.mark.second

@@ -331,7 +331,7 @@ def test_fmucontainer_sequential(kind, pair, master, outputs, fmi, tmp_path):
     motion = {x: run[f"motor.{x}"] for x in ("phi", "w", "a")}
     model = MODELS[kind]
     p = model.parameter_layout.from_names({"ratio": PARAMETERS["machine.ratio"]})
-    (want, _) = model.evaluate(numpy_(), model.prepared(MATH, p), model.input_layout.from_names(motion))
+    (want, _) = model.evaluate(numpy_(), model.with_derived(MATH, p), model.input_layout.from_names(motion))
     for name in ("tau", "power", MACHINES[kind]):
         wanted = attrgetter(name)(want)
         np.testing.assert_allclose(run[f"machine.{name}"], wanted, rtol=1e-9, atol=1e-9, err_msg=name)

@@ -89,7 +89,8 @@ def test_each_operation_stands_once():
 def test_groups_of_a_model_share_their_operations(name):
     """Less than a tenth more than all outputs in one function, in parts that a compiler is fast with."""
     program = next(iter(generate._programs(Interface(MODELS[name], {}))))
-    symbols, *_, outputs, _ = Interface(MODELS[name], {}).trace
+    t = Interface(MODELS[name], {}).trace
+    symbols, outputs = t.symbols, t.outputs
     single = casadi.Function("f", symbols, [casadi.cse(casadi.vertcat(*outputs))]).n_instructions()
     parts = re.split(r"static void values_", program.text)[1:]
     operations = sum(len(part) for part in program._parts)

@@ -13,13 +13,13 @@ import pytest
 from systems import component, pair, whole_systems
 
 from chainunit import InputError
-from chainunit.core.composite import composed
-from chainunit.core.composition import SOLVER
 from chainunit.core.engines import MATH, casadi_, numpy_
 from chainunit.core.errors import GeometryError
 from chainunit.core.model import Model, Part
 from chainunit.core.ports import LoadPort
 from chainunit.core.quantities import Layout, Value, declaration, quantity
+from chainunit.core.system_description import SOLVER
+from chainunit.core.system_model import system_model
 from chainunit.drives.gear import Gear
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.models import MODELS
@@ -142,7 +142,7 @@ def test_a_state_at_the_start_may_depend_on_another_model():
     np.testing.assert_allclose(
         Layout(CHAINS.States).values(x.machine), Layout(CHAINS.States).values(alone), rtol=1e-12, atol=1e-12
     )
-    assert part.model.controlled and part.model.start_unknowns == CHAINS.start_unknowns
+    assert part.model.controlled and part.model.start_problem.unknowns == CHAINS.start_problem.unknowns
     for tolerance, least in ((1e-12, 1e-12), (1e-3, 1e-10)):
         tuned = compiled(system.with_values({"machine.tolerance": tolerance}))
         assert tuned.model.tolerance(MATH, tuned.parameters) == least
@@ -175,7 +175,7 @@ def test_a_linkage_file_says_where_it_does_not_close():
 
 def test_another_process_gets_the_same_model(system):
     part = compiled(system)
-    assert pickle.loads(pickle.dumps(part.model)) is part.model is composed(*part.model.maker[1])
+    assert pickle.loads(pickle.dumps(part.model)) is part.model is system_model(*part.model.made.arguments)
     p, u, x = ready(part)
     assert pickle.loads(pickle.dumps((p, u, x))) == (p, u, x)
     script = (

@@ -148,7 +148,9 @@ def turned_by_exudyn(steps, fx, fy):
 
 def turned_by_us(steps, fx, fy):
     u = {"phi": np.linspace(0.0, 2.0 * math.pi, steps + 1), "w": W, "a": 0.0, "blade.fx": fx, "blade.fy": fy}
-    parts = KnifeDrive.evaluate(numpy_(), KnifeDrive.prepared(MATH, P), KnifeDrive.input_layout.from_names(u))
+    parts = KnifeDrive.evaluate(
+        numpy_(), KnifeDrive.with_derived(MATH, P), KnifeDrive.input_layout.from_names(u)
+    )
     values = [v for part, out in zip(KnifeDrive.parts, parts, strict=True) for v in part.layout.values(out)]
     found = dict(zip(NAMES, values, strict=True))
     return {name: found[name] for name in COMPARED}

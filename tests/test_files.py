@@ -17,7 +17,7 @@ from command import chainunit
 
 from chainunit.core import ledger, temporary_folders
 from chainunit.core.errors import InputError, WriteError
-from chainunit.core.files import LOCK, claim, clear, folder, whole
+from chainunit.core.files import LOCK, atomic_file, claim, clear, folder
 
 SHORT = """
 event = []
@@ -50,9 +50,9 @@ def names(folder):
 
 def test_two_writers_of_one_file_do_not_disturb_each_other(tmp_path):
     file = tmp_path / "a.txt"
-    with whole(file) as first:
+    with atomic_file(file) as first:
         first.write_text("first")
-        with whole(file) as second:
+        with atomic_file(file) as second:
             second.write_text("second")
         assert file.read_text() == "second"
     assert file.read_text() == "first"
@@ -268,7 +268,7 @@ def test_a_folder_that_was_there_or_holds_a_file_stays(tmp_path):
 def write(folder, text, *names, command="compare"):
     with claim(folder, command, *names) as place:
         for name in names:
-            with whole(place / name) as part:
+            with atomic_file(place / name) as part:
                 part.write_text(text)
 
 
@@ -293,7 +293,7 @@ def test_a_file_that_no_run_wrote_is_never_overwritten(tmp_path):
     mine.unlink()
     with claim(out, "compare") as place, pytest.raises(WriteError, match=r"notes\.md: stays as it is"):
         clear(place, "notes.md")
-        with whole(place / "notes.md") as part:
+        with atomic_file(place / "notes.md") as part:
             part.write_text("third")
     assert (out / "notes.md").read_text() == "mine, too"
 
@@ -324,11 +324,11 @@ def test_a_run_that_is_killed_while_it_replaces_a_file_leaves_its_own(moment, tm
     kill = "os.kill(os.getpid(), signal.SIGKILL)"
     renames = "real(part, file);" if moment == "after" else ""
     code = (
-        "import os, signal; from pathlib import Path; from chainunit.core.files import claim, whole\n"
+        "import os, signal; from pathlib import Path; from chainunit.core.files import claim, atomic_file\n"
         "real = Path.replace\n"
         "def replace(part, file):\n"
         f"    {renames} {kill}\n"
-        f"with claim(Path({str(out)!r}), 'compare', 'a.txt') as place, whole(place / 'a.txt') as part:\n"
+        f"with claim(Path({str(out)!r}), 'compare', 'a.txt') as place, atomic_file(place / 'a.txt') as part:\n"
         "    part.write_text('second'); Path.replace = replace\n"
     )
     killed = python(code, tmp_path)

@@ -391,7 +391,7 @@ def moving(rng, *, frictionless=False):
             -1.0, 1.0
         )
     for _ in range(50):
-        before, x = x, model.closed(MATH, p, u, layout.instance(x))
+        before, x = x, model.constrained_states(MATH, p, u, layout.instance(x))
         if np.allclose(x, before, rtol=0.0, atol=1e-13 * np.max(np.abs(x))):
             break
     else:
@@ -463,7 +463,7 @@ def dense(model, p, u, x, side, a2):
         {"left": -1.0, "right": 1.0}[side],
     )
     N = len([n for n in states if n.startswith("left.theta")])
-    walls = int(model.built_by.split("(")[1].split(",")[0])
+    walls = int(model.expression().split("(")[1].split(",")[0])
     theta, omega = (np.array([states[f"{side}.{n}_{k + 1}"] for k in range(N)]) for n in ("theta", "omega"))
     loads, own = getattr(u, side), getattr(p, side)
     on_web = p.web_share * loads.material_mass
@@ -950,8 +950,8 @@ def test_numbers_of_rods_that_make_no_model():
         with pytest.raises(InputError, match=f"{walls + webs} rods an organ.* at most 24 in all") as refusal:
             flexible(walls, webs)
         assert "\n" not in str(refusal.value)
-    assert flexible(3, 1) is flexible(3, 1) and flexible(3, 1).built_by == "flexible(3, 1)"
-    assert flexible(3, 1).direct().built_by == "flexible(3, 1).direct()"
+    assert flexible(3, 1) is flexible(3, 1) and flexible(3, 1).expression() == "flexible(3, 1)"
+    assert flexible(3, 1).direct().expression() == "flexible(3, 1).direct()"
 
 
 def test_two_rods_stand_where_a_hanging_chain_would_not():

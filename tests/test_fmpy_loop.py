@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from chainunit.core.native.compilers import compiler
-from chainunit.fmu.accompany import companion_files
+from chainunit.fmu.companion_files import companion_files
 from chainunit.fmu.description import Interface
 from chainunit.fmu.native.export import export
 from chainunit.models import MODELS

@@ -136,12 +136,12 @@ def test_dependencies_are_true(fmus):
     """A dependency that is missing would be a wrong loop analysis; one too many, a loop that is none."""
     rng = np.random.default_rng(1)
     interface = Interface(ChamberForces, {})
-    names = [s.name for s in interface.of("input")]
+    names = [s.name for s in interface.signals_of("input")]
     offset = len(interface.parameters)
     machine = ChainUnitMachine({"joint_damping": 1.0, "ratio": 3.0, "web_share": 0.4})
     declared = {
         s.name: {names[i - offset] for i in known if i - offset < len(names)}
-        for s, (known, _) in zip(interface.of("output"), interface.dependencies, strict=True)
+        for s, (known, _) in zip(interface.signals_of("output"), interface.dependencies, strict=True)
     }
     seen = {name: set() for name in declared}
     for _ in range(5):

@@ -9,23 +9,23 @@ import pytest
 from derivatives import check_derivatives
 from scipy.optimize import nnls
 from scipy.stats import f
+from synthetic import HiddenRun, Logger, synthetic
 
 from chainunit import InputError, RunError
-from chainunit.capabilities.identification import fit as fitting
 from chainunit.capabilities.identification import information as what_runs_tell
-from chainunit.capabilities.identification import residuals
-from chainunit.capabilities.identification.fit import fit, normal
 from chainunit.capabilities.identification.information import information
-from chainunit.capabilities.identification.plant import Plant
 from chainunit.capabilities.identification.posterior import posterior
-from chainunit.capabilities.identification.problem import Comparison, Problem, RecordedRun, Sensor, Unknown
-from chainunit.capabilities.identification.recording import Recording
-from chainunit.capabilities.identification.residuals import check_residuals, strains
-from chainunit.capabilities.identification.suspicion import suspicions
-from chainunit.capabilities.identification.synthetic import HiddenRun, Logger, synthetic
+from chainunit.capabilities.identification.score_tests import score_tests
 from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor
+from chainunit.recordings import fit as fitting
+from chainunit.recordings import residuals
+from chainunit.recordings.fit import fit, normal_equations
+from chainunit.recordings.plant import Plant
+from chainunit.recordings.problem import Comparison, Problem, RecordedRun, Sensor, Unknown
+from chainunit.recordings.recording import Recording
+from chainunit.recordings.residuals import residual_tests, sensor_conflicts
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 
@@ -98,7 +98,7 @@ def empty():
 def test_derivatives_of_residuals(loaded):
     """By every unknown, of every column, against differences."""
     problem = problem_of(loaded)
-    z = problem.starts
+    z = problem.start_values
     z[problem.place["run0.temperature"]], z[problem.place["gain(motor.i)"]] = 305.0, 1.02
     z[problem.place["run0.count.2"]], z[problem.place["run0.drift"]] = 0.7, 3e-5
     assert {each.column for each in problem.comparisons(z)} == set(loaded.columns)
@@ -120,7 +120,7 @@ def test_a_loaded_and_an_empty_run_are_identified(loaded, empty, angle):
     assert abs(found["run0.offset(motor.i)"] - OFFSET) < 4.0 * deviation["run0.offset(motor.i)"]
     if angle == "mark":
         assert abs(found["mark.angle"] - MARK) < 4.0 * deviation["mark.angle"] < 0.1
-    for key, share in best.shares.items():
+    for key, share in best.mean_squares.items():
         # there are five marks
         assert 0.02 < share < 3.0 if key[1] == "mark" else 0.85 < share < 1.15, key
 
@@ -155,8 +155,8 @@ def test_a_minute_of_an_induction_motor_from_many_starts(angle):
     assert seen == list(range(1, best.rounds + 1)) and best.rounds <= 30
     for u, found, deviation in zip(sought, best.z, best.deviations, strict=False):
         assert abs(found - values[u.name]) < 4.0 * deviation, u.name
-        assert deviation < 0.05 * u.spread, u.name
-    assert all(0.5 < share < 1.1 for share in best.shares.values())
+        assert deviation < 0.05 * u.prior_deviation, u.name
+    assert all(0.5 < share < 1.1 for share in best.mean_squares.values())
 
 
 def test_the_residuals_tell_a_wrong_machine(loaded, empty):
@@ -164,21 +164,21 @@ def test_the_residuals_tell_a_wrong_machine(loaded, empty):
     crank in them, which noise of twice the size does not."""
     recordings = [without(each, "motor.count") for each in (loaded, empty)]
     problem = problem_of(*recordings, empty=(1,))
-    right = check_residuals(fit(problem))
+    right = residual_tests(fit(problem))
     assert [(each.run, each.column) for each in right] == [
         (f"run{k}", name) for k in (0, 1) for name in ("motor.i", "motor.u", "motor.w")
     ]
     assert all(each.is_noise and 0.9 < each.noise < 1.1 for each in right)
     loud = Problem(problem.plant, problem.runs, SOUGHT, {**SENSORS, "motor.w": Sensor(noise=0.005)})
     best = fit(loud)
-    (own, *_) = [each for each in check_residuals(best) if each.column == "motor.w"]
+    (own, *_) = [each for each in residual_tests(best) if each.column == "motor.w"]
     assert own.is_noise and 1.8 < own.noise < 2.2
     # the column counts by its measured noise, and the deviations are those that follow from it
     np.testing.assert_allclose(
         best.deviations[: len(SOUGHT)], fit(problem).deviations[: len(SOUGHT)], rtol=0.02
     )
     wrong = problem_of(*recordings, empty=(1,), r=0.153)
-    worst = max(check_residuals(fit(wrong)), key=lambda each: each.statistic)
+    worst = max(residual_tests(fit(wrong)), key=lambda each: each.statistic)
     assert worst.column == "motor.i" and worst.statistic > 2.0 * worst.limit and worst.reason == "orders"
 
 
@@ -186,9 +186,9 @@ def test_a_wrong_gear_strains_the_clock(loaded):
     """With a mark on the crank and a speed of the motor, a gear that is off by 2 % looks as a clock that is."""
     recording = without(loaded, "motor.count")
     right = problem_of(recording)
-    assert strains(right, fit(right)) == []
+    assert sensor_conflicts(right, fit(right)) == []
     wrong = problem_of(recording, ratio=51.0)
-    (drift,) = [each for each in strains(wrong, fit(wrong)) if each.name == "run0.drift"]
+    (drift,) = [each for each in sensor_conflicts(wrong, fit(wrong)) if each.name == "run0.drift"]
     assert abs(drift.deviations) > 50.0 and drift.value == pytest.approx(5e-5 * drift.deviations)
 
 
@@ -197,12 +197,12 @@ def test_a_known_number_that_is_wrong_is_suspicious(loaded, empty):
     machine agree with its numbers."""
     recordings = [without(each, "motor.count") for each in (loaded, empty)]
     right = problem_of(*recordings, empty=(1,))
-    found = suspicions(right, fit(right), names=("r", "z", "pin.w_smooth"))
+    found = score_tests(right, fit(right), names=("r", "z", "pin.w_smooth"))
     assert [each.name for each in found] == ["machine.r", "machine.z", "machine.pin.w_smooth"]
-    assert not any(each.is_suspicious for each in found)
+    assert not any(each.is_rejected for each in found)
     wrong = problem_of(*recordings, empty=(1,), r=0.153)
-    (own,) = suspicions(wrong, fit(wrong), names=("r",))
-    assert own.is_suspicious and own.known == 0.153
+    (own,) = score_tests(wrong, fit(wrong), names=("r",))
+    assert own.is_rejected and own.known == 0.153
     assert own.known + own.change == pytest.approx(0.15, abs=4.0 * own.deviation) and own.deviation < 5e-4
 
 
@@ -211,8 +211,8 @@ def test_another_law_of_friction_is_suspicious():
     law = {"machine.pin.w_smooth": 0.2}
     recordings = [without(recorded(k == 1, 4 + k, **law), "motor.count") for k in range(2)]
     wrong = problem_of(*recordings, empty=(1,))
-    (own,) = suspicions(wrong, fit(wrong), names=("pin.w_smooth",))
-    assert own.is_suspicious and own.known == 0.02
+    (own,) = score_tests(wrong, fit(wrong), names=("pin.w_smooth",))
+    assert own.is_rejected and own.known == 0.02
     assert own.known + own.change == pytest.approx(0.2, abs=0.02 + 4.0 * own.deviation)
 
 
@@ -227,8 +227,8 @@ def test_a_law_with_which_the_machine_does_not_run_is_left_out(loaded, monkeypat
         return own(self, z, workers)
 
     monkeypatch.setattr(Problem, "comparisons", comparisons)
-    (found,) = suspicions(problem, best, names=("pin.w_smooth",))
-    assert np.isfinite(found.change) and not found.is_suspicious
+    (found,) = score_tests(problem, best, names=("pin.w_smooth",))
+    assert np.isfinite(found.change) and not found.is_rejected
 
 
 def test_the_statistic_of_noise_is_that_of_its_distribution():
@@ -236,13 +236,15 @@ def test_the_statistic_of_noise_is_that_of_its_distribution():
     found in the unit of the column."""
     rng, angle = np.random.default_rng(7), np.linspace(0.0, 60.0, 1500)
     found = [
-        residuals.check(Comparison("run", "motor.i", rng.standard_normal(1500), None, (), angle, 0.2), 0.99)
+        residuals.residual_test(
+            Comparison("run", "motor.i", rng.standard_normal(1500), None, (), angle, 0.2), 0.99
+        )
         for _ in range(300)
     ]
     assert np.mean([each.statistic for each in found]) == pytest.approx(40.0, abs=2.0)
     assert np.mean([each.is_noise for each in found]) > 0.97  # the limit is that of 1 %
     wave = rng.standard_normal(1500) + 0.9 * np.cos(3.0 * angle + 0.4)
-    own = residuals.check(Comparison("run", "motor.i", wave, None, (), angle, 0.2), 0.99)
+    own = residuals.residual_test(Comparison("run", "motor.i", wave, None, (), angle, 0.2), 0.99)
     assert own.orders[0] == (3, pytest.approx(0.18, abs=0.02)) and not own.is_noise
 
 
@@ -258,8 +260,8 @@ def test_a_proposed_run_with_fewer_rows_tells_the_same(loaded, monkeypatch):
     monkeypatch.setattr(what_runs_tell, "_simulated", simulated)
     for step in (1e-2, 1e-6):
         monkeypatch.setattr(what_runs_tell, "SPARSE", step)
-        proposals = information(problem, problem.starts).proposals
-        found.append({each.words: (each.factor, each.told) for each in proposals})
+        proposals = information(problem, problem.start_values).proposals
+        found.append({each.words: (each.factor, each.determined) for each in proposals})
     few, every = found
     assert set(rows) == {len(loaded.time), len(loaded.time) // 2} and len(few) > 3
     for words, (factor, told) in few.items():
@@ -274,7 +276,7 @@ def test_slow_changes_are_no_noise():
 
     def checked(change, noise):
         wave = change * slow + noise * rng.standard_normal(1500)
-        return residuals.check(Comparison("run", "motor.i", wave, None, (), angle, 0.2), 0.99)
+        return residuals.residual_test(Comparison("run", "motor.i", wave, None, (), angle, 0.2), 0.99)
 
     loud = [checked(0.0, 5.0) for _ in range(300)]
     assert np.mean([each.slow > each.slow_limit for each in loud]) < 0.03  # the limit is that of 1 %
@@ -290,9 +292,9 @@ def test_low_orders_of_the_crank_are_no_slow_changes():
     angle = np.linspace(0.0, 60.0, 1500)
     rng = np.random.default_rng(9)
     wave = 4.0 * sum(np.cos(k * angle + k) for k in (1, 2, 3, 31)) + rng.standard_normal(1500)
-    own = residuals.check(Comparison("run", "motor.i", wave, None, (), angle, 0.2), 0.99)
-    assert own.reason == "orders" and own.slow < own.slow_limit and own.noise > residuals.LOUD
-    exact = residuals.check(Comparison("run", "motor.i", 0.0 * wave, None, (), angle, 0.2), 0.99)
+    own = residuals.residual_test(Comparison("run", "motor.i", wave, None, (), angle, 0.2), 0.99)
+    assert own.reason == "orders" and own.slow < own.slow_limit and own.noise > residuals.EXCESS_NOISE
+    exact = residuals.residual_test(Comparison("run", "motor.i", 0.0 * wave, None, (), angle, 0.2), 0.99)
     assert exact.is_noise and exact.noise == exact.statistic == exact.slow == 0.0
 
 
@@ -305,7 +307,9 @@ def test_the_residuals_of_a_swinging_machine_are_checked():
     for _ in range(300):
         noise = rng.standard_normal(1100)
         own, near = (
-            residuals.check(Comparison("run", "crank.tau", noise, None, (), angle * factor, 0.2), 0.99)
+            residuals.residual_test(
+                Comparison("run", "crank.tau", noise, None, (), angle * factor, 0.2), 0.99
+            )
             for factor in (1.0, 1.0 + 1e-12)
         )
         assert near.statistic == pytest.approx(own.statistic, rel=1e-6) and near.limit == own.limit
@@ -317,7 +321,7 @@ def test_the_residuals_of_a_swinging_machine_are_checked():
     assert 3 < count < 20
     assert np.mean([each.statistic for each in found]) == pytest.approx(count, rel=0.1)
     wrong = rng.standard_normal(1100) + 1.5 * np.cos(3.0 * angle)
-    own = residuals.check(Comparison("run", "crank.tau", wrong, None, (), angle, 0.2), 0.99)
+    own = residuals.residual_test(Comparison("run", "crank.tau", wrong, None, (), angle, 0.2), 0.99)
     assert not own.is_noise and own.statistic > 5.0 * own.limit
 
 
@@ -362,7 +366,7 @@ def test_a_product_bends_the_distribution():
 
     class Product:
         unknowns = sought = (Unknown.within("a", "1", 2.0, 3.0), Unknown.within("b", "1", 2.0, 2.6))
-        starts, spreads = np.array([2.5, 2.3]), np.array([1.0, 0.6]) / np.sqrt(12.0)
+        start_values, prior_deviations = np.array([2.5, 2.3]), np.array([1.0, 0.6]) / np.sqrt(12.0)
         bounds = np.array([2.0, 2.0]), np.array([3.0, 2.6])
 
         def comparisons(self, z, workers=1):
@@ -373,7 +377,7 @@ def test_a_product_bends_the_distribution():
             return self
 
     problem, product = Product(), np.mean(data)
-    found = posterior(problem, normal(problem, np.array([2.4, product / 2.4])))
+    found = posterior(problem, normal_equations(problem, np.array([2.4, product / 2.4])))
     axes = np.linspace(2.0, 3.0, 1001), np.linspace(2.0, 2.6, 601)
     a, b = np.meshgrid(*axes, indexing="ij")
     density = np.exp(-0.5 * len(data) * (product - a * b) ** 2)
@@ -391,7 +395,7 @@ def test_a_number_beyond_its_bound_is_held_there():
 
     class Straight:
         unknowns = sought = (Unknown.within("a", "1", 6.0, 20.0), Unknown.within("b", "1", 0.0, 10.0))
-        starts, spreads = np.array([13.0, 5.0]), np.array([14.0, 10.0]) / np.sqrt(12.0)
+        start_values, prior_deviations = np.array([13.0, 5.0]), np.array([14.0, 10.0]) / np.sqrt(12.0)
         bounds = np.array([6.0, 0.0]), np.array([20.0, 10.0])
 
         def comparisons(self, z, workers=1):
@@ -402,8 +406,8 @@ def test_a_number_beyond_its_bound_is_held_there():
 
     b = float(np.linalg.lstsq(rows[:, 1:], data - 6.0, rcond=None)[0][0])
     problem = Straight()
-    found = posterior(problem, normal(problem, np.array([6.0, b])))
-    assert found.held == ("a",)
+    found = posterior(problem, normal_equations(problem, np.array([6.0, b])))
+    assert found.active_bounds == ("a",)
     axes = np.linspace(6.0, 6.5, 1201), np.linspace(b - 0.6, b + 0.3, 901)
     a, b = np.meshgrid(*axes, indexing="ij")
     squares = sum((d - x * a - y * b) ** 2 for d, (x, y) in zip(data, rows, strict=True))
@@ -425,7 +429,7 @@ def test_two_numbers_in_a_corner_are_not_held():
 
         class Corner:
             unknowns = sought = tuple(Unknown.within(name, "1", 0.0, 10.0) for name in "ab")
-            starts, spreads = np.array([5.0, 5.0]), np.array([10.0, 10.0]) / np.sqrt(12.0)
+            start_values, prior_deviations = np.array([5.0, 5.0]), np.array([10.0, 10.0]) / np.sqrt(12.0)
             bounds = np.array([0.0, 0.0]), np.array([10.0, 10.0])
 
             def comparisons(self, z, workers=1, data=data, rows=rows):
@@ -435,8 +439,8 @@ def test_two_numbers_in_a_corner_are_not_held():
                 return self
 
         problem = Corner()
-        found = posterior(problem, normal(problem, nnls(rows, data)[0]))
-        assert found.held == () and 0.0 < found.marginals[0].high < 0.5
+        found = posterior(problem, normal_equations(problem, nnls(rows, data)[0]))
+        assert found.active_bounds == () and 0.0 < found.marginals[0].high < 0.5
 
 
 @pytest.mark.parametrize("size", [1.0, 5.0, 20.0])
@@ -445,14 +449,14 @@ def test_noise_of_any_size_is_measured(size):
     residuals = size * np.random.default_rng(2).standard_normal(20_000)
     residuals[::500] = 60.0 * size
     of = Comparison("run", "motor.i", residuals, None, (), None, 1.0)
-    ((_, found),) = fitting._noises(SimpleNamespace(comparisons=[of])).items()
+    ((_, found),) = fitting._measured_noises(SimpleNamespace(comparisons=[of])).items()
     assert found == pytest.approx(size, rel=0.05)
 
 
 def test_a_number_without_a_sum_that_is_told():
     """Of two numbers, one of which leaves no trace."""
     own = tuple(Unknown.within(name, "1", 0.0, 1.0) for name in "ab")
-    problem = SimpleNamespace(sought=own, spreads=np.array([u.spread for u in own]))
+    problem = SimpleNamespace(sought=own, prior_deviations=np.array([u.prior_deviation for u in own]))
     assert what_runs_tell._combinations(problem, np.diag([1e6, 1e-3])) == ()
 
 
@@ -461,19 +465,23 @@ def test_of_few_rows_few_orders_are_looked_at(rows):
     """Noise exceeds the limit as seldom as with many rows, and a wave is found."""
     rng, angle = np.random.default_rng(7), np.linspace(0.0, 30.0, rows)
     noises = [rng.standard_normal(rows) for _ in range(400)]
-    found = [residuals.check(Comparison("run", "motor.i", x, None, (), angle, 1.0), 0.95) for x in noises]
+    found = [
+        residuals.residual_test(Comparison("run", "motor.i", x, None, (), angle, 1.0), 0.95) for x in noises
+    ]
     assert np.mean([each.is_noise for each in found]) == pytest.approx(0.95, abs=0.03)
     wave = noises[0] + 5.0 * np.cos(angle)
-    assert not residuals.check(Comparison("run", "motor.i", wave, None, (), angle, 1.0), 0.95).is_noise
+    assert not residuals.residual_test(
+        Comparison("run", "motor.i", wave, None, (), angle, 1.0), 0.95
+    ).is_noise
 
 
 def test_what_is_known_beforehand_counts(loaded):
     """The normal equations are those of the runs and of what is known beforehand."""
     problem = problem_of(without(loaded, "motor.count"))
-    at = normal(problem, problem.starts)
-    assert at.matrix - at.fisher == pytest.approx(np.diag(1.0 / problem.spreads**2))
+    at = normal_equations(problem, problem.start_values)
+    assert at.matrix - at.fisher == pytest.approx(np.diag(1.0 / problem.prior_deviations**2))
     np.testing.assert_allclose(at.covariance @ at.matrix, np.eye(len(at.z)), atol=1e-6)
-    assert np.all(at.deviations <= problem.spreads * (1.0 + 1e-9))
+    assert np.all(at.deviations <= problem.prior_deviations * (1.0 + 1e-9))
 
 
 def test_a_quantity_that_the_drive_does_not_have():
@@ -496,18 +504,18 @@ def test_what_runs_cannot_tell_is_named(loaded, empty):
     proposed."""
     recordings = [without(each, "motor.count") for each in (loaded, empty)]
     one = information(problem_of(recordings[0], sought=WITH_MASSES))
-    (blind,) = one.blind
-    assert sorted(name for name, _ in blind.terms) == ["machine.left.material_mass", "machine.left.web_mass"]
-    assert [c for _, c in blind.terms] == [1.0, pytest.approx(-1.0, abs=1e-4)]
-    told = {each.name: each for each in one.outlooks}
-    assert not told["machine.left.web_mass"].is_told and told["machine.left.web_mass"].by_runs > 500.0
-    assert told["machine.right.material_mass"].is_told
-    assert {each.by_both <= each.spread for each in one.outlooks} == {True}
+    (change,) = one.null_space
+    assert sorted(name for name, _ in change.terms) == ["machine.left.material_mass", "machine.left.web_mass"]
+    assert [c for _, c in change.terms] == [1.0, pytest.approx(-1.0, abs=1e-4)]
+    told = {each.name: each for each in one.determinations}
+    assert not told["machine.left.web_mass"].is_determined and told["machine.left.web_mass"].by_runs > 500.0
+    assert told["machine.right.material_mass"].is_determined
+    assert {each.by_both <= each.prior_deviation for each in one.determinations} == {True}
     best = one.proposals[0]
     assert best.words == "empty" and best.factor > max(each.factor for each in one.proposals[1:]) > 1.0
     both = information(problem_of(*recordings, empty=(1,), sought=WITH_MASSES), propose=False)
-    assert both.blind == () and both.proposals == ()
-    factors = [a.by_both / b.by_both for a, b in zip(one.outlooks, both.outlooks, strict=True)]
+    assert both.null_space == () and both.proposals == ()
+    factors = [a.by_both / b.by_both for a, b in zip(one.determinations, both.determinations, strict=True)]
     # the proposal was simulated from the start values, without noise
     assert np.exp(np.mean(np.log(factors))) == pytest.approx(best.factor, rel=0.1)
 
@@ -518,8 +526,8 @@ def test_a_combination_has_the_deviation_that_is_stated(loaded):
     problem = problem_of(without(loaded, "motor.count"), sought=WITH_MASSES)
     found = information(problem, propose=False)
     assert found.combinations
-    fisher = normal(problem, problem.started()).fisher
-    covariance = np.linalg.inv(fisher + np.diag(1.0 / problem.spreads**2))
+    fisher = normal_equations(problem, problem.initial_point()).fisher
+    covariance = np.linalg.inv(fisher + np.diag(1.0 / problem.prior_deviations**2))
     for each in found.combinations:
         places = [problem.place[name] for name, _ in each.terms]
         weights = np.array([c for _, c in each.terms])
@@ -533,5 +541,5 @@ def test_the_expected_deviations_are_those_of_the_fit(loaded, empty):
     """But for the measured noise, which deviates from the stated one by parts of a hundred in 2400 rows."""
     problem = problem_of(*(without(each, "motor.count") for each in (loaded, empty)), empty=(1,))
     best = fit(problem)
-    expected = [each.by_both for each in information(problem, best.z, propose=False).outlooks]
+    expected = [each.by_both for each in information(problem, best.z, propose=False).determinations]
     np.testing.assert_allclose(expected, best.deviations[: len(SOUGHT)], rtol=0.05)

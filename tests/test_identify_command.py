@@ -10,17 +10,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from command import chainunit
+from synthetic import HiddenRun, Logger, synthetic
 
 from chainunit import InputError, Study
 from chainunit.capabilities.identification import identification
 from chainunit.capabilities.identification import page as report
-from chainunit.capabilities.identification.false_loads import false_loads
-from chainunit.capabilities.identification.measurands import MEASURANDS
 from chainunit.capabilities.identification.result import _number, identified_tables, sentences
-from chainunit.capabilities.identification.synthetic import HiddenRun, Logger, synthetic
-from chainunit.capabilities.identification.unknown import Unknown
+from chainunit.capabilities.watch.false_loads import false_loads
 from chainunit.core.native.compilers import compiler
 from chainunit.machines.load_observer import LoadObserver
+from chainunit.recordings.measurands import MEASURANDS
+from chainunit.recordings.unknown import Unknown
 from chainunit.report import blocks
 from chainunit.study import config as study_files
 from chainunit.study.choice import choose
@@ -336,11 +336,11 @@ def test_a_motor_beside_the_torque_of_the_crank(tmp_path):
 def test_a_deviation_of_a_temperature_is_a_difference():
     """20 K are no -253 degC."""
     unknown = Unknown("motor.ambient.T", "K", 293.15, 250.0, 340.0, 5.0)
-    outlook = SimpleNamespace(name="motor.ambient.T", by_both=2.0, by_runs=3.0)
+    expected = SimpleNamespace(name="motor.ambient.T", by_both=2.0, by_runs=3.0)
     variable = SimpleNamespace(description="", unit="K", kind="temperature")
     found = SimpleNamespace(
         plan=SimpleNamespace(variables={"motor.ambient.T": variable}),
-        before=SimpleNamespace(outlooks=[outlook]),
+        information_at_start=SimpleNamespace(determinations=[expected]),
     )
     each = identification.FittedNumber(unknown, 300.0, 300.0, 2.0, 296.0, 304.0, True)
     own = _number(found, each)

@@ -35,9 +35,12 @@ def test_imports_no_more_than_is_needed(code, needed):
     assert loaded & DEPENDENCIES == needed
 
 
+RESULTS = ("BestResult", "IdentificationResult", "SweepResult", "WatchResult")
+
+
 def test_public_names():
     assert {"Study", "ChainUnitMachine", "ChamberForces", "SideLoads", "InputError"} <= set(chainunit.__all__)
-    for name in chainunit.__all__:
+    for name in (*chainunit.__all__, *RESULTS):
         assert getattr(chainunit, name) is getattr(chainunit, name) and name in dir(chainunit)
     assert chainunit.__version__ == metadata.version("chainunit")
     with pytest.raises(AttributeError, match="module 'chainunit' has no attribute 'Chainunit'"):

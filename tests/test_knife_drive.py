@@ -22,7 +22,7 @@ PINS = {
     "O1": "crank_bearing", "A": "crank_pin", "B_ab": "coupler_pin", "O2": "rocker_bearing", "B_bc": "leg_pin",
     "C": "c_pin", "D": "d_pin", "E": "e_pin", "O3": "o3_bearing", "O4": "o4_bearing",
 }  # fmt: skip
-DEFAULT = KnifeDrive.prepared(MATH, KnifeDrive.parameter_layout.from_names({}))
+DEFAULT = KnifeDrive.with_derived(MATH, KnifeDrive.parameter_layout.from_names({}))
 BODIES = ("crank", "coupler", "rocker", "leg_b", "leg_3", "leg_4", "knife")
 NAMES = [name for part in KnifeDrive.parts for name in part.layout.names]
 
@@ -140,7 +140,7 @@ def random_machine(rng):
         KnifeDrive.check(p)
     except (GeometryError, InputError):
         return None
-    p = KnifeDrive.prepared(MATH, p)
+    p = KnifeDrive.with_derived(MATH, p)
     return p if p.derived[-1] > 0.02 else None
 
 
@@ -198,7 +198,7 @@ def test_pins_on_one_line():
     }
     p = KnifeDrive.parameter_layout.from_names(given)
     KnifeDrive.check(p)
-    p = KnifeDrive.prepared(MATH, p)
+    p = KnifeDrive.with_derived(MATH, p)
     for phi in np.linspace(0.0, 6.0, 13):
         out = evaluate(p, {"phi": float(phi), "w": 4.0, "a": 2.0, "cut_force": 5e3})
         assert all(math.isfinite(x) for x in out.values())
@@ -265,7 +265,7 @@ def test_every_mode_that_goes_round_can_be_chosen():
         except GeometryError as refused:
             assert "triad" in str(refused)
             continue
-        blades.append(evaluate(KnifeDrive.prepared(MATH, p), {"phi": 1.0})["blade.y"])
+        blades.append(evaluate(KnifeDrive.with_derived(MATH, p), {"phi": 1.0})["blade.y"])
     assert len(blades) >= 2 and len({round(b, 6) for b in blades}) == len(blades)
 
 
@@ -339,6 +339,6 @@ def test_the_native_fmu_refuses_what_python_refuses(tmp_path):
     start = {"bc": 0.6, "assembly.x": 1.02}
     with CoSimulation(System({"k": component(KnifeDrive, file, start)}), {"k.phi": 0.7, "k.w": 2.0}) as one:
         run = one.run(0.01, 0.01)
-    p = KnifeDrive.prepared(MATH, KnifeDrive.parameter_layout.from_names(start))
+    p = KnifeDrive.with_derived(MATH, KnifeDrive.parameter_layout.from_names(start))
     for name, x in evaluate(p, {"phi": 0.7, "w": 2.0}).items():
         assert float(run[f"k.{name}"][-1]) == pytest.approx(x, rel=1e-10, abs=1e-9), name

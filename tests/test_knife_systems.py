@@ -125,7 +125,7 @@ def test_a_coupling_opens_in_a_hard_cut_and_the_machine_comes_to_rest(tmp_path):
     assert np.max(np.abs(energy[1:] + losses - energy[1])) < 1e-3
     # the same by another integrator, from where the coupling let go
     model = study.drive.coasting_model
-    p = model.prepared(MATH, model.parameter_layout.from_names(study.drive.coasting_parameters()))
+    p = model.with_derived(MATH, model.parameter_layout.from_names(study.drive.coasting_parameters()))
     u = model.input_layout.from_names({"tau": 0.0, "cut_force": 6e4})
     states = Layout(model.States)
 

@@ -15,8 +15,8 @@ from wrong_linkages import PRESS
 
 import chainunit
 from chainunit.core.engines import MATH
-from chainunit.fmu.accompany import companion_files
 from chainunit.fmu.backends import export
+from chainunit.fmu.companion_files import companion_files
 from chainunit.fmu.description import Interface, model_description, model_description_3
 from chainunit.fmu.pictures import drawing
 from chainunit.machines.linkages.file import read_linkage
@@ -36,11 +36,11 @@ def described(model, fmi=2):
 def test_direct_parameters_stay_direct_parameters(file):
     """Those of a triad were prepared by way of pickle, which made inverse ones of them."""
     model = read_linkage(file).direct()
-    p = model.prepared(MATH, model.Parameters(J_added=0.25))
+    p = model.with_derived(MATH, model.Parameters(J_added=0.25))
     again = pickle.loads(pickle.dumps(p))
     for each in (p, again):
         assert type(each) is model.Parameters and each.J_added == 0.25
-    assert len(getattr(again, "derived", ())) == model.derived
+    assert len(getattr(again, "derived", ())) == model.derived_count
 
 
 @pytest.mark.parametrize(

@@ -47,7 +47,7 @@ def told(model):
 
 def by_the_machine(model, q, w, a):
     """All outputs by name, and the state."""
-    p = model.prepared(MATH, model.Parameters())
+    p = model.with_derived(MATH, model.Parameters())
     u = model.input_layout.from_names({"phi": q, "w": w, "a": a})
     parts = zip(model.parts, model.evaluate(MATH, p, u), strict=True)
     return {name: value for part, out in parts for name, value in part.layout.by_name(out).items()}, p, u

@@ -158,6 +158,6 @@ def test_a_triad_that_does_not_close_with_other_lengths_is_refused():
         with pytest.raises(InputError):
             Machine(model, {"l": l})
         p = model.parameter_layout.from_names({"l": l})
-        p = model.prepared(MATH, p, None)
+        p = model.with_derived(MATH, p, None)
         met = [low < value < high for value, low, high in model.requirements(MATH, p)]
         assert len(met) == len(model.required) == 2 and not all(met)

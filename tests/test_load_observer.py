@@ -15,7 +15,7 @@ from scipy.linalg import expm
 from scipy.stats import norm
 
 from chainunit import InputError
-from chainunit.capabilities.identification.false_loads import ANGLES, false_loads
+from chainunit.capabilities.watch.false_loads import ANGLES, false_loads
 from chainunit.core.engines import MATH, numpy_
 from chainunit.core.native.compilers import compiler
 from chainunit.fmu.native.export import export

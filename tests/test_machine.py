@@ -68,7 +68,7 @@ def test_the_direct_model_follows_from_the_inverse_one(model):
 
 def test_a_machine_of_that_name_is_one_class():
     """Machines with chains are not among the machines by name: there is one for each number of rods."""
-    assert all(model.name == name and not model.built_by for name, model in MACHINES.items())
+    assert all(model.name == name and not model.made for name, model in MACHINES.items())
     assert {"ChamberForces", "KnifeDrive", "Accelerator"} <= set(MACHINES)
 
 

@@ -167,7 +167,8 @@ def test_an_observer_starts_from_the_speed_of_the_initialization_mode(native, fm
 def jacobian(model, values):
     """Outputs, and derivatives of the states, by inputs and states, by CasADi from the same kernels."""
     interface = Interface(model, {})
-    symbols, _, _, x, outputs, derivatives = interface.trace
+    t = interface.trace
+    symbols, x, outputs, derivatives = t.symbols, t.x, t.outputs, t.derivatives
     _, us, xs, _ = symbols
     states = model.state_layout.values(x) if model.state_layout else []
     rows = casadi.vertcat(*states, *outputs, *derivatives)
@@ -209,7 +210,7 @@ def test_directional_derivatives_are_exact(native, name):
     unknown, exact = [v.valueReference for v in variables if v.type == "Real"], exact[smooth]
     # those that the model says are taken by differences; others to rounding of the largest
     apart = {name for part in model.parts for name in part.by_differences}
-    names = [s.name for s in interface.of("output") if s.variable.type == "Real"] + ["der"] * n_x
+    names = [s.name for s in interface.signals_of("output") if s.variable.type == "Real"] + ["der"] * n_x
     plain = np.array([name not in apart for name in names])
     tiny, largest = 1e-16 * max(1e4, np.abs(exact[plain]).max()), np.abs(exact).max()
     for k, column in enumerate(known):
@@ -248,10 +249,10 @@ class Exchange:
         self.unit.setupExperiment()
         self.unit.enterInitializationMode()
         self.references = {n: v.valueReference for n, v in fmu.variables.items()}
-        self.inputs = [s.reference for s in interface.of("input")]
+        self.inputs = [s.reference for s in interface.signals_of("input")]
         self.n = len(interface.states)
         last = len(interface.signals)
-        outputs = [s.reference for s in interface.of("output") if s.variable.type == "Real"]
+        outputs = [s.reference for s in interface.signals_of("output") if s.variable.type == "Real"]
         self.states = outputs[: self.n]
         self.derivatives = list(range(last, last + self.n))
         self.unknown = [*self.states, *self.derivatives, *outputs[self.n :]]
@@ -288,7 +289,7 @@ class Exchange:
     def quotients(self, known):
         """Difference quotients to the right and to the left; of an input at its least value to the right twice, the
         second with half the step."""
-        low = {s.reference: s.variable.quantity.low for s in self.interface.of("input")}
+        low = {s.reference: s.variable.quantity.low for s in self.interface.signals_of("input")}
         here, x, middle = self.unit.getReal(self.inputs), self.x(), np.array(self.unit.getReal(self.unknown))
         right, left = np.empty((2, len(self.unknown), len(known)))
         for column, k in enumerate(known):
@@ -347,7 +348,7 @@ def test_derivatives_are_finite_wherever_a_model_may_be(native, name):
     rng = np.random.default_rng(21)
     with Exchange(native, name) as unit:
         unit.run()
-        inputs = [s.variable.quantity for s in unit.interface.of("input")]
+        inputs = [s.variable.quantity for s in unit.interface.signals_of("input")]
         given, x = np.array([q.start for q in inputs]), unit.x()
         # a chain at rest along one line is no state that it may be in
         still = x if name == "ChainUnitFlexible" else 0.0 * x
@@ -714,8 +715,8 @@ class Equations:
         description = fmpy.read_model_description(str(file))
         references = {v.name: v.valueReference for v in description.modelVariables}
         interface = Interface(MODELS[name], {})
-        self.inputs = [references[s.name] for s in interface.of("input")]
-        self.outputs = [s.name for s in interface.of("output")]
+        self.inputs = [references[s.name] for s in interface.signals_of("input")]
+        self.outputs = [s.name for s in interface.signals_of("output")]
         self._read, self._n, self._fmi = [references[n] for n in self.outputs], len(interface.states), fmi
         self.nominal = np.array([s.quantity.nominal or 1.0 for s in interface.states])
         kind = FMU2Model if fmi == 2 else FMU3Model
@@ -796,7 +797,7 @@ def test_inputs_that_run_meet_the_reference_results_in_model_exchange(native, na
 
             def rates(time, states, since=t, held=held):
                 u = np.array(held)
-                for place, rate, half in model.course(held):
+                for place, rate, half in model.extrapolations(held):
                     u[place] += (time - since) * (rate + (time - since) * half)
                 return unit.rates(time, u, states)
 

@@ -101,7 +101,7 @@ def test_derivatives_through_derived_numbers(monkeypatch):
     monkeypatch.setattr(kernels, "native_kernel", lambda *_: None)
     machine = Machine(KnifeDrive)
     kernel, _ = kernel_of(machine, ["crank_torque", "blade.y"], ["r", "ab", "o3d"])
-    assert machine.model.derived
+    assert machine.model.derived_count
     check_derivatives(kernel, machine, machine.model.Feed(), ["r", "ab", "o3d"], 3.0, angles=5)
 
 
@@ -127,7 +127,7 @@ def check_derivatives(kernel, machine, feed, free, speed, angles=12, torque=0, k
         assert np.max((np.abs(by_difference - slopes[:, k]) / size)[smooth]) < 1e-5
         row = np.einsum("rl,rfl->f", weights, slope_above - slope_below) / (2.0 * step)
         assert np.max(np.abs(row - bend[k])) < 1e-5 * np.max(np.abs(bend))
-    at = kernel.by_angle(x, q, w, np.zeros(angles, int))
+    at = kernel.derivatives_by_angle(x, q, w, np.zeros(angles, int))
     np.testing.assert_allclose(at[1], slopes[0, n], rtol=1e-10, atol=1e-8)
     alone = np.zeros_like(weights)
     alone[0, 3] = 1.0

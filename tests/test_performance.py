@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chainunit.capabilities.identification.notices import CHAINS_GOOD
+from chainunit.capabilities.watch.notices import CHAINS_GOOD
 from chainunit.core.model import Model, Part
 from chainunit.core.native.compilers import compiler
 from chainunit.core.quantities import Value, declaration, quantity

@@ -15,7 +15,7 @@ from chainunit.core.ports import NO_LOAD, LoadPort, PortSlopes, PortValues, flan
 from chainunit.core.quantities import Value, declaration, group, quantity
 from chainunit.fmu import export as python
 from chainunit.fmu.description import Interface
-from chainunit.fmu.recipe import icon, often, script_of
+from chainunit.fmu.recipe import frequent_outputs, icon, script_of
 from chainunit.fmu.reference import excitation
 from chainunit.fmu.script import Script
 from chainunit.models import MODELS
@@ -83,10 +83,10 @@ def test_a_load_suits_the_shaft_that_takes_it():
 def test_outputs_that_connect_are_often_asked_for():
     flange = {"phi", "w", "a", "tau"}
     port = {"tau_bias", "tau_bias_dphi", "tau_bias_dw", "J", "dJ_dphi", "phi0", "w0"}
-    assert often(MODELS["ChamberForces"]) == flange | port
+    assert frequent_outputs(MODELS["ChamberForces"]) == flange | port
     measured = {"armature.i", "supply_power"}
-    assert often(MODELS["DcMotor"]) == flange | measured | {f"load.{name}" for name in port}
-    assert often(MODELS["ChainUnit"]) == flange
+    assert frequent_outputs(MODELS["DcMotor"]) == flange | measured | {f"load.{name}" for name in port}
+    assert frequent_outputs(MODELS["ChainUnit"]) == flange
 
 
 def test_icons_follow_from_the_terminals():

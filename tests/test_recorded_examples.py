@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chainunit.capabilities.identification.fit import fit
-from chainunit.capabilities.identification.plant import Plant
-from chainunit.capabilities.identification.problem import Problem, RecordedRun, Sensor, Unknown
-from chainunit.capabilities.identification.recording import read_recording
-from chainunit.capabilities.identification.residuals import check_residuals
 from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.machines.chain_unit import ChamberForces
+from chainunit.recordings.fit import fit
+from chainunit.recordings.plant import Plant
+from chainunit.recordings.problem import Problem, RecordedRun, Sensor, Unknown
+from chainunit.recordings.recording import read_recording
+from chainunit.recordings.residuals import residual_tests
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 
@@ -74,7 +74,7 @@ def test_the_hidden_machine_is_identified():
             assert abs(found - true) < 0.03 * true, name
         elif name in ("pin.friction", "joint_damping"):
             assert abs(found - true) < 0.05 * true, name
-    assert all(each.is_noise and 0.97 < each.noise < 1.03 for each in check_residuals(best))
+    assert all(each.is_noise and 0.97 < each.noise < 1.03 for each in residual_tests(best))
 
 
 @pytest.mark.slow

@@ -7,23 +7,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from synthetic import write_recording
 
 from chainunit import InputError
 from chainunit.capabilities.identification.identification import read_runs
-from chainunit.capabilities.identification.inspection import (
+from chainunit.capabilities.identification.reading import PlannedRun
+from chainunit.capabilities.watch.watch import watch
+from chainunit.recordings.inspection import (
     Expectation,
     inspect_columns,
     inspect_motion,
     inspect_steadiness,
 )
-from chainunit.capabilities.identification.reading import PlannedRun
-from chainunit.capabilities.identification.recording import (
+from chainunit.recordings.recording import (
     Recording,
     read_part,
     read_recording,
-    write_recording,
 )
-from chainunit.capabilities.identification.watch import watch
 from chainunit.study.config import parse
 
 SPEED, RATIO, RATE = 3.0, 50.0, 0.83
@@ -388,7 +388,7 @@ def test_counts_and_times_are_written_in_full(tmp_path):
 
 
 def run(name, file, **more):
-    plan = PlannedRun(name, file, {}, SPEED, -np.inf, np.inf, 293.15, name != "empty", {})
+    plan = PlannedRun(file, {}, SPEED, -np.inf, np.inf, 293.15, name, name != "empty", {})
     return replace(plan, **more)
 
 

@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from derivatives import check_derivatives
+from synthetic import HiddenRun, Logger, synthetic
 
 from chainunit import InputError
-from chainunit.capabilities.identification.fit import fit
 from chainunit.capabilities.identification.identification import inspect_runs
-from chainunit.capabilities.identification.problem import Problem, RecordedRun, Sensor, Unknown
-from chainunit.capabilities.identification.residuals import check_residuals
-from chainunit.capabilities.identification.shaft import WAVES, MeasuredShaft
-from chainunit.capabilities.identification.synthetic import HiddenRun, Logger, synthetic
 from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
+from chainunit.recordings.fit import fit
+from chainunit.recordings.problem import Problem, RecordedRun, Sensor, Unknown
+from chainunit.recordings.residuals import residual_tests
+from chainunit.recordings.shaft import WAVES, MeasuredShaft
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 
@@ -66,7 +66,7 @@ def found_of(problem):
     for name, true in TRUTH.items():
         place = problem.place[name]
         assert abs(best.z[place] - true) < 4.0 * best.deviations[place], name
-    assert all(each.is_noise and 0.9 < each.noise < 1.1 for each in check_residuals(best))
+    assert all(each.is_noise and 0.9 < each.noise < 1.1 for each in residual_tests(best))
     return best
 
 
@@ -123,11 +123,11 @@ def test_derivatives_of_residuals():
     problem = problem_of(
         RecordedRun("run", recording, 3.0), sensors={"crank.tau": Sensor(offset=5.0, gain=0.01)}
     )
-    z, rng = problem.starts, np.random.default_rng(1)
+    z, rng = problem.start_values, np.random.default_rng(1)
     names = [f"run.{name}" for name, *_ in WAVES] + ["run.phase.2", "run.phase.3", "run.speed", "run.drift"]
     for name in names:
         place = problem.place[name]
-        z[place] += 0.1 * rng.standard_normal() * problem.spreads[place]
+        z[place] += 0.1 * rng.standard_normal() * problem.prior_deviations[place]
     # that by the drift is the rate of a spline through the rows
     left_out = {f"run.{name}" for name, k, *_ in WAVES if k not in (*range(1, 9), 30, 60)}
     check_derivatives(problem, z, 5e-3, lambda name: name not in left_out)

@@ -144,7 +144,7 @@ def test_motion_has_the_derivatives_that_it_states(kind, seed, q):
 @pytest.mark.parametrize(("kind", "seed", "q"), CASES)
 def test_third_derivatives(kind, seed, q):
     bars, h = linkage(kind, seed), 1e-3
-    links, pins = mechanism(bars, q).third()
+    links, pins = mechanism(bars, q).third_derivatives()
     around = [mechanism(bars, q + k * h) for k in (-2, -1, 1, 2)]
 
     def difference(value):

@@ -10,7 +10,7 @@ import pytest
 
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
-from chainunit.mechanism.courses import largest, means, roots
+from chainunit.mechanism.sampled_quantities import largest, means, roots
 from chainunit.study.linkage_turn import linkage_findings
 
 LINKAGES = Path(__file__).parents[1] / "examples" / "linkages"

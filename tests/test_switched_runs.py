@@ -7,17 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from derivatives import check_derivatives
+from synthetic import HiddenRun, Logger, synthetic
 
-from chainunit.capabilities.identification.fit import fit
 from chainunit.capabilities.identification.information import information
-from chainunit.capabilities.identification.plant import Plant
-from chainunit.capabilities.identification.problem import Problem, RecordedRun, Sensor, Unknown
-from chainunit.capabilities.identification.residuals import check_residuals
-from chainunit.capabilities.identification.shaft import MeasuredShaft
-from chainunit.capabilities.identification.synthetic import HiddenRun, Logger, synthetic
 from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor
+from chainunit.recordings.fit import fit
+from chainunit.recordings.plant import Plant
+from chainunit.recordings.problem import Problem, RecordedRun, Sensor, Unknown
+from chainunit.recordings.residuals import residual_tests
+from chainunit.recordings.shaft import MeasuredShaft
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 from chainunit.system import Profile
@@ -77,7 +77,7 @@ def problem_of(kind, *runs):
 @pytest.fixture
 def fine(monkeypatch):
     """Rows of a simulation so near to one another that the derivatives are not those of their interpolation."""
-    monkeypatch.setattr("chainunit.capabilities.identification.problem.STEP", 4e-4)
+    monkeypatch.setattr("chainunit.recordings.problem.STEP", 4e-4)
 
 
 @pytest.mark.slow
@@ -88,7 +88,7 @@ def test_derivatives_of_a_coast(kind, fine):
     steady = run_of(kind, seed=1, duration=4.0, integrator="compiled")
     off = run_of(kind, 2.0, duration=4.0, angles=("mark", "motor.count"), integrator="compiled")
     problem = problem_of(kind, steady, off)
-    z = problem.starts
+    z = problem.start_values
     if kind == "torque":
         z[problem.place["run2.inertia"]], z[problem.place["run2.friction"]] = 8.0, 2.0
     else:
@@ -100,7 +100,7 @@ def test_derivatives_of_a_shaken_run(fine):
     run = run_of("dc", w_ref=SHAKEN, duration=5.0, integrator="compiled")
     assert np.ptp(run.recording.columns["motor.w"]) > 40.0
     problem = problem_of("dc", run)
-    check_derivatives(problem, problem.starts)
+    check_derivatives(problem, problem.start_values)
 
 
 @pytest.mark.parametrize("kind", ["dc", pytest.param("im", marks=SLOW), "torque"])
@@ -125,7 +125,7 @@ def test_a_coast_is_identified(kind):
     if kind != "torque":
         assert rows["run2", "motor.i"] == pytest.approx(2.5 * 200.0, abs=5)
         assert rows["run2", "motor.w"] == pytest.approx(8.0 * 200.0, abs=6)
-    assert all(each.is_noise and 0.9 < each.noise < 1.1 for each in check_residuals(best))
+    assert all(each.is_noise and 0.9 < each.noise < 1.1 for each in residual_tests(best))
 
 
 @pytest.mark.parametrize("angles", [("mark",), ("motor.count",)])
@@ -153,7 +153,7 @@ def test_a_coast_tells_inertia():
     deviations = []
     for second in (run_of("dc", integrator="compiled"), run_of("dc", 2.5, integrator="compiled")):
         problem = problem_of("dc", first, second)
-        found = information(problem, problem.starts, propose=False).outlooks
+        found = information(problem, problem.start_values, propose=False).determinations
         deviations.append({each.name: each.by_runs for each in found})
     steady, coast = deviations
     for name in ("machine.left.wall_mass", "machine.rocker.I"):
@@ -167,4 +167,4 @@ def test_a_shaken_run_is_identified():
     for name, true in TRUTH.items():
         place = problem.place[name]
         assert abs(best.z[place] - true) < 4.0 * best.deviations[place], name
-    assert all(each.is_noise and 0.9 < each.noise < 1.1 for each in check_residuals(best))
+    assert all(each.is_noise and 0.9 < each.noise < 1.1 for each in residual_tests(best))

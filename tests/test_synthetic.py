@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from synthetic import HiddenRun, Logger, synthetic, write_recording
 
 from chainunit import InputError
-from chainunit.capabilities.identification.measurands import COUNTS
-from chainunit.capabilities.identification.recording import read_recording, write_recording
-from chainunit.capabilities.identification.synthetic import HiddenRun, Logger, synthetic
 from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor
+from chainunit.recordings.measurands import COUNTS
+from chainunit.recordings.recording import read_recording
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 from chainunit.system import Profile

@@ -175,7 +175,7 @@ def test_wrong_requests_are_refused(rig):
         Transients(ChamberForces, ["tau"])
     with pytest.raises(InputError, match=r"motor\.tua: no such output.*motor\.tau"):
         Transients(rig.model, ["motor.tua"])
-    assert rig.model.internal_step(MATH, rig.model.prepared(MATH, rig.p)) < STEP
+    assert rig.model.internal_step(MATH, rig.model.with_derived(MATH, rig.p)) < STEP
 
 
 def test_a_direction_gives_the_derivative_of_the_run(rig):

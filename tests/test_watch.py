@@ -10,14 +10,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from command import chainunit
+from synthetic import HiddenRun, Logger, synthetic, write_recording
 
 from chainunit import InputError, Study
-from chainunit.capabilities.identification import watch as watching
-from chainunit.capabilities.identification.crank_motion import crank_motion
-from chainunit.capabilities.identification.recording import Recording, read_recording, write_recording
-from chainunit.capabilities.identification.synthetic import HiddenRun, Logger, synthetic
+from chainunit.capabilities.watch import watch as watching
+from chainunit.capabilities.watch.crank_motion import crank_motion
 from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
+from chainunit.recordings.recording import Recording, read_recording
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 from chainunit.system import Profile

@@ -15,9 +15,8 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from synthetic import HiddenRun, Logger, synthetic, write_recording
 
-from chainunit.capabilities.identification.recording import write_recording
-from chainunit.capabilities.identification.synthetic import HiddenRun, Logger, synthetic
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive

@@ -5,51 +5,44 @@ alone, for scripts and sweeps; ``ChamberForces`` is its model, which becomes an 
 """
 
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 __all__ = [
     "EMPTY",
-    "BestResult",
     "ChainUnitMachine",
     "ChamberForces",
     "GeometryError",
-    "IdentificationResult",
     "InputError",
     "RunError",
     "SideLoads",
     "Study",
     "StudyResult",
-    "SweepResult",
-    "WatchResult",
     "__version__",
 ]
 
 if TYPE_CHECKING:
-    from .app.identifications import IdentificationResult, WatchResult
-    from .app.studies import BestResult, Study, StudyResult
-    from .app.sweeps import SweepResult
+    from .app.studies import Study, StudyResult
     from .core.errors import GeometryError, InputError, RunError
     from .machines.api import EMPTY, ChainUnitMachine
     from .machines.chain_unit import ChamberForces, SideLoads
 
     __version__: str
+
+    def __getattr__(name: str) -> Any: ...
+
 else:
     # numpy and scipy take longer to import than a command takes to answer: import them when they are needed; a
     # signal during the import of anything ends with the words of Python
     _HOMES = {
-        "BestResult": ".app.studies",
         "EMPTY": ".machines.api",
         "ChainUnitMachine": ".machines.api",
         "ChamberForces": ".machines.chain_unit",
         "GeometryError": ".core.errors",
-        "IdentificationResult": ".app.identifications",
         "InputError": ".core.errors",
         "RunError": ".core.errors",
         "SideLoads": ".machines.chain_unit",
         "Study": ".app.studies",
         "StudyResult": ".app.studies",
-        "SweepResult": ".app.sweeps",
-        "WatchResult": ".app.identifications",
     }
 
     def __getattr__(name):
@@ -57,9 +50,16 @@ else:
             value = import_module("importlib.metadata").version(__name__)
         elif name in _HOMES:
             value = getattr(import_module(_HOMES[name], __name__), name)
+        elif name.endswith("Result") and (result := _result_of_capability(name)):
+            value = result
         else:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         return globals().setdefault(name, value)
+
+    def _result_of_capability(name):
+        """The class of this name of the result of a method of `Study` that a capability brings; None without one."""
+        modules = import_module(".capabilities", __name__).modules("study_method")
+        return next((module.RESULT for module in modules if module.RESULT.__name__ == name), None)
 
     def __dir__():
         return sorted({*globals(), *__all__})

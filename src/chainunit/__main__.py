@@ -16,8 +16,9 @@ def main() -> None:
 
         interrupts.begin()
         try:
-            from .app import cli, console
+            from .app import cli
             from .core import temporary_folders
+            from .report import console
         except Exception:
             # a library may turn the interrupt of its import into another error
             if interrupts.received() is None:

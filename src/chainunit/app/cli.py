@@ -14,15 +14,13 @@ from typing import Annotated, Any
 import typer
 import typer.core
 
+from ..capabilities import modules
 from ..core.errors import InputError, InterruptedRunError, RunError, printable
 from ..core.files import full, written
+from ..report.command_options import BackendOption, OutputFolder
+from ..report.console import carry_out, exit_status, study_file, terminal_console
 from ..work import interrupts
-from .command_options import BackendOption
-from .console import carry_out, exit_status, study_file, terminal_console
 from .export_command import ExportCommand, export, export_ssp
-from .identify_command import identify
-from .sweep_command import sweep
-from .watch_command import watch
 
 
 class Example(StrEnum):
@@ -84,7 +82,7 @@ def study(
     config: Annotated[
         Path | None, typer.Argument(help="Study file (TOML); without one, the packaged example.")
     ] = None,
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")] = Path("results"),
+    output: OutputFolder = Path("results"),
     check: Annotated[
         bool, typer.Option("--check", help="Also compare every run with the monolithic solution.")
     ] = False,
@@ -138,25 +136,8 @@ def compare(
     carry_out(TASK, (read_result(first), read_result(second)), output)
 
 
-@app.command()
-def optimize(
-    config: Annotated[Path, typer.Argument(help="Study file (TOML) with the table [optimize].")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")] = Path("best"),
-    backend: BackendOption = None,
-) -> None:
-    """Search for the best machine: parameters with the least torque, load, power or energy under limits.
-
-    Writes best.toml, report.html, result.json, result.md and pictures into the output folder.
-    """
-    question = study_file(config)
-    from ..report.tasks import task_named
-
-    carry_out(task_named("optimize"), question, output, backend=backend and backend.value)
-
-
-app.command()(sweep)
-app.command()(identify)
-app.command()(watch)
+for module in modules("command"):
+    app.command()(module.COMMAND)
 app.command(cls=ExportCommand)(export)
 app.command("export-ssp")(export_ssp)
 
@@ -180,20 +161,18 @@ def schema(
     ] = None,
 ) -> None:
     """Write the JSON Schema of study files, by which an editor completes keys and marks mistakes."""
-    from ..core.files import whole
+    from ..core.files import atomic_file
     from ..study.schema import FILE, json_schema
 
     file = output or Path(FILE)
-    with whole(file) as part:
+    with atomic_file(file) as part:
         part.write_text(json.dumps(json_schema(), indent=1, ensure_ascii=False) + "\n", "utf-8")
     print(f"{file}: schema of study files")
 
 
 @app.command()
 def reproduce(
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")] = Path(
-        "reproduction"
-    ),
+    output: OutputFolder = Path("reproduction"),
 ) -> None:
     """Compute every number that the papers print, right or wrong, with the reason; draw their figures.
 
@@ -206,7 +185,7 @@ def reproduce(
 
 @app.command("two-bar-error")
 def two_bar_error(
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")] = Path("two-bar"),
+    output: OutputFolder = Path("two-bar"),
 ) -> None:
     """The error of two rigid bars in place of a hanging chain, over zeta, mu and psi, and where they are good enough.
 
@@ -220,7 +199,7 @@ def two_bar_error(
 @app.command("linkage")
 def linkage_command(
     file: Annotated[Path, typer.Argument(help="Linkage file (TOML).")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")] = Path("linkage"),
+    output: OutputFolder = Path("linkage"),
     speed: Annotated[
         str | None,
         typer.Option("--speed", help='Speed of the driver with its unit; "60 rpm" by default, or "0.1 m/s".'),

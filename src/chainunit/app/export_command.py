@@ -9,8 +9,8 @@ import typer
 import typer.core
 
 from ..core.errors import InputError
-from .command_options import BackendOption
-from .console import study_file, terminal_console
+from ..report.command_options import BackendOption
+from ..report.console import study_file, terminal_console
 
 
 class ExportCommand(typer.core.TyperCommand):

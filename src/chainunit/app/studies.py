@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from ..core.errors import InputError, RemarkWarning, RunError, near_name, shown
+from ..capabilities import modules
+from ..core.errors import InputError, RemarkWarning, near_name, shown
 from ..core.quantities import Layout
 from ..fmu.backends import Backend
 from ..machines.machine import Machine
@@ -24,6 +25,8 @@ from ..report import series
 from ..report import study as contents
 from ..report.blocks import Report
 from ..report.drawing import drawing
+from ..report.reported_result import ReportedResult
+from ..report.study_task import TASK
 from ..study import config as study_files
 from ..study.config import Config
 from ..study.foreign_machine import ForeignMachine
@@ -33,15 +36,10 @@ from ..study.record import INSUFFICIENT, StudyRecord
 from ..study.result import as_dict
 from ..study.window import Phase
 from ..work.progress import Report as Progress
-from .results import ReportedResult
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
-
-    from ..capabilities.optimize.best import Best
-    from .identifications import IdentificationResult, WatchResult
-    from .sweeps import SweepResult
 
 _TABLES, _TEXT = "tables in Python", "text in Python"
 
@@ -76,6 +74,9 @@ class Study:
 
     config: Config
     """The configuration of the study, checked."""
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any: ...
 
     def __init__(self, **tables: Any) -> None:
         self._take(study_files.of_tables(_plain(tables), _TABLES), _TABLES)
@@ -105,6 +106,16 @@ class Study:
             config = study_files.parse(text, _TEXT)
         return cls.__new__(cls)._take(config, _TEXT)
 
+    def of_tables(self, tables: dict[str, Any], source: str) -> Self:
+        """A study of the same kind with other `tables` of a study file; paths in them are relative to `source`.
+
+        Raises
+        ------
+        InputError
+            as the class.
+        """
+        return type(self).__new__(type(self))._take(study_files.of_tables(tables, source), source)
+
     def _take(self, config: Config, source: str, changes: Mapping[str, Any] | None = None) -> Self:
         """Become the study `config`, which has `changes` against its `source`; paths in it are relative to
         the source."""
@@ -112,8 +123,8 @@ class Study:
         if self._changes:
             config = dataclasses.replace(config, source=f"{source} with {self._changed}")
         self.config = config
-        for slip in config.slips:
-            warnings.warn(slip.sentence, RemarkWarning, stacklevel=3)
+        for value in config.unusual:
+            warnings.warn(value.sentence, RemarkWarning, stacklevel=3)
         return self
 
     def with_values(self, values: Mapping[str, Any]) -> Self:
@@ -195,90 +206,6 @@ class Study:
         options = {"check": check, "backend": backend, "scheduler": scheduler}
         return StudyResult.made(self.config, folder, progress, **options)
 
-    def optimize(
-        self,
-        folder: str | Path | None = None,
-        backend: Backend | None = None,
-        progress: Progress | None = None,
-    ) -> BestResult:
-        """Search for the best machine, as the table [optimize] asks: 20 starts take some ten seconds.
-
-        Parameters
-        ----------
-        folder : the folder to which the files of ``chainunit optimize -o`` are written
-        backend, progress : as of `run`
-
-        Raises
-        ------
-        InputError
-            for a study without the table [optimize].
-        WriteError
-            for a file that cannot be written; the others are written.
-        """
-        return BestResult.made(self.config, folder, progress, backend=backend)
-
-    def identify(
-        self, folder: str | Path | None = None, progress: Progress | None = None
-    ) -> IdentificationResult:
-        """Identify the machine from recordings, as the table [identify] asks: two of a minute take some ten seconds.
-
-        Parameters
-        ----------
-        folder : the folder to which the files of ``chainunit identify -o`` are written
-        progress : as of `run`
-
-        Raises
-        ------
-        InputError
-            for a study without the table [identify], and with a line for each fault of the recordings.
-        RunError
-            where the fit does not end.
-        WriteError
-            for a file that cannot be written; the others are written.
-        """
-        from .identifications import IdentificationResult
-
-        return IdentificationResult.made(self.config, folder, progress)
-
-    def watch(self, folder: str | Path | None = None, progress: Progress | None = None) -> WatchResult:
-        """Run the load observer over the recording of the table [watch].
-
-        Parameters and errors are those of `identify`, without RunError.
-        """
-        from .identifications import WatchResult
-
-        return WatchResult.made(self.config, folder, progress)
-
-    def sweep(
-        self,
-        folder: str | Path | None = None,
-        workers: int | None = None,
-        scheduler: str | None = None,
-        progress: Progress | None = None,
-    ) -> SweepResult:
-        """Run the sweep of the study, its table ``sweep``, as ``chainunit sweep`` does.
-
-        Parameters
-        ----------
-        folder : the folder with the store of all points and the report; a store that fits is continued. Without it
-            the store is in a temporary folder, which lasts as long as the result
-        workers : number of threads, or with measures of processes; by default one for each processor
-        scheduler : address of a Dask scheduler whose workers make the points, such as ``tcp://10.0.0.5:8786``
-        progress : as of `run`
-
-        Raises
-        ------
-        InputError
-            for a study without a sweep, and for a fault that only a run shows.
-        RunError
-            where a batch fails; earlier ones are in the store.
-        WriteError
-            for a file that cannot be written.
-        """
-        from .sweeps import SweepResult
-
-        return SweepResult.made(self.config, folder, progress, workers=workers, scheduler=scheduler)
-
     def __repr__(self) -> str:
         config = self.config
         with shown_in(config.units):
@@ -302,7 +229,7 @@ class Study:
 class StudyResult(ReportedResult[Config, StudyRecord]):
     """The result of a study. Its `repr` shows the title, the verdicts and the main answers of every run."""
 
-    _command = "study"
+    _task = TASK
 
     @property
     def record(self) -> StudyRecord:
@@ -373,45 +300,8 @@ class StudyResult(ReportedResult[Config, StudyRecord]):
         return [note["text"] for note in self._numbers["notes"]]
 
 
-class BestResult(ReportedResult[Config, Any]):
-    """The result of a search for the best machine. Its `repr` shows the answer, the parameters and what binds."""
-
-    _command = "optimize"
-
-    @property
-    def config(self) -> Config:
-        """The configuration of the study."""
-        return self._question
-
-    @property
-    def best(self) -> Best:
-        """All that the search found."""
-        best: Best = self._outcome.best
-        return best
-
-    @property
-    def met(self) -> bool:
-        """Whether a machine was found that meets all limits."""
-        return self.best.met
-
-    @property
-    def machine(self) -> Machine | None:
-        """The best machine; None where no machine meets all limits."""
-        return self.best.machine
-
-    @property
-    def study(self) -> Study:
-        """The study with the best machine.
-
-        Raises
-        ------
-        RunError
-            where no machine meets all limits.
-        """
-        if self.best.machine is None:
-            raise RunError(f"no machine meets all limits: {self._outcome.conflict}")
-        source, tables = self._outcome.as_file()
-        return Study.__new__(Study)._take(study_files.of_tables(tables, str(source)), str(source))
+for _module in modules("study_method"):
+    setattr(Study, _module.METHOD.__name__, _module.METHOD)
 
 
 def _plain(value: Any) -> Any:

@@ -61,8 +61,8 @@ def outputs_of(model: type[Model]) -> tuple[Variable, ...]:
 
 
 def columns_of(model: type[Model]) -> tuple[Variable, ...]:
-    """All that a batch can compute of a model: its outputs, and the quantities of `Model.further`."""
-    return (*outputs_of(model), *(variable for variable, _ in trace(model).further))
+    """All that a batch can compute of a model: its outputs, and the quantities of `Model.further_quantities`."""
+    return (*outputs_of(model), *(variable for variable, _ in trace(model).further_quantities))
 
 
 def arguments_of(model: type[Model]) -> tuple[Variable, ...]:
@@ -106,7 +106,7 @@ def equations(model: type[Model], outputs: tuple[str, ...], by: tuple[str, ...])
     places = find(outputs, names_of(declared), "output")
     columns = find(by, names_of(arguments), "parameter, input or state")
     p, u, x, _ = t.symbols
-    traced = [*t.outputs, *(value for _, value in t.further)]
+    traced = [*t.outputs, *(value for _, value in t.further_quantities)]
     rows = casadi.vertcat(*(casadi.SX(traced[place]) for place in places), casadi.SX(0, 1))
     rows, codes = t.explicit([rows, _first_unmet(list(model.requirements(casadi_(), t.p)))])
     point = casadi.vertcat(p, u, x)

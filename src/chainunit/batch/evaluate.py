@@ -77,7 +77,7 @@ def evaluate(
     ----------
     model : the model, such as `ChamberForces`; a model with states takes each state from `values`
     values : by the name of a parameter, input or state: a number, a DataArray, or an array of one dimension, which
-        becomes the dimension of that name. A DataArray whose ``units`` differ from those of the declaration is
+        becomes the dimension of that name. A DataArray whose ``units`` differ from the declared units is
         converted. Dimensions of the same name belong together; all others are combined.
     outputs : names of the outputs, or of quantities beside them (`Model.further`: ``crank_torque``,
         ``force(pivot)``); by default all outputs
@@ -138,12 +138,15 @@ class Memory:
 class Grid:
     """The states of a batch: arguments over named dimensions."""
 
-    def __init__(self, own: Equations, values: Mapping[str, Any], parameters: Any, over: str | None) -> None:
-        model = own.model
-        self._equations = own
-        places = find(values, names_of(own.arguments), "parameter, input or state")
+    def __init__(
+        self, equations: Equations, values: Mapping[str, Any], parameters: Any, over: str | None
+    ) -> None:
+        model = equations.model
+        self._equations = equations
+        places = find(values, names_of(equations.arguments), "parameter, input or state")
         given = {
-            name: _array(own.arguments[k], x) for k, (name, x) in zip(places, values.items(), strict=True)
+            name: _array(equations.arguments[k], x)
+            for k, (name, x) in zip(places, values.items(), strict=True)
         }
         self.sizes: dict[str, int] = {}
         self._coords: dict[str, Any] = {}
@@ -162,13 +165,15 @@ class Grid:
         last = over or max(reversed(self.sizes), key=self.sizes.__getitem__, default=None)
         self.dims = [d for d in self.sizes if d != last] + ([last] if last else [])
         self._loops()
-        base = {v.name: v.quantity.start for v in own.arguments}
+        base = {v.name: v.quantity.start for v in equations.arguments}
         if parameters is not None:
             base |= model.parameter_layout.by_name(parameters)
-        items = own.operations.items
-        self._needed = {own.arguments[own.place(each.entry)].name for each in items if each.kind == ARGUMENT}
+        items = equations.operations.items
+        self._needed = {
+            equations.arguments[equations.place(each.entry)].name for each in items if each.kind == ARGUMENT
+        }
         self._bounds: list[tuple[str, Any]] = []
-        self._arguments = [self._flat(v, given.get(v.name), base[v.name]) for v in own.arguments]
+        self._arguments = [self._flat(v, given.get(v.name), base[v.name]) for v in equations.arguments]
 
     def _loops(self) -> None:
         """Divide the dimensions into outer ones and the inner one, the longest."""

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.native.compilers import Compiler, compile_code, compiler, for_this_processor
+from ..core.native.compilers import Compiler, compile_code, compiler, flags_for_this_processor
 from ..core.temporary_folders import scratch
 from .equations import Equations
 from .reductions import REDUCTIONS
@@ -172,9 +172,9 @@ def load(source: str, compiler: Compiler) -> ctypes.CDLL:
     RunError
         where the compiler fails.
     """
-    flags, libraries, files = for_this_processor(compiler)
-    arguments = (*flags, "batch.c", "-o", "batch.so", *libraries)
-    binary = compile_code(compiler, arguments, {"batch.c": source.encode(), **files}, "batch.so")
+    native = flags_for_this_processor(compiler)
+    arguments = (*native.flags, "batch.c", "-o", "batch.so", *native.libraries)
+    binary = compile_code(compiler, arguments, {"batch.c": source.encode(), **native.files}, "batch.so")
     with scratch() as folder:  # a loaded library stays usable
         file = folder / "batch.so"
         file.write_bytes(binary)

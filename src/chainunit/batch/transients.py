@@ -65,7 +65,7 @@ def profile_rows(signal: Any, changes: int) -> list[float]:
 def signal_table(
     driven: Sequence[str], signals: Sequence[Mapping[str, Any]], otherwise: Mapping[str, float], changes: int
 ) -> Any:
-    """The signals of runs by the names of the `driven` inputs, with the values `otherwise` of those that a run does
+    """The signals of runs by the names of the `driven` inputs, with the values `otherwise` of signals that a run does
     not change, as `Transients.run` takes them: shape (inputs, 1 + 3*changes, runs)."""
     rows = [
         [profile_rows(own.get(name, otherwise.get(name, 0.0)), changes) for own in signals] for name in driven
@@ -102,7 +102,7 @@ class Runs:
 
 
 def _filled(x: Any, runs: int, *shape: int) -> Any:
-    """The values of all runs, filled up to whole vectors by those of the last run; a new array of the shape
+    """The values of all runs, filled up to whole vectors by the values of the last run; a new array of the shape
     (*shape, lanes)."""
     full = np.broadcast_to(np.asarray(x, float), (*shape, runs))
     return np.ascontiguousarray(np.concatenate([full, np.repeat(full[..., -1:], -runs % _LANES, -1)], -1))
@@ -117,7 +117,7 @@ class Transients:
     outputs : names of the outputs and states to keep
     varying : names of the parameters that differ between runs
     driven : names of the inputs with signals or with values that differ between runs
-    guarded : those of the outputs that may end a run by a limit of their size
+    guarded : the outputs that may end a run by a limit of their size
     by : names of the parameters and inputs of which a direction consists
 
     Raises
@@ -200,7 +200,7 @@ class Transients:
         ]
         out = np.empty((len(self.outputs) * (2 if self._by else 1), room, rows))
         count = np.zeros(room, np.int64)
-        p, model = self.model.prepared(MATH, parameters), self.model
+        p, model = self.model.with_derived(MATH, parameters), self.model
         numbers = [
             step,
             longest or float(model.internal_step(MATH, p)),
@@ -247,7 +247,7 @@ def _compiled(
     guarded: tuple[str, ...],
     by: tuple[str, ...],
     changes: int,
-    own: Compiler,
+    compiler: Compiler,
 ) -> tuple[str, ctypes.CDLL, list[str]]:
     """A digest of the source of the loop, its library, and the names of its uniform arguments."""
     operations = _operations(model, outputs, by)
@@ -309,7 +309,7 @@ def _compiled(
     names = [v.name for v in arguments_of(model)]
     starts = (0, sizes[0], sum(sizes))
     digest = hashlib.sha256(source.encode()).hexdigest()
-    return digest, load(source, own), [names[starts[kind] + k] for kind, k in code.inputs]
+    return digest, load(source, compiler), [names[starts[kind] + k] for kind, k in code.inputs]
 
 
 def _method(model: type[Model], operations: Operations) -> str:
@@ -333,7 +333,7 @@ def _operations(model: type[Model], outputs: Sequence[str], by: Sequence[str]) -
     values = [*casadi.vertsplit(t.symbols[2]), *t.outputs]
     rows = casadi.vertcat(*(casadi.SX(values[k]) for k in find(outputs, declared, "output")), casadi.SX(0, 1))
     rates = casadi.vertcat(*(casadi.SX(rate) for rate in t.derivatives))
-    closed = model.closed(casadi_(), t.p, t.u, t.x) if model.controlled else []
+    closed = model.constrained_states(casadi_(), t.p, t.u, t.x) if model.controlled else []
     met = casadi.vertcat(*(casadi.SX(x) for x in closed), casadi.SX(0, 1))
     p, u, x = t.symbols[:3]
     groups = t.explicit([rates, rows, met])

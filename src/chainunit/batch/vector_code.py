@@ -1,6 +1,6 @@
 """C code of operations over vectors of lanes.
 
-The operations are divided by level: those that follow from uniform arguments alone are computed once, as numbers,
+The operations are divided by level: values that follow from uniform arguments alone are computed once, as numbers,
 and are kept in ``U``; the others are computed for each vector of lanes.
 """
 

@@ -37,7 +37,7 @@ MATH = SimpleNamespace(
 
 
 def numpy_() -> SimpleNamespace:
-    """The engine on numpy arrays (numpy >= 2, whose names are those of the array API)."""
+    """The engine on numpy arrays (numpy >= 2, which has the names of the array API)."""
     import numpy
 
     return SimpleNamespace(**{name: getattr(numpy, name) for name in NAMES})

@@ -37,7 +37,7 @@ class InputError(ValueError):
         self.faults: tuple[InputError, ...] = tuple(faults) or (self,)
 
     @classmethod
-    def of(cls, faults: Sequence[InputError]) -> InputError:
+    def joined(cls, faults: Sequence[InputError]) -> InputError:
         """One error that stands for several."""
         return faults[0] if len(faults) == 1 else InputError("\n".join(map(str, faults)), faults=faults)
 
@@ -73,7 +73,7 @@ def each_refusal(change: Callable[[InputError], InputError]) -> Iterator[None]:
         yield
     except InputError as error:
         changed = [fault if fault.placed else change(fault) for fault in error.faults]
-        raise InputError.of(changed) from error
+        raise InputError.joined(changed) from error
 
 
 @contextmanager
@@ -111,7 +111,7 @@ class Faults:
             with all refusals.
         """
         if self.errors:
-            raise InputError.of(self.errors)
+            raise InputError.joined(self.errors)
 
 
 def near_name(given: str, known: Iterable[str]) -> str:

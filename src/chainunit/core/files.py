@@ -45,14 +45,14 @@ RESULTS: Mapping[str, _Kind] = {
 """The kinds of results by their commands. All have a file report.html, and the numbers as text, too."""
 PAGE = "report.html"
 written: list[Path] = []
-"""The results that this process wrote by `whole`, in order."""
+"""The results that this process wrote by `atomic_file`, in order."""
 _ledgers: list[Ledger] = []
 """The lists of files of the folders that this process has claimed for a command."""
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
 
 
 @contextmanager
-def whole(file: Path, *, is_result: bool = True) -> Iterator[Path]:
+def atomic_file(file: Path, *, is_result: bool = True) -> Iterator[Path]:
     """A temporary path to write to in place of `file`. It is renamed to `file` at the end, and removed after
     an error. A file that is no result, such as a part of a store, is in no list of files.
 
@@ -214,7 +214,7 @@ def refuse_other_result(path: Path, command: str) -> None:
 def claim(path: Path, command: str = "", *names: str) -> Iterator[Path]:
     """The `folder` at `path`, for this process alone as long as the context lasts; for a `command` of `RESULTS` it
     must not have the result of another one, nor files that no earlier run wrote and that the command would write: the
-    numbers and the page, and those of the further `names`.
+    numbers and the page, and of the further `names`.
 
     A lock of the operating system on a file guards the folder. The file is removed at the end. The lock ends
     with the process, even if the process is killed. A file system without locks gives no protection. A folder
@@ -286,7 +286,7 @@ def _listed(path: Path, command: str, names: Sequence[str]) -> Iterator[None]:
 
 
 def _remove_empty(path: Path) -> None:
-    """Remove the folder and the folders in it; those that hold a file stay."""
+    """Remove the folder and the folders in it; folders that hold a file stay."""
     for inner in (inner for inner in path.iterdir() if inner.is_dir() and not inner.is_symlink()):
         _remove_empty(inner)
     with contextlib.suppress(OSError):

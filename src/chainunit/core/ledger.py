@@ -87,7 +87,7 @@ class Ledger:
                 out.write(f"{known}  {name}\n")
 
     def close(self) -> None:
-        """Write the list anew, with each file as it is now, and without those that are gone."""
+        """Write the list anew, with each file as it is now, and without the files that are gone."""
         there = {}
         for name, known in sorted(self._digests.items()):
             if (self.folder / name).is_file():

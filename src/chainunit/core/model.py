@@ -9,7 +9,7 @@ import copyreg
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 from . import messages
 from .engines import MATH
@@ -80,6 +80,40 @@ class About:
     version: str = ""
 
 
+@dataclass(frozen=True)
+class FmuData:
+    """Data of a model that only its FMU needs."""
+
+    notes: str = ""
+    """further paragraphs of the documentation, each behind an empty line: frame, signs, limits"""
+    about: About | None = None
+    """who made the model, where its user did; None for the models of this package"""
+    experiment: Mapping[str, float] = field(default_factory=dict)
+    """``step`` and ``stop`` [s] of the default experiment, where the maker of the model knows them"""
+
+
+@dataclass(frozen=True)
+class Making:
+    """How a class is made that no module names: the `call` as text of Python, the same as `function` and `arguments`,
+    by which another process gets the class, and further `modules` of this package that the call imports by name,
+    such as ``drives.dc_motor``."""
+
+    call: str
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...]
+    modules: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class StartProblem:
+    """How the states at the start are found: the number of `unknowns` of an iteration, its `rounds`, and the
+    conditions on the states, see `Model.start_limits`."""
+
+    unknowns: int = 0
+    rounds: int = 0
+    required: tuple[Requirement, ...] = ()
+
+
 Place = tuple[float, float]
 
 
@@ -92,6 +126,15 @@ class Sketch:
     links: Mapping[str, Sequence[str]]
     driven: str
     ground: frozenset[str]
+
+
+class Extrapolation(NamedTuple):
+    """How an input goes on inside a step: the `place` of the input, its `rate`, and `half` of its second derivative.
+    After the time `since` it has changed by since * (rate + since * half)."""
+
+    place: int
+    rate: Any
+    half: Any
 
 
 class Part:
@@ -115,30 +158,35 @@ class ModelType(type):
     """The type of all models."""
 
 
-def _reduced(model: Any) -> str | tuple[Callable[..., Any], tuple[Any, ...]]:
+def _pickled_form(model: Any) -> str | tuple[Callable[..., Any], tuple[Any, ...]]:
     """A model as pickle stores it: by its name, or, for a class that has no name in a module, by the call
     that makes it."""
-    maker = vars(model).get("maker")
-    return model.__qualname__ if maker is None else maker
+    made = vars(model).get("made")
+    return model.__qualname__ if made is None else (made.function, made.arguments)
 
 
-copyreg.pickle(ModelType, _reduced)
+copyreg.pickle(ModelType, _pickled_form)
 
 
 def keep(model: type[Model], *names: str) -> None:
-    """Let pickle take instances of these declarations of a model with a `maker`, whose classes no module names."""
+    """Let pickle take instances of these declarations of a model that is `made`, whose classes no module names."""
     for name in names:
-        of = getattr(model, name)
+        declared = getattr(model, name)
 
-        def reduced(instance: Any, of: type = of, name: str = name) -> str | tuple[Any, ...]:
-            if type(instance) is not of:  # of another declaration with these fields
+        def reduced(instance: Any, declared: type = declared, name: str = name) -> str | tuple[Any, ...]:
+            if type(instance) is not declared:  # of another declaration with these fields
                 return copyreg.__newobj__, (type(instance),), vars(instance)  # type: ignore[attr-defined]
-            return _kept, (model, name, Layout(of).values(instance), getattr(instance, "derived", None))
+            return _unpickled, (
+                model,
+                name,
+                Layout(declared).values(instance),
+                getattr(instance, "derived", None),
+            )
 
-        of.__reduce__ = reduced
+        declared.__reduce__ = reduced
 
 
-def _kept(model: type[Model], name: str, values: Sequence[Any], derived: Any) -> Any:
+def _unpickled(model: type[Model], name: str, values: Sequence[Any], derived: Any) -> Any:
     """The instance of that declaration of a model; see `keep`."""
     instance = Layout(getattr(model, name)).instance(values)
     if derived is not None:
@@ -161,41 +209,27 @@ class Model(metaclass=ModelType):
     parts: ClassVar[tuple[Part, ...]]
     required: ClassVar[tuple[Requirement, ...]] = ()
     terminals: ClassVar[tuple[Terminal, ...]] = ()
-    derived: ClassVar[int] = 0
+    derived_count: ClassVar[int] = 0
     """Number of values that follow from the fixed parameters alone and are computed once before a run; see
     `derive`."""
     input_rates: ClassVar[Mapping[str, str]] = {}
     """Inputs of a co-simulation FMU whose time derivative is another input (``phi`` has ``w``, ``w`` has
     ``a``). They are extrapolated inside a step; without that a turning shaft would stand still in each
     step."""
-    start_unknowns: ClassVar[int] = 0
-    """Number of unknowns that an iteration finds to give the states at the start; see `start`."""
-    start_rounds: ClassVar[int] = 0
-    """Number of rounds of that iteration."""
-    start_required: ClassVar[tuple[Requirement, ...]] = ()
-    """Conditions on the states at the start; see `start_limits`."""
+    start_problem: ClassVar[StartProblem] = StartProblem()
+    """Iteration for the states at the start; see `start`."""
     controlled: ClassVar[bool] = False
     """Whether a co-simulation FMU integrates with error control to `tolerance` and corrects the states by
-    `closed` after each substep; otherwise it integrates in equal steps."""
-    built_by: ClassVar[str] = ""
-    """The call that makes this class, if a function of its module makes it; else empty."""
+    `constrained_states` after each substep; otherwise it integrates in equal steps."""
+    made: ClassVar[Making | None] = None
+    """How a function of its module makes this class; None for a class that the module names."""
     components: ClassVar[Mapping[str, type[Model]]] = {}
     """By name, the models that make this one, if it is a system of models."""
-    modules: ClassVar[tuple[str, ...]] = ()
-    """Further modules of this package that the call imports by name, such as ``drives.dc_motor``."""
-    maker: ClassVar[tuple[Callable[..., Any], tuple[Any, ...]] | None] = None
-    """The same call as function and arguments, by which another process gets the class."""
-
-    notes: ClassVar[str] = ""
-    """Further paragraphs of the documentation of its FMU, each behind an empty line: frame, signs, limits."""
-    about: ClassVar[About | None] = None
-    """Who made the model, where its user did; None for the models of this package."""
+    fmu_data: ClassVar[FmuData] = FmuData()
     repeated: ClassVar[Mapping[str, str]] = {}
     """Outputs that are another output under a further name, by their names: their FMU has one value for both."""
     constant: ClassVar[Mapping[str, float]] = {}
     """Outputs that never change, with their values by name."""
-    experiment: ClassVar[Mapping[str, float]] = {}
-    """``step`` and ``stop`` [s] of the default experiment of its FMU, where the maker of the model knows them."""
 
     parameter_layout: ClassVar[Layout]
     input_layout: ClassVar[Layout]
@@ -207,6 +241,11 @@ class Model(metaclass=ModelType):
         cls.parameter_layout = Layout(cls.Parameters)
         cls.input_layout = Layout(cls.Inputs)
         cls.state_layout = Layout(cls.States) if cls.States else None
+
+    @classmethod
+    def expression(cls) -> str:
+        """The expression of Python that gives this class in its module."""
+        return cls.made.call if cls.made else cls.__qualname__
 
     @staticmethod
     def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
@@ -220,9 +259,9 @@ class Model(metaclass=ModelType):
         return []
 
     @classmethod
-    def prepared(cls, xp: Any, p: Any, derived: list[Any] | None = None) -> Any:
+    def with_derived(cls, xp: Any, p: Any, derived: list[Any] | None = None) -> Any:
         """The parameters with the values of `derive`, or with the values `derived` in their place."""
-        if not cls.derived:
+        if not cls.derived_count:
             return p
         # not `copy.copy`, which asks for the pickled form: that has no symbols and no values of a subclass
         ready = object.__new__(type(p))
@@ -231,7 +270,7 @@ class Model(metaclass=ModelType):
 
     @classmethod
     def check(cls, p: Any, derived: list[Any] | None = None) -> Any:
-        """The parameters `prepared`, with the values `derived` if they are given. Parameters that are out of
+        """The parameters `with_derived`, with the values `derived` if they are given. Parameters that are out of
         bounds, or with which the machine does not work, are refused.
 
         Raises
@@ -245,10 +284,10 @@ class Model(metaclass=ModelType):
             raise InputError(line)
         p = within_bounds(cls.parameter_layout, p)
         try:
-            p = cls.prepared(MATH, p, derived)
+            p = cls.with_derived(MATH, p, derived)
         except (ArithmeticError, ValueError):
             # `math` raises where other engines give NaN, which no requirement admits
-            p = cls.prepared(MATH, p, [math.nan] * cls.derived)
+            p = cls.with_derived(MATH, p, [math.nan] * cls.derived_count)
         cls._meets(p, cls.required, cls.requirements(MATH, p))
         return p
 
@@ -263,9 +302,8 @@ class Model(metaclass=ModelType):
                 raise error
 
     @classmethod
-    def course(cls, values: Sequence[Any]) -> list[tuple[int, Any, Any]]:
-        """Index, rate and half of the second derivative of each input of `input_rates`, from the `values` of
-        all inputs: after the time `since` the input has changed by since * (rate + since * half)."""
+    def extrapolations(cls, values: Sequence[Any]) -> list[Extrapolation]:
+        """The extrapolation of each input of `input_rates`, from the `values` of all inputs."""
 
         def rate(name: str | None) -> Any:
             other = cls.input_rates.get(name or "")
@@ -273,7 +311,8 @@ class Model(metaclass=ModelType):
 
         names = cls.input_layout.names
         return [
-            (names.index(name), rate(name), 0.5 * rate(cls.input_rates[name])) for name in cls.input_rates
+            Extrapolation(names.index(name), rate(name), 0.5 * rate(cls.input_rates[name]))
+            for name in cls.input_rates
         ]
 
     @staticmethod
@@ -287,7 +326,7 @@ class Model(metaclass=ModelType):
         return []
 
     @staticmethod
-    def start_improved(xp: Any, p: Any, u: Any, z: list[Any]) -> list[Any]:
+    def improve_start(xp: Any, p: Any, u: Any, z: list[Any]) -> list[Any]:
         """The unknowns of the start after one more round."""
         raise NotImplementedError
 
@@ -298,7 +337,7 @@ class Model(metaclass=ModelType):
 
     @staticmethod
     def start_limits(xp: Any, p: Any, u: Any, x: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """Value, lower limit and upper limit of each requirement of `start_required`, in order, for the
+        """Value, lower limit and upper limit of each requirement of the `start_problem`, in order, for the
         states `x`."""
         return iter(())
 
@@ -312,16 +351,16 @@ class Model(metaclass=ModelType):
             where the states do not meet a condition, in one line.
         """
         x = cls.start(MATH, p, u)
-        cls._meets(p, cls.start_required, cls.start_limits(MATH, p, u, x))
+        cls._meets(p, cls.start_problem.required, cls.start_limits(MATH, p, u, x))
         return x
 
     @classmethod
     def start(cls, xp: Any, p: Any, u: Any, rounds: int | None = None) -> Any:
-        """States at the start with the inputs `u`, by `start_rounds` or so many `rounds`: a few show the
-        dependencies."""
+        """States at the start with the inputs `u`, by the rounds of the `start_problem` or so many `rounds`: a few
+        show the dependencies."""
         z = cls.start_guess(xp, p, u)
-        for _ in range(cls.start_rounds if rounds is None else rounds):
-            z = cls.start_improved(xp, p, u, z)
+        for _ in range(cls.start_problem.rounds if rounds is None else rounds):
+            z = cls.improve_start(xp, p, u, z)
         return cls.start_states(xp, p, u, z)
 
     @staticmethod
@@ -340,7 +379,7 @@ class Model(metaclass=ModelType):
         raise NotImplementedError
 
     @staticmethod
-    def closed(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+    def constrained_states(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
         """The states near `x`, in declared order, that meet the model's constraints (`controlled` models)."""
         raise NotImplementedError
 
@@ -351,10 +390,10 @@ class Model(metaclass=ModelType):
 
     @classmethod
     def evaluate(cls, xp: Any, p: Any, u: Any, x: Any = None) -> tuple[Any, ...]:
-        """The outputs of every part at one point (or array of points). Parameters that are not yet `prepared`
+        """The outputs of every part at one point (or array of points). Parameters that are not yet `with_derived`
         are prepared in each call."""
-        if cls.derived and not hasattr(p, "derived"):
-            p = cls.prepared(MATH, p)
+        if cls.derived_count and not hasattr(p, "derived"):
+            p = cls.with_derived(MATH, p)
         shared = cls.shared(xp, p, u, x)
         return tuple(part.equations(xp, p, u, x, shared) for part in cls.parts)
 
@@ -364,7 +403,7 @@ class Model(metaclass=ModelType):
         return None
 
     @classmethod
-    def further(cls, xp: Any, p: Any, u: Any, x: Any = None) -> list[tuple[Variable, Any]]:
+    def further_quantities(cls, xp: Any, p: Any, u: Any, x: Any = None) -> list[tuple[Variable, Any]]:
         """Quantities beside the outputs, each declared and with its value at one point. Batches and cycle quantities
         know them; FMUs do not have them."""
         return []

@@ -128,7 +128,7 @@ class Link:
             Vec2(p2.x - y * t2 - x * spin, p2.y + x * t2 - y * spin),
         )
 
-    def third(self, r: Vec2, start: Vec2, t3: Any) -> Vec2:
+    def third_derivative(self, r: Vec2, start: Vec2, t3: Any) -> Vec2:
         """Third derivative by q of the point `r` away from the pin; `start` is that of the pin, `t3` that of
         the angle."""
         t1 = self.t1

@@ -286,12 +286,12 @@ def quantity(
     return dataclasses.field(default=default, metadata=metadata)
 
 
-def group(of: type, description: str, *, default: Any = None) -> Any:
-    """A field that holds the quantities of the declaration `of`, under this field's name.
+def group(declared: type, description: str, *, default: Any = None) -> Any:
+    """A field that holds the quantities of the declaration `declared`, under this field's name.
 
-    `default` is an instance of `of` with the start values (outputs have none).
+    `default` is an instance of `declared` with the start values (outputs have none).
     """
-    metadata = {"group": description, "of": of, "default": default}
+    metadata = {"group": description, "of": declared, "default": default}
     if default is None:
         return dataclasses.field(metadata=metadata)
     return dataclasses.field(default=default, metadata=metadata)
@@ -313,20 +313,20 @@ def declared_class(name: str, bases: tuple[type, ...], fields: Fields = ()) -> A
     return dataclasses.make_dataclass(name, fields, bases=bases, frozen=True, kw_only=True)
 
 
-def fields_of(of: type, *, without: Sequence[str] = ()) -> Fields:
+def fields_of(declared: type, *, without: Sequence[str] = ()) -> Fields:
     """The fields of a declaration except those in `without`, to build another one from."""
     return [
         (f.name, f.type, dataclasses.field(default=f.default, metadata=f.metadata))
-        for f in dataclasses.fields(of)
+        for f in dataclasses.fields(declared)
         if f.name not in without
     ]
 
 
-def pruned(of: type, leave_out: Container[str], prefix: str = "") -> type | None:
-    """The declaration `of` without the quantities whose full names, after `prefix`, are in `leave_out`: `of` itself
+def pruned(declared: type, leave_out: Container[str], prefix: str = "") -> type | None:
+    """The declaration without the quantities whose full names, after `prefix`, are in `leave_out`: `declared` itself
     where nothing is left out, None where nothing is left."""
     fields = []
-    for f in dataclasses.fields(of):
+    for f in dataclasses.fields(declared):
         name = prefix + f.name
         if "quantity" in f.metadata:
             if name not in leave_out:
@@ -340,9 +340,9 @@ def pruned(of: type, leave_out: Container[str], prefix: str = "") -> type | None
             fields.append((f.name, inner, group(inner, f.metadata["group"], default=default)))
     if not fields:
         return None
-    layout = {v.name for v in variables(of)}
+    layout = {v.name for v in variables(declared)}
     there = any(prefix + name in leave_out for name in layout)
-    return declared_class(of.__name__, (), fields) if there else of
+    return declared_class(declared.__name__, (), fields) if there else declared
 
 
 def narrowed(instance: Any, to: type) -> Any:

@@ -30,9 +30,9 @@ class Trace:
     derivatives: list[Any]
 
     @cached_property
-    def further(self) -> list[tuple[Variable, Any]]:
-        """The quantities beside the outputs, see `Model.further`."""
-        return self.model.further(casadi_(), self.p, self.u, self.x)
+    def further_quantities(self) -> list[tuple[Variable, Any]]:
+        """The quantities beside the outputs, see `Model.further_quantities`."""
+        return self.model.further_quantities(casadi_(), self.p, self.u, self.x)
 
     def outputs_at(self, x: Any) -> list[Any]:
         """The outputs with the states `x` in place of the symbols."""
@@ -43,7 +43,7 @@ class Trace:
         """The expressions in terms of parameters, inputs and states alone, without the derived values."""
         import casadi
 
-        if not self.model.derived:
+        if not self.model.derived_count:
             return list(expressions)
         p = self.model.parameter_layout.instance(casadi.vertsplit(self.symbols[0]))
         derived = casadi.vertcat(*self.model.derive(casadi_(), p))
@@ -58,10 +58,10 @@ def trace(model: type[Model]) -> Trace:
     layouts = (model.parameter_layout, model.input_layout, model.state_layout)
     sizes = [len(of.names) if of else 0 for of in layouts]
     symbols = [casadi.SX.sym(name, size) for name, size in zip("pux", sizes, strict=True)]
-    symbols.append(casadi.SX.sym("k", model.derived))
+    symbols.append(casadi.SX.sym("k", model.derived_count))
     p = model.parameter_layout.instance(casadi.vertsplit(symbols[0]))
-    if model.derived:
-        p = model.prepared(casadi_(), p, casadi.vertsplit(symbols[3]))
+    if model.derived_count:
+        p = model.with_derived(casadi_(), p, casadi.vertsplit(symbols[3]))
     u = model.input_layout.instance(casadi.vertsplit(symbols[1]))
     x = model.state_layout.instance(casadi.vertsplit(symbols[2])) if model.state_layout else None
     derivatives = model.derivatives(casadi_(), p, u, x) if model.state_layout else []

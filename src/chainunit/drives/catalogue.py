@@ -98,7 +98,7 @@ def heading(variable: Variable) -> str:
 
 
 def catalogue(extra: Path | None = None) -> list[CatalogueMotor]:
-    """The packaged motors, followed by those of the file `extra` (CSV, or TOML if its name ends in .toml).
+    """The packaged motors, followed by the motors of the file `extra` (CSV, or TOML if its name ends in .toml).
 
     Raises
     ------
@@ -115,7 +115,7 @@ def catalogue(extra: Path | None = None) -> list[CatalogueMotor]:
 def motor_of_catalogue(
     designation: str, extra: Path | None = None, others: Collection[str] = ()
 ) -> CatalogueMotor:
-    """The motor with this `designation`, among the packaged motors and those of the file `extra`; `others` are
+    """The motor with this `designation`, among the packaged motors and the motors of the file `extra`; `others` are
     further names to suggest for a misspelled one.
 
     Raises
@@ -185,7 +185,7 @@ class _Row:
 def _motors(
     rows: Callable[[str, str, Faults], Iterator[_Row]], text: str, file: str, others: set[str]
 ) -> list[CatalogueMotor]:
-    """The motors of a file whose `rows` these are, behind those of the designations `others`."""
+    """The motors of a file whose `rows` these are, behind the motors of the designations `others`."""
     motors, others, faults = [], set(others), Faults()
     for row in rows(text, file, faults):
         with faults.collected(), each_refusal(row.refusal):

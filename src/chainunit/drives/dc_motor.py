@@ -144,7 +144,7 @@ class DcMotorPoint(MotorPoint):
         self.turn(p, u, x)
 
     def rates(self, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
-        """Time derivatives of the states after those of the shaft."""
+        """Time derivatives of the states after the derivatives of the shaft's states."""
         speed, current = p.speed_control, p.current_control
         return [
             self.di,

@@ -40,7 +40,7 @@ class FreeRotorPoint(MotorPoint):
         self.turn(p, u, x)
 
     def rates(self, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
-        """None beside those of the shaft."""
+        """None beside the states of the shaft."""
         return []
 
 

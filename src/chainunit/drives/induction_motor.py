@@ -367,7 +367,7 @@ class InductionMotorPoint(MotorPoint):
         self.turn(p, u, x)
 
     def rates(self, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
-        """Time derivatives of the states after those of the shaft."""
+        """Time derivatives of the states after the derivatives of the shaft's states."""
         psi, psi_r = x.stator.psi, x.cage.psi
         # the soft starter runs while the supply is on, up to the full voltage
         limit = (1.0 - x.supply.ramp) / 2e-3

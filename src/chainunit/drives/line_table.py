@@ -41,8 +41,8 @@ class Damping:
     )
 
 
-def form(of: type[ShaftLine], title: str, prefix: str, **others: Any) -> type[BaseModel]:
-    """The pydantic model of the table: the fields of `of`, tables `shaft2`, `shaft3`, `damping_ratio`,
+def form(declared: type[ShaftLine], title: str, prefix: str, **others: Any) -> type[BaseModel]:
+    """The pydantic model of the table: the fields of `declared`, tables `shaft2`, `shaft3`, `damping_ratio`,
     `others`.
 
     `prefix` stands before a name in messages, such as "driveline.".
@@ -53,7 +53,7 @@ def form(of: type[ShaftLine], title: str, prefix: str, **others: Any) -> type[Ba
     for name in SHAFTS:
         inner = _shaft(name, prefix + name + ".")
         more[name] = (inner, Field(default_factory=inner))
-    return schema(of, title, prefix, **more)
+    return schema(declared, title, prefix, **more)
 
 
 def _shaft(title: str, prefix: str) -> type[BaseModel]:

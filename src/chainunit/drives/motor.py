@@ -84,7 +84,7 @@ class MotorPoint:
         return {"a": self.a, "tau": self.tau, "air_gap_tau": self.air_gap}
 
     def rates(self, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
-        """Time derivatives of the states after those of the shaft."""
+        """Time derivatives of the states after the derivatives of the shaft's states."""
         raise NotImplementedError
 
 

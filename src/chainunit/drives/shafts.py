@@ -155,7 +155,7 @@ def stiffness_of(keys: Mapping[str, Any]) -> float:
         if key not in (*required, *section.also, "section", "shear_modulus")
     ]
     if faults:
-        raise InputError.of(faults)
+        raise InputError.joined(faults)
     constant = section.constant(*(keys[key] for key in (*section.takes, *section.also) if key in keys))
     modulus = {"shear_modulus": keys["shear_modulus"]} if "shear_modulus" in keys else {}
     return stiffness(constant, keys["length"], **modulus)

@@ -15,7 +15,7 @@ from ..core.engines import casadi_
 from ..core.errors import InputError
 from ..core.model import About, Model
 from ..core.quantities import DISPLAY_UNITS, TYPES, Type, Variable, base_units, written
-from ..core.symbolic_trace import trace
+from ..core.symbolic_trace import Trace, trace
 from .recipe import Experiment, script_of
 from .script import Script
 
@@ -44,12 +44,14 @@ class Interface:
     """The variables of a model's FMU in the order of their value references: parameters, inputs, states
     (each an output), other outputs part by part."""
 
-    def __init__(self, model: type[Model], start: dict[str, float], own: type[Script] | None = None) -> None:
+    def __init__(
+        self, model: type[Model], start: dict[str, float], script: type[Script] | None = None
+    ) -> None:
         """
         Parameters
         ----------
         start : start values in place of the declared ones
-        own : the class of the user's script; by default the class of the model's script in `fmu/`
+        script : the class of the user's script; by default the class of the model's script in `fmu/`
 
         Raises
         ------
@@ -57,7 +59,7 @@ class Interface:
             for a name in `start` that is neither parameter nor input.
         """
         self.model = model
-        self.script = own or script_of(model)
+        self.script = script or script_of(model)
         self.parameters = model.parameter_layout.variables
         self.inputs = model.input_layout.variables
         self.states = model.state_layout.variables if model.state_layout else ()
@@ -79,24 +81,22 @@ class Interface:
     @cached_property
     def repeated(self) -> dict[str, Signal]:
         """The outputs that repeat another one, by name, with the signal of that one."""
-        own = {signal.name: signal for signal in self.of("output")}
+        own = {signal.name: signal for signal in self.signals_of("output")}
         return {name: own[of] for name, of in self.model.repeated.items()}
 
     @property
     def discrete(self) -> list[int]:
-        """Places among the outputs after the states of those that are counts or switches."""
+        """Places, among the outputs after the states, of counts and switches."""
         return [i for i, v in enumerate(self.others) if v.type != "Real"]
 
-    def of(self, causality: str) -> list[Signal]:
+    def signals_of(self, causality: str) -> list[Signal]:
         """Signals of one causality, in order."""
         return [s for s in self.signals if s.causality == causality]
 
     @property
-    def trace(self) -> tuple[list[Any], Any, Any, Any, list[Any], list[Any]]:
-        """The model in symbols: the casadi vectors (p, u, x, derived values); p, u and x as instances of their
-        declarations; the outputs part by part in declared order; and the derivatives of the states."""
-        t = trace(self.model)
-        return t.symbols, t.p, t.u, t.x, t.outputs, t.derivatives
+    def trace(self) -> Trace:
+        """The model in symbols."""
+        return trace(self.model)
 
     @property
     def dependencies(self) -> list[tuple[list[int], list[int]]]:
@@ -108,16 +108,16 @@ class Interface:
     @cached_property
     def _dependencies(self) -> list[tuple[list[int], list[int]]]:
         model = self.model
-        symbols, p, u, x, outputs, derivatives = self.trace
+        t = self.trace
+        rows = rows_at_start = [*t.outputs, *t.derivatives]
         states, start = [], []
-        rows_at_start = [*outputs, *derivatives]
         if model.state_layout:
-            states = model.state_layout.values(x)
-            first = model.start(casadi_(), p, u, rounds=min(2, model.start_rounds))
+            states = model.state_layout.values(t.x)
+            first = model.start(casadi_(), t.p, t.u, rounds=min(2, model.start_problem.rounds))
             start = model.state_layout.values(first)
-            rows_at_start = [*trace(model).outputs_at(first), *model.derivatives(casadi_(), p, u, first)]
-        in_run = self._influences(symbols, [*states, *outputs, *derivatives])
-        at_start = self._influences(symbols, [*start, *rows_at_start])
+            rows_at_start = [*t.outputs_at(first), *model.derivatives(casadi_(), t.p, t.u, first)]
+        in_run = self._influences(t.symbols, [*states, *rows])
+        at_start = self._influences(t.symbols, [*start, *rows_at_start])
         n = len(self.parameters)
         return [
             ([i for i in entries if i >= n], first) for entries, first in zip(in_run, at_start, strict=True)
@@ -134,11 +134,10 @@ class Interface:
         """
         import casadi
 
-        if not self.model.derived:
+        if not self.model.derived_count:
             return []
-        symbols, p, *_ = self.trace
-        rows = [casadi.SX(v) for v in self.model.derive(casadi_(), p)]
-        places = {i for row in self._places(symbols[:1], rows) for i in row}
+        rows = [casadi.SX(v) for v in self.model.derive(casadi_(), self.trace.p)]
+        places = {i for row in self._places(self.trace.symbols[:1], rows) for i in row}
         for i in sorted(places):
             if self.parameters[i].quantity.tunable:
                 raise ValueError(
@@ -148,7 +147,7 @@ class Interface:
 
     @property
     def reinitialized(self) -> frozenset[str]:
-        """The states that an event may change: `Model.closed` gives others than the states themselves."""
+        """The states that an event may change: `Model.constrained_states` gives others than the states themselves."""
         return _shared(self.model)._reinitialized
 
     @cached_property
@@ -157,9 +156,9 @@ class Interface:
 
         if not (self.model.state_layout and self.model.controlled):
             return frozenset()
-        _, p, u, x, *_ = self.trace
-        closed = self.model.closed(casadi_(), p, u, x)
-        pairs = zip(self.states, self.model.state_layout.values(x), closed, strict=True)
+        t = self.trace
+        constrained = self.model.constrained_states(casadi_(), t.p, t.u, t.x)
+        pairs = zip(self.states, self.model.state_layout.values(t.x), constrained, strict=True)
         return frozenset(v.name for v, own, met in pairs if not casadi.is_equal(casadi.SX(met), own))
 
     def _influences(self, symbols: list[Any], rows: list[Any]) -> list[list[int]]:
@@ -167,7 +166,7 @@ class Interface:
         derived values."""
         direct = self._places(symbols, rows)
         first = sum(symbol.shape[0] for symbol in symbols[:3])
-        through = self._places(symbols[:1], self.derived) if self.model.derived else []
+        through = self._places(symbols[:1], self.derived) if self.model.derived_count else []
         return [
             sorted({j for i in row for j in (through[i - first] if i >= first else (i,))}) for row in direct
         ]
@@ -265,7 +264,7 @@ def model_description_3(
         derivative = {} if state is None else {"derivative": str(state)}
         tag = TYPES_3[kind]
         elements[attributes["name"]] = SubElement(variables, tag, {**attributes, **own, **derivative})
-    for signal in interface.of("output"):
+    for signal in interface.signals_of("output"):
         if (one := interface.repeated.get(signal.name)) is not None:
             SubElement(elements[one.name], "Alias", name=signal.name, description=signal.variable.description)
     time = {
@@ -313,7 +312,7 @@ def _variables(
 
 def _structure(interface: Interface, derivatives: bool) -> Iterator[tuple[str, int, list[int]]]:
     """For each unknown: its kind in FMI 3.0, its value reference, and the value references of its dependencies."""
-    outputs = [s.reference for s in interface.of("output")]
+    outputs = [s.reference for s in interface.signals_of("output")]
     rates = [len(interface.signals) + i for i in range(len(interface.states) if derivatives else 0)]
     kinds = ["Output"] * len(outputs) + ["ContinuousStateDerivative"] * len(rates)
     unknowns = list(zip(kinds, [*outputs, *rates], interface.dependencies, strict=False))
@@ -330,11 +329,13 @@ def _dependencies(references: Iterable[int]) -> dict[str, str]:
     return {"dependencies": " ".join(texts), "dependenciesKind": " ".join("dependent" for _ in texts)}
 
 
-def _root(model: type[Model], version: str, own: Mapping[str, str]) -> Element:
+def _root(model: type[Model], version: str, identity: Mapping[str, str]) -> Element:
     """The root element, with the attributes that are common to both versions of FMI. `version` is that of this
     package."""
-    fmi, identifier = own.items()
-    about = model.about or About(metadata.metadata("chainunit")["Author"], _copyright(), "MIT", version)
+    fmi, identifier = identity.items()
+    about = model.fmu_data.about or About(
+        metadata.metadata("chainunit")["Author"], _copyright(), "MIT", version
+    )
     given = {"author": about.author, "version": about.version}
     given |= {"copyright": about.copyright, "license": about.license}
     return Element(
@@ -399,12 +400,12 @@ def _definitions(
     root: Element,
     interface: Interface,
     derivatives: bool,
-    more: set[str],
+    further_units: set[str],
     add_type: Callable[[Element, str, dict[str, str]], None],
 ) -> None:
-    """Write the definitions of all units and of those in `more`, the declared types, the categories of messages, and
-    the default experiment."""
-    units = more | {s.variable.unit for s in interface.signals if s.variable.type == "Real"}
+    """Write the definitions of all units with the `further_units`, the declared types, the categories of messages,
+    and the default experiment."""
+    units = further_units | {s.variable.unit for s in interface.signals if s.variable.type == "Real"}
     units |= {_per_second(v.unit) for v in interface.states if derivatives}
     definitions = SubElement(root, "UnitDefinitions")
     for unit in sorted(units):

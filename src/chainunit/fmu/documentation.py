@@ -33,13 +33,13 @@ def page(interface: Interface, version: str, sketch: Sketch | None) -> str:
     """A self-contained page: a description of the model with its `sketch`, and tables of its parameters, inputs and
     outputs."""
     model = interface.model
-    text = escape(inspect.cleandoc(model.__doc__ or "") + model.notes).replace("\n\n", "</p><p>")
+    text = escape(inspect.cleandoc(model.__doc__ or "") + model.fmu_data.notes).replace("\n\n", "</p><p>")
     picture = f"<figure>{drawing(sketch)}<figcaption>{_FIGURE}</figcaption></figure>\n" if sketch else ""
     tables = "".join(
-        f"<h2>{title}</h2>\n{_table(interface.of(causality), causality)}"
+        f"<h2>{title}</h2>\n{_table(interface.signals_of(causality), causality)}"
         for title, causality in (("Parameters", "parameter"), ("Inputs", "input"), ("Outputs", "output"))
     )
-    motion = {s.name: s for s in interface.of("input") if s.name in ("phi", "w", "a")}
+    motion = {s.name: s for s in interface.signals_of("input") if s.name in ("phi", "w", "a")}
     inputs = _NOT_CONNECTED
     if len(motion) == 3 and not motion["w"].start:
         phi = motion["phi"]
@@ -49,7 +49,7 @@ def page(interface: Interface, version: str, sketch: Sketch | None) -> str:
     return (
         f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{model.name}</title>'
         f"<style>{_STYLE}</style></head>\n<body><h1>{model.name}</h1>\n<p>{escape(model.description)}</p>\n"
-        f"{picture}<p>{text}</p>\n<p>{inputs}</p>\n{tables}{_origin(model.about)}"
+        f"{picture}<p>{text}</p>\n<p>{inputs}</p>\n{tables}{_origin(model.fmu_data.about)}"
         f"<p>Made by chainunit {version}; its code in this FMU is under the MIT licence.</p></body></html>\n"
     )
 

@@ -21,10 +21,10 @@ from xml.etree.ElementTree import Element, tostring
 from pythonfmu import FmuBuilder
 
 from ..core.errors import InputError
-from ..core.files import folder, whole
+from ..core.files import atomic_file, folder
 from ..core.model import Model
 from ..core.temporary_folders import scratch
-from .accompany import companion_files
+from .companion_files import companion_files
 from .description import Interface, model_description
 from .pack import interface_of, pack
 from .recipe import script_file, script_of
@@ -67,7 +67,7 @@ def export(model: type[Model], file: Path, start: dict[str, float] | None = None
         script.write_text(text)
         raw = _build(script, work / "raw.fmu")
         version = metadata.version("chainunit")
-        with whole(file) as part:
+        with atomic_file(file) as part:
             pack(_contents(raw) | companion_files(interface, version, 2, ("pythonfmu",)), part)
     return file
 
@@ -202,18 +202,19 @@ def _script(model: type[Model], start: dict[str, float]) -> str:
     a function makes, the arguments of that function."""
     file = script_file(model)
     module = model.__module__.rpartition(".")[2]
-    call = model.built_by or model.__qualname__
-    paths = (*(f"{__package__.partition('.')[0]}.{each}" for each in model.modules), model.__module__)
+    made, call = model.made, model.expression()
+    paths = (
+        *(f"{__package__.partition('.')[0]}.{each}" for each in (made.modules if made else ())),
+        model.__module__,
+    )
     imports = "\n".join("from {0} import {2}".format(*path.rpartition(".")) for path in paths)
     own = script_of(model)
     extras = {"experiment": own.experiment, "sizes": own.sizes}
     more = "".join(f"    {name} = {values!r}\n" for name, values in extras.items() if values)
     plain = _SCRIPT.format(name=model.name, imports=imports, module=module, call=call, more=more)
     text = file.read_text() if file else plain
-    if model.built_by:
-        text = re.sub(
-            r"(?m)^(    model = \w+\.)\w+\([\d, ]*\)(?:\.\w+\(\))*", rf"\g<1>{model.built_by}", text
-        )
+    if made:
+        text = re.sub(r"(?m)^(    model = \w+\.)\w+\([\d, ]*\)(?:\.\w+\(\))*", rf"\g<1>{call}", text)
     values = {name: float(start[name]) for name in sorted(start)}
     return text + (f"    start = {values!r}\n" if values else "")
 

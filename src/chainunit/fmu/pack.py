@@ -17,7 +17,7 @@ _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time of a zip entry
 
 
 def interface_of(
-    model: type[Model], start: Mapping[str, float] | None, own: type[Script] | None = None
+    model: type[Model], start: Mapping[str, float] | None, script: type[Script] | None = None
 ) -> Interface:
     """The interface of `model` with these start values; they are checked as parameters of the model.
 
@@ -28,11 +28,11 @@ def interface_of(
     InputError
         where the start values are out of bounds or make no machine.
     """
-    interface = Interface(model, {name: float(value) for name, value in (start or {}).items()}, own)
-    for signal in interface.of("input"):
+    interface = Interface(model, {name: float(value) for name, value in (start or {}).items()}, script)
+    for signal in interface.signals_of("input"):
         if not signal.variable.quantity.admits(signal.start or 0.0):
             raise InputError(complaint(signal.variable, signal.start))
-    model.check(model.parameter_layout.instance([s.start for s in interface.of("parameter")]))
+    model.check(model.parameter_layout.instance([s.start for s in interface.signals_of("parameter")]))
     return interface
 
 

@@ -48,7 +48,7 @@ def script_of(model: type[Model]) -> type[Script]:
         experiment = {k: min(x, experiment.get(k, x)) for k, x in (experiment | script.experiment).items()}
     inputs = set(model.input_layout.names)
     sizes = {f"{name}.{k}": x for name, script in own.items() for k, x in script.sizes.items()}
-    experiment |= model.experiment
+    experiment |= model.fmu_data.experiment
     members = {"experiment": experiment, "sizes": {full: x for full, x in sizes.items() if full in inputs}}
     return type("SystemScript", (Script,), members)
 
@@ -65,8 +65,8 @@ def _script(file: Path) -> type[Script]:
     return own
 
 
-def often(model: type[Model]) -> set[str]:
-    """The outputs that are read at every step: those of the terminals."""
+def frequent_outputs(model: type[Model]) -> set[str]:
+    """The outputs that are read at every step: the members of the terminals."""
     return {name for terminal in model.terminals for name in terminal.members.values()}
 
 
@@ -74,7 +74,7 @@ def icon(model: type[Model], kind: str, sketch: Sketch | None) -> bytes:
     """The icon of a model, "svg" or "png": for a user's machine its `sketch`; else the file in `data/icons` with the
     model's name, else the general icon of a motor (the model takes a load port), of a line (it takes one and gives
     one), or of a machine."""
-    if sketch and model.about is not None:
+    if sketch and model.fmu_data.about is not None:
         return pictures.icon_svg(sketch) if kind == "svg" else pictures.icon_png(sketch)
     folder = resources.files("chainunit") / "data" / "icons"
     takes = {t.members["tau_bias"] in model.input_layout.names for t in model.terminals if t.kind == LOAD}

@@ -83,7 +83,9 @@ def _tables(interface: Interface) -> dict[str, tuple[list[str], list[list[float]
         where a value is no finite number, or one step of the file takes more than `_MOST_STEPS` of the integrator.
     """
     model = interface.model
-    p = model.prepared(MATH, model.parameter_layout.instance([s.start for s in interface.of("parameter")]))
+    p = model.with_derived(
+        MATH, model.parameter_layout.instance([s.start for s in interface.signals_of("parameter")])
+    )
     inputs = excitation(interface)
     layout = model.state_layout
     tables: dict[str, list[list[float]]] = {INPUTS: [], STEPPED: [], READ: []}
@@ -111,9 +113,9 @@ def _tables(interface: Interface) -> dict[str, tuple[list[str], list[list[float]
         if march:
             x = march(t, new, x)
         u = list(new)
-        for place, rate, half in model.course(new):
+        for place, rate, half in model.extrapolations(new):
             u[place] += STEP * (rate + STEP * half)
-    heads = {kind: ["time", *(s.name for s in interface.of(kind))] for kind in ("input", "output")}
+    heads = {kind: ["time", *(s.name for s in interface.signals_of(kind))] for kind in ("input", "output")}
     return {end: (heads["input" if end == INPUTS else "output"], rows) for end, rows in tables.items()}
 
 
@@ -125,10 +127,10 @@ def _march(interface: Interface, p: Any) -> Any:
     model = interface.model
     layout = model.state_layout
     assert layout is not None
-    (of_p, of_u, of_x, of_derived), *_, derivatives = interface.trace
+    (of_p, of_u, of_x, of_derived), derivatives = interface.trace.symbols, interface.trace.derivatives
     inputs, since = casadi.SX.sym("u", len(model.input_layout.names)), casadi.SX.sym("since")
     moving = [inputs[k] for k in range(inputs.numel())]
-    for place, rate, half in model.course(moving):
+    for place, rate, half in model.extrapolations(moving):
         moving[place] += since * (rate + since * half)
     # states in units of their nominal size, so that one tolerance suits all of them
     nominal = casadi.DM([v.quantity.nominal or 1.0 for v in layout.variables])
@@ -152,7 +154,7 @@ def _march(interface: Interface, p: Any) -> Any:
         if model.controlled:
             for _ in range(2):
                 values, states = model.input_layout.instance(list(u)), layout.instance(list(x))
-                x = model.closed(MATH, p, values, states)
+                x = model.constrained_states(MATH, p, values, states)
         try:
             later = solver(x0=casadi.DM(x) / nominal, u=u)["xf"] * nominal
         except RuntimeError as error:
@@ -201,7 +203,7 @@ def excitation(interface: Interface) -> Callable[[float], dict[str, float]]:
             moving = _load(sizes.get(terminal.members["tau_bias"], _PUSH * inertia), inertia)
         elif terminal.kind == FLANGE:
             moving = _SHAFT
-            turning = [s for s in interface.of("input") if s.name == terminal.members.get("tau")]
+            turning = [s for s in interface.signals_of("input") if s.name == terminal.members.get("tau")]
             if turning and model.state_layout:
                 # with a usual torque the states of a light shaft would run away
                 tau, most = turning[0], _PUSH * _inertia(interface, turning[0].name)
@@ -212,7 +214,7 @@ def excitation(interface: Interface) -> Callable[[float], dict[str, float]]:
         courses |= {terminal.members[member]: course for member, course in moving.items()}
     others = {
         s.name: _swing(s.variable.quantity, _size(s.variable.quantity, s.start, sizes.get(s.name)), k)
-        for k, s in enumerate(interface.of("input"))
+        for k, s in enumerate(interface.signals_of("input"))
     }
     courses = others | {name: course for name, course in courses.items() if name in others}
     return lambda t: {name: course(t) for name, course in courses.items()}
@@ -247,19 +249,21 @@ def _inertia(interface: Interface, torque: str) -> float:
     model, layout = interface.model, interface.model.state_layout
     if layout is None:
         return 1.0
-    symbols, *_, derivatives = interface.trace
+    symbols, derivatives = interface.trace.symbols, interface.trace.derivatives
     speeds = [d for d, v in zip(derivatives, interface.states, strict=True) if v.unit == "rad/s"]
     by = casadi.jacobian(casadi.vertcat(*speeds), symbols[1][model.input_layout.names.index(torque)])
-    p = model.prepared(MATH, model.parameter_layout.instance([s.start for s in interface.of("parameter")]))
-    u = [s.start for s in interface.of("input")]
+    p = model.with_derived(
+        MATH, model.parameter_layout.instance([s.start for s in interface.signals_of("parameter")])
+    )
+    u = [s.start for s in interface.signals_of("input")]
     x = layout.values(model.begin(p, model.input_layout.instance(u)))
     at: list[Any] = [model.parameter_layout.values(p), u, x, getattr(p, "derived", [])]
     slopes = casadi.Function("slopes", symbols, [casadi.densify(by)])(*at).full()
     return float(1.0 / (abs(slopes).max() or 1.0))
 
 
-def _size(q: Quantity, start: float | None, own: float | None) -> float:
-    return own or start or q.nominal or _SIZES.get(q.unit, 1.0)
+def _size(q: Quantity, start: float | None, stated: float | None) -> float:
+    return stated or start or q.nominal or _SIZES.get(q.unit, 1.0)
 
 
 def _swing(q: Quantity, size: float, k: int) -> Callable[[float], float]:

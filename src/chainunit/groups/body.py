@@ -79,7 +79,7 @@ class Body:
         start, t3 = third
         pin, c = self.link.pin, self.c
         arm, turning = c.p - pin.p, c.p1 - pin.p1
-        force = self.link.third(arm, start, t3) * (-(self.m * w2))
+        force = self.link.third_derivative(arm, start, t3) * (-(self.m * w2))
         # the present force acts on an arm that turns
         by_arm = turning.x * (c.p2.y * w2 + field) - turning.y * (c.p2.x * w2)
         return force, arm.cross(force) - by_arm * self.m - self.I * (t3 * w2)

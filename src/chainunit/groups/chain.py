@@ -210,9 +210,9 @@ class Chain:
         """
         N = len(rods)
         speeds = [0.0, *omega, end_spin]
-        slips = [speeds[k + 1] - speeds[k] for k in range(N + 1)]
-        moments = [c * slip for c, slip in zip(rods.damping, slips, strict=True)]
-        self.damping_power = sum(moment * slip for moment, slip in zip(moments, slips, strict=True))
+        relative = [speeds[k + 1] - speeds[k] for k in range(N + 1)]
+        moments = [c * speed for c, speed in zip(rods.damping, relative, strict=True)]
+        self.damping_power = sum(moment * speed for moment, speed in zip(moments, relative, strict=True))
         self.folding = 0.0
         # without a stop nothing is computed for it
         if not (isinstance(rods.fold_stiffness, float) and rods.fold_stiffness == 0.0):

@@ -18,7 +18,7 @@ from typing import Any
 from ..core.planar import ZERO, Link, Motion, Vec2
 from .body import Bar, Load
 from .driver import Driver, SolvedDriver
-from .group import GuideForce, Joint, Placed, Slide, Third
+from .group import GuideForce, Joint, PlacedLinkage, Slide, Third
 
 
 @dataclass
@@ -68,7 +68,7 @@ class Cylinder(Driver):
         """The mass of the rod [kg], which moves at the speed of the way at least."""
         return 0.0 if self.rod.mass is None else self.rod.mass.m
 
-    def solve(self, xp: Any, q: Any, at: Placed, derived: Sequence[Any]) -> SolvedCylinder:
+    def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedCylinder:
         """The cylinder at the way `q` [m]."""
         return SolvedCylinder.at(xp, q, at.pins[self.bar.pin].p, at.pins[self.lever.pin].p, self)
 
@@ -122,10 +122,10 @@ class SolvedCylinder(SolvedDriver):
         margin = r.cross(e) / (b * xp.sqrt(square))
         return cls(data, (e, r), way, links, (end,), margin, (Slide(d, q, 1.0, 0.0),))
 
-    def third(
+    def third_derivatives(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """Third derivatives by q of the links and the pins, from those of the outer pins and the rails."""
+        """Third derivatives by q of the links and the pins, from the outer pins' and rails'."""
         barrel, _, lever = self.links
         e, r, d = self._e, self._r, barrel.u
         t1, t2, turn1, turn2 = barrel.t1, barrel.t2, lever.t1, lever.t2
@@ -134,7 +134,7 @@ class SolvedCylinder(SolvedDriver):
         rest = rest + d.turned() * (3.0 * t2) - d * (3.0 * (t1 * t1))
         t3 = rest.dot(r) * self._per_det + t1 * t1 * t1
         turn3 = rest.dot(e) * self._per_det + turn1 * turn1 * turn1
-        end = lever.third(r, ZERO, turn3)
+        end = lever.third_derivative(r, ZERO, turn3)
         return [(ZERO, t3), (end, t3), (ZERO, turn3)], [end]
 
     def _forces(self, loads: Sequence[Load]) -> tuple[Any, Any]:
@@ -152,7 +152,7 @@ class SolvedCylinder(SolvedDriver):
         """See `SolvedDriver`: the force of the cylinder [N]."""
         return self._forces(loads)[0]
 
-    def turning(self, effort: Any) -> Iterator[tuple[int, Vec2]]:
+    def force_turn(self, effort: Any) -> Iterator[tuple[int, Vec2]]:
         """See `SolvedDriver`: the line of the force turns with the cylinder."""
         barrel = self.links[0]
         more = barrel.u.turned() * (effort * barrel.t1)

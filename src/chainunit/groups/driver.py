@@ -12,7 +12,7 @@ from typing import Any
 
 from ..core.planar import ZERO, Link, Motion, Vec2
 from .body import Bar, Load, Mass
-from .group import Group, GuideForce, Placed, Rail, Slide, SolvedGroup, Third
+from .group import Group, GuideForce, PlacedLinkage, Rail, Slide, SolvedGroup, Third
 
 UPWARD = Vec2(0.0, 1.0)
 
@@ -70,7 +70,7 @@ class Crank(Driver):
         arm2 = mass.s * mass.s if beside is None else mass.s * mass.s + beside * beside
         return mass.I + mass.m * arm2
 
-    def solve(self, xp: Any, q: Any, at: Placed, derived: Sequence[Any]) -> SolvedDriver:
+    def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedDriver:
         """The crank at the angle `q` [rad]."""
         link = crank(xp, at.pins[self.bar.pin].p, q, self.start, self.sense)
         return TurnedCrank((link,), (link.at(self.bar.length),) if self._ends else ())
@@ -107,9 +107,9 @@ class Ram(Driver):
         """Its mass [kg]."""
         return 0.0 if self.bar.mass is None else self.bar.mass.m
 
-    def solve(self, xp: Any, q: Any, at: Placed, derived: Sequence[Any]) -> SolvedDriver:
+    def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedDriver:
         """The ram at the way `q` [m]."""
-        rail = self.rail.placed(at.links)
+        rail = self.rail.at_position(at.links)
         start = Motion(rail.pin.p + rail.u * q, rail.u)
         return PushedRam((Link(start, rail.u, 0.0, 0.0),), (), 1.0, (Slide(rail.u, q, 1.0, 0.0),))
 
@@ -119,19 +119,19 @@ class SolvedDriver(SolvedGroup):
 
     __slots__ = ()
 
-    def third(
+    def third_derivatives(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """Third derivatives by q of the links and the pins, from those of the outer pins and the rails."""
+        """Third derivatives by q of the links and the pins, from the outer pins' and rails'."""
         (link,) = self.links
-        return [(ZERO, 0.0)], [link.third(end.p - link.pin.p, ZERO, 0.0) for end in self.pins]
+        return [(ZERO, 0.0)], [link.third_derivative(end.p - link.pin.p, ZERO, 0.0) for end in self.pins]
 
     def effort(self, loads: Sequence[Load]) -> Any:
         """The torque, or of a ram the force, along the coordinate that holds against the loads of the links [N m,
         N]."""
         raise NotImplementedError
 
-    def turning(self, effort: Any) -> Iterator[tuple[int, Vec2]]:
+    def force_turn(self, effort: Any) -> Iterator[tuple[int, Vec2]]:
         """The derivative of the driver's own forces on its links, by their places, as their lines turn with q."""
         return iter(())
 

@@ -15,7 +15,7 @@ from typing import Any
 
 from ..core.planar import Link, Motion, Vec2
 from .body import Bar, Load
-from .group import Group, Placed, SolvedGroup, Third
+from .group import Group, PlacedLinkage, SolvedGroup, Third
 
 
 @dataclass
@@ -45,7 +45,7 @@ class Dyad(Group):
         first, second = self.first, self.second
         return (first.pin, first.name), (self.inner, first.name), (second.pin, second.name)
 
-    def solve(self, xp: Any, q: Any, at: Placed, derived: Sequence[Any]) -> SolvedDyad:
+    def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedDyad:
         """The dyad where its outer pins are."""
         first, second, pins = self.first, self.second, at.pins
         return SolvedDyad.between(
@@ -102,16 +102,16 @@ class SolvedDyad(SolvedGroup):
         second = Link(q, u2, s2, (hx * x1 + hy * y1) * minus_per_det)
         return cls((r1, r2), minus_per_det, (first, second), first.carried(r1), det / (a * b))
 
-    def third(
+    def third_derivatives(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """Third derivatives by q of the links and the pins, from those of the outer pins and the rails."""
+        """Third derivatives by q of the links and the pins, from the outer pins' and rails'."""
         (p, q), (first, second) = outer, self.links
         (r1, s1, x), (r2, s2, y) = (self.r1, first.t1, first.t2), (self.r2, second.t1, second.t2)
         h = p - q - r1.turned() * (s1 * s1 * s1) + r2.turned() * (s2 * s2 * s2)
         h = h - r1 * (3.0 * (s1 * x)) + r2 * (3.0 * (s2 * y))
         thirds = (p, h.dot(r2) * self._minus_per_det), (q, h.dot(r1) * self._minus_per_det)
-        return thirds, (first.third(r1, *thirds[0]),)
+        return thirds, (first.third_derivative(r1, *thirds[0]),)
 
     def reactions(self, loads: Sequence[Load]) -> tuple[Vec2, Vec2, Vec2]:
         """Forces at P (on the first link), at B (on the first link, from the second) and at Q

@@ -14,7 +14,7 @@ Joint = tuple[str, str]
 """A joint of a linkage by the names of its pin and of the link on which its reaction acts."""
 
 
-class Placed(Protocol):
+class PlacedLinkage(Protocol):
     """The linkage before a group at one position: its `pins` with points, and its `links`, by name."""
 
     @property
@@ -34,7 +34,7 @@ class Rail(NamedTuple):
     at: Vec2
     along: Vec2
 
-    def placed(self, links: Mapping[str, Link]) -> Link:
+    def at_position(self, links: Mapping[str, Link]) -> Link:
         """The line at the position of its link, as a link of its own: it starts from the point."""
         if self.of is None:
             return Link(Motion(self.at), self.along, 0.0, 0.0)
@@ -91,7 +91,7 @@ class SolvedGroup:
     ) -> None:
         self.links, self.pins, self.margin, self.slides = links, pins, margin, slides
 
-    def third(
+    def third_derivatives(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
         """Third derivatives by q of each link and of each pin that the group adds, from the third derivatives of the
@@ -107,7 +107,7 @@ class SolvedGroup:
 class Group:
     """A group as data."""
 
-    derived: ClassVar[int] = 0
+    derived_count: ClassVar[int] = 0
     """The number of values that `derive` computes from the lengths, once before a run."""
 
     @property
@@ -135,19 +135,19 @@ class Group:
         """The lines of earlier links on which its own links slide."""
         return ()
 
-    def derive(self, xp: Any, before: Callable[[float], Placed]) -> list[Any]:
+    def derive(self, xp: Any, before: Callable[[float], PlacedLinkage]) -> list[Any]:
         """Numbers that follow from its lengths; `before` gives the linkage before the group at a crank angle
         [rad]."""
         return []
 
-    def solve(self, xp: Any, q: Any, at: Placed, derived: Sequence[Any]) -> SolvedGroup:
+    def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedGroup:
         """The group at the coordinate `q` [rad]; `at` is the linkage before the group at this coordinate."""
         raise NotImplementedError
 
 
 def rail_third(rail: Rail, placed: Link, links: Mapping[str, Link], thirds: Mapping[str, Third]) -> Third:
-    """The third derivatives of a rail, where it is `placed`, from those of the links."""
+    """The third derivatives of a rail, where it is `placed`, from the third derivatives of the links."""
     if rail.of is None:
         return ZERO, 0.0
     link, third = links[rail.of], thirds[rail.of]
-    return link.third(placed.pin.p - link.pin.p, *third), third[1]
+    return link.third_derivative(placed.pin.p - link.pin.p, *third), third[1]

@@ -11,11 +11,19 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 from ..core.planar import ZERO, Link, Motion, Vec2, coriolis, coriolis_third, rod_rates
 from .body import Bar, Load
-from .group import GuideForce, Joint, Placed, Rail, Slide, Third
+from .group import GuideForce, Joint, PlacedLinkage, Rail, Slide, Third
+
+
+class SolvedLeg(NamedTuple):
+    """A leg as a link, its inner pin, and the motion in its sliding joint, where it has one."""
+
+    link: Link
+    pin: Motion | None
+    slide: Slide | None
 
 
 @dataclass
@@ -39,7 +47,7 @@ class Leg:
         """The line of an earlier link on which it slides, if any."""
         return None
 
-    def placed(self, at: Placed) -> PlacedLeg:
+    def at_position(self, at: PlacedLinkage) -> PlacedLeg:
         """The leg, with the linkage `at` before it, for any pose of the ternary link."""
         raise NotImplementedError
 
@@ -69,15 +77,15 @@ class LegAt:
         """Right side for the second derivatives of the pose, from the first ones."""
         raise NotImplementedError
 
-    def third(self, ternary: Link, outer: Third) -> Any:
-        """Right side for the third derivatives of the pose, from those of the outer pin or of the rail."""
+    def third_right_side(self, ternary: Link, outer: Third) -> Any:
+        """Right side for the third derivatives of the pose, from the outer pin or the rail."""
         raise NotImplementedError
 
-    def link_third(self, ternary: Link, own: Third, outer: Third) -> tuple[Third, Vec2 | None]:
-        """Third derivatives of the leg, and of its inner pin, from those of the ternary link (`own`)."""
+    def link_third(self, ternary: Link, ternary_third: Third, outer: Third) -> tuple[Third, Vec2 | None]:
+        """Third derivatives of the leg, and of its inner pin, from the ternary link's (`ternary_third`)."""
         raise NotImplementedError
 
-    def solved(self, ternary: Link) -> tuple[Link, Motion | None, Slide | None]:
+    def solution(self, ternary: Link) -> SolvedLeg:
         """The leg as a link, its inner pin, and the motion in its sliding joint."""
         raise NotImplementedError
 
@@ -111,7 +119,7 @@ class RodLeg(Leg):
         """Pin and link of the outer and of the inner reaction."""
         return (self.bar.pin, self.bar.name), (self.pin, self.bar.name)
 
-    def placed(self, at: Placed) -> PlacedLeg:
+    def at_position(self, at: PlacedLinkage) -> PlacedLeg:
         """The leg, with the linkage `at` before it, for any pose of the ternary link."""
         return partial(RodAt, at.pins[self.bar.pin], self.bar.length, self.arm)
 
@@ -148,8 +156,8 @@ class RodAt(LegAt):
         a, p = self.spot, self._outer
         return self._r.dot(p.p2 + a * (t1 * t1)) - (origin1 + a.turned() * t1 - p.p1).squared()
 
-    def third(self, ternary: Link, outer: Third) -> Any:
-        """Right side for the third derivatives of the pose, from those of the outer pin or the rail."""
+    def third_right_side(self, ternary: Link, outer: Third) -> Any:
+        """Right side for the third derivatives of the pose, from the outer pin or the rail."""
         a, p, t1 = self.spot, self._outer, ternary.t1
         k = ternary.carried(a)
         centripetal = 3.0 * (k.p1 - p.p1).dot(k.p2 - p.p2)
@@ -157,19 +165,19 @@ class RodAt(LegAt):
             self._r.dot(outer[0] + a.turned() * (t1 * t1 * t1) + a * (3.0 * (t1 * ternary.t2))) - centripetal
         )
 
-    def link_third(self, ternary: Link, own: Third, outer: Third) -> tuple[Third, Vec2 | None]:
-        """Third derivatives of the leg and of its inner pin, from those of the ternary link."""
-        end = ternary.third(self.spot, *own)
+    def link_third(self, ternary: Link, ternary_third: Third, outer: Third) -> tuple[Third, Vec2 | None]:
+        """Third derivatives of the leg and of its inner pin, from the ternary link's."""
+        end = ternary.third_derivative(self.spot, *ternary_third)
         p, k = self._outer, ternary.carried(self.spot)
         t1 = self._r.cross(k.p1 - p.p1) * self._per_square
         return (outer[0], self._r.cross(end - outer[0]) * self._per_square + t1 * t1 * t1), end
 
-    def solved(self, ternary: Link) -> tuple[Link, Motion | None, Slide | None]:
+    def solution(self, ternary: Link) -> SolvedLeg:
         """The leg as a link, its inner pin, and the motion in its sliding joint."""
         p, k, r = self._outer, ternary.carried(self.spot), self._r
         k = Motion(p.p + r, k.p1, k.p2)
         rates = rod_rates(r, k.p1 - p.p1, k.p2 - p.p2, self._per_square)
-        return Link(p, r * (1.0 / self.size), *rates), k, None
+        return SolvedLeg(Link(p, r * (1.0 / self.size), *rates), k, None)
 
     def known_part(self, load: Load) -> tuple[Vec2, Any]:
         """See `LegAt`: the force across the rod, which the moment about its outer pin needs."""
@@ -213,9 +221,9 @@ class BlockLeg(Leg):
         """The line of an earlier link on which the leg slides."""
         return self.on
 
-    def placed(self, at: Placed) -> PlacedLeg:
+    def at_position(self, at: PlacedLinkage) -> PlacedLeg:
         """The leg, with the linkage `at` before it, for any pose of the ternary link."""
-        return partial(BlockAt, self.on.placed(at.links), self.arm)
+        return partial(BlockAt, self.on.at_position(at.links), self.arm)
 
 
 class BlockAt(LegAt):
@@ -253,22 +261,22 @@ class BlockAt(LegAt):
         s2 = (k.p2 - coriolis(rail, carried, rail.u * s1)).dot(rail.u)
         return Slide(rail.u, self._way.dot(rail.u), s1, s2)
 
-    def third(self, ternary: Link, outer: Third) -> Any:
-        """Right side for the third derivatives of the pose, from those of the outer pin or the rail."""
+    def third_right_side(self, ternary: Link, outer: Third) -> Any:
+        """Right side for the third derivatives of the pose, from the outer pin or the rail."""
         a, t1, slide, rail = self.spot, ternary.t1, self._slide(ternary), self._rail
-        carried = rail.third(self._way, *outer)
+        carried = rail.third_derivative(self._way, *outer)
         moved = coriolis_third(rail, carried, slide.d * slide.s1, slide.d * slide.s2)
         return (moved + a.turned() * (t1 * t1 * t1) + a * (3.0 * (t1 * ternary.t2))).dot(self._n)
 
-    def link_third(self, ternary: Link, own: Third, outer: Third) -> tuple[Third, Vec2 | None]:
-        """Third derivatives of the leg and of its inner pin, from those of the ternary link."""
-        end = ternary.third(self.spot, *own)
+    def link_third(self, ternary: Link, ternary_third: Third, outer: Third) -> tuple[Third, Vec2 | None]:
+        """Third derivatives of the leg and of its inner pin, from the ternary link's."""
+        end = ternary.third_derivative(self.spot, *ternary_third)
         return (end, outer[1]), end
 
-    def solved(self, ternary: Link) -> tuple[Link, Motion | None, Slide | None]:
+    def solution(self, ternary: Link) -> SolvedLeg:
         """The leg as a link, its inner pin, and the motion in its sliding joint."""
         k, rail = ternary.carried(self.spot), self._rail
-        return Link(k, rail.u, rail.t1, rail.t2), k, self._slide(ternary)
+        return SolvedLeg(Link(k, rail.u, rail.t1, rail.t2), k, self._slide(ternary))
 
     def known_part(self, load: Load) -> tuple[Vec2, Any]:
         """See `LegAt`: the force along the rail."""
@@ -298,7 +306,7 @@ class SlotLeg(Leg):
         """Pin and link of the outer and of the inner reaction."""
         return (self.bar.pin, self.bar.name), (self.guide, self.bar.name)
 
-    def placed(self, at: Placed) -> PlacedLeg:
+    def at_position(self, at: PlacedLinkage) -> PlacedLeg:
         """The leg, with the linkage `at` before it, for any pose of the ternary link."""
         return partial(SlotAt, at.pins[self.bar.pin], self.at, self.along)
 
@@ -331,25 +339,25 @@ class SlotAt(LegAt):
         y1 = self._outer.p1 - origin1
         return self._outer.p2.dot(self._n) - 2.0 * (t1 * y1.dot(self._d)) - t1 * t1 * self._y.dot(self._n)
 
-    def third(self, ternary: Link, outer: Third) -> Any:
-        """Right side for the third derivatives of the pose, from those of the outer pin or the rail."""
+    def third_right_side(self, ternary: Link, outer: Third) -> Any:
+        """Right side for the third derivatives of the pose, from the outer pin or the rail."""
         d, n, y, t1, t2 = self._d, self._n, self._y, ternary.t1, ternary.t2
         y1, y2 = self._outer.p1 - ternary.pin.p1, self._outer.p2 - ternary.pin.p2
         rest = t1 * y2.dot(d) + t2 * y1.dot(d) + t1 * t1 * y1.dot(n) + t1 * t2 * y.dot(n)
         return outer[0].dot(n) - 3.0 * rest + t1 * t1 * t1 * y.dot(d)
 
-    def link_third(self, ternary: Link, own: Third, outer: Third) -> tuple[Third, Vec2 | None]:
-        """Third derivatives of the leg and of its inner pin, from those of the ternary link."""
-        return (outer[0], own[1]), None
+    def link_third(self, ternary: Link, ternary_third: Third, outer: Third) -> tuple[Third, Vec2 | None]:
+        """Third derivatives of the leg and of its inner pin, from the ternary link's."""
+        return (outer[0], ternary_third[1]), None
 
-    def solved(self, ternary: Link) -> tuple[Link, Motion | None, Slide | None]:
+    def solution(self, ternary: Link) -> SolvedLeg:
         """The leg as a link, its inner pin, and the motion in its sliding joint."""
         p, d = self._outer, self._d
         carried = ternary.carried(self._y)
         s1 = (p.p1 - carried.p1).dot(d)
         s2 = (p.p2 - coriolis(ternary, carried, d * s1)).dot(d)
         slide = Slide(d, (self._y - self.spot).dot(d), s1, s2)
-        return Link(p, d, ternary.t1, ternary.t2), None, slide
+        return SolvedLeg(Link(p, d, ternary.t1, ternary.t2), None, slide)
 
     def known_part(self, load: Load) -> tuple[Vec2, Any]:
         """See `LegAt`: the moment of the block."""

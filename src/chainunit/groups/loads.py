@@ -265,7 +265,7 @@ class GuideLosses(NamedTuple):
 
     The block of a guide of the length L bears at its two ends: on these press N/2 + M/L and N/2 - M/L, M the moment
     about its middle. Each dissipates friction |press| Dv^2/sqrt(Dv^2 + v_smooth^2) at the relative speed Dv.
-    `lengths` are those of the guides by joint [m]; one that is not named has a point for a block, and M does not
+    `lengths` has the lengths of guides by joint [m]; one that is not named has a point for a block, and M does not
     matter. As with pins, friction is left out of the reactions.
     """
 

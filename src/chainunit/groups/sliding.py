@@ -18,7 +18,7 @@ from typing import Any
 
 from ..core.planar import Link, Motion, Vec2, coriolis, coriolis_third, rod_rates
 from .body import Bar, Load
-from .group import Group, GuideForce, Placed, Rail, Slide, SolvedGroup, Third
+from .group import Group, GuideForce, PlacedLinkage, Rail, Slide, SolvedGroup, Third
 
 
 @dataclass
@@ -64,10 +64,10 @@ class RRP(Group):
         """The lines of earlier links on which the group slides."""
         return (self.rail,)
 
-    def solve(self, xp: Any, q: Any, at: Placed, derived: Sequence[Any]) -> SolvedRRP:
+    def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedRRP:
         """The group at the coordinate `q` of the driver [rad, m]."""
         return SolvedRRP.between(
-            xp, at.pins[self.first.pin], self.rail.placed(at.links), self.first.length, self.side
+            xp, at.pins[self.first.pin], self.rail.at_position(at.links), self.first.length, self.side
         )
 
 
@@ -119,14 +119,14 @@ class SolvedRRP(SolvedGroup):
         per = minus_per_along, per_square
         return cls(rail, per, (rod, slider), (inner,), along / a, (Slide(d, s, s1, s2),))
 
-    def third(
+    def third_derivatives(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """Third derivatives by q of the links and the pins, from those of the outer pins and the rails."""
+        """Third derivatives by q of the links and the pins, from the outer pins' and rails'."""
         (p,), ((base, t3),), (rod, slider), rail = outer, rails, self.links, self._rail
         (slide,), inner = self.slides, slider.pin
         r, r1, r2 = inner.p - rod.pin.p, inner.p1 - rod.pin.p1, inner.p2 - rod.pin.p2
-        carried = rail.third(inner.p - rail.pin.p, base, t3)
+        carried = rail.third_derivative(inner.p - rail.pin.p, base, t3)
         most = coriolis_third(rail, carried, slide.d * slide.s1, slide.d * slide.s2)
         s3 = (r.dot(most - p) + 3.0 * r1.dot(r2)) * self._per_along
         end = most + rail.u * s3
@@ -185,7 +185,7 @@ class RPR(Group):
         """The sliding joints, with the link on which the opposite reaction acts; None for the ground."""
         return {(self.guide, self.first.name): self.second.name}
 
-    def solve(self, xp: Any, q: Any, at: Placed, derived: Sequence[Any]) -> SolvedRPR:
+    def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedRPR:
         """The group at the coordinate `q` of the driver [rad, m]."""
         return SolvedRPR.between(
             xp, at.pins[self.first.pin], at.pins[self.second.pin], self.offset, self.side
@@ -234,10 +234,10 @@ class SolvedRPR(SolvedGroup):
         links = Link(p, d, t1, t2), Link(q, d, t1, t2)
         return cls(offset, per_way, links, (), way / xp.sqrt(square), (Slide(d, way, s1, s2),))
 
-    def third(
+    def third_derivatives(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """Third derivatives by q of the links and the pins, from those of the outer pins and the rails."""
+        """Third derivatives by q of the links and the pins, from the outer pins' and rails'."""
         (p, q), (slide,), (link, _) = outer, self.slides, self.links
         n, t1, t2 = slide.d.turned(), link.t1, link.t2
         # the part along n of v''' = (t3 - t1^3) (L n - offset d) - 3 t1 t2 v + 3 t2 L' n - 3 t1^2 L' d

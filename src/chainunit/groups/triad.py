@@ -32,7 +32,7 @@ from typing import Any, ClassVar, NamedTuple
 from ..core.model import Requirement
 from ..core.planar import Link, Motion, Vec2
 from .body import Bar, Load, Mass
-from .group import Group, Joint, Placed, Rail, Slide, SolvedGroup, Third
+from .group import Group, Joint, PlacedLinkage, Rail, Slide, SolvedGroup, Third
 from .legs import Leg, LegAt, PlacedLeg, RodLeg, rods_at
 
 LEGS = 3
@@ -121,7 +121,7 @@ class Triad(Group):
     start: float = 0.0
     turns: float = 0.0
 
-    derived: ClassVar[int] = 3 * (2 * HARMONICS + 1) + 2
+    derived_count: ClassVar[int] = 3 * (2 * HARMONICS + 1) + 2
     """The number of values that `derive` gives: the series of the pose, the largest misfit, the least margin."""
 
     @property
@@ -153,17 +153,17 @@ class Triad(Group):
         """The lines of earlier links on which the group slides."""
         return tuple(leg.rail for leg in self.legs if leg.rail)
 
-    def solve(self, xp: Any, q: Any, at: Placed, derived: Sequence[Any]) -> SolvedTriad:
+    def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedTriad:
         """The triad with the linkage `at` before it, on the branch that the series `derived` gives."""
-        legs = self.placed(at)
+        legs = self.at_position(at)
         near = pose_of_series(derived, xp.cos(q), xp.sin(q))
         if self.turns:
             near = near._replace(theta=near.theta + self.turns * q)
         return SolvedTriad.at(xp, legs, correct_pose(xp, legs, near, _STEPS))
 
-    def placed(self, at: Placed) -> tuple[PlacedLeg, ...]:
+    def at_position(self, at: PlacedLinkage) -> tuple[PlacedLeg, ...]:
         """The legs, with the linkage `at` before them, for any pose of the ternary link."""
-        return tuple(leg.placed(at) for leg in self.legs)
+        return tuple(leg.at_position(at) for leg in self.legs)
 
     def modes(self, pins: Mapping[str, Motion]) -> list[Pose]:
         """All poses in which the triad, with rods for legs, can be assembled at the position of its outer `pins`."""
@@ -174,11 +174,13 @@ class Triad(Group):
             tuple(leg.arm for leg in rods),
         )
 
-    def _followed(self, xp: Any, before: Callable[[float], Placed], angles: Sequence[float]) -> list[Pose]:
+    def _followed(
+        self, xp: Any, before: Callable[[float], PlacedLinkage], angles: Sequence[float]
+    ) -> list[Pose]:
         """The poses at these crank angles, each from the ones before it."""
 
         def pose(q: float, near: Pose, steps: int = _STEPS) -> Pose:
-            return correct_pose(xp, self.placed(before(q)), near, steps)
+            return correct_pose(xp, self.at_position(before(q)), near, steps)
 
         poses = [pose(angles[0], self.assembly, 8)]
         for q in angles[1:]:
@@ -188,13 +190,13 @@ class Triad(Group):
             poses.append(pose(q, near))
         return poses
 
-    def turns_in_a_turn(self, xp: Any, before: Callable[[float], Placed]) -> float:
+    def turns_in_a_turn(self, xp: Any, before: Callable[[float], PlacedLinkage]) -> float:
         """How often the ternary link turns in a turn of the crank, see `turns`."""
         angles = [self.start + 2.0 * math.pi * k / SAMPLES for k in range(SAMPLES + 1)]
         first, *_, last = self._followed(xp, before, angles)
         return float(round((last.theta - first.theta) / (2.0 * math.pi)))
 
-    def derive(self, xp: Any, before: Callable[[float], Placed]) -> list[Any]:
+    def derive(self, xp: Any, before: Callable[[float], PlacedLinkage]) -> list[Any]:
         """The series of the pose over the crank angle, the largest misfit and the least margin around; `before` gives
         the linkage before the triad at a crank angle [rad]."""
         angles = [self.start + 2.0 * math.pi * k / SAMPLES for k in range(SAMPLES)]
@@ -303,26 +305,26 @@ class SolvedTriad(SolvedGroup):
         x2, y2, t2 = rows.solve([leg.second(origin1, t1) for leg in rows.legs])
         origin = Motion(Vec2(pose.x, pose.y), origin1, Vec2(x2, y2))
         ternary = Link(origin, Vec2(xp.cos(pose.theta), xp.sin(pose.theta)), t1, t2)
-        solved = [leg.solved(ternary) for leg in rows.legs]
+        solved = [leg.solution(ternary) for leg in rows.legs]
         size = xp.sqrt(sum((rows.legs[i].spot - rows.legs[i - 1].spot).squared() for i in range(LEGS)))
         margin = rows.det / (rows.legs[0].size * rows.legs[1].size * rows.legs[2].size * size)
         return cls(
             rows,
-            (*(link for link, _, _ in solved), ternary),
-            tuple(pin for _, pin, _ in solved if pin is not None),
+            (*(leg.link for leg in solved), ternary),
+            tuple(leg.pin for leg in solved if leg.pin is not None),
             margin,
-            tuple(slide for _, _, slide in solved if slide is not None),
+            tuple(leg.slide for leg in solved if leg.slide is not None),
         )
 
-    def third(
+    def third_derivatives(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """Third derivatives by q of the links and the pins, from those of the outer pins and the rails."""
+        """Third derivatives by q of the links and the pins, from the outer pins' and rails'."""
         *_, ternary = self.links
         starts, lines = iter(outer), iter(rails)
         before = [next(lines) if leg.on_rail else (next(starts), 0.0) for leg in self.legs]
         x, y, t3 = self._rows.solve(
-            [leg.third(ternary, each) for leg, each in zip(self.legs, before, strict=True)]
+            [leg.third_right_side(ternary, each) for leg, each in zip(self.legs, before, strict=True)]
         )
         own = Vec2(x, y), t3
         ends = [leg.link_third(ternary, own, each) for leg, each in zip(self.legs, before, strict=True)]

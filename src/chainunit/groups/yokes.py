@@ -9,7 +9,7 @@ from typing import Any
 
 from ..core.planar import Link, Motion, Vec2, coriolis, coriolis_third
 from .body import Bar, Load
-from .group import Group, GuideForce, Placed, Rail, Slide, SolvedGroup, Third
+from .group import Group, GuideForce, PlacedLinkage, Rail, Slide, SolvedGroup, Third
 
 
 @dataclass
@@ -54,9 +54,11 @@ class PRP(Group):
         """The lines of earlier links on which the group slides."""
         return self.first_rail, self.second_rail
 
-    def solve(self, xp: Any, q: Any, at: Placed, derived: Sequence[Any]) -> SolvedPRP:
+    def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedPRP:
         """The group at the coordinate `q` of the driver [rad, m]."""
-        return SolvedPRP.between(self.first_rail.placed(at.links), self.second_rail.placed(at.links))
+        return SolvedPRP.between(
+            self.first_rail.at_position(at.links), self.second_rail.at_position(at.links)
+        )
 
 
 class SolvedPRP(SolvedGroup):
@@ -84,28 +86,28 @@ class SolvedPRP(SolvedGroup):
         """
         per = 1.0 / a.u.cross(b.u)
 
-        def ways(gap: Vec2) -> tuple[Any, Any]:
+        def displacements(gap: Vec2) -> tuple[Any, Any]:
             """Ways along both rails that close a gap: a.u x - b.u y = gap."""
             return gap.cross(b.u) * per, gap.cross(a.u) * per
 
-        x, y = ways(b.pin.p - a.pin.p)
+        x, y = displacements(b.pin.p - a.pin.p)
         on_a, on_b = a.carried(a.u * x), b.carried(b.u * y)
-        x1, y1 = ways(on_b.p1 - on_a.p1)
+        x1, y1 = displacements(on_b.p1 - on_a.p1)
         most_a, most_b = coriolis(a, on_a, a.u * x1), coriolis(b, on_b, b.u * y1)
-        x2, y2 = ways(most_b - most_a)
+        x2, y2 = displacements(most_b - most_a)
         inner = Motion(on_a.p, on_a.p1 + a.u * x1, most_a + a.u * x2)
         links = Link(inner, a.u, a.t1, a.t2), Link(inner, b.u, b.t1, b.t2)
         slides = Slide(a.u, x, x1, x2), Slide(b.u, y, y1, y2)
         return cls((a, b, per), links, (inner,), a.u.cross(b.u), slides)
 
-    def third(
+    def third_derivatives(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """Third derivatives by q of the links and the pins, from those of the outer pins and the rails."""
+        """Third derivatives by q of the links and the pins, from the outer pins' and rails'."""
         (a, b, per), (one, other), (inner,) = self._rails, self.slides, self.pins
         most = []
         for rail, slide, (base, t3) in ((a, one, rails[0]), (b, other, rails[1])):
-            carried = rail.third(inner.p - rail.pin.p, base, t3)
+            carried = rail.third_derivative(inner.p - rail.pin.p, base, t3)
             most.append(coriolis_third(rail, carried, slide.d * slide.s1, slide.d * slide.s2))
         x3 = (most[1] - most[0]).cross(b.u) * per
         end = most[0] + a.u * x3
@@ -170,9 +172,9 @@ class RPP(Group):
         """The lines of earlier links on which the group slides."""
         return (self.rail,)
 
-    def solve(self, xp: Any, q: Any, at: Placed, derived: Sequence[Any]) -> SolvedRPP:
+    def solve(self, xp: Any, q: Any, at: PlacedLinkage, derived: Sequence[Any]) -> SolvedRPP:
         """The group at the coordinate `q` of the driver [rad, m]."""
-        return SolvedRPP.between(at.pins[self.block.pin], self.rail.placed(at.links), self.slot)
+        return SolvedRPP.between(at.pins[self.block.pin], self.rail.at_position(at.links), self.slot)
 
 
 class SolvedRPP(SolvedGroup):
@@ -205,32 +207,32 @@ class SolvedRPP(SolvedGroup):
         e = d * slot.x + d.turned() * slot.y
         per = 1.0 / slot.y  # d x e
 
-        def ways(gap: Vec2) -> tuple[Any, Any]:
+        def displacements(gap: Vec2) -> tuple[Any, Any]:
             """Ways along rail and slot: d x + e y = gap."""
             return gap.cross(e) * per, d.cross(gap) * per
 
         w = p.p - rail.pin.p
-        x, y = ways(w)
+        x, y = displacements(w)
         carried = rail.carried(w)
-        x1, y1 = ways(p.p1 - carried.p1)
+        x1, y1 = displacements(p.p1 - carried.p1)
         slid = d * x1 + e * y1
-        x2, y2 = ways(p.p2 - coriolis(rail, carried, slid))
+        x2, y2 = displacements(p.p2 - coriolis(rail, carried, slid))
         on_rail = rail.carried(d * x)
         start = Motion(on_rail.p, on_rail.p1 + d * x1, coriolis(rail, on_rail, d * x1) + d * x2)
         links = Link(p, d, rail.t1, rail.t2), Link(start, d, rail.t1, rail.t2)
         return cls(rail, per, links, (), slot.y, (Slide(e, y, y1, y2), Slide(d, x, x1, x2)))
 
-    def third(
+    def third_derivatives(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """Third derivatives by q of the links and the pins, from those of the outer pins and the rails."""
+        """Third derivatives by q of the links and the pins, from the outer pins' and rails'."""
         (p,), ((base, t3),), rail, (slot, way) = outer, rails, self._rail, self.slides
         block, yoke = self.links
         d, e = way.d, slot.d
         slid, slid2 = d * way.s1 + e * slot.s1, d * way.s2 + e * slot.s2
-        carried = rail.third(block.pin.p - rail.pin.p, base, t3)
+        carried = rail.third_derivative(block.pin.p - rail.pin.p, base, t3)
         x3 = (p - coriolis_third(rail, carried, slid, slid2)).cross(e) * self._per
-        on_rail = rail.third(yoke.pin.p - rail.pin.p, base, t3)
+        on_rail = rail.third_derivative(yoke.pin.p - rail.pin.p, base, t3)
         start = coriolis_third(rail, on_rail, d * way.s1, d * way.s2) + d * x3
         return [(p, t3), (start, t3)], []
 

@@ -205,7 +205,7 @@ class ChainUnitMachine(Machine):
 
     def organ_rods(self, side: str, loads: SideLoads = EMPTY, number: int = CHAIN_RODS) -> tuple[Any, Any]:
         """Lengths [m] and masses [kg] of an organ as `number` rods, shape (number,), wall first, with the material on
-        them. The numbers of rods in wall and web are those that bring the rods nearest to equal length."""
+        them. Wall and web have the numbers of rods that bring the rods nearest to equal length."""
         p, own = self.p, getattr(self.p, side)
         loads = getattr(self._inputs(0.0, 0.0, 0.0, loads, loads), side)
         on_web = p.web_share * loads.material_mass

@@ -117,9 +117,9 @@ def _rod_fields(
     ]
 
 
-def both(of: type, default: Any = None) -> list[Any]:
-    """Fields for the declaration `of` on each side."""
-    return [(name, of, group(of, f"{name} organ", default=default)) for name in SIDES]
+def both(declared: type, default: Any = None) -> list[Any]:
+    """Fields for the declaration `declared` on each side."""
+    return [(name, declared, group(declared, f"{name} organ", default=default)) for name in SIDES]
 
 
 @declaration
@@ -279,7 +279,7 @@ class Organs:
             **on_drive(xp, p, s, a, reactions, at_a1),
         }
 
-    def closed(self, xp: Any, p: Any, u: Any, x: Any, q: Any, w: Any) -> list[Any]:
+    def constrained_states(self, xp: Any, p: Any, u: Any, x: Any, q: Any, w: Any) -> list[Any]:
         """States with which both chains end at A2 and move with it, by the smallest change in the metric of the
         masses. Where the drive has corrected its speed, the change is a jolt from the rocker; its work enters
         `energy_due`."""
@@ -341,7 +341,7 @@ class Organs:
         return sides
 
     def _start_state(self, rods_start: Any, side: str, hanging: State) -> State:
-        """Angles and speeds of a side: those of `rods_start`, or those of the hanging chain."""
+        """Angles and speeds of a side, of `rods_start` or of the hanging chain."""
         N, share = self.number, rods_start.given
         start = self._start_layout.values(getattr(rods_start, side))
         values = [

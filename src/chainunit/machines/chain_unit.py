@@ -16,7 +16,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar, Literal, NamedTuple, TypeAlias
 
-from ..core.model import Requirement
+from ..core.model import FmuData, Requirement
 from ..core.planar import ZERO, Link, Vec2
 from ..core.ports import PortValues
 from ..core.quantities import Value, declaration, group, quantity
@@ -438,8 +438,8 @@ class ChamberForces(InverseMachine):
     """The inverse model: motion of the motor shaft in, torque and every reaction out."""
 
     name, noun, sides = "ChamberForces", "chain unit", SIDES
-    notes = (
-        "\n\nThe start values are those of the packaged study, with three exceptions: the shaft stands, "
+    fmu_data = FmuData(
+        notes="\n\nThe start values are those of the packaged study, with three exceptions: the shaft stands, "
         "ratio is 1 (there 50), and the processing forces are 0 (there 10 N a side), which makes the rocker torque "
         "some percent less."
     )

@@ -22,7 +22,7 @@ from types import MappingProxyType
 from typing import Any, ClassVar
 
 from ..core.errors import InputError
-from ..core.model import Requirement
+from ..core.model import Making, Requirement, StartProblem
 from ..core.ports import PortSlopes
 from ..core.quantities import Layout, declared_class, group
 from ..mechanism.chains import ChainedState
@@ -66,12 +66,11 @@ class ChainedModel(LinkageModel):
 
     organs: ClassVar[Organs]
     controlled = True
-    start_required = _HANGS
 
     def __init_subclass__(cls) -> None:
         if hasattr(cls, "organs"):
-            cls.start_unknowns = cls.organs.unknowns
-            cls.start_rounds = 100 if cls.start_unknowns else 0
+            unknowns = cls.organs.unknowns
+            cls.start_problem = StartProblem(unknowns, 100 if unknowns else 0, _HANGS)
         super().__init_subclass__()
 
     @staticmethod
@@ -105,7 +104,7 @@ class ChainedModel(LinkageModel):
         return cls.organs.guess(xp, p, u, cls.at_crank(p, u)[0])
 
     @classmethod
-    def start_improved(cls, xp: Any, p: Any, u: Any, z: Sequence[Any]) -> list[Any]:
+    def improve_start(cls, xp: Any, p: Any, u: Any, z: Sequence[Any]) -> list[Any]:
         """The unknowns of the start after one more round."""
         return cls.organs.improved(xp, p, u, cls.at_crank(p, u)[0], z)
 
@@ -116,9 +115,9 @@ class ChainedModel(LinkageModel):
         return cls.States(**cls.organs.start_states(xp, p, u, *cls.at_crank(p, u), z))
 
     @classmethod
-    def closed(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+    def constrained_states(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
         """The states with which both chains end at A2 and move with it."""
-        return cls.organs.closed(xp, p, u, x, *cls.at_crank(p, u, x))
+        return cls.organs.constrained_states(xp, p, u, x, *cls.at_crank(p, u, x))
 
     @classmethod
     def shared(cls, xp: Any, p: Any, u: Any, x: Any) -> ChainedState:
@@ -153,9 +152,9 @@ class TurningChains(ChainedModel, DirectMachine):
         return cls.States(**vars(cls.initial_states(xp, p)), **chains)
 
     @classmethod
-    def closed(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+    def constrained_states(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
         """The states with which both chains end at A2 and move with it."""
-        return [x.phi, x.w, *super().closed(xp, p, u, x)]
+        return [x.phi, x.w, *super().constrained_states(xp, p, u, x)]
 
     @classmethod
     def derivatives(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
@@ -195,8 +194,7 @@ def _flexible(walls: int, webs: int) -> type[InverseMachine]:
         """
 
         name = "ChainUnitFlexible"
-        built_by = f"flexible({walls}, {webs})"
-        maker = (flexible, (walls, webs))
+        made = Making(f"flexible({walls}, {webs})", flexible, (walls, webs))
         description = (
             f"Forces in a chain unit whose organs are chains of {chains.number} rods, {walls} in the wall and {webs} "
             "in the web: from motor angle and speed to torque, load port and every support reaction"
@@ -236,7 +234,7 @@ def _flexible(walls: int, webs: int) -> type[InverseMachine]:
             """The direct model of the same machine: torque in, motion out."""
             words = "start of the rods"
             rods = group(chains.RodsStart, words, default=chains.RodsStart())
-            return cls._turning(TurningChains, [("rods_start", chains.RodsStart, rods)], organs=chains)
+            return cls._direct_of(TurningChains, [("rods_start", chains.RodsStart, rods)], organs=chains)
 
         @classmethod
         def derivatives(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:

@@ -160,11 +160,11 @@ class _Judgement(NamedTuple):
 
 
 def _judge(
-    xp: Any, p: Any, x: Any, unknown: int, value: Any, of: Any, usual: Any, uncertainty: Any
+    xp: Any, p: Any, x: Any, unknown: int, value: Any, load: Any, usual: Any, uncertainty: Any
 ) -> _Judgement:
-    """The judgement of an imbalance; `unknown` is the place of its left side, `of` what is known of the load, `usual`
-    its natural fluctuation."""
-    size = of.spread * of.spread
+    """The judgement of an imbalance; `unknown` is the place of its left side, `load` the parameters of the load,
+    `usual` its natural fluctuation."""
+    size = load.spread * load.spread
     known, quiet = (
         xp.maximum(difference(symmetric(_entries(matrix)), unknown, unknown + 1), _LEAST) * size
         for matrix in (x.covariance, x.quiet)
@@ -172,7 +172,7 @@ def _judge(
     natural, permanent = 2.0 * (usual * usual), uncertainty * uncertainty
     deviation = xp.sqrt(natural + quiet + permanent)
     # the innovations of a filter that follows both sides move its estimate as much as the loads may move
-    diffusion = DIFFUSION * of.change * of.change
+    diffusion = DIFFUSION * load.change * load.change
     turn = 2.0 * math.pi * p.ratio / xp.maximum(xp.abs(x.speed), SLOWEST * p.ratio)
     # each of the two grounds has half of the false alarms
     z = level(xp, deviation * deviation / (diffusion * turn), 0.5e-6 * p.alarm.rate)
@@ -186,10 +186,10 @@ def _entries(covariance: Any) -> list[Any]:
     return [getattr(covariance, name) for name in ENTRIES]
 
 
-def _bounded(xp: Any, rate: Any, estimate: Any, of: Any) -> Any:
-    """The rate of an estimated load, limited so that the estimate reaches its bounds in no less than `ONSET`; `of` is
-    what is known of the load."""
-    deviation, farthest = estimate - of.expected, FARTHEST * of.spread
+def _bounded(xp: Any, rate: Any, estimate: Any, load: Any) -> Any:
+    """The rate of an estimated load, limited so that the estimate reaches its bounds in no less than `ONSET`; `load`
+    has the parameters of the load."""
+    deviation, farthest = estimate - load.expected, FARTHEST * load.spread
     return xp.maximum(xp.minimum(rate, (farthest - deviation) / ONSET), (-farthest - deviation) / ONSET)
 
 

@@ -23,7 +23,7 @@ _XP = numpy_()
 class Machine:
     """A machine with checked parameters: its `model`, and its parameters `p`.
 
-    Angles and speeds are those of the motor, as in the FMU; with ``ratio`` 1 they are those of the crank. Every
+    Angles and speeds count at the motor, as in the FMU; with ``ratio`` 1 at the crank. Every
     argument may be a float or an array; shapes broadcast, and outputs have the common shape. A value that is not
     finite, or a load outside its declared bounds, raises an `InputError` that names it; in an array this holds for
     each value. A value that exceeds a bound only by rounding counts as the bound.
@@ -57,7 +57,7 @@ class Machine:
         self.p: Any = model.check(model.parameter_layout.from_names({**by_name, **values}, base))
 
     def replace(self, parameters: Mapping[str, float] | None = None, /, **values: float) -> Self:
-        """The same machine with new values of some parameters; the arguments are those of the constructor."""
+        """The same machine with new values of some parameters; the arguments are as of the constructor."""
         machine = copy.copy(self)
         layout = self.model.parameter_layout
         machine.p = self.model.check(layout.from_names({**(parameters or {}), **values}, self.p))

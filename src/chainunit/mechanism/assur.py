@@ -33,7 +33,7 @@ class JointOf(NamedTuple):
     on: str
     by: str
 
-    def other(self, link: str) -> str:
+    def other_link(self, link: str) -> str:
         """The link on its other side."""
         return self.by if link == self.on else self.on
 
@@ -41,9 +41,9 @@ class JointOf(NamedTuple):
 class AssurGroup(NamedTuple):
     """A group: its kind (RRR, RRP, RPR, PRP, RPP, or triad), its links, and its joints in the order of their roles.
 
-    Of a dyad the links are `first` and `second`, the joints those of the first link with what stands before, between
-    both, and of the second link. Of a triad the ternary link stands first, then its legs; the joints are the outer
-    ones of the legs, then their inner ones.
+    Of a dyad the links are `first` and `second`; the joints connect the first link with the links before, both with
+    each other, and the second link with the links before. Of a triad the ternary link stands first, then its legs;
+    the joints are the outer ones of the legs, then their inner ones.
     """
 
     kind: str
@@ -107,7 +107,7 @@ def _dependences(
     """For each link the others on which its equations depend."""
     depends: dict[str, dict[str, None]] = {link: {} for link in unknown}
     for (k, _), link in matched.items():
-        other = joints[k].other(link)
+        other = joints[k].other_link(link)
         if other in depends:
             depends[link][other] = None
     return depends
@@ -229,7 +229,9 @@ def _classified(part: tuple[str, ...], joints: Sequence[JointOf], placed: set[st
         for one that is not covered.
     """
     inner = [j for j in joints if j.on in part and j.by in part]
-    outer = {link: [j for j in joints if link in (j.on, j.by) and j.other(link) in placed] for link in part}
+    outer = {
+        link: [j for j in joints if link in (j.on, j.by) and j.other_link(link) in placed] for link in part
+    }
     if len(part) == 2 and len(inner) == 1 and all(len(each) == 1 for each in outer.values()):
         return _dyad(part, inner[0], {link: each[0] for link, each in outer.items()})
     if len(part) == 4:

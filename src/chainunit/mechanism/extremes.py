@@ -1,7 +1,7 @@
 """The largest and the least value of a quantity over the way of the driver, such as the place of a ram.
 
 The search of `extreme` has the same operations for all values, so that symbols do, too: an FMU computes the extremes
-of its own lengths before a run. Standard library only: FMUs carry this file. See `courses` for whole arrays.
+of its own lengths before a run. Standard library only: FMUs carry this file. For arrays: `sampled_quantities`.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-Course = Callable[[Any], tuple[Any, Any, Any]]
+Coordinate = Callable[[Any], tuple[Any, Any, Any]]
 """A quantity and its first and second derivative by the coordinate, at a coordinate."""
 
 ROUNDS = 4
@@ -18,7 +18,7 @@ _NO_CURVATURE = 1e-100
 
 
 def extreme(
-    xp: Any, course: Course, places: Sequence[float], sense: float, ends: bool = False
+    xp: Any, function: Coordinate, places: Sequence[float], sense: float, ends: bool = False
 ) -> tuple[Any, Any]:
     """Where a smooth quantity is largest (`sense` +1) or least (-1), at the places or between them, and its value
     there.
@@ -37,7 +37,7 @@ def extreme(
 
     def vertex(q: Any, around: Any, reach: float) -> tuple[Any, Any]:
         """The place of the vertex of the parabola at `q`, within `reach` of `around`, and its value there."""
-        value, first, second = course(q)
+        value, first, second = function(q)
         bend = xp.maximum(-sense * second, _NO_CURVATURE)
         near = xp.minimum(xp.maximum(q + sense * first / bend, around - reach), around + reach)
         near = xp.minimum(xp.maximum(near, low), high)
@@ -57,18 +57,18 @@ def extreme(
         best = xp.maximum(best, value)
     for _ in range(ROUNDS - 1):
         place, _ = vertex(place, around, reach)
-    return place, course(place)[0]
+    return place, function(place)[0]
 
 
 class MotionExtreme(NamedTuple):
-    """An extreme of a quantity of a linkage: the quantity as a `course` of engine and mechanism, and the arguments of
-    `extreme`."""
+    """An extreme of a quantity of a linkage: the quantity as a `function` of engine and mechanism, and the arguments
+    of `extreme`."""
 
-    course: Callable[[Any, Any], tuple[Any, Any, Any]]
+    function: Callable[[Any, Any], tuple[Any, Any, Any]]
     places: Sequence[float]
     sense: float
     ends: bool
 
     def value(self, xp: Any, placed: Callable[[Any], Any]) -> Any:
         """Its value; `placed` gives the mechanism at a coordinate."""
-        return extreme(xp, lambda q: self.course(xp, placed(q)), self.places, self.sense, self.ends)[1]
+        return extreme(xp, lambda q: self.function(xp, placed(q)), self.places, self.sense, self.ends)[1]

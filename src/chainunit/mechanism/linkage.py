@@ -88,10 +88,10 @@ class Linkage:
         return Topology(carries, tuple(groups), points)
 
     @property
-    def derived(self) -> int:
-        """The number of values that follow from the lengths, once before a run: those of the groups, then the
+    def derived_count(self) -> int:
+        """The number of values that follow from the lengths, once before a run: of the groups, and of the
         extremes."""
-        return sum(group.derived for group in self.groups) + len(self.extremes)
+        return sum(group.derived_count for group in self.groups) + len(self.extremes)
 
     def before(self, group: int) -> Linkage:
         """The linkage without the group of this index and all later ones, without loads and extremes."""

@@ -53,7 +53,7 @@ class Mechanism:
         self._groups: list[tuple[SolvedGroup, Connections]] = []
         links, pins, first = self.links, self.pins, 0
         for group, connections in zip((linkage.driver, *linkage.groups), self.topology.groups, strict=True):
-            last = first + group.derived
+            last = first + group.derived_count
             solved = group.solve(xp, q, self, derived[first:last])
             first = last
             self._groups.append((solved, connections))
@@ -81,36 +81,36 @@ class Mechanism:
         }
         return other
 
-    def third(self) -> tuple[dict[str, Third], dict[str, Vec2]]:
+    def third_derivatives(self) -> tuple[dict[str, Third], dict[str, Vec2]]:
         """Third derivatives by q of each link and of each pin that is not in the ground."""
         pins: dict[str, Vec2] = {}
         thirds: dict[str, Third] = {}
         groups = (self.linkage.driver, *self.linkage.groups)
         for group, (solved, connections) in zip(groups, self._groups, strict=True):
-            links, inner = solved.third(
+            links, inner = solved.third_derivatives(
                 [pins.get(pin, ZERO) for pin in connections.outer],
-                [rail_third(rail, rail.placed(self.links), self.links, thirds) for rail in group.rails],
+                [rail_third(rail, rail.at_position(self.links), self.links, thirds) for rail in group.rails],
             )
             thirds.update(zip(connections.links, links, strict=True))
             pins.update(zip(connections.pins, inner, strict=True))
             for name in connections.links:
                 link = self.links[name]
                 for point in self.topology.points[name]:
-                    pins[point] = link.third(self.pins[point].p - link.pin.p, *thirds[name])
+                    pins[point] = link.third_derivative(self.pins[point].p - link.pin.p, *thirds[name])
         return thirds, pins
 
-    def turning(self, reactions: Mapping[Joint, Vec2], effort: Any) -> Iterator[Wrench]:
+    def reaction_turn(self, reactions: Mapping[Joint, Vec2], effort: Any) -> Iterator[Wrench]:
         """The part of the reactions in the moments on the links as their arms turn with q, and in the forces as the
         guides turn."""
         driver, connections = self._groups[0]
         assert isinstance(driver, SolvedDriver)
-        for k, force in driver.turning(effort):
+        for k, force in driver.force_turn(effort):
             yield Wrench(connections.links[k], force, 0.0)
         for _, connections in self._groups:
             for joint, carrier, _ in connections.joints:
                 (pin, name), force = joint, reactions[joint]
                 if joint in self.slides:
-                    yield from self._turning_guide(name, carrier, force)
+                    yield from self._guide_turn(name, carrier, force)
                     continue
                 p1, start = self.pins[pin].p1, self.links[name].pin.p1
                 if p1 is not start:
@@ -118,7 +118,7 @@ class Mechanism:
                 if carrier is not None:
                     yield Wrench(carrier, ZERO, (self.links[carrier].pin.p1 - p1).cross(force))
 
-    def _turning_guide(self, name: str, carrier: str | None, force: Vec2) -> Iterator[Wrench]:
+    def _guide_turn(self, name: str, carrier: str | None, force: Vec2) -> Iterator[Wrench]:
         """That part of the reaction of a guide: the force is normal to its line, which turns with the link."""
         link = self.links[name]
         more = force.turned() * link.t1
@@ -224,7 +224,7 @@ def _placed(
 
 
 def derived_numbers(xp: Any, linkage: Linkage) -> list[Any]:
-    """Values that follow from the lengths, once before a run: those of the groups, then the extremes."""
+    """Values that follow from the lengths, once before a run: of the groups, then of the extremes."""
     numbers: list[Any] = []
     for k, group in enumerate(linkage.groups):
         numbers += group.derive(xp, functools.partial(_placed, xp, linkage.before(k), tuple(numbers)))
@@ -280,7 +280,7 @@ class MachineState:
         ----------
         xp : engine (see `chainunit.core.engines`)
         w : speed of the crank [rad/s]
-        loads : loads in place of those of the linkage
+        loads : loads in place of the linkage's own
         """
         self._xp, self.m, self.w = xp, m, w
         self._loads = m.linkage.loads if loads is None else loads
@@ -357,9 +357,9 @@ class MachineState:
 
     def _by_angle(self) -> Any:
         m, w2, field = self.m, self.w * self.w, self.steady.field
-        links, pins = m.third()
+        links, pins = m.third_derivatives()
         acting = {name: body.centrifugal_slope(w2, field, links[name]) for name, body in m.bodies.items()}
-        add_wrenches(acting, m.turning(self.steady.reactions, self.steady.torque))
+        add_wrenches(acting, m.reaction_turn(self.steady.reactions, self.steady.torque))
         return self._slope(LiftedMechanism(m, links, pins), self.w, acting, m.turns2())
 
     def _by_speed(self) -> Any:

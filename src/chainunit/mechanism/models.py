@@ -14,7 +14,7 @@ from functools import cache
 from typing import Any, ClassVar
 
 from ..core.engines import MATH
-from ..core.model import Model, Part, Sketch, keep
+from ..core.model import Making, Model, Part, Sketch, keep
 from ..core.ports import PortSlopes, ShaftMotion
 from ..core.quantities import (
     Fields,
@@ -38,9 +38,9 @@ MACHINES: dict[str, type[InverseMachine]] = {}
 """The machines by name: every subclass of `InverseMachine` with a name is a machine that study files may name."""
 
 
-def names_of(of: type) -> tuple[str, ...]:
+def names_of(declared: type) -> tuple[str, ...]:
     """The names of the fields of a declaration."""
-    return tuple(f.name for f in dataclasses.fields(of))
+    return tuple(f.name for f in dataclasses.fields(declared))
 
 
 @declaration
@@ -58,11 +58,11 @@ class LinkageModel(Model):
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
         if hasattr(cls, "Parameters"):
-            cls.derived = cls.linkage(MATH, cls.Parameters(), cls.Inputs()).derived
+            cls.derived_count = cls.linkage(MATH, cls.Parameters(), cls.Inputs()).derived_count
 
     @staticmethod
     def linkage(xp: Any, p: Any, u: Any) -> Linkage:
-        """The linkage with these parameters and inputs, whose values are those of the engine `xp`; places and
+        """The linkage with these parameters and inputs, whose values the engine `xp` computes; places and
         lengths do not depend on the inputs."""
         raise NotImplementedError
 
@@ -74,7 +74,7 @@ class LinkageModel(Model):
     @classmethod
     def state(cls, xp: Any, p: Any, u: Any, q: Any, w: Any) -> MachineState:
         """The machine at crank angle `q` [rad] and speed `w` [rad/s]."""
-        derived = p.derived if cls.derived else ()
+        derived = p.derived if cls.derived_count else ()
         return MachineState(xp, Mechanism(xp, cls.linkage(xp, p, u), q, derived, cls.topology()), w)
 
     @classmethod
@@ -153,7 +153,7 @@ class InverseMachine(LinkageModel, MachineModel):
         if "name" in own and "direct_name" not in own:
             cls.direct_name = f"{cls.name}Direct"
         # a function that makes classes may make several of one name
-        if "name" in own and not cls.built_by:
+        if "name" in own and not cls.made:
             MACHINES[cls.name] = cls
         if hasattr(cls, "Outputs") and "parts" not in own:
             apart = cls.by_differences
@@ -171,7 +171,7 @@ class InverseMachine(LinkageModel, MachineModel):
 
     @classmethod
     def shared(cls, xp: Any, p: Any, u: Any, x: Any) -> MachineState:
-        """The machine at the crank angle and speed that follow from those of the motor."""
+        """The machine at the crank angle and speed that follow from angle and speed of the motor."""
         return cls.state(xp, p, u, u.phi / p.ratio, u.w / p.ratio)
 
     @classmethod
@@ -198,7 +198,7 @@ class InverseMachine(LinkageModel, MachineModel):
         return sketch_of(cls.state(MATH, p, cls.Inputs(), low + (high - low) / (2.0 * math.pi), 0.0).m)
 
     @classmethod
-    def further(cls, xp: Any, p: Any, u: Any, x: Any = None) -> list[tuple[Variable, Any]]:
+    def further_quantities(cls, xp: Any, p: Any, u: Any, x: Any = None) -> list[tuple[Variable, Any]]:
         """The effort at the driver, ``crank_torque``; the size of each force, ``force(pivot)``; and the places of all
         pins, ``x(A)`` and ``y(A)``. A machine whose outputs depend on states has no places here."""
         outputs = cls.parts[0].layout.by_name(cls.evaluate(xp, p, u, x)[0])
@@ -225,17 +225,19 @@ class InverseMachine(LinkageModel, MachineModel):
     def direct(cls) -> type[DirectMachine]:
         """The direct model of the same machine: torque in, motion out.
 
-        Its parameters are those of the machine, the inertia on its shaft and the start. Its inputs are the torque and
-        the loads. Its outputs are those of the machine without `tau` and load port, and those of `DriverPort.answer`.
+        It has the parameters of the machine, the inertia on its shaft and the start. Its inputs are the torque and
+        the loads. It has the outputs of the machine without `tau` and load port, and those of `DriverPort.answer`.
         """
         stops = cls.end_stops
         if stops is None:
-            return cls._turning(DirectMachine)
+            return cls._direct_of(DirectMachine)
         more = ("end_stops", EndStops, group(EndStops, "end stops of the driver", default=stops))
-        return cls._turning(DirectMachine, [more])
+        return cls._direct_of(DirectMachine, [more])
 
     @classmethod
-    def _turning(cls, base: type[DirectMachine], parameters: Fields = (), **more: Any) -> type[DirectMachine]:
+    def _direct_of(
+        cls, base: type[DirectMachine], parameters: Fields = (), **more: Any
+    ) -> type[DirectMachine]:
         """The direct model as a subclass of `base`, with more `parameters` and attributes."""
         outputs = fields_of(cls.Outputs, without=("tau", *names_of(cls.driver_port.values)))
         # where the start declares the same name, the machine's own declaration counts
@@ -248,11 +250,9 @@ class InverseMachine(LinkageModel, MachineModel):
             "description": cls.direct_description
             or f"{cls.name} that moves by itself: from {port.words.effort} to {port.words.place}, speed, "
             "acceleration and every reaction",
-            "built_by": f"{cls.built_by or cls.__qualname__}.direct()",
-            "maker": (direct_model, (cls,)),
+            "made": Making(f"{cls.expression()}.direct()", direct_model, (cls,)),
             "inverse": cls,
-            "about": cls.about,
-            "notes": cls.notes,
+            "fmu_data": cls.fmu_data,
             "repeated": cls.repeated,
             "constant": cls.constant,
             "terminals": port.flanges,
@@ -271,7 +271,7 @@ class InverseMachine(LinkageModel, MachineModel):
             **more,
         }
         model = type(f"Direct{cls.__name__}", (base,), members)
-        if cls.built_by:
+        if cls.made:
             keep(model, "Parameters", "Inputs")
         return model
 
@@ -351,13 +351,13 @@ class DirectMachine(LinkageModel):
         return 1e-9
 
     @staticmethod
-    def closed(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+    def constrained_states(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
         """The states themselves: they have no constraints."""
         return [x.phi, x.w]
 
     @classmethod
     def shared(cls, xp: Any, p: Any, u: Any, x: Any) -> MachineState:
-        """The machine at the crank angle and speed that follow from those of the motor."""
+        """The machine at the crank angle and speed that follow from angle and speed of the motor."""
         return cls.state(xp, p, u, x.phi / p.ratio, x.w / p.ratio)
 
     @classmethod

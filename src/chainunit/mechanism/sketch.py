@@ -10,8 +10,8 @@ from .machine import Mechanism
 
 
 def shown_pins(linkage: Linkage) -> set[str]:
-    """The pins and points that are drawn: not those of the ground that only say where a rail lies, and not further
-    points of a link that meet a pin."""
+    """The pins and points that are drawn, without points of the ground that only say where a rail lies, and without
+    further points of a link that meet a pin."""
     topology = linkage.topology
     joined = {pin for pin, _ in topology.joints}
     return {pin for pin in (*joined, *topology.carries) if "." not in pin or pin in joined}

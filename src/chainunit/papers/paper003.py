@@ -28,7 +28,7 @@ _ANGLES = np.radians(np.arange(0.0, 360.0, 5.0))
 @cache
 def machine(**values: float) -> Any:
     """Parameters of the packaged machine, some of them changed."""
-    return KnifeDrive.prepared(MATH, KnifeDrive.parameter_layout.from_names(values))
+    return KnifeDrive.with_derived(MATH, KnifeDrive.parameter_layout.from_names(values))
 
 
 def state(p: Any, angle: float, cut: float = 0.0) -> MachineState:

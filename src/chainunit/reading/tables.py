@@ -115,8 +115,8 @@ def option_value(name: str, text: str, unit: str, description: str) -> float:
 
 
 @result
-class Slip:
-    """A value that no machine of this kind has, so that a slip of the unit is likely."""
+class UnusualValue:
+    """A value that no machine of this kind has, so that a mistaken unit is likely."""
 
     variable: Variable
     value: float
@@ -150,11 +150,11 @@ class Slip:
         return f"{v.name} = {self.value:g}{unit}: is unusual ({v.description}; {usual}){hint}"
 
 
-def slips(
+def unusual_values(
     declared: Mapping[str, type],
     data: Mapping[str, Any],
     usual: Mapping[str, tuple[float, float]] = MappingProxyType({}),
-) -> Iterator[Slip]:
+) -> Iterator[UnusualValue]:
     """The unusual values in the sections of a checked file. `declared` has the declaration of each section by
     its name. `usual` has, by the name of a quantity, the usual sizes that replace the declared ones."""
     for section, of in declared.items():
@@ -169,7 +169,7 @@ def slips(
                 )
                 value = to_number(variable, given)
                 if not variable.quantity.is_usual(value):
-                    yield Slip(variable, value, _meant(variable, given))
+                    yield UnusualValue(variable, value, _meant(variable, given))
 
 
 def _meant(variable: Variable, given: Any) -> str | None:
@@ -238,7 +238,7 @@ def read_table(form: type[BaseModel], table: Mapping[str, Any], prefix: str = ""
     try:
         return form.model_validate(dict(table))
     except ValidationError as error:
-        raise InputError.of(refusals(error, form, prefix)) from error
+        raise InputError.joined(refusals(error, form, prefix)) from error
 
 
 def given_values(section: BaseModel) -> dict[str, Any]:
@@ -358,7 +358,7 @@ def toml(text: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except ValueError as error:  # TOMLDecodeError, and numbers that are too long
-        raise InputError.of(syntax_faults(text, error)) from error
+        raise InputError.joined(syntax_faults(text, error)) from error
     except RecursionError as error:
         raise InputError("no valid TOML: tables or lists are nested too deeply") from error
 
@@ -392,7 +392,7 @@ def in_file(source: str, lines_of: Callable[[], Mapping[str, int]]) -> Iterator[
 
         # faults of another file that this file names come last
         ordered = sorted(error.faults, key=lambda fault: (fault.placed, line_of(fault)))
-        raise InputError.of(
+        raise InputError.joined(
             [
                 fault
                 if fault.placed

@@ -1,6 +1,6 @@
 """Texts of numbers with units as patterns of a JSON Schema. `units` refuses every text that does not match.
 
-A unit of one name must be one of those that fit the quantity. The reader checks products, quotients and
+A unit of one name must fit the quantity. The reader checks products, quotients and
 powers, and characters that have no place in a unit. The patterns use only features that the regular
 expressions of Python, ECMAScript and Rust have in common.
 """

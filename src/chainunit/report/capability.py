@@ -1,18 +1,18 @@
-"""Capabilities, as a report knows them: a question, its section, and the command that answers it."""
+"""Capabilities, as a report knows them: a question, its section, and its answer."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol, Self
 
 from ..study.capability import StudyCapability
+from ..study.config import Config
 from ..study.record import StudyRecord
 from ..study.registry import registered
 from .blocks import Block, Source
 from .lines import Line
 from .supplement import Supplement
-from .task import Task
 
 
 @dataclass(frozen=True)
@@ -22,6 +22,15 @@ class Contents:
     heading: str
     blocks: Callable[[Source, StudyRecord], Iterator[Block]]
     pictures: tuple[str, ...] = ()
+
+
+class AnyStudy(Protocol):
+    """A study from Python, `chainunit.Study`, as a capability knows it."""
+
+    config: Config
+
+    def of_tables(self, tables: dict[str, Any], source: str) -> Self:
+        """A study of the same kind with other `tables` of a study file; paths in them are relative to `source`."""
 
 
 class Capability(StudyCapability):
@@ -39,10 +48,6 @@ class Capability(StudyCapability):
     def answer(self, s: Source, study: StudyRecord) -> Iterator[Block]:
         """Its blocks in the answer of a study."""
         return iter(())
-
-    def tasks(self) -> Mapping[str, Task[Any, Any]]:
-        """Its commands, by name."""
-        return {}
 
     def supplement(self, study: StudyRecord) -> Supplement | None:
         """Its additions to the machine in motion."""

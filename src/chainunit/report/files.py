@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
-from ..core.files import whole
+from ..core.files import atomic_file
 from . import html, print_figures
 from .blocks import Report
 from .markdown import markdown
@@ -19,13 +19,13 @@ def writers(report: Report, folder: Path, name: str) -> list[Callable[[], list[P
 
     def numbers() -> list[Path]:
         file = folder / f"{name}.json"
-        with whole(file) as part:
+        with atomic_file(file) as part:
             part.write_text(numbers_text(report), "utf-8")
         return [file]
 
     def draw() -> list[Path]:
         for drawing in report.drawings:
-            with whole(folder / drawing.file) as part:
+            with atomic_file(folder / drawing.file) as part:
                 part.write_text(drawing.svg, "utf-8")
             pictures.append(folder / drawing.file)
         pictures.extend(print_figures.write(report.figures, folder, report.units))
@@ -33,7 +33,7 @@ def writers(report: Report, folder: Path, name: str) -> list[Callable[[], list[P
 
     def text() -> list[Path]:
         file = folder / f"{name}.md"
-        with whole(file) as part:
+        with atomic_file(file) as part:
             part.write_text(markdown(report, [picture.name for picture in pictures]), "utf-8")
         return [file]
 

@@ -20,7 +20,7 @@ from plotly.io.json import to_json_plotly  # type: ignore[import-untyped]
 from plotly.offline import get_plotlyjs  # type: ignore[import-untyped]
 
 from .. import __version__
-from ..core.files import PAGE, whole
+from ..core.files import PAGE, atomic_file
 from ..reading.text import Units, forms
 from . import blocks as b
 from . import motion, page_figures
@@ -51,7 +51,7 @@ def write(report: b.Report, folder: Path) -> Path:
     """Write the page into `folder`; returns the file."""
     file = folder / NAME
     page = render(report)
-    with whole(file) as part:
+    with atomic_file(file) as part:
         part.write_text(page, "utf-8")
     return file
 

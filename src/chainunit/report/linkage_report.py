@@ -129,7 +129,7 @@ def _motion(s: b.Source, f: LinkageFindings) -> Iterator[b.Block]:
             "long",
         )
     still = [name for name in f.description.structure.links if name not in f.swings]
-    turning = [name for name in still if f.description.turning[name][0]]
+    turning = [name for name in still if f.description.link_turns[name][0]]
     for links, words in (
         (turning, ("turns all the way round", "turn all the way round")),
         ([name for name in still if name not in turning], ("does not turn", "do not turn")),

@@ -4,7 +4,7 @@ tables that follow from the declarations."""
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, get_type_hints
 
 from ..core.errors import InputError, near_name
@@ -17,7 +17,6 @@ from ..reading.results import documented, results_in
 from ..study.analyses import all_analyses
 from ..study.keys import Key, KeyTable, catalogue_columns, key_tables
 from .blocks import Block, Report, Section, Table, TableRow, Text, heads
-from .tasks import tasks
 
 _KEY_COLUMNS = heads("key", "default", "allowed", "meaning")
 
@@ -109,8 +108,11 @@ def _row(key: Key) -> TableRow:
     return TableRow((key.name, key.left_out or key.follows or "-", key.allowed or "-", key.description))
 
 
-def reference(commands: Iterable[tuple[str, str, Iterable[tuple[str, str]]]]) -> Report:
-    """The whole reference; each of the `commands` has a name, a description, and options with their help."""
+def reference(
+    commands: Iterable[tuple[str, str, Iterable[tuple[str, str]]]], contents: Mapping[str, type | None]
+) -> Report:
+    """The whole reference; each of the `commands` has a name, a description, and options with their help, and
+    `contents` the declared content of the result.json of some."""
     sections = [
         Section(
             f"{table.name}-{table.of}",
@@ -121,7 +123,8 @@ def reference(commands: Iterable[tuple[str, str, Iterable[tuple[str, str]]]]) ->
     ]
     sections += [Section(name, f"FMU {name}", tuple(_variables(model))) for name, model in MODELS.items()]
     sections += [
-        Section(f"result-{name}", f"result.json: {name}", (_parts(of),)) for name, of in _results().items()
+        Section(f"result-{name}", f"result.json: {name}", (_parts(of),))
+        for name, of in _results(contents).items()
     ]
     for name, words, options in commands:
         rows = tuple(TableRow((option, words)) for option, words in options)
@@ -135,12 +138,11 @@ def reference(commands: Iterable[tuple[str, str, Iterable[tuple[str, str]]]]) ->
     return Report("Reference", "reference", {}, (), tuple(sections))
 
 
-def _results() -> dict[str, type]:
+def _results(contents: Mapping[str, type | None]) -> dict[str, type]:
     """The declared results by their names: those of the analyses of a study, and those of other commands."""
     returned = ((each.name, get_type_hints(each.find)["return"]) for each in all_analyses())
     found = {name: results_in(hint)[1] for name, hint in returned}
-    found |= {name: task.content for name, task in tasks().items()}
-    return {name: of for name, of in found.items() if of is not None}
+    return {name: of for name, of in (found | dict(contents)).items() if of is not None}
 
 
 def _parts(of: type) -> Table:
@@ -154,7 +156,7 @@ def _variables(model: type[Model]) -> Iterator[Block]:
     interface: Any = Interface(model, {})
     rows = []
     for causality in ("parameter", "input", "output"):
-        for signal in interface.of(causality):
+        for signal in interface.signals_of(causality):
             v = signal.variable
             start, unit = (
                 f"{v.quantity.start or 0.0:g}{unit_behind(v.unit)}",

@@ -16,7 +16,7 @@ from pathlib import Path
 import xarray as xr
 
 from .. import __version__
-from ..core.files import netcdf, whole
+from ..core.files import atomic_file, netcdf
 from ..study.record import LOAD_CYCLE, StudyRecord
 from ..work.interrupts import stoppable
 from .run_names import title
@@ -31,7 +31,7 @@ def _load_cycle(study: StudyRecord, turns: xr.Dataset, file: Path) -> Path:
     time, drive = turns["time"].values, study.drive
     torque, speed = drive.motor_shaft(turns)
     columns = time - time[0], speed, torque, drive.load_inertia(turns)
-    with whole(file) as part, part.open("w", newline="", encoding="utf-8") as out:
+    with atomic_file(file) as part, part.open("w", newline="", encoding="utf-8") as out:
         writer = csv.writer(out)
         writer.writerow(("time [s]", "speed [rad/s]", "torque [N.m]", "inertia [kg.m2]"))
         writer.writerows([f"{x:.9g}" for x in row] for row in zip(*columns, strict=True))
@@ -57,7 +57,7 @@ def write(study: StudyRecord, folder: Path) -> list[Path]:
     if study.runs:
         file = folder / SERIES
         # an interrupt inside the library leaves its locks taken
-        with stoppable(), whole(file) as part, netcdf():
+        with stoppable(), atomic_file(file) as part, netcdf():
             tree(study).to_netcdf(part, engine="netcdf4")
         files.append(file)
     return files

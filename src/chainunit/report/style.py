@@ -11,7 +11,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
-from ..core.files import whole
+from ..core.files import atomic_file
 
 STYLE: dict[str, Any] = {
     "font.size": 10,
@@ -94,7 +94,7 @@ def draw(plots: Mapping[str, Callable[[], Any]], folder: Path) -> list[Path]:
         for name, make in plots.items():
             figure = make()
             try:
-                with whole(folder / name) as part:
+                with atomic_file(folder / name) as part:
                     figure.savefig(part, format="png")
             finally:
                 plt.close(figure)

@@ -1,7 +1,7 @@
 """A task: what a command computes, reports and leaves in a folder.
 
-The command line (`chainunit.app.console.carry_out`) and Python (`chainunit.app.results.ReportedResult`) take the same
-steps by it: they claim the folder, clear it, compute, report and write.
+The command line (`chainunit.report.console`) and Python (`chainunit.report.reported_result`) take the same steps by
+it: they claim the folder, clear it, compute, report and write.
 """
 
 from __future__ import annotations

@@ -33,6 +33,16 @@ class FileReference:
     """whether it is a recording, which has to be there"""
 
 
+@dataclass(frozen=True)
+class Estimates:
+    """Estimated numbers of a study: their `values` by full name, the `covariance` of their errors in this order,
+    shape (numbers, numbers), and the name of the `file` that holds both, beside the study file."""
+
+    values: Mapping[str, float]
+    covariance: Any
+    file: str
+
+
 class StudyCapability:
     """A capability; each method has a default for a capability that has no such thing."""
 
@@ -114,6 +124,9 @@ class StudyCapability:
     def words(self) -> Mapping[str, str]:
         """By name, the words on the numbers of its results, for a comparison of two."""
         return {}
+
+    def take_estimates(self, config: Config, estimates: Estimates, tables: dict[str, Any]) -> None:
+        """Write into its `tables` of the study file with estimated numbers what follows from their errors."""
 
     def analyses(self) -> Iterable[type[Analysis]]:
         """Its analyses of a study."""

@@ -20,7 +20,16 @@ from ..machines.api import machine_of, ratios
 from ..machines.chain_unit import SideName
 from ..machines.machine import Machine
 from ..mechanism.models import MachineModel
-from ..reading.tables import Slip, filled, given_values, in_file, read, read_table, slips, toml
+from ..reading.tables import (
+    UnusualValue,
+    filled,
+    given_values,
+    in_file,
+    read,
+    read_table,
+    toml,
+    unusual_values,
+)
 from ..reading.text import DEFAULT_UNITS, Units, chosen_units
 from ..reading.toml_lines import lines_of
 from .checks import check_order
@@ -94,7 +103,7 @@ class Config:
     """by name, all values that are no quantities, such as "start" or "driveline.place", given or not"""
     is_packaged: bool = False
     """whether the file is the packaged example"""
-    slips: tuple[Slip, ...] = ()
+    unusual: tuple[UnusualValue, ...] = ()
     """values that look like a slip of the unit"""
     units: Units = dataclasses.field(default_factory=lambda: DEFAULT_UNITS)
     """units in which the report shows numbers"""
@@ -215,7 +224,7 @@ def of_tables(data: Mapping[str, Any], source: str) -> Config:
     except InputError as error:
         # the commands read the recordings; a missing one is told beside the faults of the file
         if missing := list(missing_recordings(data, source)):
-            raise InputError.of([*error.faults, *missing]) from error
+            raise InputError.joined([*error.faults, *missing]) from error
         raise
 
 
@@ -224,7 +233,7 @@ def _of_tables(data: Mapping[str, Any], source: str) -> Config:
     parts, faults = check_values(in_system, source)
     if parts is None:
         # a key that the file has, not the one that stands for it
-        raise InputError.of(faults if in_system is data else [_of_linkage(fault) for fault in faults])
+        raise InputError.joined(faults if in_system is data else [_of_linkage(fault) for fault in faults])
     data = in_system
     if not faults:
         return _of_values(data, parts, source)
@@ -233,7 +242,7 @@ def _of_tables(data: Mapping[str, Any], source: str) -> Config:
         _of_values(without(data, faults), parts, source)
     except InputError as error:
         faults += independent(error.faults, faults, parts)
-    raise InputError.of(faults)
+    raise InputError.joined(faults)
 
 
 def _of_linkage(fault: InputError) -> InputError:
@@ -249,19 +258,19 @@ def _of_values(data: Mapping[str, Any], parts: Parts, source: str) -> Config:
     whole = over_example(data, parts)
     form = read_table(parts.form, whole)
     declared = {name: section.declaration for name, section in parts.sections.items()}
-    unusual = tuple(slips(declared, data, {"run.crank_speed": parts.machine.usual_speed}))
+    unusual = tuple(unusual_values(declared, data, {"run.crank_speed": parts.machine.usual_speed}))
     with each_refusal(lambda fault: _with_hints(fault, unusual)):
         events = read_events(form.event, parts.machine)
         if "event" in data:
             kinds = {f"event.{name}": event.Parameters for name, event in events.items()}
             tables = dict(zip(events, data["event"], strict=True))
-            unusual += tuple(slips(kinds, {"event": tables}))
+            unusual += tuple(unusual_values(kinds, {"event": tables}))
         config = _config(data, form, parts, events, source, unusual)
         given, names = frozenset(_names(data, events)), frozenset(_names(whole, events))
         return dataclasses.replace(config, given=given, of_example=names - given - {"title"}, tables=data)
 
 
-def _with_hints(fault: InputError, unusual: Iterable[Slip]) -> InputError:
+def _with_hints(fault: InputError, unusual: Iterable[UnusualValue]) -> InputError:
     """A refusal, followed by the unusual values of its table: where values do not fit together, one may be a
     slip of the unit."""
     table = fault.key.partition(".")[0]
@@ -285,7 +294,7 @@ def _config(
     parts: Parts,
     events: Mapping[str, Event],
     source: str,
-    unusual: tuple[Slip, ...],
+    unusual: tuple[UnusualValue, ...],
 ) -> Config:
     """The study of a file each of whose values is allowed."""
     sections, faults = parts.sections, Faults()
@@ -344,7 +353,7 @@ def _config(
         source=source,
         given=frozenset(),
         choices=_choices(checked, parts),
-        slips=unusual,
+        unusual=unusual,
         units=chosen_units(checked.report.units),
         labels=checked.report.labels,
         values={name: x for name, x in of_study.items() if name not in _OWN_TABLES},

@@ -17,7 +17,7 @@ from ..machines.linkages.model import LinkageDescription
 from ..machines.linkages.structure import CYLINDER
 from ..machines.machine import Machine
 from ..mechanism.assur import PRISMATIC
-from ..mechanism.courses import largest, means, roots
+from ..mechanism.sampled_quantities import largest, means, roots
 
 PLACES = 361
 _LOSSLESS = 1e-9
@@ -259,7 +259,7 @@ def _motions(
             f"{description.variable('link', name)}.w",
         )
         for name in structure.links
-        if description.turning[name][0] == 0.0
+        if description.link_turns[name][0] == 0.0
     ]
     _, outputs = way.state(q)
     parts = [each for each in parts if np.ptp(outputs[each[2]]) > STANDS]

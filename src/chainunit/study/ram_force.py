@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..mechanism.assur import GROUND, PRISMATIC, REVOLUTE
-from ..mechanism.courses import ROUNDING, roots
+from ..mechanism.sampled_quantities import ROUNDING, roots
 from .record import StudyRecord
 from .turn import TurnAnalysis
 

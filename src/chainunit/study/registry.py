@@ -13,4 +13,12 @@ _HOME = f"{__package__.rpartition('.')[0]}.capabilities"
 def registered() -> tuple[Any, ...]:
     """All capabilities in their order, each a `chainunit.study.capability.StudyCapability`."""
     names = import_module(_HOME).NAMES
-    return tuple(import_module(f"{_HOME}.{name}").CAPABILITY for name in names)
+    return tuple(_capability(f"{_HOME}.{name}") for name in names)
+
+
+def _capability(folder: str) -> Any:
+    """The capability of a folder: of its module `capability`, where the folder itself is imported by the command line
+    and must be light."""
+    package = import_module(folder)
+    home = package if hasattr(package, "CAPABILITY") else import_module(f"{folder}.capability")
+    return home.CAPABILITY

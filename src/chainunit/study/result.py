@@ -63,7 +63,7 @@ def _as_dict(study: StudyRecord) -> dict[str, Any]:
         "verdict": {"model": _on_model(study), "motor": motor_verdict(study)},
         "warnings": as_data(study.warnings),
         "notes": as_data(study.notes),
-        "slips": as_data(config.slips),
+        "slips": as_data(config.unusual),
         **(given := _given_values(study)),
         **_statics(study),
         **_runs(study),

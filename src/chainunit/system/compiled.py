@@ -16,13 +16,13 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from ..core.composite import composed
-from ..core.composition import RESERVED, SOLVER, reference
 from ..core.engines import casadi_
 from ..core.errors import InputError, printable, shown
 from ..core.integrators import MAX_STEPS
 from ..core.model import About, Model, Terminal
 from ..core.ports import MEASURED
+from ..core.system_description import RESERVED, SOLVER, reference
+from ..core.system_model import system_model
 from ..fmu.backends import Backend, Origin
 from ..fmu.backends import export as export_fmu
 from ..fmu.description import Interface
@@ -77,7 +77,7 @@ def compiled(
         )
     description = _description(system, models, name, printable(title))
     description |= {"about": about and asdict(about), "experiment": dict(experiment or {})}
-    model = composed(json.dumps(description, sort_keys=True))
+    model = system_model(json.dumps(description, sort_keys=True))
     values = system.values
     layout = model.parameter_layout
     limits = {own: [values[full] for each in models if (full := f"{each}.{own}") in values] for own in SOLVER}
@@ -122,7 +122,7 @@ def input_starts(system: System, model: type[Model]) -> dict[str, float]:
 
 
 def _description(system: System, models: Mapping[str, type[Model]], name: str, title: str) -> dict[str, Any]:
-    """The description of a system that a `chainunit.core.composition.Composition` takes."""
+    """The description of a system that a `chainunit.core.system_description.SystemDescription` takes."""
     exact = hold_loads(system).connections
     influences = {each: _influences(model) for each, model in models.items()}
     free = _free_terminals(system)
@@ -242,12 +242,11 @@ def _influences(model: type[Model]) -> _Influences:
 def _constraints(interface: Interface) -> set[str]:
     import casadi
 
-    (_, us, *_), p, u, x, *_ = interface.trace
-    rows = casadi.vertcat(*interface.model.closed(casadi_(), p, u, x))
+    t = interface.trace
+    rows = casadi.vertcat(*interface.model.constrained_states(casadi_(), t.p, t.u, t.x))
+    depends = casadi.which_depends(rows, t.symbols[1], 1, False)
     names = [v.name for v in interface.inputs]
-    return {
-        name for name, counts in zip(names, casadi.which_depends(rows, us, 1, False), strict=True) if counts
-    }
+    return {name for name, counts in zip(names, depends, strict=True) if counts}
 
 
 class _Plan:
@@ -321,6 +320,6 @@ class _Plan:
 
         def rounds(name: str) -> int:
             before = max(map(rounds, self._started_by[name]), default=0)
-            return before + self._models[name].start_rounds
+            return before + self._models[name].start_problem.rounds
 
         return max(map(rounds, self._started_by), default=0)

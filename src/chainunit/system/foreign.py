@@ -126,17 +126,17 @@ def foreign_component(file: Path, role: Role, names: Mapping[str, str] | None = 
     InputError
         also where a variable is missing, or an input is an output or the reverse: in one line, with the remedy.
     """
-    outsider = fmu_component(file, names)
+    component = fmu_component(file, names)
     motor = role == "motor"
     kinds = {"flange": FLANGE, "load": LOAD}
     gives = {FLANGE: "output" if motor else "input", LOAD: "input" if motor else "output"}
     for name, kind in kinds.items():
-        terminal = outsider.terminals.get(name)
+        terminal = component.terminals.get(name)
         prefix = "load." if kind == LOAD and motor else ""
         for member in _REQUIREMENTS[kind]:
             variable = terminal.members.get(member, "") if terminal else prefix + member
-            connector = outsider.connectors.get(variable)
-            label = outsider.names.get(variable, variable) or prefix + member
+            connector = component.connectors.get(variable)
+            label = component.names.get(variable, variable) or prefix + member
             needs = f"a {role} needs the {gives[kind]} {prefix + member} in {_UNITS[member]}"
             if connector is None:
                 raise InputError(
@@ -145,9 +145,9 @@ def foreign_component(file: Path, role: Role, names: Mapping[str, str] | None = 
             if connector.causality != gives[kind]:
                 raise InputError(f"{file}: {label} is of the kind {connector.causality}; {needs}")
     known = _MOTOR if motor else _MACHINE
-    signals = {name: unit for name, unit in known.items() if name in outsider.connectors}
+    signals = {name: unit for name, unit in known.items() if name in component.connectors}
     return replace(
-        outsider, connectors={**outsider.connectors, **_with_units(file, signals, outsider.connectors)}
+        component, connectors={**component.connectors, **_with_units(file, signals, component.connectors)}
     )
 
 
@@ -206,10 +206,10 @@ def _prefixes(names: Iterable[str], members: Iterable[str]) -> list[str]:
     return sorted(set.intersection(*sets))
 
 
-def _of(ends: Iterable[str], like: Terminal, name: str, prefix: str) -> Terminal:
-    """A terminal of the kind of `like`, with those of its members that the FMU has."""
-    members = {m: prefix + m for m in like.members if prefix + m in ends}
-    return Terminal(name, like.kind, like.description, members)
+def _of(ends: Iterable[str], known: Terminal, name: str, prefix: str) -> Terminal:
+    """A terminal of the kind of `known`, with those of its members that the FMU has."""
+    members = {m: prefix + m for m in known.members if prefix + m in ends}
+    return Terminal(name, known.kind, known.description, members)
 
 
 def _declared(file: Path, ours: Mapping[str, str]) -> list[Terminal]:

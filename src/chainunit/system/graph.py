@@ -126,7 +126,7 @@ class System:
     components : by name; a machine comes before its driver
     joints : pairs of terminals by full name, such as ``("motor.flange", "machine.flange")``
     wires : single connections from an output to an input
-    start : start values of parameters and inputs by full name, beside those of the components
+    start : start values of parameters and inputs by full name, beside the start values of the components
     slopes : whether load ports pass their slopes; without them the load is held constant over a step
 
     Raises
@@ -199,7 +199,7 @@ class System:
 
     @cached_property
     def connections(self) -> list[Connection]:
-        """All connections between variables, those of the joints first."""
+        """All connections between variables, first those by joints."""
         excluded = () if self.slopes else Layout(PortSlopes).names
         connections = [
             c for joint in self.joints for member, c in self._joint(*joint) if member not in excluded
@@ -209,12 +209,12 @@ class System:
             self.connector(target, "input")
         return [*connections, *self.wires]
 
-    def _joint(self, one: str, other: str) -> list[tuple[str, Connection]]:
+    def _joint(self, first: str, second: str) -> list[tuple[str, Connection]]:
         """The connections of a joint, each with the name of the member."""
-        (name, left), (name2, right) = self.terminal(one), self.terminal(other)
+        (name, left), (name2, right) = self.terminal(first), self.terminal(second)
         if left.kind != right.kind:
             raise InputError(
-                f"{one} ({left.kind}) cannot be joined to {other} ({right.kind}): the kinds must be alike"
+                f"{first} ({left.kind}) cannot be joined to {second} ({right.kind}): the kinds must be alike"
             )
         pairs = []
         for member in left.members:
@@ -227,7 +227,7 @@ class System:
             elif member == "phi":
                 both = "give" if gives[0] else "take"
                 raise InputError(
-                    f"{one} and {other} both {both} the angle: one must give it, the other take it"
+                    f"{first} and {second} both {both} the angle: one must give it, the other take it"
                 )
         return pairs
 

@@ -21,7 +21,7 @@ BLOCK = 4096
 
 
 def selected(names: Iterable[str] | None, there: Sequence[str]) -> list[str]:
-    """Those of the full names `there` that a run is to keep, in their order: the `names`, or all without them.
+    """The full names of `there` that a run is to keep, in their order: the `names`, or all without them.
 
     Raises
     ------

@@ -18,7 +18,7 @@ import numpy as np
 import xarray as xr
 
 from ..core.errors import InputError, InterruptedRunError, RunError
-from ..core.files import whole
+from ..core.files import atomic_file
 from ..work.interrupts import stoppable
 from ..work.progress import Progress
 from . import rows
@@ -300,7 +300,7 @@ class FmuSimulation(Simulation):
         try:
             with (
                 stoppable() as stopped,
-                nullcontext() if file is None else whole(file) as part,
+                nullcontext() if file is None else atomic_file(file) as part,
                 rows.Rows(recorders, room, part) as table,
             ):
                 complaints = _Complaints(self._journal)

@@ -17,7 +17,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
 from ..core.errors import InputError, refusal_prefix
-from ..core.files import folder, whole
+from ..core.files import atomic_file, folder
 from ..core.model import Model
 from ..core.quantities import written
 from ..core.temporary_folders import scratch
@@ -99,7 +99,7 @@ def export(
         contents[_parameter_file(name_of)] = xml_bytes(_parameter_set(part, [*set_here, *free]))
     structure = _description(system, parts, sources, (name, description), (stop, step))
     contents["SystemStructure.ssd"] = xml_bytes(structure)
-    with whole(file) as temporary:
+    with atomic_file(file) as temporary:
         pack(contents, temporary)
     titles = ", ".join(f"{name_of} ({part.title})" for name_of, part in parts.items())
     return f"SSP 1.0, {titles}, {len(system.connections)} connections; {'; '.join(dict.fromkeys(origins))}"

@@ -126,11 +126,11 @@ class _BatchError(Exception):
 
 def _batches(store: BatchStore, gaps: list[int], workers: int, scheduler: str | None) -> Made:
     if not gaps or (scheduler is None and workers == 1):
-        return _here(store, gaps)
+        return _in_this_process(store, gaps)
     return _on_workers(store, gaps, workers, scheduler)
 
 
-def _here(store: BatchStore, gaps: list[int]) -> Made:
+def _in_this_process(store: BatchStore, gaps: list[int]) -> Made:
     """Make batches in this process."""
     job = store.job
     try:
@@ -236,7 +236,7 @@ def _client(workers: int, scheduler: str | None) -> Iterator[Any]:
     """A client of that scheduler, or of as many local processes."""
     with _silent():
         if scheduler is not None:
-            with _connected(scheduler) as client:
+            with _connection(scheduler) as client:
                 yield client
         else:
             with _local(workers) as client:
@@ -301,7 +301,7 @@ def _local(workers: int) -> Iterator[Any]:
 
 
 @contextmanager
-def _connected(scheduler: str) -> Iterator[Any]:
+def _connection(scheduler: str) -> Iterator[Any]:
     """A client of the scheduler at that address."""
     from distributed import Client
 

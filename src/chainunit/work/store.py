@@ -20,7 +20,7 @@ import numpy as np
 
 from .. import __version__
 from ..core.errors import RunError
-from ..core.files import regular_bytes, whole, writing
+from ..core.files import atomic_file, regular_bytes, writing
 from .job import BATCH, CHECKS, Job, ResultVariable, text_array
 
 if TYPE_CHECKING:
@@ -150,7 +150,7 @@ class BatchStore:
         Raises
         ------
         RunError
-            for results that are not those that the job declares.
+            for results that the job does not declare.
         WriteError
             where a file cannot be written.
         """
@@ -186,7 +186,7 @@ class BatchStore:
             return
         with writing(file):
             file.parent.mkdir(parents=True, exist_ok=True)
-        with whole(file, is_result=False) as part:
+        with atomic_file(file, is_result=False) as part:
             part.write_bytes(content)
 
     def _remove_leftovers(self) -> None:

@@ -1,42 +1,42 @@
-"""The identification of a machine: its recordings, the numbers that they can tell, the fit, and its checks."""
+"""The identification of a machine: its recordings, the numbers that they can determine, the fit, and its tests."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.errors import Faults, InputError, printable
-from ...core.temporary_folders import scratch
+from ...core.errors import Faults, InputError
 from ...drives.induction_motor import InductionMotor
+from ...recordings.fit import MOST_ROUNDS, Fit, fit
+from ...recordings.inspection import (
+    inspect_runs,
+)
+from ...recordings.measurands import MEASURANDS, OF_TERMINALS, SIGNALS, usual_offset
+from ...recordings.problem import Comparison, Problem, RecordedRun, Sensor
+from ...recordings.recorded_drive import drive_of, is_of_shaft, plant_for
+from ...recordings.recording import Recording
+from ...recordings.residuals import (
+    PriorConflict,
+    ResidualTest,
+    prior_conflicts,
+    residual_tests,
+    sensor_conflicts,
+)
+from ...recordings.unknown import Unknown
 from ...study.arrays import rms
-from ...study.choice import choose
 from ...study.config import Config
 from ...study.drive import Drive
 from ...system import Profile
 from ...work.progress import Report, quiet
-from .fit import MOST_ROUNDS, Fit, fit
 from .information import Combination, Information, information
-from .inspection import OF_SPEED, Expectation, inspect_columns, inspect_motion, inspect_steadiness
-from .measurands import MEASURANDS
-from .plant import AnyPlant, Plant
 from .posterior import Posterior, posterior
-from .problem import Comparison, Problem, RecordedRun, Sensor, likeness, mark_times
-from .reading import OFFSET_SHARE, WITH_OFFSET, IdentificationPlan, PlannedRun, WatchPlan
-from .recording import Recording, read_part, remedy
-from .residuals import ResidualCheck, Strain, check_residuals, strained_priors, strains
-from .shaft import MEASURED, MeasuredShaft
-from .suspicion import Suspicion, suspicions
-from .unknown import Unknown
+from .reading import IdentificationPlan, PlannedRun
+from .score_tests import ScoreTest, score_tests
 
-SIGNALS = ("motor.i", "motor.u", "motor.power", "crank.tau")
-"""Quantities of which a recording must have one: they tell the torque."""
-WIDE, NEAR = 5.0, 1.2
-"""Factors by which the RMS of a column may differ from the simulated one: of a current, power or torque, which depend
-on the sought numbers; and of a speed or a voltage under control."""
 CONTROL = ("speed_control.kp", "speed_control.ki", "current_control.kp", "current_control.ki")
 """Gains of the control of a motor, of which the course of its current depends."""
 AT_BOUND = 0.02
@@ -48,7 +48,7 @@ it."""
 class FittedNumber:
     """A sought number: its value in the best fit, `fitted`, which has a meaning together with those of all others;
     its mean `value` in the distribution that the recordings leave, its standard deviation, the ends of its interval
-    of 95 %, and whether the recordings tell it."""
+    of 95 %, and whether the recordings determine it."""
 
     unknown: Unknown
     fitted: float
@@ -56,37 +56,46 @@ class FittedNumber:
     deviation: float
     low: float
     high: float
-    is_told: bool
+    is_determined: bool
 
     @property
     def at_bound(self) -> str:
-        """The bound at which the fit ended, "lower" or "upper"; such a number is not told."""
-        return _bound(self.unknown, self.fitted)
+        """The bound at which the fit ended, "lower" or "upper"; such a number is not determined."""
+        return _bound_of(self.unknown, self.fitted)
+
+
+class ComparedColumn(NamedTuple):
+    """The times of the rows that are compared [s], the measured column, and the simulated one as its sensor would
+    show it, each of shape (n,)."""
+
+    time: Any
+    measured: Any
+    simulated: Any
 
 
 @dataclass(frozen=True)
 class IdentifiedMachine:
     """An identified machine.
 
-    `before` is what the runs can tell at the start values, with further runs in order; `after` the same at the fitted
-    values. `best` are the normal equations there, `posterior` is the distribution of the sought numbers around them,
-    `checks` are those of the residuals, and `suspicions` those of known numbers.
+    `information_at_start` is the information of the runs at the start values, with further runs in order;
+    `information_at_fit` the same at the fitted values. `best` are the normal equations there, `posterior` is the
+    distribution of the sought numbers around them, and `score_tests` are those of known numbers.
     """
 
     config: Config
     plan: IdentificationPlan
     problem: Problem
-    before: Information
+    information_at_start: Information
     best: Fit
     posterior: Posterior
-    after: Information
-    checks: tuple[ResidualCheck, ...]
-    suspicions: tuple[Suspicion, ...]
+    information_at_fit: Information
+    residual_tests: tuple[ResidualTest, ...]
+    score_tests: tuple[ScoreTest, ...]
 
     @property
     def estimates(self) -> dict[str, FittedNumber]:
         """The sought numbers by the full names of the study file."""
-        told = {each.name: each.is_told for each in self.after.outlooks}
+        determined = {each.name: each.is_determined for each in self.information_at_fit.determinations}
         return {
             own.name: FittedNumber(
                 own,
@@ -95,7 +104,7 @@ class IdentifiedMachine:
                 each.deviation,
                 each.low,
                 each.high,
-                told[each.name] and not _bound(own, float(x)),
+                determined[each.name] and not _bound_of(own, float(x)),
             )
             for own, x, each in zip(
                 self.plan.sought,
@@ -112,23 +121,25 @@ class IdentifiedMachine:
 
     @property
     def is_described(self) -> bool:
-        """Whether the residuals may be noise, clocks, sensors and known numbers are as they are known, and no number
-        is held by a bound."""
-        doubts = self.strains or self.posterior.held or any(each.is_suspicious for each in self.suspicions)
-        return all(check.is_noise for check in self.checks) and not doubts
+        """Whether the residuals may be noise, clocks, sensors and known numbers are as they are known, and no bound
+        is active."""
+        if self.prior_conflicts or self.posterior.active_bounds:
+            return False
+        are_rejected = any(test.is_rejected for test in self.score_tests)
+        return not are_rejected and all(test.is_noise for test in self.residual_tests)
 
     @property
-    def strains(self) -> list[Strain]:
+    def prior_conflicts(self) -> list[PriorConflict]:
         """The numbers of clocks and sensors, and sought ones with a stated deviation, that are not as they are
         known."""
-        return [*strains(self.problem, self.best), *strained_priors(self.plan.sought, self.best)]
+        return [*sensor_conflicts(self.problem, self.best), *prior_conflicts(self.plan.sought, self.best)]
 
-    def courses(self, comparison: Comparison) -> tuple[Any, Any, Any]:
-        """The times of the rows that are compared [s], a measured column, and the simulated one as its sensor would
-        show it, each of shape (n,)."""
+    def columns_over_time(self, comparison: Comparison) -> ComparedColumn:
+        """The measured and the simulated column of a comparison."""
         recording = self._run(comparison.run).recording
         measured = recording.columns[comparison.column][comparison.rows]
-        return recording.time[comparison.rows], measured, measured - comparison.residuals * comparison.size
+        simulated = measured - comparison.residuals * comparison.size
+        return ComparedColumn(recording.time[comparison.rows], measured, simulated)
 
     def is_steady(self, name: str) -> bool:
         """Whether the turns of a run are alike."""
@@ -138,16 +149,16 @@ class IdentifiedMachine:
     def _run(self, name: str) -> RecordedRun:
         return next(each for each in self.problem.runs if each.name == name)
 
-    def combined(self, combination: Combination) -> tuple[float, float]:
+    def value_of_sum(self, combination: Combination) -> tuple[float, float]:
         """The value of a sum of sought numbers, and its standard deviation."""
         places = [self.problem.place[name] for name, _ in combination.terms]
         sums = self.posterior.samples[:, places] @ [factor for _, factor in combination.terms]
         return float(np.mean(sums)), float(np.std(sums))
 
 
-def _bound(own: Unknown, x: float) -> str:
+def _bound_of(own: Unknown, x: float) -> str:
     """The bound at which a fitted value lies, "lower" or "upper"; empty between them."""
-    near = AT_BOUND * own.spread
+    near = AT_BOUND * own.prior_deviation
     return "lower" if x <= own.low + near else "upper" if x >= own.high - near else ""
 
 
@@ -159,13 +170,13 @@ def system_name(name: str) -> str:
 def identify(
     config: Config,
     report: Report = quiet,
-    told: Callable[[IdentificationPlan, Information], None] = lambda *_: None,
+    before_fit: Callable[[IdentificationPlan, Information], None] = lambda *_: None,
 ) -> IdentifiedMachine:
     """Identify the machine of a study from the recordings of its table [identify].
 
     Parameters
     ----------
-    told : gets what the recordings can tell, before anything is fitted
+    before_fit : gets the plan and the information of the recordings, before anything is fitted
 
     Raises
     ------
@@ -183,9 +194,9 @@ def identify(
     problem = _problem(config, plan, drive, recordings)
     inspect_runs(problem, workers)
     report("what the recordings can tell", 0.15, 1.0)
-    start = problem.started(workers)
+    start = problem.initial_point(workers)
     before = information(problem, start, workers)
-    told(plan, before)
+    before_fit(plan, before)
     best = fit(
         problem,
         start,
@@ -199,8 +210,8 @@ def identify(
     report("checks", 0.95, 1.0)
     after = information(problem, best.z, workers, propose=False, at=best)
     around = posterior(problem, best, workers, plan.seed)
-    checks, suspects = tuple(check_residuals(best)), tuple(suspicions(problem, best, workers))
-    return IdentifiedMachine(config, plan, problem, before, best, around, after, checks, suspects)
+    tests = tuple(residual_tests(best)), tuple(score_tests(problem, best, workers))
+    return IdentifiedMachine(config, plan, problem, before, best, around, after, *tests)
 
 
 def plan_of(config: Config) -> IdentificationPlan:
@@ -211,7 +222,7 @@ def plan_of(config: Config) -> IdentificationPlan:
     InputError
         for a study without the table [identify].
     """
-    plan: IdentificationPlan | None = config.plans["identification"].identify
+    plan: IdentificationPlan | None = config.plans["identification"]
     if plan is None:
         raise InputError(
             "identify: is missing; add [[identify.run]] with the recordings, and [[identify.parameter]] with the "
@@ -219,28 +230,6 @@ def plan_of(config: Config) -> IdentificationPlan:
             key="identify",
         )
     return plan
-
-
-def read_signal(of: PlannedRun | WatchPlan) -> Recording:
-    """The part of a recording that counts.
-
-    Raises
-    ------
-    InputError
-        see `read_part`; and where no column tells the torque.
-    """
-    recording = read_part(of.file, of.columns, of.begin, of.end)
-    if not recording.columns.keys() & set(SIGNALS):
-        others = recording.others
-        more = (
-            f"; its other heads are: {printable(', '.join(others))}{remedy('motor.i', others)}"
-            if others
-            else ""
-        )
-        raise InputError(
-            f"{of.file}: has no column that tells the torque; must have one of {', '.join(SIGNALS)}{more}"
-        )
-    return recording
 
 
 def read_runs(runs: Sequence[PlannedRun]) -> dict[str, Recording]:
@@ -254,7 +243,7 @@ def read_runs(runs: Sequence[PlannedRun]) -> dict[str, Recording]:
     faults, recordings = Faults(), dict[str, Recording]()
     for run in runs:
         with faults.collected():
-            recording = read_signal(run)
+            recording = run.read()
             begin, end = recording.time[0], recording.time[-1]
             if run.off is not None and not begin < run.off < end:
                 raise InputError(
@@ -283,19 +272,6 @@ def _same_rows(first: Recording, second: Recording) -> bool:
     return bool(common) and all(np.array_equal(first.columns[name], second.columns[name]) for name in common)
 
 
-def drive_of(config: Config, recordings: Mapping[str, Recording]) -> Drive:
-    """The drive of the study, tuned where the file does not give the gains of its control."""
-    of_motor = sorted({name for each in recordings.values() for name in each.columns if name in SIGNALS[:3]})
-    if of_motor and not (config.gives("motor") or config.plate is not None):
-        raise InputError(
-            f"motor: is missing, and the recordings have {', '.join(of_motor)}; add [motor] with its data, or "
-            "system.motor with a motor of the catalogue",
-            "motor",
-        )
-    with scratch() as folder:
-        return choose(config, folder, quiet).drive
-
-
 def _problem(
     config: Config, plan: IdentificationPlan, drive: Drive, recordings: Mapping[str, Recording]
 ) -> Problem:
@@ -305,17 +281,6 @@ def _problem(
     of_shaft = is_of_shaft(measured)
     runs = [_run(config, drive, run, recordings[run.name], of_shaft) for run in plan.runs]
     return Problem(plant, runs, sought, _sensors(plan, measured, recordings))
-
-
-def is_of_shaft(columns: Collection[str]) -> bool:
-    """Whether the columns are those of a machine whose motor is not recorded."""
-    return all(name in (*MEASURED, "mark") for name in columns)
-
-
-def plant_for(drive: Drive, columns: Collection[str], by: list[str]) -> AnyPlant:
-    """The plant that has these columns, with derivatives by these parameters and inputs of the system."""
-    measured = [name for name in columns if name != "mark"]
-    return MeasuredShaft(drive.machine, measured, by) if is_of_shaft(columns) else Plant(drive, measured, by)
 
 
 def _run(config: Config, drive: Drive, run: PlannedRun, recording: Recording, of_shaft: bool) -> RecordedRun:
@@ -349,57 +314,24 @@ def _sensors(
             continue
         own = plan.sensor(name)
         size = max(rms(each.columns[name]) for each in recordings.values() if name in each.columns)
-        usual = OFFSET_SHARE * size if name in WITH_OFFSET else 0.0
-        sensors[name] = Sensor(
-            own.noise, own.resolution, own.gain, usual if own.offset is None else own.offset
-        )
+        offset = usual_offset(name, size) if own.offset is None else own.offset
+        sensors[name] = Sensor(own.noise, own.resolution, own.gain, offset)
     return sensors
 
 
-def inspect_runs(problem: Problem, workers: int) -> None:
-    """Refuse recordings with faults; the sizes to expect are those of the drive at the start values. What needs no
-    simulation is told before it, as with a wrong unit of the time it has no end."""
-    faults, ratio = Faults(), problem.plant.ratio
-    for run in problem.runs:
-        reference = run.values.get("motor.w_ref")
-        speeds = [run.crank_speed, *(w / ratio for _, _, w in getattr(reference, "changes", ()))]
-        faults.add(inspect_motion(run.recording, (min(speeds), max(speeds)), ratio, run.off))
-    faults.refuse()
-    for run in problem.runs:
-        response = problem.simulated(run, problem.starts, workers)
-        expected, off = dict[str, Expectation](), np.inf if run.off is None else run.off
-        # of less than a turn the RMS is that of an angle
-        known = off - float(run.recording.time[0]) >= 2.0 * np.pi / run.crank_speed
-        has_angle = len(mark_times(run.recording)) > 0
-        for name in run.recording.columns if known else ():
-            rows = response.describes(name, response.time) & (response.time <= off)
-            if MEASURANDS[name].analog and rows.any():
-                size, factor = rms(response.values[name][rows]), NEAR if name in OF_SPEED else WIDE
-                words = f"{1.0 / factor:.2g} to {factor:g} times the simulated one"
-                like = likeness(run.recording, name, response) if has_angle else 0.0
-                expected[name] = Expectation(size / factor, size * factor, words, like)
-        faults.add(inspect_columns(run.recording, expected, run.off))
-    faults.refuse()
-    for run in problem.runs:
-        reference = run.values.get("motor.w_ref")
-        if not hasattr(reference, "changes"):
-            faults.add(inspect_steadiness(run.recording, ratio, run.off, reference is not None))
-    faults.refuse()
-
-
-def remarks(found: IdentifiedMachine) -> Iterator[str]:
+def remarks(machine: IdentifiedMachine) -> Iterator[str]:
     """Sentences on data that are missing or assumed."""
-    runs, config = found.problem.runs, found.config
+    runs, config = machine.problem.runs, machine.config
     columns = {name for run in runs for name in run.recording.columns}
     if (
         issubclass(config.motor_type, InductionMotor)
         and "motor.i" in columns
         and "motor.power" not in columns
     ):
-        of_current = next(each for each in found.best.comparisons if each.column == "motor.i")
-        time, _, current = found.courses(of_current)
+        of_current = next(each for each in machine.best.comparisons if each.column == "motor.i")
+        column = machine.columns_over_time(of_current)
         speed = next(run.crank_speed for run in runs if run.name == of_current.run)
-        turn = current[time > time[-1] - 2.0 * np.pi / speed]
+        turn = column.simulated[column.time > column.time[-1] - 2.0 * np.pi / speed]
         swing = np.ptp(turn) / np.mean(turn)
         yield (
             f"The recordings have no active power. The current of this induction motor changes by {100.0 * swing:.2g}"
@@ -415,7 +347,7 @@ def remarks(found: IdentifiedMachine) -> Iterator[str]:
                 f"{run.recording.source} has no mark: the angle of the crank follows from the course of the other "
                 "columns, and machines that are alike in both halves of a turn may be taken for each other"
             )
-    has_motor = bool(columns & set(SIGNALS[:3]))
+    has_motor = bool(columns & set(OF_TERMINALS))
     if has_motor and config.motor is not None and config.motor_type.follows(config.motor):
         tuned = [f"motor.{name}" for name in CONTROL if f"motor.{name}" not in config.given]
         if tuned:

@@ -1,8 +1,8 @@
-"""What runs can tell: standard deviations to expect, numbers that cannot be told apart, and runs that tell more.
+"""The information of runs: standard deviations to expect, sums of numbers that alone are determined, further runs.
 
 The matrix of Fisher's information follows from the exact sensitivities of the simulated runs; of the measured values
-only the sizes of the noise enter. Nuisances, such as the angle of the crank, are not known. A number is *told* by the
-runs if their standard deviation of it is less than half of that of its prior.
+only the sizes of the noise enter. Nuisances, such as the angle of the crank, are not known. A number is
+*determined* by the runs if their standard deviation of it is less than half of that of its prior.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from typing import Any
 
 import numpy as np
 
+from ...recordings.fit import NormalEquations, inverse, normal_equations
+from ...recordings.plant import CRANK
+from ...recordings.problem import Problem, RecordedRun
+from ...recordings.recording import Recording
 from ...system import Profile
-from .fit import Normal, inverse, normal
-from .plant import CRANK
-from .problem import Problem, RecordedRun
-from .recording import Recording
 
-TOLD = 0.5
-"""Standard deviation by the runs alone, in parts of that of the prior, below which they tell a number."""
+DETERMINED = 0.5
+"""Standard deviation by the runs alone, in parts of that of the prior, below which they determine a number."""
 SHARP = 0.1
 """The same of a combination that is worth naming."""
 MOST_TERMS = 4
@@ -29,9 +29,9 @@ ROUNDING = 1.05
 """Factor by which the standard deviation of a sum may grow as its factors are rounded."""
 WEAK = 1e3
 """Standard deviation that stands for no prior, in parts of that of the prior: it makes a singular matrix regular."""
-BLIND, PART = 1e-4, 0.05
-"""Information on a direction, in parts of that of the prior, below which the runs are blind for it, and the least
-part of a number in it that is named."""
+NO_INFORMATION, LEAST_PART = 1e-4, 0.05
+"""Information on a direction, in parts of that of the prior, below which it counts as one of the null space, and
+the least part of a number in it that is named."""
 FURTHER = "further run"
 """Name of a run that is proposed; no run of a file has a space in its name."""
 REFERENCE = "motor.w_ref"
@@ -46,19 +46,19 @@ ADDED = 15.0
 
 
 @dataclass(frozen=True)
-class Outlook:
-    """A sought number: its standard deviation by the prior (`spread`), by the runs alone, and by both."""
+class Determination:
+    """A sought number: its standard deviation by the prior (`prior_deviation`), by the runs alone, and by both."""
 
     name: str
     unit: str
-    spread: float
+    prior_deviation: float
     by_runs: float
     by_both: float
 
     @property
-    def is_told(self) -> bool:
-        """Whether the runs tell the number."""
-        return self.by_runs < TOLD * self.spread
+    def is_determined(self) -> bool:
+        """Whether the runs determine the number."""
+        return self.by_runs < DETERMINED * self.prior_deviation
 
 
 @dataclass(frozen=True)
@@ -80,25 +80,25 @@ class Combination:
 
 @dataclass(frozen=True)
 class Proposal:
-    """A further run, in words, and what it would tell: the mean factor by which the standard deviations of the sought
-    numbers would fall, and the number of those that would be told."""
+    """A further run, in words, with the mean factor by which the standard deviations of the sought numbers
+    would fall, and the count of numbers that would be determined."""
 
     words: str
     factor: float
-    told: int
+    determined: int
 
 
 @dataclass(frozen=True)
 class Information:
-    """What the runs can tell: of each number, of sums whose first number they do not tell, and further runs.
+    """The information of the runs: on each number, on sums whose first number they do not determine; further runs.
 
-    `blind` are changes of the sought numbers together, in the proportions of the coefficients, which leave no trace
-    in any column.
+    `null_space` has changes of the sought numbers together, in the proportions of the coefficients, which leave no
+    trace in any column.
     """
 
-    outlooks: tuple[Outlook, ...]
+    determinations: tuple[Determination, ...]
     combinations: tuple[Combination, ...]
-    blind: tuple[Combination, ...]
+    null_space: tuple[Combination, ...]
     proposals: tuple[Proposal, ...]
 
 
@@ -107,43 +107,43 @@ def information(
     z: Any = None,
     workers: int = 2,
     propose: bool = True,
-    at: Normal | None = None,
+    at: NormalEquations | None = None,
 ) -> Information:
-    """What the runs of a problem can tell at the values `z` of the unknowns, by default the start values.
+    """The information of the runs of a problem at the values `z` of the unknowns, by default the start values.
 
     Of the recordings the columns, the times of the rows and the sizes of the noise count. With `propose` further runs
     are ranked, each of which is simulated. `at` are the normal equations there, where they are known, with the
     measured sizes of the noise.
     """
-    z = problem.started(workers) if z is None else z
-    fisher = (at or normal(problem, z, workers)).fisher
-    outlooks, told = _outlooks(problem, fisher), _combinations(problem, fisher)
-    proposals = _proposals(problem, z, fisher, outlooks, workers) if propose else ()
-    return Information(outlooks, told, _blind(problem, fisher), tuple(proposals))
+    z = problem.initial_point(workers) if z is None else z
+    fisher = (at or normal_equations(problem, z, workers)).fisher
+    determinations, sums = _determinations(problem, fisher), _combinations(problem, fisher)
+    proposals = _proposals(problem, z, fisher, determinations, workers) if propose else ()
+    return Information(determinations, sums, _null_space(problem, fisher), tuple(proposals))
 
 
 def _covariance(problem: Problem, fisher: Any, wider: float) -> Any:
     """The covariance of the sought numbers with priors that are `wider` by this factor."""
     count = len(problem.sought)
-    spread = problem.spreads.copy()
+    spread = problem.prior_deviations.copy()
     spread[:count] *= wider
     return inverse(fisher + np.diag(1.0 / spread**2))[:count, :count]
 
 
-def _outlooks(problem: Problem, fisher: Any) -> tuple[Outlook, ...]:
+def _determinations(problem: Problem, fisher: Any) -> tuple[Determination, ...]:
     alone, both = (np.sqrt(np.diag(_covariance(problem, fisher, x))) for x in (WEAK, 1.0))
     return tuple(
-        Outlook(u.name, u.unit, u.spread, float(a), float(k))
+        Determination(u.name, u.unit, u.prior_deviation, float(a), float(k))
         for u, a, k in zip(problem.sought, alone, both, strict=True)
     )
 
 
 def _combinations(problem: Problem, fisher: Any) -> tuple[Combination, ...]:
-    """For each number that is not told, the sum with the fewest others that is."""
+    """For each number that is not determined, the sum with the fewest others that is."""
     covariance, both = (_covariance(problem, fisher, wider) for wider in (WEAK, 1.0))
-    sought, found = problem.sought, dict[frozenset[str], Combination]()
+    sought, sums = problem.sought, dict[frozenset[str], Combination]()
     for first, unknown in enumerate(sought):
-        if math.sqrt(covariance[first, first]) < TOLD * unknown.spread:
+        if math.sqrt(covariance[first, first]) < DETERMINED * unknown.prior_deviation:
             continue
         others: list[int] = []
         while len(others) < MOST_TERMS - 1:
@@ -152,15 +152,15 @@ def _combinations(problem: Problem, fisher: Any) -> tuple[Combination, ...]:
                 break
             others.append(min(left, key=lambda k: _rest(covariance, first, [*others, k])))
             deviation = math.sqrt(_rest(covariance, first, others))
-            if deviation < SHARP * unknown.spread:
+            if deviation < SHARP * unknown.prior_deviation:
                 factors, deviation = _factors(covariance, both, first, others)
                 names = [sought[k].name for k in others]
                 terms = ((unknown.name, 1.0), *zip(names, factors, strict=True))
-                found.setdefault(
+                sums.setdefault(
                     frozenset((unknown.name, *names)), Combination(terms, unknown.unit, deviation)
                 )
                 break
-    return tuple(found.values())
+    return tuple(sums.values())
 
 
 def _factors(alone: Any, both: Any, first: int, others: Sequence[int]) -> tuple[list[float], float]:
@@ -181,14 +181,14 @@ def _factors(alone: Any, both: Any, first: int, others: Sequence[int]) -> tuple[
     return factors, deviation(factors)
 
 
-def _blind(problem: Problem, fisher: Any) -> tuple[Combination, ...]:
+def _null_space(problem: Problem, fisher: Any) -> tuple[Combination, ...]:
     """The directions without information, each with as few numbers as possible."""
-    count, spread = len(problem.sought), problem.spreads
+    count, spread = len(problem.sought), problem.prior_deviations
     matrix = fisher + np.diag(np.where(np.arange(len(spread)) < count, 0.0, 1.0 / spread**2))
     nuisances = matrix[count:, count:]
     own = matrix[:count, :count] - matrix[:count, count:] @ np.linalg.solve(nuisances, matrix[count:, :count])
     sizes, directions = np.linalg.eigh(own * np.outer(spread[:count], spread[:count]))
-    basis = directions[:, sizes < BLIND].T
+    basis = directions[:, sizes < NO_INFORMATION].T
     rows = []
     for k in range(len(basis)):
         # the largest entry is eliminated from all others
@@ -200,13 +200,13 @@ def _blind(problem: Problem, fisher: Any) -> tuple[Combination, ...]:
             if other != k:
                 basis[other] -= basis[other, place] * basis[k]
         rows.append(place)
-    found = []
+    directions_named = []
     for place, row in zip(rows, basis, strict=True):
         first = problem.sought[place]
-        others = [k for k in np.argsort(-np.abs(row)) if k != place and abs(row[k]) > PART]
+        others = [k for k in np.argsort(-np.abs(row)) if k != place and abs(row[k]) > LEAST_PART]
         terms = [(problem.sought[k].name, float(row[k] * spread[k] / spread[place])) for k in others]
-        found.append(Combination(((first.name, 1.0), *terms), first.unit, math.inf))
-    return tuple(found)
+        directions_named.append(Combination(((first.name, 1.0), *terms), first.unit, math.inf))
+    return tuple(directions_named)
 
 
 def _rest(covariance: Any, first: int, others: Sequence[int]) -> float:
@@ -217,35 +217,35 @@ def _rest(covariance: Any, first: int, others: Sequence[int]) -> float:
 
 
 def _proposals(
-    problem: Problem, z: Any, fisher: Any, now: Sequence[Outlook], workers: int
+    problem: Problem, z: Any, fisher: Any, now: Sequence[Determination], workers: int
 ) -> Iterator[Proposal]:
     """Further runs, the best first."""
     ranked = []
     for words, run in _candidates(problem):
         more = Problem(problem.plant, (*problem.runs, run), problem.sought, problem.sensors)
-        at = more.starts
+        at = more.start_values
         for name, place in problem.place.items():
             at[more.place[name]] = z[place]
         sparse, scales = _sparse(problem, run)
         single = Problem(
             problem.plant, (_simulated(more, sparse, at, workers),), problem.sought, problem.sensors
         )
-        own = normal(
+        own = normal_equations(
             single, np.array([at[more.place[name]] for name in single.place]), workers, scales
         ).fisher
         total = np.zeros((len(at), len(at)))
         for part, matrix in ((problem, fisher), (single, own)):
             places = [more.place[name] for name in part.place]
             total[np.ix_(places, places)] += matrix
-        then = _outlooks(more, total)
+        then = _determinations(more, total)
         factor = np.exp(np.mean([math.log(a.by_both / b.by_both) for a, b in zip(now, then, strict=True)]))
-        ranked.append(Proposal(words, float(factor), sum(each.is_told for each in then)))
+        ranked.append(Proposal(words, float(factor), sum(each.is_determined for each in then)))
     yield from sorted(ranked, key=lambda each: -each.factor)
 
 
 def _sparse(problem: Problem, run: RecordedRun) -> tuple[RecordedRun, dict[tuple[str, str], float]]:
-    """The run with fewer rows, of which each counts for those that it stands for, and the factors on the standard
-    deviations by which it does."""
+    """The run with fewer rows, and the factors on the standard deviations by which each of them counts for
+    several."""
     step = min(SPARSE, 2.0 * math.pi / (SPARSE_ROWS * run.crank_speed))
     (sparse,) = Problem(problem.plant, (run,), problem.sought, problem.sensors).thinned(step).runs
     every = sparse.recording.step / run.recording.step
@@ -298,7 +298,7 @@ def _other_speeds(problem: Problem, own: RecordedRun) -> Iterator[tuple[str, Rec
 
 def _simulated(problem: Problem, run: RecordedRun, z: Any, workers: int) -> RecordedRun:
     """The run with a recording as the plant would give it, without noise."""
-    response = problem.simulated(run, z, workers)
+    response = problem.simulate(run, z, workers)
     time = run.recording.time
     columns = {}
     for name in run.recording.columns:

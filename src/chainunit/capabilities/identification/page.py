@@ -1,12 +1,13 @@
-"""The report on an identification: its numbers, sums that are told, further runs, and measured over simulated."""
+"""The report on an identification: its numbers, sums that are determined, further runs, measured over simulated."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from ...core.files import whole
+from ...core.files import atomic_file
 from ...reading.text import shown_in
+from ...recordings.measurands import MEASURANDS
 from ...report import blocks as b
 from ...report import figure as fig
 from ...report.lines import Line, Name, line
@@ -14,7 +15,6 @@ from ...report.task import Task, Writer
 from ...study.config import Config
 from ...study.study_file import toml_text
 from .identification import IdentifiedMachine, identify
-from .measurands import MEASURANDS
 from .result import as_dict, identified_notes, identified_tables, sentences
 
 WRONG = "The model does not describe the recordings: these are not the numbers of the machine."
@@ -22,18 +22,18 @@ FILE = "identified.toml"
 """The study file with the identified values."""
 
 
-def identification_report(found: IdentifiedMachine) -> b.Report:
+def identification_report(machine: IdentifiedMachine) -> b.Report:
     """The report on an identification."""
-    result = as_dict(found)
+    result = as_dict(machine)
     s = b.Source(result)
-    config: Config = found.config
+    config: Config = machine.config
     with shown_in(config.units):
-        figures = tuple(_figures(s, found))
+        figures = tuple(_figures(s, machine))
         return b.Report(
             config.title or "Identified machine",
             "Identification from recordings",
             result,
-            tuple(_opening(s, found)),
+            tuple(_opening(s, machine)),
             (
                 b.Section("numbers", "Identified numbers", tuple(_numbers(s))),
                 b.Section("limits", "Limits of these recordings", tuple(_limits(s))),
@@ -47,18 +47,18 @@ def identification_report(found: IdentifiedMachine) -> b.Report:
         )
 
 
-def pictures(found: IdentifiedMachine) -> tuple[str, ...]:
+def pictures(machine: IdentifiedMachine) -> tuple[str, ...]:
     """The names of the pictures, one for each run."""
-    return tuple(f"course_{run.name}.png" for run in found.plan.runs)
+    return tuple(f"course_{run.name}.png" for run in machine.plan.runs)
 
 
-def _writers(found: IdentifiedMachine, folder: Path, of_report: list[Writer]) -> list[Writer]:
+def _writers(machine: IdentifiedMachine, folder: Path, of_report: list[Writer]) -> list[Writer]:
     """With the study file of the identified values."""
 
     def study_file() -> list[Path]:
-        with whole(folder / FILE) as part:
-            head = "" if found.is_described else WRONG
-            text = toml_text(identified_tables(found, folder), identified_notes(found), head)
+        with atomic_file(folder / FILE) as part:
+            head = "" if machine.is_described else WRONG
+            text = toml_text(identified_tables(machine, folder), identified_notes(machine), head)
             part.write_text(text, "utf-8")
         return [folder / FILE]
 
@@ -71,19 +71,19 @@ TASK: Task[Config, IdentifiedMachine] = Task(
     identification_report,
     files=(FILE, "course_*.png"),
     writers=_writers,
-    shortfall=lambda found: None if found.is_described else "",
+    shortfall=lambda machine: None if machine.is_described else "",
 )
 
 
-def _opening(s: b.Source, found: IdentifiedMachine) -> Iterator[b.Block]:
+def _opening(s: b.Source, machine: IdentifiedMachine) -> Iterator[b.Block]:
     words = s.line("These recordings determine {=told} of {=sought} numbers.")
-    if found.is_described:
+    if machine.is_described:
         yield b.Judgement(
             "good", line("The model describes the recordings: their residuals are noise. ", words)
         )
     else:
         yield b.Judgement("bad", line("The model does not describe the recordings. ", words))
-    for sentence in sentences(found):
+    for sentence in sentences(machine):
         yield b.Judgement("warning", f"{sentence}.")
     for each in s.lines("remarks"):
         yield b.Judgement("remark", line(each, "."))
@@ -93,12 +93,14 @@ def _numbers(s: b.Source) -> Iterator[b.Block]:
     rows = []
     for name, each in s.result["numbers"].items():
         path = f"numbers.{name}"
-        told: tuple[Line, ...] = ("not determined", "")
+        estimate: tuple[Line, ...] = ("not determined", "")
         if each["told"]:
-            told = s.number(f"{path}.value", digits=4), s.number(f"{path}.deviation", digits=2)
+            estimate = s.number(f"{path}.value", digits=4), s.number(f"{path}.deviation", digits=2)
         ends = (s.number(f"{path}.{end}", digits=4) for end in ("from", "to"))
         rows.append(
-            b.TableRow((Name(name), *told, *ends, s.number(f"{path}.expected", digits=2), _given(s, path)))
+            b.TableRow(
+                (Name(name), *estimate, *ends, s.number(f"{path}.expected", digits=2), _given(s, path))
+            )
         )
     columns = (
         b.Column("number"),
@@ -224,8 +226,8 @@ def _residuals(s: b.Source) -> Iterator[b.Block]:
     )
 
 
-def _figures(s: b.Source, found: IdentifiedMachine) -> Iterator[b.Block]:
-    for run, file in zip(found.plan.runs, pictures(found), strict=True):
+def _figures(s: b.Source, machine: IdentifiedMachine) -> Iterator[b.Block]:
+    for run, file in zip(machine.plan.runs, pictures(machine), strict=True):
         panels = []
         for name, course in s.result["courses"][run.name].items():
             y, simulated = (course[key]["value"] for key in ("measured", "simulated"))
@@ -249,7 +251,7 @@ def _figures(s: b.Source, found: IdentifiedMachine) -> Iterator[b.Block]:
             f"course-{run.name}",
             f"Run {run.name}: measured and simulated",
             "Means in classes of the crank angle over all turns of the run."
-            if found.is_steady(run.name)
+            if machine.is_steady(run.name)
             else "Means in classes of time.",
             tuple(panels),
             file=file,

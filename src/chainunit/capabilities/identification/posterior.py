@@ -2,8 +2,8 @@
 
 Near the best fit the simulated columns are taken as quadratic along the directions in which the distribution is wide,
 and as linear along all others. A number of which only the bounds are known is evenly distributed within them
-beforehand. The distribution is sampled: what the recordings hardly tell has the form that its bounds give it, and
-products, such as that of friction and weight, which are told much better than each factor, bend it.
+beforehand. The distribution is sampled: its form along a number that the recordings hardly determine is that of the
+bounds, and products, such as that of friction and weight, which are determined much better than each factor, bend it.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2
 
-from .fit import Normal, inverse
-from .problem import OUTLIER, Problem
+from ...recordings.fit import NormalEquations, inverse
+from ...recordings.problem import OUTLIER, Problem
 
 WIDE = 0.02
 """Standard deviation of a direction, in parts of that of its prior, from which on it counts as wide."""
@@ -29,18 +29,18 @@ STEP = 5e-3
 CHAINS, STEPS, KEPT = 300, 1200, 10
 """Number of chains, their steps, of which the second half counts, and states that are kept of each."""
 _STIFF = 1e4
-"""Stiffness of a number that is held, in parts of one standard deviation of its prior."""
+"""Stiffness of a number whose bound is active, in parts of one standard deviation of its prior."""
 LEVEL = 0.95
 """Probability of an interval."""
-SHARP, PRESSURE, PRESSED = 0.1, 0.9973, 3.0
+SHARP, BOUND_LEVEL, BOUND_DEVIATIONS = 0.1, 0.9973, 3.0
 """Standard deviation of a number, in parts of that of its prior, up to which a bound can contradict it; probability
-with which right bounds press less; and standard deviations beyond its bound from which on it is held there."""
+with which right bounds press less; and standard deviations beyond its bound from which on the bound is active."""
 
 
 @dataclass(frozen=True)
 class Marginal:
     """A sought number: its mean `value`, its standard `deviation`, the interval from `low` to `high` that contains it
-    with a probability of 95 %, and the standard deviation `spread` of its prior."""
+    with a probability of 95 %, and the standard deviation `prior_deviation` of its prior."""
 
     name: str
     unit: str
@@ -48,17 +48,17 @@ class Marginal:
     deviation: float
     low: float
     high: float
-    spread: float
+    prior_deviation: float
 
 
 @dataclass(frozen=True)
 class Posterior:
-    """The distributions of all sought numbers, and `samples` of them, shape (samples, numbers). Those that are `held`
-    at a bound lie beyond it by the recordings."""
+    """The distributions of all sought numbers, and `samples` of them, shape (samples, numbers). The recordings
+    contradict a bound of each of the numbers `active_bounds`."""
 
     marginals: tuple[Marginal, ...]
     samples: Any
-    held: tuple[str, ...] = ()
+    active_bounds: tuple[str, ...] = ()
 
     @cached_property
     def covariance(self) -> Any:
@@ -66,60 +66,62 @@ class Posterior:
         return np.atleast_2d(np.cov(self.samples, rowvar=False))
 
 
-def posterior(problem: Problem, best: Normal, workers: int = 2, seed: int = 0) -> Posterior:
+def posterior(problem: Problem, best: NormalEquations, workers: int = 2, seed: int = 0) -> Posterior:
     """The distribution of the sought numbers around the best fit."""
     rng = np.random.default_rng(seed)
-    held = _held(problem, best)
-    bent = _Bent(problem, best, workers, held)
-    samples = bent.sampled(rng)
-    if held:
-        samples = _from_bounds(problem, best, held, samples, rng)
+    active = _active_bounds(problem, best)
+    density = _CurvedDensity(problem, best, workers, active)
+    samples = density.sample(rng)
+    if active:
+        samples = _beyond_bounds(problem, best, active, samples, rng)
     edges = np.quantile(samples, [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL], axis=0)
     means, deviations = np.mean(samples, axis=0), np.std(samples, axis=0, ddof=1)
     rows = np.stack([means, deviations, *edges], axis=1)
     marginals = tuple(
-        Marginal(u.name, u.unit, float(x), float(s), float(low), float(high), u.spread)
+        Marginal(u.name, u.unit, float(x), float(s), float(low), float(high), u.prior_deviation)
         for u, (x, s, low, high) in zip(problem.sought, rows, strict=True)
     )
-    return Posterior(marginals, samples, tuple(problem.sought[k].name for k in held))
+    return Posterior(marginals, samples, tuple(problem.sought[k].name for k in active))
 
 
-def _pull(problem: Problem, best: Normal) -> Any:
+def _score(problem: Problem, best: NormalEquations) -> Any:
     """The gradient of the logarithm of the density at the best fit: where there are bounds alone, of the recordings
     alone."""
     even = np.array([u.is_even for u in problem.unknowns])
-    return best.gradient - np.where(even, (problem.starts - best.z) / problem.spreads**2, 0.0)
+    return best.gradient - np.where(even, (problem.start_values - best.z) / problem.prior_deviations**2, 0.0)
 
 
-def _held(problem: Problem, best: Normal) -> dict[int, float]:
-    """The places of the sought numbers that their bound holds, with the gradient towards it."""
-    count, (low, high), pull = len(problem.sought), problem.bounds, _pull(problem, best)
-    near = 1e-6 * problem.spreads
+def _active_bounds(problem: Problem, best: NormalEquations) -> dict[int, float]:
+    """The places of the sought numbers whose bound is active, with the gradient towards it."""
+    count, (low, high), pull = len(problem.sought), problem.bounds, _score(problem, best)
+    near = 1e-6 * problem.prior_deviations
     at = np.where(best.z <= low + near, pull < 0.0, (best.z >= high - near) & (pull > 0.0))
-    pressed = [int(k) for k in np.flatnonzero(at[:count])]
-    if not pressed:
+    at_bounds = [int(k) for k in np.flatnonzero(at[:count])]
+    if not at_bounds:
         return {}
     # what the sum of squares would fall by without these bounds; one of them alone may press for another one's error
-    fall = float(pull[pressed] @ best.covariance[np.ix_(pressed, pressed)] @ pull[pressed])
-    if fall < chi2.ppf(PRESSURE, len(pressed)):
+    fall = float(pull[at_bounds] @ best.covariance[np.ix_(at_bounds, at_bounds)] @ pull[at_bounds])
+    if fall < chi2.ppf(BOUND_LEVEL, len(at_bounds)):
         return {}
-    held, deviations = dict[int, float](), best.deviations
-    for k in pressed:
-        if deviations[k] > SHARP * problem.spreads[k]:
-            continue  # what is hardly told comes to its bound by chance, and along a bend
+    active, deviations = dict[int, float](), best.deviations
+    for k in at_bounds:
+        if deviations[k] > SHARP * problem.prior_deviations[k]:
+            continue  # a number that is hardly determined comes to its bound by chance, and along a bend
         # the others stay at their bounds, as they did in the fit
-        free = [j for j in range(len(best.z)) if j == k or j not in pressed]
+        free = [j for j in range(len(best.z)) if j == k or j not in at_bounds]
         own = inverse(best.matrix[np.ix_(free, free)])[free.index(k), free.index(k)]
-        if abs(pull[k]) * math.sqrt(own) > PRESSED:
-            held[k] = float(pull[k])
-    return held
+        if abs(pull[k]) * math.sqrt(own) > BOUND_DEVIATIONS:
+            active[k] = float(pull[k])
+    return active
 
 
-def _from_bounds(problem: Problem, best: Normal, held: dict[int, float], samples: Any, rng: Any) -> Any:
-    """The samples with the numbers that are held on their side of the bound, from which the density falls by the
+def _beyond_bounds(
+    problem: Problem, best: NormalEquations, active: dict[int, float], samples: Any, rng: Any
+) -> Any:
+    """The samples with the numbers of active bounds on their side of the bound, from which the density falls by the
     gradient; the others follow."""
-    places, pulls = list(held), np.array(list(held.values()))
-    steps = -np.sign(pulls) * rng.exponential(1.0 / np.abs(pulls), (len(samples), len(held)))
+    places, pulls = list(active), np.array(list(active.values()))
+    steps = -np.sign(pulls) * rng.exponential(1.0 / np.abs(pulls), (len(samples), len(active)))
     covariance = best.covariance[places, : samples.shape[1]]
     samples = samples + steps @ np.linalg.solve(covariance[:, places], covariance)
     samples[:, places] = best.z[places] + steps
@@ -127,16 +129,18 @@ def _from_bounds(problem: Problem, best: Normal, held: dict[int, float], samples
     return np.clip(samples, low, high)
 
 
-class _Bent:
+class _CurvedDensity:
     """The distribution near the best fit. The change of all unknowns is `across` @ a + `along` @ b, with the places
     `a` in the wide directions and `b` in all others. Given `a`, `b` is normal."""
 
-    def __init__(self, problem: Problem, best: Normal, workers: int, held: Collection[int]) -> None:
-        self._problem, self._z, self._held = problem, best.z, list(held)
+    def __init__(
+        self, problem: Problem, best: NormalEquations, workers: int, active: Collection[int]
+    ) -> None:
+        self._problem, self._z, self._fixed = problem, best.z, list(active)
         count, size = len(problem.sought), len(best.z)
-        spread = problem.spreads
+        spread = problem.prior_deviations
         stiff = np.zeros(size)
-        stiff[self._held] = (_STIFF / spread[self._held]) ** 2
+        stiff[self._fixed] = (_STIFF / spread[self._fixed]) ** 2
         covariance = inverse(best.matrix + np.diag(stiff))
         own = covariance[:count, :count] / np.outer(spread[:count], spread[:count])
         sizes, directions = np.linalg.eigh(own)
@@ -150,12 +154,12 @@ class _Bent:
         self._pairs = list(itertools.combinations_with_replacement(range(len(wide)), 2))
         self._reduce(best, workers, stiff)
 
-    def _reduce(self, best: Normal, workers: int, stiff: Any) -> None:
-        """The sum of squares as a quadratic form of (1, a, products of a, b), reduced by the best b. Numbers that are
-        held have a further, `stiff` information."""
+    def _reduce(self, best: NormalEquations, workers: int, stiff: Any) -> None:
+        """The sum of squares as a quadratic form of (1, a, products of a, b), reduced by the best b. Numbers
+        of active bounds have a further, `stiff` information."""
         problem = self._problem
         even = np.array([u.is_even for u in problem.unknowns])
-        known = np.where(even, 0.0, 1.0 / problem.spreads**2) + stiff
+        known = np.where(even, 0.0, 1.0 / problem.prior_deviations**2) + stiff
         wide, pairs = self._across.shape[1], len(self._pairs)
         basis = np.hstack([self._across, self._along])
         linear = 1 + np.r_[0:wide, wide + pairs : wide + pairs + self._along.shape[1]]
@@ -163,7 +167,7 @@ class _Bent:
         matrix += self._squares(best, workers, linear)
         matrix[np.ix_(linear, linear)] += basis.T @ (known[:, None] * basis)
         # the gradient is that of all rows; without the pull of a prior where there are bounds alone
-        matrix[0, linear] = matrix[linear, 0] = -basis.T @ np.where(stiff > 0.0, 0.0, _pull(problem, best))
+        matrix[0, linear] = matrix[linear, 0] = -basis.T @ np.where(stiff > 0.0, 0.0, _score(problem, best))
         places = slice(0, 1 + wide + pairs), slice(1 + wide + pairs, None)
         inner = matrix[places[1], places[1]]
         mean = -np.linalg.solve(inner, matrix[places[1], places[0]])
@@ -174,7 +178,7 @@ class _Bent:
         root: Any = np.linalg.qr((own @ np.linalg.cholesky(inverse(inner))).T, mode="r")
         self._root = root.T
 
-    def _squares(self, best: Normal, workers: int, linear: Any) -> Any:
+    def _squares(self, best: NormalEquations, workers: int, linear: Any) -> Any:
         """The products of the derivatives of all columns, of first order and of second order by pairs."""
         wide, basis = self._across.shape[1], np.hstack([self._across, self._along])
         problem = self._problem.thinned(STEP)
@@ -183,7 +187,7 @@ class _Bent:
         seconds = np.empty((len(base), wide), object)
         for k in range(wide):
             step = self._across[:, k]
-            ahead, behind = (_room(best.z, sign * step, low, high) for sign in (1.0, -1.0))
+            ahead, behind = (_largest_factor(best.z, sign * step, low, high) for sign in (1.0, -1.0))
             size = max(min(ahead, 1.0), 0.1) if ahead >= behind else -max(min(behind, 1.0), 0.1)
             moved = problem.comparisons(best.z + size * step, workers)
             for n, (here, there) in enumerate(zip(base, moved, strict=True)):
@@ -212,34 +216,34 @@ class _Bent:
         products = [a[:, i] * a[:, j] for i, j in self._pairs]
         return np.column_stack([np.ones(len(a)), a, *products])
 
-    def _drawn(self, a: Any, rng: Any) -> tuple[Any, Any]:
+    def _draw(self, a: Any, rng: Any) -> tuple[Any, Any]:
         """The logarithm of the density at `a`, shape (chains,), and sought numbers, shape (chains, numbers)."""
         problem, terms = self._problem, self._terms(a)
         count = len(problem.sought)
         z = self._z[:count] + a @ self._across[:count].T + terms @ self._mean.T
         z += rng.standard_normal((len(a), self._root.shape[1])) @ self._root.T
         low, high = (bound[:count] for bound in problem.bounds)
-        outside = np.maximum(low - z, z - high) / problem.spreads[:count]
-        outside[:, self._held] = 0.0
+        outside = np.maximum(low - z, z - high) / problem.prior_deviations[:count]
+        outside[:, self._fixed] = 0.0
         beyond = np.sum(np.maximum(outside, 0.0), axis=1)
         density = -0.5 * np.einsum("ni,ij,nj->n", terms, self._form, terms)
         # beyond the bounds there is nothing; the steep slope leads chains back that began there
         return density - np.where(beyond > 0.0, 1e3 * (1.0 + beyond), 0.0), z
 
-    def sampled(self, rng: Any) -> Any:
+    def sample(self, rng: Any) -> Any:
         """Samples of the sought numbers, shape (samples, numbers), by Metropolis' method in many chains: a step of a
         chain is a part of the difference of two others (differential evolution)."""
         wide = self._across.shape[1]
         if not wide:
-            return self._drawn(np.zeros((CHAINS * KEPT, 0)), rng)[1]
+            return self._draw(np.zeros((CHAINS * KEPT, 0)), rng)[1]
         a = rng.standard_normal((CHAINS, wide))
-        density, z = self._drawn(a, rng)
+        density, z = self._draw(a, rng)
         kept = []
         for step in range(STEPS):
             others = np.array([rng.permutation(CHAINS) for _ in range(2)])
             jump = 1.0 if step % 10 == 9 else 1.7 / math.sqrt(2.0 * wide)
             tried = a + jump * (a[others[0]] - a[others[1]]) + 1e-3 * rng.standard_normal(a.shape)
-            new, there = self._drawn(tried, rng)
+            new, there = self._draw(tried, rng)
             taken = np.log(rng.random(CHAINS)) < new - density
             a, z = np.where(taken[:, None], tried, a), np.where(taken[:, None], there, z)
             density = np.where(taken, new, density)
@@ -248,7 +252,7 @@ class _Bent:
         return np.concatenate(kept)
 
 
-def _room(z: Any, step: Any, low: Any, high: Any) -> float:
+def _largest_factor(z: Any, step: Any, low: Any, high: Any) -> float:
     """The largest factor on a step that stays within the bounds."""
     with np.errstate(divide="ignore", invalid="ignore"):
         room = np.where(step > 0.0, (high - z) / step, np.where(step < 0.0, (low - z) / step, math.inf))

@@ -6,7 +6,6 @@ import dataclasses
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from ...core.errors import Faults, InputError, near_name
@@ -14,16 +13,11 @@ from ...core.messages import unit_behind
 from ...core.quantities import Layout, Quantity, Variable, named_values
 from ...core.units import split
 from ...reading.lists import Entry, leaves
-from ...reading.tables import given_values, instance
-from .measurands import MEASURANDS
-from .table import RUNS, SENSORS, SOUGHT, IdentifyTable, RunTable, WatchTable
-from .unknown import Unknown
+from ...recordings.measurands import MEASURANDS
+from ...recordings.table import PlannedRecording, read_span, recording_values
+from ...recordings.unknown import Unknown
+from .table import RUNS, SENSORS, SOUGHT, IdentifyTable, RunTable
 
-OFFSET_SHARE = 0.05
-"""Standard deviation of the offset of a sensor of current or torque without another knowledge, in parts of the RMS of
-its column."""
-WITH_OFFSET = ("motor.i", "crank.tau")
-"""Quantities whose sensors usually have an offset."""
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,19}")
 _FIXED = {"mark": "stands for the mark of a turn; give it another"}
 """Names that no run may have, each with the reason."""
@@ -42,48 +36,16 @@ class SensorKnowledge:
 
 
 @dataclasses.dataclass(frozen=True)
-class PlannedRun:
-    """A recording of the plan: its `file`, the heads of its `columns` by quantity, the speed of the crank [rad/s],
-    the part that counts [s], the temperature of the surroundings [K], whether it has the `feed` that is sought, and
-    the amounts that were added to sought numbers by their full names; the changes of the crank speed (begin and
-    duration [s], speed after it [rad/s]), and the time at which the motor is switched off [s], or None."""
+class PlannedRun(PlannedRecording):
+    """A recording of the plan: its name, whether it has the feed that is sought, and the amounts that were `added` to
+    sought numbers by their full names; the changes of the crank speed (begin and duration [s], speed after it
+    [rad/s]), and the time at which the motor is switched off [s], or None."""
 
     name: str
-    file: Path
-    columns: Mapping[str, str]
-    crank_speed: float
-    begin: float
-    end: float
-    ambient: float
     has_feed: bool
     added: Mapping[str, float]
     speeds: tuple[tuple[float, float, float], ...] = ()
     off: float | None = None
-
-
-@dataclasses.dataclass(frozen=True)
-class WatchPlan:
-    """A recording that is watched: its `file`, the heads of its `columns` by quantity, the speed of the crank
-    [rad/s], the part that counts [s], the temperature of the surroundings [K]; the time of its begin in which is
-    learned [s], the standard deviation of the feed as a share, the noise of the sensors in parts of the RMS of their
-    columns, the standard deviation of their gains, and the result of an identification, if there is one."""
-
-    file: Path
-    columns: Mapping[str, str]
-    crank_speed: float
-    begin: float
-    end: float
-    ambient: float
-    learning: float
-    feed_deviation: float
-    noise: float
-    gain: float
-    identification: Path | None
-
-    @property
-    def turn(self) -> float:
-        """Time of a turn of the crank [s]."""
-        return 2.0 * math.pi / self.crank_speed
 
 
 @dataclasses.dataclass(frozen=True)
@@ -158,66 +120,6 @@ def read_identification(
     )
 
 
-def read_watch(form: Any, crank_speed: float, source: str) -> WatchPlan:
-    """The plan of a checked table [watch], its `form` with what the file gives.
-
-    Parameters
-    ----------
-    crank_speed : the speed where the table does not give its own [rad/s]
-    source : the study file; other files are named relative to it
-
-    Raises
-    ------
-    InputError
-        with a line for each fault.
-    """
-    given, usual = given_values(form), instance(WatchTable, {})
-    entry = Entry("watch", given)
-    if not given.get("file"):
-        entry.fault("file", "must be given, the recording")
-    begin, end = _part(entry)
-    columns = _columns(entry)
-    entry.refuse()
-    folder, identification = Path(source).parent, given.get("identification")
-    numbers = {name: float(given.get(name, getattr(usual, name))) for name in _OF_WATCH}
-    return WatchPlan(
-        file=folder / given["file"],
-        columns=columns,
-        crank_speed=float(given.get("crank_speed", crank_speed)),
-        begin=begin,
-        end=end,
-        identification=folder / identification if identification else None,
-        **numbers,
-    )
-
-
-_OF_WATCH = ("ambient", "learning", "feed_deviation", "noise", "gain")
-
-
-def _part(entry: Entry) -> tuple[float, float]:
-    """Begin and end of the part that counts [s]."""
-    begin, end = entry.given.get("begin", -math.inf), entry.given.get("end", math.inf)
-    if not begin < end:
-        key = entry.key("end")
-        entry.add([InputError(f"{key} = {end:g} s: must be > begin = {begin:g} s", key)])
-    return begin, end
-
-
-def _columns(entry: Entry) -> dict[str, str]:
-    """The heads of columns by quantity."""
-    columns: dict[str, str] = {}
-    for quantity, head in leaves(entry.given.get("columns", {})):
-        key = f"columns.{quantity}"
-        if quantity not in MEASURANDS:
-            hint = near_name(quantity, MEASURANDS) or f"; there are {', '.join(MEASURANDS)}"
-            entry.fault(key, f"no such quantity{hint}")
-        elif not isinstance(head, str):
-            entry.wrong(key, head, "must be the head of its column")
-        else:
-            columns[quantity] = head
-    return columns
-
-
 def _sought(entry: Entry, name: str, variable: Variable, value: float) -> Unknown:
     """A sought number, with its bounds and its prior."""
     given, q, place = entry.given, variable.quantity, entry.place
@@ -268,13 +170,13 @@ def _deviation(entry: Entry, variable: Variable, value: float) -> float:
 def _run(
     entry: Entry, name: str, crank_speed: float, known: Mapping[str, tuple[Variable, float]], source: str
 ) -> PlannedRun:
-    given, usual = entry.given, instance(RunTable, {})
+    given = entry.given
     if not _NAME.fullmatch(name):
         words = "must begin with a small letter, and have at most 20 small letters, digits and _"
         entry.wrong("name", name, words)
     if "file" not in given:
         entry.fault("file", "must be given, the recording")
-    begin, end = _part(entry)
+    begin, end = read_span(entry)
     off = float(given["switched_off"]) if "switched_off" in given else None
     if off is not None and not begin < off < end:
         bounds = (("> begin", begin), ("< end", end))
@@ -288,21 +190,10 @@ def _run(
             continue
         of = Quantity(known[full][0].unit, "amount that was added")
         added[full] = entry.quantity(f"added.{full}", Variable("", of.description, of), value)
-    speeds = list(_speeds(entry))
-    columns = _columns(entry)
-    entry.refuse()
+    speeds = tuple(_speeds(entry))
+    values = recording_values(entry, crank_speed, source)
     return PlannedRun(
-        name,
-        Path(source).parent / given["file"],
-        columns,
-        float(given.get("crank_speed", crank_speed)),
-        begin,
-        end,
-        float(given.get("ambient", usual.ambient)),
-        given.get("feed", "same") == "same",
-        added,
-        tuple(speeds),
-        off,
+        **values, name=name, has_feed=given.get("feed", "same") == "same", added=added, speeds=speeds, off=off
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,19 +11,16 @@ import numpy as np
 
 from ... import __version__
 from ...core.messages import unit_behind
-from ...core.quantities import Layout
-from ...reading.text import array_entry, entry, shown_in
+from ...reading.text import array_entry, difference_entry, entry, shown_in
+from ...recordings.fit import fitted_entries
+from ...recordings.measurands import MEASURANDS
+from ...recordings.residuals import EXCESS_NOISE, ResidualTest
+from ...study.capability import Estimates
+from ...study.registry import registered
 from ...study.study_file import changed_tables
-from .fit import Normal
 from .identification import FittedNumber, IdentifiedMachine, remarks, system_name
 from .information import Combination, Information, short_name
-from .measurands import MEASURANDS
-from .observation import false_imbalance, usual_loads
-from .plant import ANGLE
-from .problem import MARK_ANGLE, Problem
 from .reading import IdentificationPlan
-from .residuals import LOUD, ResidualCheck
-from .unknown import Unknown
 
 RESULT = "result.json"
 """Name of the file with the result."""
@@ -31,63 +28,69 @@ CORRELATED = 0.8
 """Correlation from which a pair of numbers is named."""
 MOST_PAIRS = 12
 MOST_CHANGES = 4
-"""Most numbers whose changes without a trace are told one by one."""
+"""Most numbers whose changes without a trace are named one by one."""
 CLASSES = 90
 """Number of crank angles at which measured and simulated courses are shown."""
 CLASSES_OF_TIME = 600
 """Number of times at which those of a run that is not steady are shown."""
 
 
-def as_dict(found: IdentifiedMachine) -> dict[str, Any]:
+def as_dict(machine: IdentifiedMachine) -> dict[str, Any]:
     """All results, ready for JSON, each number with its unit."""
-    with shown_in(found.config.units):
-        return _as_dict(found)
+    with shown_in(machine.config.units):
+        return _as_dict(machine)
 
 
-def _as_dict(found: IdentifiedMachine) -> dict[str, Any]:
-    config, best = found.config, found.best
-    estimates = found.estimates
-    told = sum(each.is_told for each in estimates.values())
+def _as_dict(machine: IdentifiedMachine) -> dict[str, Any]:
+    config, best = machine.config, machine.best
+    estimates, start = machine.estimates, machine.information_at_start
+    determined = sum(each.is_determined for each in estimates.values())
     return {
         "chainunit": __version__,
         "title": config.title,
         "source": config.source,
         "report": dict(config.labels),
-        "is_described": found.is_described,
-        "status": "complete" if found.is_described else "the model does not describe the recordings",
+        "is_described": machine.is_described,
+        "status": "complete" if machine.is_described else "the model does not describe the recordings",
         "sought": entry(float(len(estimates)), "1"),
-        "told": entry(float(told), "1"),
-        "runs": {run.name: _run(found, k) for k, run in enumerate(found.plan.runs)},
-        "numbers": {name: _number(found, each) for name, each in estimates.items()},
+        "told": entry(float(determined), "1"),
+        "runs": {run.name: _run(machine, k) for k, run in enumerate(machine.plan.runs)},
+        "numbers": {name: _number(machine, each) for name, each in estimates.items()},
         "covariance": {
             "names": list(estimates),
             "units": [each.unknown.unit for each in estimates.values()],
-            "matrix": found.covariance.tolist(),
+            "matrix": machine.covariance.tolist(),
         },
-        "correlations": list(_correlations(found)),
-        "combinations": [_combination(found, each) for each in found.after.combinations],
-        "blind": [_blind(found, each) for each in found.after.blind],
-        "told_at_start": entry(float(sum(each.is_told for each in found.before.outlooks)), "1"),
+        "correlations": list(_correlations(machine)),
+        "combinations": [_combination(machine, each) for each in machine.information_at_fit.combinations],
+        "blind": [_unseen_change(machine, each) for each in machine.information_at_fit.null_space],
+        "told_at_start": entry(float(sum(each.is_determined for each in start.determinations)), "1"),
         "proposals": [
-            {"text": each.words, "factor": entry(each.factor, "1"), "told": entry(float(each.told), "1")}
-            for each in found.before.proposals
+            {
+                "text": each.words,
+                "factor": entry(each.factor, "1"),
+                "told": entry(float(each.determined), "1"),
+            }
+            for each in start.proposals
         ],
-        "residuals": [_check(found, each) for each in found.checks],
+        "residuals": [_check(machine, each) for each in machine.residual_tests],
         "sensors": {
-            unknown.name: each for unknown, each in fitted_entries(found.problem, best) if unknown.is_nuisance
+            unknown.name: each
+            for unknown, each in fitted_entries(machine.problem, best)
+            if unknown.is_nuisance
         },
         "fit": {
             "rounds": entry(float(best.rounds), "1"),
             "starts": entry(float(best.starts), "1"),
             "agreeing": entry(float(best.agreeing), "1"),
         },
-        "remarks": list(remarks(found)),
-        "courses": {run.name: _courses(found, run.name) for run in found.plan.runs},
+        "remarks": list(remarks(machine)),
+        "courses": {run.name: _courses(machine, run.name) for run in machine.plan.runs},
     }
 
 
-def _run(found: IdentifiedMachine, k: int) -> dict[str, Any]:
-    run, recording = found.plan.runs[k], found.problem.runs[k].recording
+def _run(machine: IdentifiedMachine, k: int) -> dict[str, Any]:
+    run, recording = machine.plan.runs[k], machine.problem.runs[k].recording
     return {
         "file": str(run.file),
         "columns": list(recording.columns),
@@ -97,62 +100,58 @@ def _run(found: IdentifiedMachine, k: int) -> dict[str, Any]:
         "crank_speed": entry(run.crank_speed, "rad/s", "speed"),
         "ambient": entry(run.ambient, "K", "temperature"),
         "feed": "that of all loaded runs" if run.has_feed else "none",
-        "added": {name: entry(x, found.plan.variables[name].unit) for name, x in run.added.items()},
+        "added": {name: entry(x, machine.plan.variables[name].unit) for name, x in run.added.items()},
     }
 
 
-def _number(found: IdentifiedMachine, each: FittedNumber) -> dict[str, Any]:
-    """A sought number: with its value only where the recordings tell it."""
-    variable = found.plan.variables[each.unknown.name]
-    before = next(one for one in found.before.outlooks if one.name == system_name(each.unknown.name))
+def _number(machine: IdentifiedMachine, each: FittedNumber) -> dict[str, Any]:
+    """A sought number: with its value only where the recordings determine it."""
+    variable = machine.plan.variables[each.unknown.name]
+    name, start = system_name(each.unknown.name), machine.information_at_start
+    before = next(one for one in start.determinations if one.name == name)
     own, unit, kind = each.unknown, variable.unit, variable.kind
     return {
         "title": variable.description,
-        "told": each.is_told,
-        "value": entry(each.value if each.is_told else None, unit, kind),
-        "fitted": entry(each.fitted if each.is_told else None, unit, kind),
-        "deviation": _difference(each.deviation, unit),
+        "told": each.is_determined,
+        "value": entry(each.value if each.is_determined else None, unit, kind),
+        "fitted": entry(each.fitted if each.is_determined else None, unit, kind),
+        "deviation": difference_entry(each.deviation, unit),
         "from": entry(each.low, unit, kind),
         "to": entry(each.high, unit, kind),
         "given": entry(own.start, unit, kind),
-        "given_deviation": _difference(own.spread, unit),
+        "given_deviation": difference_entry(own.prior_deviation, unit),
         "least": entry(own.low, unit, kind),
         "most": entry(own.high, unit, kind),
-        "expected": _difference(before.by_both, unit),
-        "by_runs": _difference(before.by_runs, unit),
+        "expected": difference_entry(before.by_both, unit),
+        "by_runs": difference_entry(before.by_runs, unit),
     }
 
 
-def _difference(x: float, unit: str) -> dict[str, Any]:
-    """The entry of a number that is no temperature itself, such as a standard deviation."""
-    return entry(x, unit, "difference" if unit == "K" else "")
-
-
-def _correlations(found: IdentifiedMachine) -> Iterator[dict[str, Any]]:
+def _correlations(machine: IdentifiedMachine) -> Iterator[dict[str, Any]]:
     """The pairs of numbers with the largest correlations."""
-    names = [each.name for each in found.plan.sought]
-    scale = 1.0 / np.sqrt(np.diag(found.covariance))
-    matrix = found.covariance * np.outer(scale, scale)
+    names = [each.name for each in machine.plan.sought]
+    scale = 1.0 / np.sqrt(np.diag(machine.covariance))
+    matrix = machine.covariance * np.outer(scale, scale)
     pairs = sorted(((i, k) for i in range(len(names)) for k in range(i)), key=lambda pair: -abs(matrix[pair]))
     for i, k in pairs[:MOST_PAIRS]:
         if abs(matrix[i, k]) >= CORRELATED:
             yield {"first": names[k], "second": names[i], "correlation": entry(float(matrix[i, k]), "1")}
 
 
-def _combination(found: IdentifiedMachine, each: Combination) -> dict[str, Any]:
-    value, deviation = found.combined(each)
+def _combination(machine: IdentifiedMachine, each: Combination) -> dict[str, Any]:
+    value, deviation = machine.value_of_sum(each)
     return {
         "text": str(each),
         "terms": dict(each.terms),
         # of temperatures, a sum is no temperature
-        "value": _difference(value, each.unit),
-        "deviation": _difference(deviation, each.unit),
+        "value": difference_entry(value, each.unit),
+        "deviation": difference_entry(deviation, each.unit),
     }
 
 
-def _blind(found: IdentifiedMachine, each: Combination) -> dict[str, Any]:
+def _unseen_change(machine: IdentifiedMachine, each: Combination) -> dict[str, Any]:
     """A change of numbers together that leaves no trace."""
-    units = {system_name(u.name): u.unit for u in found.plan.sought}
+    units = {system_name(u.name): u.unit for u in machine.plan.sought}
     changes = [
         f"{short_name(name)} {'up' if factor > 0.0 else 'down'} by {abs(factor):.3g}{unit_behind(units[name])}"
         for name, factor in each.terms
@@ -164,7 +163,7 @@ def _blind(found: IdentifiedMachine, each: Combination) -> dict[str, Any]:
     return {"text": words, "terms": dict(each.terms)}
 
 
-def _check(found: IdentifiedMachine, each: ResidualCheck) -> dict[str, Any]:
+def _check(machine: IdentifiedMachine, each: ResidualTest) -> dict[str, Any]:
     unit = MEASURANDS[each.column].unit
     return {
         "run": each.run,
@@ -183,31 +182,15 @@ def _check(found: IdentifiedMachine, each: ResidualCheck) -> dict[str, Any]:
     }
 
 
-def fitted_entries(problem: Problem, best: Normal) -> Iterator[tuple[Unknown, dict[str, Any]]]:
-    """Each unknown of a fit with its value and standard deviation as entries of a result. The angle of a run is
-    within a turn; that of the mark lies on both sides of 0."""
-    for unknown, x, s in zip(problem.unknowns, best.z, best.deviations, strict=True):
-        value, unit = float(x), unknown.unit
-        if unknown.is_nuisance and unknown.name.endswith(f".{ANGLE}") and unknown.name != MARK_ANGLE:
-            value %= 2.0 * math.pi
-        yield (
-            unknown,
-            {
-                "value": entry(value, unit, "temperature" if unit == "K" else ""),
-                "deviation": _difference(float(s), unit),
-            },
-        )
-
-
-def _courses(found: IdentifiedMachine, run: str) -> dict[str, Any]:
+def _courses(machine: IdentifiedMachine, run: str) -> dict[str, Any]:
     """By analog column, the mean measured and simulated values in classes: of the crank angle over all turns of a
     steady run, of the time of another one."""
     courses: dict[str, Any] = {}
-    steady = found.is_steady(run)
-    for each in found.best.comparisons:
+    steady = machine.is_steady(run)
+    for each in machine.best.comparisons:
         if each.run != run or not MEASURANDS[each.column].analog:
             continue
-        time, measured, simulated = found.courses(each)
+        time, measured, simulated = machine.columns_over_time(each)
         x = np.mod(each.angle, 2.0 * math.pi) if steady else time
         ends = (0.0, 2.0 * math.pi) if steady else (time[0], time[-1])
         edges = np.linspace(ends[0], ends[1], (CLASSES if steady else CLASSES_OF_TIME) + 1)
@@ -225,36 +208,38 @@ def _courses(found: IdentifiedMachine, run: str) -> dict[str, Any]:
     return courses
 
 
-def outlook(plan: IdentificationPlan, before: Information) -> str:
-    """What the recordings can tell, in words: with the standard deviations to expect."""
+def sentence_before_fit(plan: IdentificationPlan, before: Information) -> str:
+    """The numbers that the recordings can determine, in words: with the standard deviations to expect."""
     names = {system_name(u.name): u.name for u in plan.sought}
-    told = [each for each in before.outlooks if each.is_told]
-    words = f"Before the fit: these recordings can determine {len(told)} of {len(before.outlooks)} numbers"
-    if told:
-        listed = (f"{names[each.name]} to {each.by_both:.2g}{unit_behind(each.unit)}" for each in told)
+    determined = [each for each in before.determinations if each.is_determined]
+    total = len(before.determinations)
+    words = f"Before the fit: these recordings can determine {len(determined)} of {total} numbers"
+    if determined:
+        listed = (f"{names[each.name]} to {each.by_both:.2g}{unit_behind(each.unit)}" for each in determined)
         words += f" ({', '.join(listed)})"
-    if before.proposals and len(told) < len(before.outlooks):
+    if before.proposals and len(determined) < total:
         best = before.proposals[0]
-        words += f". Of further runs, this one would tell most: {best.words} (then {best.told} numbers)"
+        words += f". Of further runs, this one would tell most: {best.words} (then {best.determined} numbers)"
     return f"{words}."
 
 
-def sentences(found: IdentifiedMachine) -> list[str]:
+def sentences(machine: IdentifiedMachine) -> list[str]:
     """Sentences that judge an identification."""
+    active_bounds = machine.posterior.active_bounds
     words = [
         f"{each}: the model does not describe the recordings; check the gear ratio, the units of the columns and the "
         "data of the sensors"
-        for each in found.strains
+        for each in machine.prior_conflicts
     ]
     words += [
         f"{name} = {each.fitted:.4g}{unit_behind(each.unknown.unit)} lies at its {each.at_bound} bound"
-        + (", and the recordings contradict this bound" if system_name(name) in found.posterior.held else "")
+        + (", and the recordings contradict this bound" if system_name(name) in active_bounds else "")
         + ": widen it, or check what else is held for known"
-        for name, each in found.estimates.items()
+        for name, each in machine.estimates.items()
         if each.at_bound
     ]
-    words += [str(each) for each in found.suspicions if each.is_suspicious]
-    for check in found.checks:
+    words += [str(each) for each in machine.score_tests if each.is_rejected]
+    for check in machine.residual_tests:
         unit = MEASURANDS[check.column].unit
         place = f"{check.column} of the run {check.run}"
         if check.reason == "orders":
@@ -269,7 +254,7 @@ def sentences(found: IdentifiedMachine) -> list[str]:
                 f"{check.changes:.2g} {unit}: the speed, the feed or the supply was not steady; state the changes of "
                 "the speed (speeds), or name a steady part (begin, end)"
             )
-        elif check.noise > LOUD:
+        elif check.noise > EXCESS_NOISE:
             words.append(
                 f"{place}: its noise is {check.noise:.2g} times the stated one; state "
                 "its own (identify.sensor.noise), as all deviations grow with it"
@@ -277,38 +262,24 @@ def sentences(found: IdentifiedMachine) -> list[str]:
     return words
 
 
-def identified_tables(found: IdentifiedMachine, folder: Path) -> dict[str, Any]:
+def identified_tables(machine: IdentifiedMachine, folder: Path) -> dict[str, Any]:
     """The tables of the study with the fitted values, as a file in `folder` has them, beside the result of the
-    identification, by which a recording is watched. A number that the recordings do
-    not tell has its fitted value, too: only all of them together give the measured courses. A table [observer] has
-    the false imbalance that errors of the machine make."""
-    values = {name: float(f"{each.fitted:.6g}") for name, each in found.estimates.items()}
-    tables = changed_tables(found.config, values, "identified", folder)
+    identification. A number that the recordings do not determine has its fitted value, too: only all of them together
+    give the measured courses. Other capabilities take the errors of the values into their tables."""
+    values = {name: float(f"{each.fitted:.6g}") for name, each in machine.estimates.items()}
+    tables = changed_tables(machine.config, values, "identified", folder)
     tables.pop("identify", None)
-    if "watch" in tables:
-        tables["watch"]["identification"] = RESULT
-    if "observer" in tables:
-        false = _false_imbalance(found, values)
-        tables["observer"] |= {name: float(f"{x:.4g}") for name, x in false.items()}
+    estimates = Estimates(values, machine.covariance, RESULT)
+    for part in registered():
+        part.take_estimates(machine.config, estimates, tables)
     return tables
 
 
-def _false_imbalance(found: IdentifiedMachine, values: Mapping[str, float]) -> dict[str, float]:
-    """The false imbalance of an observer of the machine with the fitted `values`, by its key in [observer]."""
-    config = found.config
-    loads = {name.removeprefix("feed."): x for name, x in values.items() if name.startswith("feed.")}
-    feed = Layout(type(config.feed)).from_names(loads, config.feed)
-    own = {name.removeprefix("machine."): x for name, x in values.items()}
-    names = [name.removeprefix("machine.") for name in found.estimates]
-    known = config.machine.by_name | own | usual_loads(feed)
-    return false_imbalance(known, names, found.covariance, config.run.crank_speed)
-
-
-def identified_notes(found: IdentifiedMachine) -> dict[str, str]:
+def identified_notes(machine: IdentifiedMachine) -> dict[str, str]:
     """By full name, a sentence on each number of the study file that the recordings do not determine."""
     notes = {}
-    for name, each in found.estimates.items():
-        if not each.is_told:
+    for name, each in machine.estimates.items():
+        if not each.is_determined:
             unit = unit_behind(each.unknown.unit)
             ends = f"95 % from {each.low:.4g} to {each.high:.4g}{unit}"
             notes[name] = f"not determined, {ends}; it holds only together with the other fitted values"

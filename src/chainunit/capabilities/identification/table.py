@@ -9,6 +9,7 @@ from pydantic import Field
 
 from ...core.quantities import Value, declaration, quantity
 from ...reading.lists import TableList
+from ...recordings.table import COLUMNS, FILE, FROM_RECORDING, RecordingTable
 from ...study.entry_values import entered, filled_text
 
 FEEDS = ("same", "none")
@@ -43,55 +44,11 @@ class IdentifyTable:
 
 
 @declaration
-class RecordingTable:
-    """A recording."""
-
-    crank_speed: Value = quantity(
-        "rad/s", "speed of the crank in this run", default=3.0, min=0.01, max=1000.0, kind="speed"
-    )
-    begin: Value = quantity("s", "time of the recording from which it counts", default=0.0, min=-1e9, max=1e9)
-    end: Value = quantity("s", "time of the recording up to which it counts", default=0.0, min=-1e9, max=1e9)
-    ambient: Value = quantity("K", "temperature of the surroundings", default=293.15, min=230.0, max=340.0)
-
-
-@declaration
 class RunTable(RecordingTable):
     """A recorded run."""
 
     switched_off: Value = quantity(
         "s", "time of the recording at which the motor is switched off", default=0.0, min=-1e9, max=1e9
-    )
-
-
-@declaration
-class WatchTable(RecordingTable):
-    """The recording that is watched."""
-
-    learning: Value = quantity(
-        "s",
-        "time from its begin in which the angle of the crank, the zero of the signal and the forces are learned",
-        default=20.0,
-        above=0.0,
-        max=1e5,
-    )
-    feed_deviation: Value = quantity(
-        "1",
-        "standard deviation of the study's feed from that at the begin, as a share",
-        default=0.05,
-        above=0.0,
-        max=1.0,
-        kind="percent",
-    )
-    noise: Value = quantity(
-        "1",
-        "standard deviation of the noise of a sensor, in parts of the RMS of its column",
-        default=0.01,
-        min=1e-6,
-        max=1.0,
-        kind="percent",
-    )
-    gain: Value = quantity(
-        "1", "standard deviation of the gain of a sensor", default=0.01, min=0.0, max=1.0, kind="percent"
     )
 
 
@@ -112,31 +69,6 @@ class SensorTable:
     )
 
 
-_FILE: Any = filled_text("recording (CSV, or CSV.gz), relative to the study file")
-_COLUMNS: Any = (
-    dict[str, Any],
-    Field({}, description="by quantity, the head of its column, where that is not the quantity's name"),
-)
-WATCH_KEYS: Mapping[str, Any] = {
-    "file": _FILE,
-    "columns": _COLUMNS,
-    "identification": (
-        str,
-        Field(
-            "",
-            description="result.json of chainunit identify, whose covariance widens the thresholds; relative to the "
-            "study file",
-        ),
-    ),
-}
-"""Keys of the table [watch] that are no quantities."""
-
-FROM_RECORDING: Mapping[str, str] = {
-    "crank_speed": "run.crank_speed",
-    "begin": "the first row",
-    "end": "the last row",
-}
-"""By key of a recording, the source of its value if the file leaves the key out."""
 SOUGHT = TableList(
     "identify.parameter",
     title="Number that is sought",
@@ -175,7 +107,7 @@ RUNS = TableList(
     follows={**FROM_RECORDING, "name": "run_1, run_2, ..", "switched_off": "never"},
     keys={
         "name": filled_text("name of the run, in small letters, digits and _"),
-        "file": _FILE,
+        "file": FILE,
         "feed": (
             Literal[FEEDS],
             Field(
@@ -191,7 +123,7 @@ RUNS = TableList(
                 "duration, and the crank speed after it",
             ),
         ),
-        "columns": _COLUMNS,
+        "columns": COLUMNS,
         "added": (
             dict[str, Any],
             Field(

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ...mechanism.courses import means
+from ...mechanism.sampled_quantities import means
 from .kernel import Kernel
 
 Sense = Literal["max", "min", "peak"]
@@ -54,7 +54,7 @@ def stationary(kernel: Kernel, x: Any, columns: Any, q: Any, w: Any, sign: Any, 
     at = q.copy()
     good = np.ones(len(q), bool)
     for _ in range(_ROUNDS):
-        value, slope, mixed, curvature = kernel.by_angle(x, at, w, columns)
+        value, slope, mixed, curvature = kernel.derivatives_by_angle(x, at, w, columns)
         good &= np.isfinite(slope) & (sign * curvature < 0.0)
         with np.errstate(all="ignore"):
             step = np.where(good, -slope / curvature, 0.0)
@@ -63,7 +63,7 @@ def stationary(kernel: Kernel, x: Any, columns: Any, q: Any, w: Any, sign: Any, 
         if np.all(np.abs(np.where(good, step, 0.0)) < _EXACT):
             break
     if not np.all(good):
-        value, _, mixed, curvature = kernel.by_angle(x, at, w, columns)
+        value, _, mixed, curvature = kernel.derivatives_by_angle(x, at, w, columns)
     return Stationary(at, value, mixed, curvature, good)
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,6 +25,16 @@ from ...machines.machine import Machine
 
 _P, _U, _K, _LANE, _WEIGHT, _SEED = range(6)
 """The arguments of the compiled code: parameters, inputs, derived numbers, (angle, speed), weights, direction."""
+
+
+class AngleDerivatives(NamedTuple):
+    """A column in each lane: its `value`, its `slope` by the angle, each of shape (lanes,), the derivatives of this
+    slope by the free parameters, `mixed`, shape (free, lanes), and by the angle, `curvature`, shape (lanes,)."""
+
+    value: Any
+    slope: Any
+    mixed: Any
+    curvature: Any
 
 
 class Kernel:
@@ -57,7 +67,7 @@ class Kernel:
         lane = casadi.SX.sym("lane", 2)
         weight, seed = (
             casadi.SX.sym("weight", self.rows),
-            casadi.SX.sym("seed", self.size + 1 + model.derived),
+            casadi.SX.sym("seed", self.size + 1 + model.derived_count),
         )
         ratio = p[names.index("ratio")]
         shaft = {"phi": lane[0] * ratio, "w": lane[1] * ratio, "a": casadi.SX(0.0)}
@@ -114,7 +124,7 @@ class Kernel:
         """All parameters and derived numbers of machines, shapes (machines, ..)."""
         p = np.tile(self._p, (len(xs), 1))
         p[:, self._places] = xs
-        if not self._model.derived:
+        if not self._model.derived_count:
             return p, np.zeros((len(xs), 0))
         return p, np.array([np.array(self._derived[0](row)).ravel() for row in p])
 
@@ -208,9 +218,8 @@ class Kernel:
             matrix[:n, :n] += np.array(self._derived[2](outer[_P][0], by_derived))
         return 0.5 * (matrix + matrix.T)
 
-    def by_angle(self, x: Any, q: Any, w: Any, columns: Any) -> tuple[Any, Any, Any, Any]:
-        """Of one column in each lane, `columns` of shape (lanes,): its value, its slope by the angle, the
-        derivatives of this slope by the free parameters, shape (free, lanes), and that by the angle."""
+    def derivatives_by_angle(self, x: Any, q: Any, w: Any, columns: Any) -> AngleDerivatives:
+        """The derivatives of one column in each lane, `columns` of shape (lanes,)."""
         outer, slopes = self._directions(x)
         outer, n, lanes = {**outer, _SEED: outer[_SEED][-1:]}, self.size, np.arange(len(q))
         out = self._run(self._slopes, outer, {_LANE: np.array([q, w])}, (1, len(q)))[:, 0]
@@ -220,7 +229,7 @@ class Kernel:
         mixed = bend[:n]
         if len(slopes):
             mixed = mixed + slopes.T @ bend[n + 1 : n + 1 + len(slopes)]
-        return out[columns, lanes], out[self.rows + columns, lanes], mixed, bend[n]
+        return AngleDerivatives(out[columns, lanes], out[self.rows + columns, lanes], mixed, bend[n])
 
 
 def _along(rows: Any, point: Any, seed: Any) -> Any:
@@ -239,7 +248,7 @@ def symbols_of(machine: Machine, names: Sequence[str]) -> list[Any]:
     """
     t = trace(machine.model)
     places = {v.name: k for k, v in enumerate(columns_of(machine.model))}
-    values = [*t.outputs, *(value for _, value in t.further)]
+    values = [*t.outputs, *(value for _, value in t.further_quantities)]
     missing = [name for name in names if name not in places]
     if missing:
         raise RunError(f"{missing[0]}: no such column of the {machine.model.name}")

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.files import whole
+from ...core.files import atomic_file
 from ...fmu.backends import Backend
 from ...reading.results import as_data
 from ...reading.text import shown_in
@@ -96,7 +96,7 @@ def _writers(outcome: OptimizedStudy, folder: Path, of_report: list[Writer]) -> 
 
     def study_file() -> list[Path]:
         text = toml_text(best_tables(best, config, folder))
-        with whole(folder / FILE) as part:
+        with atomic_file(folder / FILE) as part:
             part.write_text(text, "utf-8")
         return [folder / FILE]
 

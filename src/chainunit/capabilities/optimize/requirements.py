@@ -34,7 +34,7 @@ class Requirements:
                     distances.append(casadi.SX(distance))
                     self.subjects.append(place)
         rows = casadi.densify(casadi.vertcat(*distances, casadi.SX(0, 1)))
-        if model.derived:
+        if model.derived_count:
             own = model.derive(casadi_(), model.parameter_layout.instance(casadi.vertsplit(p)))
             rows = casadi.substitute(rows, k, casadi.vertcat(*own))
         names = model.parameter_layout.names

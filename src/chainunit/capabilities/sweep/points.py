@@ -18,9 +18,9 @@ import numpy as np
 
 from ... import __version__
 from ...batch.evaluate import ReasonKind, StateReason, reasons_of
-from ...core.composition import reference
 from ...core.errors import InputError
 from ...core.quantities import Layout, Quantity, Variable
+from ...core.system_description import reference
 from ...machines.machine import Machine
 from ...reading.results import InUnit
 from ...study.block_runs import BlockRuns, Cause

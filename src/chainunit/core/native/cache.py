@@ -25,7 +25,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..errors import InputError, WriteError
-from ..files import whole
+from ..files import atomic_file
 
 VARIABLE, OFF = "CHAINUNIT_CACHE", "off"
 _MOST = 256 * 2**20
@@ -67,7 +67,7 @@ def entry(key: bytes, make: Callable[[], bytes]) -> bytes:
     content = make()
     with contextlib.suppress(OSError, WriteError, InputError):
         place.mkdir(parents=True, exist_ok=True, mode=0o700)
-        with whole(place / name, is_result=False) as part:
+        with atomic_file(place / name, is_result=False) as part:
             part.touch(0o600)
             part.write_bytes(_mark(name, content) + content)
         _shrink(place)

@@ -17,7 +17,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..errors import RunError
 from ..temporary_folders import scratch
@@ -110,9 +110,17 @@ def compile_code(
     return entry(key.digest(), make)
 
 
-def for_this_processor(compiler: Compiler) -> tuple[tuple[str, ...], tuple[str, ...], dict[str, bytes]]:
-    """Flags for fast code that runs on this machine alone, the libraries behind them, and a file that is part of the
-    code's name in the cache: the properties of this processor.
+class ProcessorFlags(NamedTuple):
+    """Flags for fast code that runs on this machine alone, the libraries behind them, and files that are part of the
+    code's name in the cache: the properties of this processor."""
+
+    flags: tuple[str, ...]
+    libraries: tuple[str, ...]
+    files: dict[str, bytes]
+
+
+def flags_for_this_processor(compiler: Compiler) -> ProcessorFlags:
+    """The flags for the processor of this machine.
 
     The code has vectors and may contract products and sums; it does not reorder sums, and NaN and infinity keep their
     meaning.
@@ -124,8 +132,9 @@ def for_this_processor(compiler: Compiler) -> tuple[tuple[str, ...], tuple[str, 
     ).stdout
     libc, version = platform.libc_ver()
     if compiler.zig or libc != "glibc" or host() != "linux64":
-        return flags, ("-lm",), {"processor.txt": macros}
+        return ProcessorFlags(flags, ("-lm",), {"processor.txt": macros})
     number = "".join(part.zfill(2) if k else part for k, part in enumerate(version.split(".")[:2]))
     # schedules a long body for its many values; GCC for this processor would not
     flags += ("-fschedule-insns", "-fsched-pressure")
-    return (*flags, f"-DVECTOR_LIBRARY={number}"), ("-lmvec", "-lm"), {"processor.txt": macros}
+    flags += (f"-DVECTOR_LIBRARY={number}",)
+    return ProcessorFlags(flags, ("-lmvec", "-lm"), {"processor.txt": macros})

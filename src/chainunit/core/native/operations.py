@@ -88,7 +88,7 @@ class Operations:
         self.results = [results[begin:end] for begin, end in pairwise(ends)]
 
     def rearranged(self, items: Sequence[Operation]) -> Operations:
-        """The same results from other `items`, whose order does not matter: those that are needed are put in order.
+        """The same results from other `items`, whose order does not matter: needed operations are put in order.
         The first ones have the places of the present ones."""
         places: dict[int, int] = {}
         order: list[Operation] = []

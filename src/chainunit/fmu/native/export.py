@@ -13,9 +13,9 @@ from importlib import metadata
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
-from ...core.files import folder, whole
+from ...core.files import atomic_file, folder
 from ...core.model import Model
-from ..accompany import companion_files
+from ..companion_files import companion_files
 from ..description import model_description, model_description_3
 from ..pack import interface_of, pack, xml_bytes
 from ..recipe import recipes
@@ -128,7 +128,7 @@ def export(
         slow = ", the first time about a minute" if compiler.zig and name == "win64" else ""
         report(f"compiling for {name}{slow}")
         contents |= build(compiler, name, fmi, model.name, sources, units)
-    with whole(file) as part:
+    with atomic_file(file) as part:
         pack(contents, part)
     return file
 

@@ -24,7 +24,7 @@ def groups(interface: Interface) -> list[list[int]]:
     """Outputs that are evaluated together, as places among the declared outputs: last all discrete ones."""
     lists: list[list[int]] = []
     discrete = interface.discrete
-    terminal_outputs, at = recipe.often(interface.model), 0
+    terminal_outputs, at = recipe.frequent_outputs(interface.model), 0
     for part in interface.model.parts:
         places = {name: at + i for i, name in enumerate(part.layout.names) if at + i not in discrete}
         at += len(part.layout.names)
@@ -53,11 +53,11 @@ def _programs(interface: Interface) -> Iterator[Program]:
     import casadi
 
     model = interface.model
-    (ps, us, xs, ks), p, u, x, outputs, derivatives = interface.trace
+    t = interface.trace
+    (ps, us, xs, ks), p, u, x, outputs = t.symbols, t.p, t.u, t.x, list(t.outputs)
     # derived values come last, and only if the model has them
-    more = [ks] if model.derived else []
+    more = [ks] if model.derived_count else []
     point = [ps, us, xs, *more]
-    outputs = list(outputs)
 
     def one(name: str, arguments: list[Any], results: list[Any], frequency: str = "ONCE") -> Program:
         return Program(name, arguments, [casadi.vertcat(*map(casadi.SX, results))], [0], frequency)
@@ -71,31 +71,31 @@ def _programs(interface: Interface) -> Iterator[Program]:
     if interface.discrete:
         apart.add(len(values) - 1)
     smooth = [casadi.SX(0, 1) if g in apart else group for g, group in enumerate(values)]
-    smooth.append(casadi.vertcat(*derivatives))
+    smooth.append(casadi.vertcat(*t.derivatives))
     slopes = [casadi.jtimes(row, casadi.vertcat(us, xs), casadi.vertcat(du, dx)) for row in smooth]
     yield Program("forward", [ps, us, xs, du, dx, *more], slopes, [*offsets, len(outputs)], "SELDOM")
     if interface.states:
-        yield one("derivatives", point, derivatives, "OFTEN")
+        yield one("derivatives", point, t.derivatives, "OFTEN")
         assert model.state_layout is not None
-        unknowns = casadi.SX.sym("z", model.start_unknowns)
-        z = casadi.vertsplit(unknowns) if model.start_unknowns else []
+        unknowns = casadi.SX.sym("z", model.start_problem.unknowns)
+        z = casadi.vertsplit(unknowns) if model.start_problem.unknowns else []
         if z:
             yield one("guess", [ps, us], model.start_guess(casadi_(), p, u))
-            yield one("improved", [ps, us, unknowns], model.start_improved(casadi_(), p, u, z))
+            yield one("improved", [ps, us, unknowns], model.improve_start(casadi_(), p, u, z))
         yield one(
             "initial", [ps, us, unknowns], model.state_layout.values(model.start_states(casadi_(), p, u, z))
         )
-        if model.start_required:
+        if model.start_problem.required:
             yield one(
                 "start_limits", point, [v for row in model.start_limits(casadi_(), p, u, x) for v in row]
             )
         yield one("internal_step", [ps], [model.internal_step(casadi_(), p)])
         if model.controlled:
             yield one("tolerance", [ps], [model.tolerance(casadi_(), p)])
-            yield one("closed", point, model.closed(casadi_(), p, u, x), "OFTEN")
+            yield one("closed", point, model.constrained_states(casadi_(), p, u, x), "OFTEN")
     if limits := [v for row in model.requirements(casadi_(), p) for v in row]:
         yield one("requirements", [ps, *more], limits)
-    if model.derived:
+    if model.derived_count:
         yield one("derive", [ps], interface.derived)
 
 
@@ -186,7 +186,7 @@ def tables(interface: Interface, guid: str, room: int) -> str:
             place[output], group_of[output] = first + k, g
         first += len(group)
     n_y = len(interface.others)
-    starts = [s.start for s in (*interface.of("parameter"), *interface.of("input"))]
+    starts = [s.start for s in (*interface.signals_of("parameter"), *interface.signals_of("input"))]
     parameter_names = model.parameter_layout.names
     lines = [
         f"/* {model.name}: tables for model.h, generated from the model's declarations. */",
@@ -204,7 +204,7 @@ def tables(interface: Interface, guid: str, room: int) -> str:
         _array("Group", "group", group_rows),
         _array("Type", "discrete_type", [interface.others[i].type.upper() for i in interface.discrete]),
     ]
-    requirements = (*model.required, *model.start_required)
+    requirements = (*model.required, *model.start_problem.required)
     for i, r in enumerate(requirements):
         lines.append(_array("int", f"given_{i}", [str(parameter_names.index(n)) for n in r.context]))
     rows = [
@@ -220,13 +220,13 @@ def tables(interface: Interface, guid: str, room: int) -> str:
         "n_u": len(interface.inputs),
         "n_x": len(interface.states),
         "n_y": n_y,
-        "n_k": model.derived,
-        "n_z": model.start_unknowns,
+        "n_k": model.derived_count,
+        "n_z": model.start_problem.unknowns,
         "n_w": room,
         "n_groups": len(group_rows),
         "differenced": f"{sum(1 << g for g in difference_groups(interface))}u",
         "n_required": len(model.required),
-        "n_start_required": len(model.start_required),
+        "n_start_required": len(model.start_problem.required),
         "start": "starts",
         "declared": "declared",
         "nominal": "nominal",
@@ -237,7 +237,7 @@ def tables(interface: Interface, guid: str, room: int) -> str:
         "discrete": len(group_rows) - 1 if interface.discrete else -1,
         "discrete_type": "discrete_type",
         "required": "required" if rows else "NULL",
-        "start_rounds": model.start_rounds,
+        "start_rounds": model.start_problem.rounds,
         "max_steps": parameter_names.index(MAX_STEPS) if interface.states else -1,
     }
     lines.append("const Model model = {")

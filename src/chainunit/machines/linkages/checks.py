@@ -131,9 +131,9 @@ def alike_points(points: Mapping[str, Iterable[str]], used: set[tuple[str, ...]]
     return ""
 
 
-def _alike(one: str, other: str) -> bool:
+def _alike(first: str, second: str) -> bool:
     """Whether two names may be meant to be one: but for capitals and signs between, or a letter more."""
-    a, b = (name.replace("_", "").lower() for name in (one, other))
+    a, b = (name.replace("_", "").lower() for name in (first, second))
     if a == b:
         return True
     digits = [re.sub(r"\D", "", name) for name in (a, b)]

@@ -53,7 +53,9 @@ def gap_hint(
     if not isinstance(group, Dyad | RRP):
         return ""
     try:
-        apart = [_apart(group, Mechanism(MATH, before, at, derived[: before.derived])) for at in (q, *places)]
+        apart = [
+            _apart(group, Mechanism(MATH, before, at, derived[: before.derived_count])) for at in (q, *places)
+        ]
     except (ArithmeticError, ValueError, IndexError):
         return ""
     if isinstance(group, RRP):
@@ -91,7 +93,7 @@ def _apart(group: Dyad | RRP, m: Mechanism) -> float:
     """How far apart the outer joints of the group are [m]."""
     if isinstance(group, Dyad):
         return math.sqrt((m.pins[group.first.pin].p - m.pins[group.second.pin].p).squared())
-    line = group.rail.placed(m.links)
+    line = group.rail.at_position(m.links)
     return abs(line.u.cross(m.pins[group.first.pin].p - line.pin.p))
 
 

@@ -138,9 +138,9 @@ def field_of(entry: Mapping[str, Any]) -> tuple[str, Any, Any]:
     )
 
 
-def with_starts(of: type, starts: Mapping[str, float]) -> type:
+def with_starts(declared: type, starts: Mapping[str, float]) -> type:
     """A declaration with other start values, by name."""
-    flat = Layout(of).from_names(dict(starts))
+    flat = Layout(declared).from_names(dict(starts))
     fields = [
         (f.name, f.type, group(f.metadata["of"], f.metadata["group"], default=getattr(flat, f.name)))
         if "of" in f.metadata
@@ -153,9 +153,9 @@ def with_starts(of: type, starts: Mapping[str, float]) -> type:
                 | {"quantity": dataclasses.replace(f.metadata["quantity"], start=getattr(flat, f.name))},
             ),
         )
-        for f in dataclasses.fields(of)
+        for f in dataclasses.fields(declared)
     ]
-    return declared_class(of.__name__, (), fields)
+    return declared_class(declared.__name__, (), fields)
 
 
 RESERVED = frozenset(

@@ -20,7 +20,7 @@ def dimension_of_unit(unit: str) -> Dimension:
 
 def checked_dimension(text: str, units: Mapping[str, str | None], unit: str | None) -> None:
     """Refuse an expression that is not of the dimension of `unit`, or, without it, adds what does not fit together;
-    `units` are those of the names, extremes and tables in it, None for one that is not known yet.
+    `units` has the units of the names, extremes and tables in it, None for one that is not known yet.
 
     Raises
     ------

@@ -43,10 +43,12 @@ class EntryReader(Entry):
         self.refused: set[str] = set()
         self.points: dict[str, dict[str, list[Any]]] = {}
 
-    def table(self, key: str, of: Mapping[str, Any] | None = None, default: Any = None) -> Mapping[str, Any]:
+    def table(
+        self, key: str, parent: Mapping[str, Any] | None = None, default: Any = None
+    ) -> Mapping[str, Any]:
         """A table; faults where it is none."""
         name = key.rpartition(".")[2]
-        given = (self.data if of is None else of).get(name, {} if default is None else default)
+        given = (self.data if parent is None else parent).get(name, {} if default is None else default)
         if not isinstance(given, Mapping):
             self.fault(key, f"is {shown(given)}; must be a table")
             return {}
@@ -75,14 +77,14 @@ class EntryReader(Entry):
     def tables(self, kind: str, known: tuple[str, ...]) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
         """The tables in a table, each behind its name and its full key; their keys are `known`."""
         given = self.table(kind)
-        self.named(kind, given)
+        self.fault_reserved_names(kind, given)
         for name in given:
             key = f"{kind}.{name}"
             table = self.table(key, given)
             self.keys(key, table, known)
             yield name, key, table
 
-    def named(self, key: str, names: Mapping[str, Any]) -> None:
+    def fault_reserved_names(self, key: str, names: Mapping[str, Any]) -> None:
         """Fault names that no variable can have."""
         for each in names:
             if wrong := name_fault(each):
@@ -139,7 +141,7 @@ class EntryReader(Entry):
             self.used |= words(given) & {*self.derived}
             given = self.expanded(given)
             each = expression(given)
-            known |= self.further(each, motion is not None)
+            known |= self.further_units(each, motion is not None)
             for name in each.names:
                 if name not in known:
                     raise InputError(f"is {shown(given)}; {name} is no parameter{self.note(name, known)}")
@@ -161,7 +163,7 @@ class EntryReader(Entry):
             return given
         return 0.0
 
-    def further(self, given: Expression, in_load: bool) -> dict[str, str | None]:
+    def further_units(self, given: Expression, in_load: bool) -> dict[str, str | None]:
         """The units of extremes and tables of an expression, by name.
 
         Raises
@@ -192,7 +194,7 @@ class EntryReader(Entry):
 
     def points_in(self, key: str, given: Mapping[str, Any]) -> dict[str, list[Any]]:
         """Points by name."""
-        self.named(key, given)
+        self.fault_reserved_names(key, given)
         return {name: self.vector(f"{key}.{name}", at, "m") for name, at in given.items()}
 
     def common(self) -> dict[str, float]:
@@ -235,7 +237,7 @@ class EntryReader(Entry):
         return text
 
     def checked_parameter(self, key: str, given: Any, text: str) -> str:
-        """A parameter that is an expression, in those that are numbers; empty where it is wrong."""
+        """A parameter that is an expression, in parameters that are numbers; empty where it is wrong."""
         if self.refused & words(text):
             return ""
         with self.at(key):
@@ -243,7 +245,7 @@ class EntryReader(Entry):
                 self.keys(key, given, ("value", "description"))
             self.used |= words(text) & {*self.derived}
             whole = self.expanded(text)
-            self.further(expression(whole), False)
+            self.further_units(expression(whole), False)
             for each in expression(whole).names:
                 if each not in self.units or each in self.inputs:
                     raise InputError(f"is {shown(text)}; {each} is no parameter{near_name(each, self.units)}")
@@ -279,7 +281,7 @@ class EntryReader(Entry):
         """Parameters or inputs; parameters that are expressions of others are taken up apart."""
         entries = []
         table = self.table(kind)
-        self.named(kind, table)
+        self.fault_reserved_names(kind, table)
         for name, given in table.items():
             if kind == "parameters" and is_expression(given):
                 continue

@@ -97,7 +97,7 @@ class _LinkageReader(LoadReader):
         driver, span = self.driver(joints)
         loads = [self.load(name, given) for name, given in self.table("loads").items()]
         common, groups, about = self.common(), self.groups(), self.about()
-        self.unused(parameters, inputs, tables)
+        self.fault_unused(parameters, inputs, tables)
         self.all(quantity_names(parameters, inputs, self.table("tables"), RESERVED, links))
         self.all([*spring_faults(loads, joints), *guide_faults(data, joints)])
         self.refuse()
@@ -155,7 +155,7 @@ class _LinkageReader(LoadReader):
             groups.append([kind, links])
         return groups
 
-    def unused(
+    def fault_unused(
         self, parameters: list[dict[str, Any]], inputs: list[dict[str, Any]], tables: Mapping[str, Any]
     ) -> None:
         """Fault parameters, inputs and tables that nothing uses; a name in a faulty entry may be meant to be used."""
@@ -177,7 +177,7 @@ class _LinkageReader(LoadReader):
     def links(self) -> Mapping[str, Any]:
         """The tables of the links."""
         links = self.table("links")
-        self.named("links", links)
+        self.fault_reserved_names("links", links)
         if not links:
             self.fault(
                 "links", "there is none; give at least the link that the driver turns, as [links.crank]"
@@ -252,7 +252,7 @@ class _LinkageReader(LoadReader):
         return {"mass": mass, "inertia": f"{mass} * {square} / 12.0", "centroid": middle}
 
     def joints(self) -> list[dict[str, Any]]:
-        """The joints: those that are named, and a revolute one for each further link in a point of the same name."""
+        """The joints: the named ones, and a revolute one for each further link in a point of the same name."""
         joints = []
         for name, key, given in self.tables("joints", _JOINT_KEYS):
             kind = given.get("type", PRISMATIC if "toward" in given else REVOLUTE)

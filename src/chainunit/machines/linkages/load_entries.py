@@ -18,7 +18,7 @@ from ...mechanism.expressions import Expression
 from ...reading.tables import file_text
 from .checks import name_fault
 from .entries import EntryReader, Known, is_given
-from .loads import place_of
+from .loads import parts_of_extreme
 
 LOADS = {
     "force": ("type", "on", "force"),
@@ -141,10 +141,10 @@ class LoadReader(EntryReader):
 
     # extremes of the motion
 
-    def further(self, given: Expression, in_load: bool) -> dict[str, str | None]:
+    def further_units(self, given: Expression, in_load: bool) -> dict[str, str | None]:
         """The units of the extremes and tables of an expression, by name; a load may have them."""
         if not in_load:
-            return super().further(given, in_load)
+            return super().further_units(given, in_load)
         found: dict[str, str | None] = {each: self.extreme(each, given.text) for each in given.extremes}
         for name in given.tables:
             if name not in self.curve_units:
@@ -176,7 +176,7 @@ class LoadReader(EntryReader):
                 f"{begin}{name[4:-1]} is no place of the motion; write a point of a link and its axis, such as "
                 "min(ram.C.y); of two numbers the lesser is min(a, b)"
             )
-        _, link, point, axis = place_of(name)
+        _, link, point, axis = parts_of_extreme(name)
         if link not in self.points or link == GROUND:
             known = [each for each in self.points if each != GROUND]
             raise InputError(f"{begin}{link} is no link{meant(link, known)} links: {', '.join(known)}")

@@ -77,12 +77,22 @@ def _texts(loads: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, str]]:
             yield from ((f"loads.{load['name']}.{key}", each) for each in entries if isinstance(each, str))
 
 
-def place_of(extreme: str) -> tuple[str, str, str, str]:
-    """Kind (min, max), link, point (empty for the link itself) and axis (x, y, angle) of an extreme by its name."""
+class ExtremeName(NamedTuple):
+    """The parts of the name of an extreme: its kind (min, max), its link, its point (empty for the link itself), and
+    its axis (x, y, angle)."""
+
+    kind: str
+    link: str
+    point: str
+    axis: str
+
+
+def parts_of_extreme(extreme: str) -> ExtremeName:
+    """The parts of the name of an extreme."""
     match = _EXTREME.fullmatch(extreme)
     assert match
     link, *point, axis = match[2].split(".")
-    return match[1], link, "".join(point), axis
+    return ExtremeName(match[1], link, "".join(point), axis)
 
 
 def name_of_load(load: Mapping[str, Any]) -> str:

@@ -18,7 +18,7 @@ from typing import Any, cast
 from ...core.engines import MATH
 from ...core.errors import GeometryError, InputError
 from ...core.messages import unit_behind
-from ...core.model import About, Requirement, keep
+from ...core.model import About, FmuData, Making, Requirement, keep
 from ...core.planar import ZERO
 from ...core.quantities import Value, declared_class, group, quantity
 from ...groups.loads import GuideLosses, PinLosses, Weight
@@ -34,6 +34,7 @@ from ...mechanism.machine import MachineState, Mechanism, derived_numbers
 from ...mechanism.models import InverseMachine
 from .closing import dead_group, gap_hint, open_group
 from .declarations import LinkageMotion, LinkBody, common_parameters, field_of
+from .geometry import LinkGeometry
 from .loads import (
     ForceLaw,
     LinkAngle,
@@ -42,14 +43,14 @@ from .loads import (
     checked_widths,
     extremes_of,
     name_of_load,
-    place_of,
+    parts_of_extreme,
     requirement_of_width,
     widths_of,
 )
 from .narrow import check_triads, lesser, lows, turns_of_triads
 from .outputs import DescribedLinkage, LinkageOutputs
 from .parts import LinkageParts
-from .probes import constant_outputs, notes_on, own_axis, repeated_outputs
+from .probes import constant_outputs, description_axis, notes_on, repeated_outputs
 from .structure import check_groups, structure_of
 
 ANGLES = 48
@@ -90,7 +91,7 @@ class LinkageDescription(LinkageOutputs):
         }
         self.tables = {name: self.curves[name] for name, each in tables.items() if each["over"] == "phi"}
         self.extremes = extremes_of(data["loads"])
-        self.turning: dict[str, tuple[float, float]] = {}
+        self.link_turns: dict[str, tuple[float, float]] = {}
         self.Parameters = self._parameters()
         inputs = [field_of(each) for each in data.get("inputs", ())]
         self.port, motion = ROTATING, cast("type", LinkageMotion)
@@ -106,9 +107,9 @@ class LinkageDescription(LinkageOutputs):
             )
         self.Inputs = declared_class("Inputs", (motion,), inputs)
         p, u = self.Parameters(), self.Inputs()
-        self.sides = dict(LinkageParts(MATH, self.structure, self.values(p, u)).sides)
+        self.sides = dict(LinkageParts(LinkGeometry(MATH, self.structure, self.values(p, u))).sides)
         self.sides |= turns_of_triads(self.linkage(MATH, p, u))
-        self.turning = self._followed(p, u)
+        self.link_turns = self._followed(p, u)
         self._check_extremes()
         self.widths = (
             checked_widths(data["loads"], self.values(self._ready(), u)) if widths_of(data["loads"]) else ()
@@ -145,7 +146,7 @@ class LinkageDescription(LinkageOutputs):
 
     def parts(self, xp: Any, p: Any, u: Any) -> LinkageParts:
         """The groups with the values of parameters and inputs."""
-        return LinkageParts(xp, self.structure, self.values(p, u), self.sides)
+        return LinkageParts(LinkGeometry(xp, self.structure, self.values(p, u)), self.sides)
 
     def linkage(self, xp: Any, p: Any, u: Any) -> DescribedLinkage:
         """The linkage with the values of parameters and inputs."""
@@ -156,7 +157,7 @@ class LinkageDescription(LinkageOutputs):
         loads["pins"] = PinLosses(p.pins, p.pins.damping)
         if any(j.kind == PRISMATIC for j in self.structure.joints.values()):
             lengths = {
-                parts.receivers[each["name"]][0]: parts.number(each["length"])
+                parts.receivers[each["name"]][0]: parts.geometry.number(each["length"])
                 for each in self.data["joints"]
                 if "length" in each
             }
@@ -166,18 +167,18 @@ class LinkageDescription(LinkageOutputs):
 
     def _extreme(self, name: str, parts: LinkageParts) -> MotionExtreme:
         """An extreme of the motion, by its name in expressions."""
-        kind, link, point, axis = place_of(name)
+        kind, link, point, axis = parts_of_extreme(name)
         frame, ends = parts.frames[link], self.structure.driver.linear
-        at = frame.of(parts.point(link, point) if point else ZERO)
+        at = frame.coordinates(parts.geometry.point(link, point) if point else ZERO)
 
-        def course(xp: Any, m: Any) -> tuple[Any, Any, Any]:
+        def coordinate(xp: Any, m: Any) -> tuple[Any, Any, Any]:
             moving = m.links[link]
             if axis == "angle":
-                return self.angle(xp, link, own_axis(moving.u, frame), m.q), moving.t1, moving.t2
+                return self.angle(xp, link, description_axis(moving.u, frame), m.q), moving.t1, moving.t2
             k = moving.beside(at.x, at.y)
             return getattr(k.p, axis), getattr(k.p1, axis), getattr(k.p2, axis)
 
-        return MotionExtreme(course, self.places(), 1.0 if kind == "max" else -1.0, ends)
+        return MotionExtreme(coordinate, self.places(), 1.0 if kind == "max" else -1.0, ends)
 
     def _check_extremes(self) -> None:
         """Refuse extremes of the angle of a link that turns round.
@@ -188,8 +189,9 @@ class LinkageDescription(LinkageOutputs):
             in one line.
         """
         for name in self.extremes:
-            _, link, _, axis = place_of(name)
-            if axis == "angle" and self.turning[link][0]:
+            extreme = parts_of_extreme(name)
+            link = extreme.link
+            if extreme.axis == "angle" and self.link_turns[link][0]:
                 raise InputError(
                     f"{name}: {link} turns all the way round, and its angle has no extremes; take those of a "
                     "point, or of a link that swings",
@@ -200,28 +202,28 @@ class LinkageDescription(LinkageOutputs):
         kind, link = load["type"], load["on"][0]
         if kind == "torque":
             angle = self._angle_for([load["torque"]], link, parts)
-            return TorqueLaw(link, load["torque"], parts.values, self.tables, angle)
+            return TorqueLaw(link, load["torque"], parts.geometry.values, self.tables, angle)
         if kind == "spring":
             ends = [
                 (None if link == GROUND else link, parts.pin_on(link, point))
                 for link, point in (load["on"], load["by"])
             ]
             stiffness, length, damping = (
-                parts.number(load[key]) for key in ("stiffness", "length", "damping")
+                parts.geometry.number(load[key]) for key in ("stiffness", "length", "damping")
             )
             return SpringDamper((ends[0], ends[1]), stiffness, length, damping)
         pin = parts.pin_on(link, load["on"][1])
         axis = parts.frames[link].axis if kind == "follower" else None
         fx, fy = load["force"]
         angle = self._angle_for([fx, fy], link, parts)
-        return ForceLaw(link, pin, (fx, fy), axis, parts.values, self.tables, angle)
+        return ForceLaw(link, pin, (fx, fy), axis, parts.geometry.values, self.tables, angle)
 
     def _angle_for(self, entries: Sequence[float | str], link: str, parts: LinkageParts) -> LinkAngle | None:
         """The angle of a link for a load; None where the load does not depend on it."""
         if not any(isinstance(each, str) and "angle" in expression(each).names for each in entries):
             return None
         frame = parts.frames[link]
-        return lambda xp, m: self.angle(xp, link, own_axis(m.links[link].u, frame), m.q)
+        return lambda xp, m: self.angle(xp, link, description_axis(m.links[link].u, frame), m.q)
 
     # the rotation of links over the turn
 
@@ -269,7 +271,7 @@ class LinkageDescription(LinkageOutputs):
         around = [*places, places[0] + 2.0 * math.pi] if not self.data["driver"]["linear"] else places
         angles: dict[str, list[float]] = {}
         signs: list[float] = []
-        courses: list[list[float]] = []
+        margins_over_way: list[list[float]] = []
         for q in around:
             try:
                 m = Mechanism(MATH, linkage, q, derived)
@@ -277,12 +279,12 @@ class LinkageDescription(LinkageOutputs):
                 raise self._closing(linkage, derived) from None
             margins = m.margins()
             signs = signs or [math.copysign(1.0, margin) for margin in margins]
-            courses.append([margin * sign for margin, sign in zip(margins, signs, strict=True)])
-            for each, margin in zip(self.structure.groups, courses[-1], strict=True):
+            margins_over_way.append([margin * sign for margin, sign in zip(margins, signs, strict=True)])
+            for each, margin in zip(self.structure.groups, margins_over_way[-1], strict=True):
                 if not margin > LEAST_MARGIN:
                     raise dead_group(each.links, self._at(q))
             for name in self.structure.links:
-                axis = own_axis(m.links[name].u, parts.frames[name])
+                axis = description_axis(m.links[name].u, parts.frames[name])
                 angle = math.atan2(axis.y, axis.x)
                 before = angles.setdefault(name, [self.structure.poses[name][2]])
                 before.append(before[-1] + math.remainder(angle - before[-1], 2.0 * math.pi))
@@ -291,19 +293,21 @@ class LinkageDescription(LinkageOutputs):
             margins = Mechanism(MATH, linkage, q, derived).margins()
             return [margin * sign for margin, sign in zip(margins, signs, strict=True)]
 
-        for k, q, least in lows(margins_at, courses, around):
+        for k, q, least in lows(margins_at, margins_over_way, around):
             links = self.structure.groups[k].links
             if not least > LEAST_MARGIN:
                 if math.isnan(least):
                     raise open_group(links, self._at(q), self._gap(linkage, k, derived, q))
                 raise dead_group(links, self._at(q))
-        turning = {}
-        for name, course in angles.items():
-            course = course[1:]
-            rate = 0.0 if self.data["driver"]["linear"] else round((course[-1] - course[0]) / (2.0 * math.pi))
-            rest = [angle - rate * (q - around[0]) for angle, q in zip(course, around, strict=True)]
-            turning[name] = rate, 0.5 * (min(rest) + max(rest)) - rate * around[0]
-        return turning
+        turns = {}
+        for name, samples in angles.items():
+            samples = samples[1:]
+            rate = (
+                0.0 if self.data["driver"]["linear"] else round((samples[-1] - samples[0]) / (2.0 * math.pi))
+            )
+            rest = [angle - rate * (q - around[0]) for angle, q in zip(samples, around, strict=True)]
+            turns[name] = rate, 0.5 * (min(rest) + max(rest)) - rate * around[0]
+        return turns
 
     def obstacle(self, p: Any) -> str:
         """The sentence on the place at which the linkage with these parameters does not close or jams, with the
@@ -337,7 +341,7 @@ class LinkageDescription(LinkageOutputs):
                 number = k + 1 - behind_driver
                 part = linkage.before(number) if number < len(linkage.groups) else linkage
                 try:
-                    Mechanism(MATH, part, q, derived[: part.derived])
+                    Mechanism(MATH, part, q, derived[: part.derived_count])
                 except (ArithmeticError, ValueError, IndexError):
                     return open_group(each.links, self._at(q), self._gap(linkage, k, derived, q))
         return InputError("the linkage does not close: change its lengths", key="links")
@@ -396,10 +400,8 @@ class LinkageDescription(LinkageOutputs):
             noun = data["title"] or data["name"]
             turning = data["driver"]["link"]
             description = data["title"] or f"linkage {data['name']}"
-            built_by = f"machine_of({described.text!r})"
-            maker = (machine_of, (described.text,))
-            about = About(**data.get("about", {}))
-            notes = described.notes
+            made = Making(f"machine_of({described.text!r})", machine_of, (described.text,))
+            fmu_data = FmuData(described.notes, About(**data.get("about", {})))
             repeated = repeated_outputs(described.structure, described.variable)
             constant = constant_outputs(described.structure, described.variable)
             driver_port = described.port
@@ -462,8 +464,8 @@ class LinkageDescription(LinkageOutputs):
             yield margin, LEAST_MARGIN, math.inf
         last = 0
         for each in linkage.groups:
-            last += each.derived
-            if each.derived:
+            last += each.derived_count
+            if each.derived_count:
                 yield derived[last - 2], -math.inf, MOST_MISFIT
         values = self.values(p, u)
         for _, width, sign in self.widths:

@@ -21,13 +21,13 @@ NEAR = 0.35
 
 def lows(
     margins_at: Callable[[float], Sequence[float]],
-    courses: Sequence[Sequence[float]],
+    margins: Sequence[Sequence[float]],
     places: Sequence[float],
 ) -> Iterator[tuple[int, float, float]]:
     """The number of a group, the place and the value of each low of its margin that may lead to a dead position; NaN
-    where the linkage does not close. The `courses` are the margins at the `places`."""
+    where the linkage does not close. The `margins` are the margins at the `places`."""
     last = len(places) - 1
-    for group, course in enumerate(zip(*courses, strict=True)):
+    for group, margins_of_group in enumerate(zip(*margins, strict=True)):
 
         def margin(q: float, group: int = group) -> float:
             try:
@@ -35,9 +35,9 @@ def lows(
             except (ArithmeticError, ValueError):
                 return math.nan
 
-        for k, here in enumerate(course):
+        for k, here in enumerate(margins_of_group):
             low, high = max(k - 1, 0), min(k + 1, last)
-            if here < NEAR and here <= course[low] and here <= course[high]:
+            if here < NEAR and here <= margins_of_group[low] and here <= margins_of_group[high]:
                 yield group, *lowest(margin, places[low], places[high])
 
 
@@ -69,7 +69,7 @@ def check_triads(linkage: Linkage, derived: Sequence[Any]) -> None:
         in one line.
     """
     for k, group in enumerate(linkage.groups):
-        if isinstance(group, Triad) and not derived[linkage.before(k + 1).derived - 2] <= MOST_MISFIT:
+        if isinstance(group, Triad) and not derived[linkage.before(k + 1).derived_count - 2] <= MOST_MISFIT:
             raise InputError(
                 f"the triad of {group.name} does not close all the way round, or moves too sharply to be followed: "
                 "change its lengths",

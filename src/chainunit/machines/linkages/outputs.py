@@ -19,7 +19,7 @@ from ..parts import Force, force
 from .declarations import RESERVED, GuideReaction, LinkTurning, PointMotion, Running, WayRunning
 from .loads import name_of_load
 from .parts import LinkageParts
-from .probes import guide_reaction, own_axis, point_motion
+from .probes import description_axis, guide_reaction, point_motion
 from .structure import Structure
 
 
@@ -36,7 +36,7 @@ class LinkageOutputs:
     data: Mapping[str, Any]
     structure: Structure
     port: DriverPort
-    turning: Mapping[str, tuple[float, float]]
+    link_turns: Mapping[str, tuple[float, float]]
     """For each link its turns per turn of the driver, and the middle of the rest of its angle [rad]."""
 
     def variable(self, kind: str, name: str) -> str:
@@ -91,15 +91,15 @@ class LinkageOutputs:
         for name, link in self.structure.links.items():
             moving, frame = m.links[name], parts.frames[name]
             fields = {
-                "angle": self.angle(xp, name, own_axis(moving.u, frame), m.q),
+                "angle": self.angle(xp, name, description_axis(moving.u, frame), m.q),
                 "w": moving.t1 * w,
                 "a": moving.t2 * (w * w) + moving.t1 * a,
             }
             for point in link.points:
-                at = frame.of(parts.point(name, point))
+                at = frame.coordinates(parts.geometry.point(name, point))
                 fields[point] = point_motion(moving.beside(at.x, at.y), w, a)
             if link.heavy:
-                at = frame.of(parts.vector(link.centroid))
+                at = frame.coordinates(parts.geometry.vector(link.centroid))
                 fields["centroid"] = point_motion(moving.beside(at.x, at.y), w, a)
             values[self.variable("link", name)] = self.link_outputs[name](**fields)
         return values
@@ -107,7 +107,7 @@ class LinkageOutputs:
     def angle(self, xp: Any, name: str, axis: Vec2, q: Any) -> Any:
         """The angle of a link without jumps: the middle of its course, which may turn with the driver, and the
         rest."""
-        rate, middle = self.turning[name]
+        rate, middle = self.link_turns[name]
         about = middle + rate * q if rate else middle
         c, s = (xp.cos(about), xp.sin(about)) if rate else (math.cos(about), math.sin(about))
         return about + xp.atan2(c * axis.y - s * axis.x, c * axis.x + s * axis.y)

@@ -1,18 +1,14 @@
-"""From the description of a linkage to its Assur groups: frames of links, rails, and assembly modes.
-
-A description places the points of a link in the link's own frame. A group has frames of its own for its links
-(`chainunit.groups`): a `LinkFrame` is the place of such a frame in that of the description. Standard library only:
-FMUs carry this file.
-"""
+"""From the description of a linkage to its Assur groups: bars with their frames, rails, and assembly modes. Standard
+library only: FMUs carry this file."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 from ...core.errors import InputError
-from ...core.planar import ZERO, Vec2
+from ...core.planar import Vec2
 from ...groups.body import Bar, Mass
 from ...groups.cylinder import Cylinder
 from ...groups.driver import Crank, Driver, Ram
@@ -23,89 +19,37 @@ from ...groups.sliding import RPR, RRP
 from ...groups.triad import Pose, Triad
 from ...groups.yokes import PRP, RPP
 from ...mechanism.assur import GROUND, REVOLUTE, AssurGroup
-from ...mechanism.expressions import value_of
-from .structure import CYLINDER, Entry, JointEntry, LinkEntry, Structure
-
-ALONG_X = Vec2(1.0, 0.0)
-
-
-class LinkFrame(NamedTuple):
-    """A frame of a group's link in that of the description: its origin [m] and its x axis, a unit vector."""
-
-    origin: Vec2
-    axis: Vec2
-
-    def of(self, point: Vec2) -> Vec2:
-        """A point in this frame."""
-        return self.of_vector(point - self.origin)
-
-    def of_vector(self, v: Vec2) -> Vec2:
-        """A vector in this frame."""
-        return Vec2(self.axis.dot(v), self.axis.cross(v))
-
-
-OWN = LinkFrame(ZERO, ALONG_X)
-
-
-def rotated(v: Vec2, by: Vec2) -> Vec2:
-    """A vector that is turned by the angle of the unit vector `by`."""
-    return Vec2(v.x * by.x - v.y * by.y, v.x * by.y + v.y * by.x)
-
-
-def mirrored(by: Vec2) -> Vec2:
-    """The unit vector of the opposite angle."""
-    return Vec2(by.x, -by.y)
+from .geometry import ALONG_X, OWN, LinkFrame, LinkGeometry, RoughPoses
+from .structure import CYLINDER, JointEntry
 
 
 class LinkageParts:
-    """The groups of a linkage with values: `xp` is the engine, `values` are the quantities by name.
+    """The groups of a linkage whose links have this `geometry`.
 
     `frames` has the frame of each link in its group; `receivers` the key of each joint's reaction in the groups (pin
     and link), with the sign that turns it into the force on the link that the description names first.
     """
 
-    def __init__(
-        self,
-        xp: Any,
-        structure: Structure,
-        values: Mapping[str, Any],
-        sides: Mapping[str, float] | None = None,
-    ) -> None:
+    def __init__(self, geometry: LinkGeometry, sides: Mapping[str, float] | None = None) -> None:
         """
         Parameters
         ----------
         sides : the assembly modes, of a triad the turns of its ternary link; None to find modes by the rough poses,
             which takes numbers and `MATH`
         """
-        self.xp, self.structure, self.values = xp, structure, values
+        self.geometry, self.structure = geometry, geometry.structure
+        self._rough = RoughPoses(geometry)
         self.sides: dict[str, float] = dict(sides or {})
         self._known_sides = sides is not None
         self.frames: dict[str, LinkFrame] = {GROUND: OWN}
         self.receivers: dict[str, tuple[tuple[str, str], float]] = {}
-        self._points: dict[str, dict[str, Vec2]] = {}
-        self._carriers = {self.pin(GROUND, name): GROUND for name in structure.ground}
-        first, *rest = [*structure.groups, None]
+        self._carriers = {self.pin(GROUND, name): GROUND for name in self.structure.ground}
+        first, *rest = [*self.structure.groups, None]
         cylinder = first is not None and first.kind == CYLINDER
         self.driver = self._cylinder(first) if first is not None and cylinder else self._driver()
         self.groups: tuple[Group, ...] = tuple(
-            self._group(each) for each in (rest if cylinder else structure.groups) if each is not None
+            self._group(each) for each in (rest if cylinder else self.structure.groups) if each is not None
         )
-
-    def number(self, entry: Entry) -> Any:
-        """The value of an entry."""
-        return value_of(self.xp, entry, self.values)
-
-    def vector(self, entries: tuple[Entry, Entry]) -> Vec2:
-        """The value of a point."""
-        return Vec2(self.number(entries[0]), self.number(entries[1]))
-
-    def point(self, link: str, point: str) -> Vec2:
-        """A point of a link in the frame of the description [m]."""
-        known = self._points.setdefault(link, {})
-        if point not in known:
-            entries = self.structure.ground if link == GROUND else self.structure.links[link].points
-            known[point] = self.vector(entries[point])
-        return known[point]
 
     def pin(self, link: str, point: str) -> str:
         """The name of a point in the linkage."""
@@ -119,7 +63,7 @@ class LinkageParts:
     @property
     def ground(self) -> dict[str, Vec2]:
         """Places of the ground pins [m]."""
-        return {self.pin(GROUND, name): self.point(GROUND, name) for name in self.structure.ground}
+        return {self.pin(GROUND, name): self.geometry.point(GROUND, name) for name in self.structure.ground}
 
     # bars
 
@@ -134,66 +78,18 @@ class LinkageParts:
                 if self._carriers[pin] == link or (link, name) not in self.structure.marked:
                     continue
                 pin = f"{link}.{name}"
-            at = frame.of(self.point(link, name))
+            at = frame.coordinates(self.geometry.point(link, name))
             points[pin], self._carriers[pin] = (at.x, at.y), link
-        return Bar(link, start, length, self._mass(entry, frame), points)
-
-    def _mass(self, entry: LinkEntry, frame: LinkFrame) -> Mass | None:
-        """The body of a link: further masses are parts of it."""
-        if not entry.heavy:
-            return None
-        m, c = self.number(entry.mass), self.vector(entry.centroid)
-        inertia = self.number(entry.inertia)
-        for point, added in entry.masses.items():
-            more, at = self.number(added), self.point(entry.name, point)
-            total = m + more
-            # a link that is massless as yet has its centroid where the mass is
-            share = more / (total + 1e-300)
-            inertia = inertia + m * share * (at - c).squared()
-            m, c = total, c + (at - c) * share
-        at = frame.of(c)
-        return Mass(m, at.x, inertia, at.y)
-
-    def _between(self, link: str, start: str, end: str) -> tuple[LinkFrame, Any]:
-        """The frame of a link from one of its points to another, and their distance."""
-        a, b = self.point(link, start), self.point(link, end)
-        length = self.xp.sqrt((b - a).squared())
-        return LinkFrame(a, (b - a) * (1.0 / length)), length
+        return Bar(link, start, length, self.geometry.mass(entry, frame), points)
 
     # joints
 
-    def _turn(self, joint: JointEntry) -> Vec2:
-        """The unit vector of the angle of `on` less that of `by`."""
-        angle = self.number(joint.angle)
-        return Vec2(self.xp.cos(angle), self.xp.sin(angle))
-
-    def _line(self, joint: JointEntry) -> Vec2:
-        """The direction of a prismatic joint's line in its link `by`, a unit vector."""
-        link, start = joint.by
-        return self._between(link, start, joint.toward)[0].axis
-
-    def _across(self, joint: JointEntry, v: Vec2, link: str) -> Vec2:
-        """A vector of a link's frame in that of the link on the other side of the prismatic joint."""
-        turn = self._turn(joint)
-        return rotated(v, turn if joint.on[0] == link else mirrored(turn))
-
-    def _direction(self, joint: JointEntry, link: str) -> Vec2:
-        """The direction of a prismatic joint's line in the frame of one of its links."""
-        line = self._line(joint)
-        return line if joint.by[0] == link else self._across(joint, line, joint.by[0])
-
-    def _line_through(self, joint: JointEntry, link: str, point: Vec2) -> Vec2:
-        """The place, in the link on the other side, of a point through which the line of a `point` of the link
-        goes."""
-        own, other = self.point(link, joint.at(link)), joint.other(link)
-        return self.point(other, joint.at(other)) + self._across(joint, point - own, link)
-
     def _rail(self, joint: JointEntry, link: str, point: Vec2) -> Rail:
         """The line along which a `point` of the link moves in a link before it."""
-        of = joint.other(link)
+        of = joint.other_link(link)
         frame = self.frames[of]
-        at = frame.of(self._line_through(joint, link, point))
-        return Rail(None if of == GROUND else of, at, frame.of_vector(self._direction(joint, of)))
+        at = frame.coordinates(self.geometry.line_through(joint, link, point))
+        return Rail(None if of == GROUND else of, at, frame.components(self.geometry.direction(joint, of)))
 
     def _receive(self, joint: JointEntry, pin: str, link: str) -> None:
         """The reaction of a joint acts in the groups at that pin on that link."""
@@ -201,7 +97,7 @@ class LinkageParts:
 
     def _outer(self, joint: JointEntry, link: str) -> str:
         """The pin of a link before it from which a link starts."""
-        other = joint.other(link)
+        other = joint.other_link(link)
         pin = self.pin_on(other, joint.at(other))
         self._receive(joint, pin, link)
         return pin
@@ -215,19 +111,19 @@ class LinkageParts:
     # the driver and the groups
 
     def _driver(self) -> Driver:
-        entry, xp = self.structure.driver, self.xp
+        entry, geometry = self.structure.driver, self.geometry
         joint, link = self.structure.joints[entry.joint], entry.link
         if not entry.linear:
-            frame = LinkFrame(self.point(link, joint.at(link)), ALONG_X)
-            zero = self.number(entry.zero)
+            frame = LinkFrame(geometry.point(link, joint.at(link)), ALONG_X)
+            zero = geometry.number(entry.zero)
             start = self._outer(joint, link)
             bar = self._bar(link, frame, start)
             end = next(iter(bar.points), start)
-            return Crank(bar, end, Vec2(xp.cos(zero), xp.sin(zero)), entry.sense)
+            return Crank(bar, end, Vec2(geometry.xp.cos(zero), geometry.xp.sin(zero)), entry.sense)
         sign = 1.0 if joint.on[0] == link else -1.0
-        along = self._direction(joint, link) * sign
-        frame = LinkFrame(self.point(link, joint.at(link)), along)
-        rail = Rail(None, self.point(GROUND, joint.at(GROUND)), self._direction(joint, GROUND) * sign)
+        along = geometry.direction(joint, link) * sign
+        frame = LinkFrame(geometry.point(link, joint.at(link)), along)
+        rail = Rail(None, geometry.point(GROUND, joint.at(GROUND)), geometry.direction(joint, GROUND) * sign)
         bar = self._bar(link, frame)
         return Ram(bar, rail, self._guide(joint, link), self.pin_on(link, joint.at(link)))
 
@@ -237,20 +133,22 @@ class LinkageParts:
         p, c, q = (self.structure.joints[joint.name] for joint in group.joints)
         inner = self._inner(c, rod, lever)
         # from the barrel to the rod
-        along = {link: self._direction(slide, link) for link in (barrel, rod)}
+        along = {link: self.geometry.direction(slide, link) for link in (barrel, rod)}
         if slide.on[0] == barrel:
             along = {link: -v for link, v in along.items()}
         frames = {
-            link: LinkFrame(self.point(link, joint.at(link)), along[link])
+            link: LinkFrame(self.geometry.point(link, joint.at(link)), along[link])
             for link, joint in ((barrel, p), (rod, c))
         }
-        (near, far) = (frame.of(self.point(link, slide.at(link))) for link, frame in frames.items())
+        (near, far) = (
+            frame.coordinates(self.geometry.point(link, slide.at(link))) for link, frame in frames.items()
+        )
         bars = self._bar(barrel, frames[barrel], self._outer(p, barrel)), self._bar(rod, frames[rod])
         swung = self._rod(lever, q, c)
 
         def turn() -> Any:
-            start, end = self._rough(GROUND, p), self._rough(GROUND, q)
-            return (end - start).cross(self._rough(lever, c) - start)
+            start, end = self._rough.place(GROUND, p), self._rough.place(GROUND, q)
+            return (end - start).cross(self._rough.place(lever, c) - start)
 
         return Cylinder(
             bars[0],
@@ -264,6 +162,9 @@ class LinkageParts:
             self._side(barrel, turn),
         )
 
+    # joints by their letters: p and q join a link with those before, b and c are the pin between two links, g and h
+    # are guides on links before, s is the slot between two links
+
     def _group(self, group: AssurGroup) -> Group:
         joints = [self.structure.joints[j.name] for j in group.joints]
         if group.kind == "triad":
@@ -275,7 +176,7 @@ class LinkageParts:
 
     def _rod(self, link: str, outer: JointEntry, inner: JointEntry) -> Bar:
         start = self._outer(outer, link)
-        frame, length = self._between(link, outer.at(link), inner.at(link))
+        frame, length = self.geometry.span(link, outer.at(link), inner.at(link))
         return self._bar(link, frame, start, length)
 
     def _rrr(self, first: str, second: str, p: JointEntry, b: JointEntry, q: JointEntry) -> Group:
@@ -283,8 +184,8 @@ class LinkageParts:
         bars = self._rod(first, p, b), self._rod(second, q, b)
 
         def turn() -> Any:
-            start, end = self._rough(p.other(first), p), self._rough(q.other(second), q)
-            return (end - start).cross(self._rough(second, b) - start)
+            start, end = self._rough.place(p.other_link(first), p), self._rough.place(q.other_link(second), q)
+            return (end - start).cross(self._rough.place(second, b) - start)
 
         return Dyad(inner, *bars, self._side(first, turn))
 
@@ -310,9 +211,9 @@ class LinkageParts:
 
     def _slider(self, link: str, rail: JointEntry, at: str) -> tuple[Bar, Rail, str]:
         """A block whose frame starts at the point `at` on its rail."""
-        point = self.point(link, at)
+        point = self.geometry.point(link, at)
         line = self._rail(rail, link, point)
-        bar = self._bar(link, LinkFrame(point, self._direction(rail, link)))
+        bar = self._bar(link, LinkFrame(point, self.geometry.direction(rail, link)))
         return bar, line, self._guide(rail, link)
 
     def _rrp(self, first: str, slider: str, p: JointEntry, c: JointEntry, g: JointEntry) -> Group:
@@ -321,17 +222,19 @@ class LinkageParts:
         bar, rail, guide = self._slider(slider, g, c.at(slider))
 
         def along() -> Any:
-            return (self._rough(slider, c) - self._rough(p.other(first), p)).dot(self._rough_line(g))
+            return (self._rough.place(slider, c) - self._rough.place(p.other_link(first), p)).dot(
+                self._rough.line(g)
+            )
 
         return RRP(inner, rod, bar, rail, guide, self._side(first, along))
 
     def _rpr(self, first: str, second: str, p: JointEntry, g: JointEntry, q: JointEntry) -> Group:
         frames = [
-            LinkFrame(self.point(link, j.at(link)), self._direction(g, link))
+            LinkFrame(self.geometry.point(link, j.at(link)), self.geometry.direction(g, link))
             for link, j in ((first, p), (second, q))
         ]
         block, line = (
-            frame.of(self.point(link, g.at(link)))
+            frame.coordinates(self.geometry.point(link, g.at(link)))
             for frame, link in zip(frames, (first, second), strict=True)
         )
         starts = self._outer(p, first), self._outer(q, second)
@@ -341,8 +244,8 @@ class LinkageParts:
         ]
 
         def along() -> Any:
-            arm = self._rough(p.other(first), p) - self._rough(q.other(second), q)
-            return arm.dot(self._rough_line(g))
+            arm = self._rough.place(p.other_link(first), p) - self._rough.place(q.other_link(second), q)
+            return arm.dot(self._rough.line(g))
 
         offset = line.y - block.y
         return RPR(bars[0], bars[1], offset, self._guide(g, first), self._side(first, along))
@@ -354,14 +257,14 @@ class LinkageParts:
         return PRP(inner, one, other, one_rail, other_rail, (one_guide, other_guide))
 
     def _rpp(self, block: str, yoke: str, p: JointEntry, s: JointEntry, g: JointEntry) -> Group:
-        pin = self.point(block, p.at(block))
+        pin = self.geometry.point(block, p.at(block))
         start = self._outer(p, block)
-        along = self._direction(g, yoke)
-        origin = self._line_through(s, block, pin)
+        along = self.geometry.direction(g, yoke)
+        origin = self.geometry.line_through(s, block, pin)
         rail = self._rail(g, yoke, origin)
         own = LinkFrame(origin, along)
-        slot = own.of_vector(self._direction(s, yoke))
-        in_block = self._across(s, along, yoke)
+        slot = own.components(self.geometry.direction(s, yoke))
+        in_block = self.geometry.across(s, along, yoke)
         bars = self._bar(block, LinkFrame(pin, in_block), start), self._bar(yoke, own)
         return RPP(*bars, rail, slot, (self._guide(s, block), self._guide(g, yoke)))
 
@@ -383,30 +286,14 @@ class LinkageParts:
     def _leg(self, link: str, outer: JointEntry, inner: JointEntry, ternary: str) -> Leg:
         pin = self.pin(ternary, inner.at(ternary))
         if inner.kind == REVOLUTE:
-            arm = self.point(ternary, inner.at(ternary))
+            arm = self.geometry.point(ternary, inner.at(ternary))
             self._receive(inner, pin, link)
             if outer.kind == REVOLUTE:
                 return RodLeg(self._rod(link, outer, inner), pin, arm)
             bar, rail, guide = self._slider(link, outer, inner.at(link))
             return BlockLeg(bar, pin, arm, rail, guide)
-        point = self.point(link, outer.at(link))
+        point = self.geometry.point(link, outer.at(link))
         start = self._outer(outer, link)
-        at = self._line_through(inner, link, point)
-        bar = self._bar(link, LinkFrame(point, self._direction(inner, link)), start)
-        return SlotLeg(bar, at, self._direction(inner, ternary), self._guide(inner, link))
-
-    # the assembly, by rough poses
-
-    def _rough(self, link: str, joint: JointEntry) -> Vec2:
-        """The rough place of a joint's point."""
-        return self._rough_point(link, self.point(link, joint.at(link)))
-
-    def _rough_point(self, link: str, point: Vec2) -> Vec2:
-        x, y, angle = (0.0, 0.0, 0.0) if link == GROUND else self.structure.poses[link]
-        return Vec2(x, y) + rotated(point, Vec2(math.cos(angle), math.sin(angle)))
-
-    def _rough_line(self, joint: JointEntry) -> Vec2:
-        link, start = joint.by
-        ends = (self._rough_point(link, self.point(link, each)) for each in (start, joint.toward))
-        a, b = ends
-        return b - a
+        at = self.geometry.line_through(inner, link, point)
+        bar = self._bar(link, LinkFrame(point, self.geometry.direction(inner, link)), start)
+        return SlotLeg(bar, at, self.geometry.direction(inner, ternary), self._guide(inner, link))

@@ -11,13 +11,14 @@ from ...groups.group import GuideForce
 from ...mechanism.assur import GROUND, PRISMATIC
 from ...mechanism.machine import Mechanism
 from .declarations import GuideReaction, PointMotion
-from .parts import LinkageParts, LinkFrame
+from .geometry import LinkFrame
+from .parts import LinkageParts
 from .structure import DriverEntry, JointEntry, LinkEntry, Structure
 
 _Node = TypeVar("_Node")
 
 
-def own_axis(u: Vec2, frame: LinkFrame) -> Vec2:
+def description_axis(u: Vec2, frame: LinkFrame) -> Vec2:
     """The x axis of a link's description, from the direction of its frame in the group."""
     e = frame.axis
     return Vec2(u.x * e.x + u.y * e.y, u.y * e.x - u.x * e.y)
@@ -106,12 +107,12 @@ def _pinned(structure: Structure, end: tuple[str, str]) -> set[tuple[str, str]]:
     return _connected(end, pins)
 
 
-def _connected(one: _Node, pairs: Sequence[set[_Node]]) -> set[_Node]:
+def _connected(start: _Node, pairs: Sequence[set[_Node]]) -> set[_Node]:
     """All that the pairs connect with this one, and itself."""
-    met, grows = {one}, True
+    met, grows = {start}, True
     while grows:
-        more = met.union(*(pair for pair in pairs if pair & met))
-        met, grows = more, more != met
+        grown = met.union(*(pair for pair in pairs if pair & met))
+        met, grows = grown, grown != met
     return met
 
 

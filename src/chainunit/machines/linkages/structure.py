@@ -35,7 +35,7 @@ class JointEntry(NamedTuple):
         """Its point on one of its links."""
         return self.on[1] if self.on[0] == link else self.by[1]
 
-    def other(self, link: str) -> str:
+    def other_link(self, link: str) -> str:
         """The link on its other side."""
         return self.by[0] if self.on[0] == link else self.on[0]
 

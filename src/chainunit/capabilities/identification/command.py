@@ -1,0 +1,36 @@
+"""The command that identifies a machine from recordings of its motor."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ...report.command_options import OutputFolder
+from ...report.console import carry_out, study_file, terminal_console
+
+
+def identify(
+    config: Annotated[Path, typer.Argument(help="Study file (TOML) with a table [identify].")],
+    output: OutputFolder = Path("identified"),
+) -> None:
+    """Identify masses, friction and feed of a real machine from recordings of its motor.
+
+    Says what the recordings can tell before anything is fitted. Writes identified.toml, report.html, result.json,
+    result.md and pictures into the output folder. The exit status is 1 where the model does not describe the
+    recordings.
+    """
+    question = study_file(config)
+    from .page import TASK
+    from .result import sentence_before_fit
+
+    errors = terminal_console(stderr=True)
+
+    def before_fit(*information: Any) -> None:
+        errors.print(sentence_before_fit(*information), soft_wrap=True)
+
+    carry_out(TASK, question, output, errors, before_fit=before_fit)
+
+
+COMMAND = identify

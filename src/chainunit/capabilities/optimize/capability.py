@@ -1,0 +1,49 @@
+"""The best machine: parameters that make one or two quantities of a turn least, within limits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from ...report.capability import Capability
+from ...study.file_reading import FileReading
+from ...study.file_section import FileSection
+from ...study.rules import CHAINS, MACHINE_FMU, NEEDS_MODEL, TWO_BARS, Rule
+from .table import FIELDS, Optimize, read_wishes
+from .wishes import Wishes
+
+
+class OptimizeCapability(Capability):
+    """The capability, with the table [optimize]."""
+
+    name = "optimize"
+    tables = {  # noqa: RUF012
+        "optimize": FileSection(
+            Optimize,
+            optional=True,
+            keys=FIELDS,
+            title="Search for the best machine",
+            is_used=lambda config: False,
+            apart=True,
+            forms={"objectives": {"items": {"type": "string"}, "maxItems": 2}},
+            single_keys=("objectives", "free", "limits"),
+        )
+    }
+
+    def rules(self) -> Iterable[Rule]:
+        """It needs a model of the machine, with two bars."""
+        yield Rule("optimize", MACHINE_FMU, NEEDS_MODEL)
+        yield Rule("optimize", CHAINS, TWO_BARS)
+
+    def plan(self, reading: FileReading) -> Wishes | None:
+        """The wishes that the table states."""
+        if "optimize" not in reading.data:
+            return None
+        loads, run = reading.values["feed"], reading.values["run"]
+        by_motor = bool(reading.parts.designation or "sizing" in reading.data)
+        table, form = reading.values["optimize"], reading.form.optimize
+        return read_wishes(
+            table, form, reading.parts.machine, reading.machine, loads, run.crank_speed, by_motor
+        )
+
+
+CAPABILITY = OptimizeCapability()

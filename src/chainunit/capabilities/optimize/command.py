@@ -1,0 +1,29 @@
+"""The command that searches for the best machine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ...report.command_options import BackendOption, OutputFolder
+from ...report.console import carry_out, study_file
+
+
+def optimize(
+    config: Annotated[Path, typer.Argument(help="Study file (TOML) with the table [optimize].")],
+    output: OutputFolder = Path("best"),
+    backend: BackendOption = None,
+) -> None:
+    """Search for the best machine: parameters with the least torque, load, power or energy under limits.
+
+    Writes best.toml, report.html, result.json, result.md and pictures into the output folder.
+    """
+    question = study_file(config)
+    from .page import TASK
+
+    carry_out(TASK, question, output, backend=backend and backend.value)
+
+
+COMMAND = optimize

@@ -1,0 +1,84 @@
+"""A sweep: quantities of a turn and measures of runs over parameters of the study, at many points."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from ...report.capability import Capability
+from ...study.conditions import given, has_entries, has_entry, is_one_of
+from ...study.file_reading import FileReading
+from ...study.file_section import FileSection
+from ...study.rules import CHAINS, MACHINE_FMU, MOTOR_FMU, NEEDS_MODEL, TWO_BARS, Rule
+from .plan import SweepPlan
+from .reading import Sweepable, read_plan
+from .table import FIELDS, MEASURES_OF_SWEEP, MOST_RESULTS, MOST_VALUES, SWEPT, SweepTable
+
+
+class SweepCapability(Capability):
+    """The capability, with the table [sweep]."""
+
+    name = "sweep"
+    tables = {  # noqa: RUF012
+        "sweep": FileSection(
+            SweepTable,
+            optional=True,
+            keys=FIELDS,
+            title="Sweep",
+            is_used=lambda config: False,
+            entries={"parameter": SWEPT},
+            follows={
+                "quantities": "without measures peak(crank_torque) and rms(crank_torque)",
+                "event": "the only one of the study, or that whose quantities are swept",
+                "best": "the first one",
+            },
+            forms={
+                "quantities": {"items": {"type": "string"}, "maxItems": MOST_RESULTS},
+                "measures": {
+                    "items": {"enum": list(MEASURES_OF_SWEEP)},
+                    "maxItems": len(MEASURES_OF_SWEEP),
+                },
+                "parameter.name": {"minLength": 1},
+                "parameter.values": {
+                    "items": {"type": ["number", "string"]},
+                    "minItems": 1,
+                    "maxItems": MOST_VALUES,
+                },
+            },
+            single_keys=("parameter", "quantities", "measures"),
+            deciders={"points": "method"},
+        )
+    }
+
+    def rules(self) -> Iterable[Rule]:
+        """It varies one drive, of which the models are known."""
+        yield Rule("sweep", MACHINE_FMU, NEEDS_MODEL)
+        yield Rule(
+            "sweep", given("sizing"), "varies one drive, and [sizing] tries many; leave out one of the two"
+        )
+        yield Rule(
+            "sweep.points",
+            is_one_of("sweep.method", "grid"),
+            "a grid has the points of its parameters; leave it out, or give another method",
+        )
+        yield Rule(
+            "sweep.measures",
+            ~given("coupling"),
+            "coupling_trip_time is of a safety coupling; add [coupling], or leave it out",
+            has_entry("sweep.measures", "coupling_trip_time"),
+        )
+        words = "need a model of the motor, which is an FMU; leave them out"
+        yield Rule("sweep.measures", MOTOR_FMU, words, has_entries("sweep.measures"))
+        words = f"{TWO_BARS}, or give measures"
+        yield Rule("sweep.quantities", CHAINS, words, has_entries("sweep.quantities"))
+
+    def plan(self, reading: FileReading) -> SweepPlan | None:
+        """The plan of the table; None for a machine that was refused."""
+        if "sweep" not in reading.data or reading.machine is None:
+            return None
+        parts, values = reading.parts, reading.values
+        fixed = {"machine.ratio": "follows from the motor's rated speed"} if parts.designation else {}
+        quantities = Sweepable.of(reading.machine, values["feed"], values["run"], reading.events)
+        return read_plan(reading.form.sweep, values["sweep"], parts.machine, quantities, fixed)
+
+
+CAPABILITY = SweepCapability()

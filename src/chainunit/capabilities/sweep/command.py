@@ -1,0 +1,42 @@
+"""The command that runs a sweep."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ...report.command_options import OutputFolder
+from ...report.console import carry_out, study_file
+
+
+def sweep(
+    config: Annotated[Path, typer.Argument(help="Study file (TOML) with a table [sweep].")],
+    output: OutputFolder = Path("sweep"),
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            "--workers", min=1, help="Threads, or with measures processes; one for each processor by default."
+        ),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            "--scheduler",
+            help="Address of a Dask scheduler whose workers make the points: tcp://10.0.0.5:8786.",
+        ),
+    ] = None,
+) -> None:
+    """Vary parameters of a study: quantities of a turn, and measures of runs with an event, at many points.
+
+    Writes report.html, result.json, result.md, plots and the store of all points into the output folder. A sweep that
+    was killed goes on from its store.
+    """
+    question = study_file(config)
+    from .page import TASK
+
+    carry_out(TASK, question, output, workers=workers, scheduler=scheduler)
+
+
+COMMAND = sweep

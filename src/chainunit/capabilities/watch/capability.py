@@ -1,0 +1,132 @@
+"""The load observer, which watches for one-sided overload beside the motor of a study, or over a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ...core.errors import InputError
+from ...recordings.table import FROM_RECORDING, recording_rules
+from ...report.capability import Capability, Contents
+from ...study.analysis import Analysis
+from ...study.capability import Estimates, FileReference
+from ...study.conditions import given
+from ...study.config import Config
+from ...study.drive import Drive
+from ...study.file_reading import FileReading
+from ...study.file_section import FileSection
+from ...study.rules import MOTOR_FMU, Rule, has_sides
+from .observer_table import ObserverTable
+from .reading import WatchPlan, read_watch
+from .table import KEYS, WatchTable
+
+
+@dataclass(frozen=True)
+class WatchPlans:
+    """The plan of the table [watch], and the values of [observer]; None for one that is absent."""
+
+    watch: WatchPlan | None
+    observer: ObserverTable | None
+
+
+class WatchCapability(Capability):
+    """The capability, with the tables [watch] and [observer]."""
+
+    name = "watch"
+    tables = {  # noqa: RUF012
+        "watch": FileSection(
+            WatchTable,
+            optional=True,
+            keys=KEYS,
+            title="Recording that is watched",
+            is_used=lambda config: False,
+            apart=True,
+            required=("file",),
+            follows=FROM_RECORDING,
+            forms={"file": {"minLength": 1}},
+        ),
+        "observer": FileSection(
+            ObserverTable, optional=True, title="Load observer", with_findings=True, apart=True
+        ),
+    }
+
+    def rules(self) -> Iterable[Rule]:
+        """Recordings need models of motor and machine, and the observer the two sides of a chain unit."""
+        words = (
+            "is of the chain unit, and the machine is {machine}: the observer compares the feed and the force of two "
+            "sides, which this machine does not have; leave it out. chainunit identify finds the loads of this "
+            "machine from its recordings"
+        )
+        yield Rule("watch", ~has_sides(), words)
+        yield Rule(
+            "observer", ~has_sides(), "knows the chain unit, and the machine is {machine}; leave it out"
+        )
+        yield from recording_rules("watch")
+        yield Rule("observer", MOTOR_FMU, "needs a model of the motor, which is an FMU; leave it out")
+        yield Rule(
+            "observer",
+            given("driveline"),
+            "takes the shaft between motor and machine for rigid; leave out [driveline] or [observer]",
+        )
+
+    def plan(self, reading: FileReading) -> WatchPlans:
+        """The plans of the tables."""
+        data, watch = reading.data, None
+        if "watch" in data:
+            watch = read_watch(reading.form.watch, reading.values["run"].crank_speed, reading.source)
+        return WatchPlans(watch, reading.values["observer"] if "observer" in data else None)
+
+    def files(self, data: Mapping[str, Any]) -> Iterator[FileReference]:
+        """The recording, and the result of an identification."""
+        watch = data.get("watch")
+        if isinstance(watch, dict):
+            yield FileReference("watch.file", watch, "file")
+            yield FileReference("watch.identification", watch, "identification", is_recording=False)
+
+    def faults(self, config: Config) -> Iterator[InputError]:
+        """The refusal of an observer of a feed that is zero."""
+        plans: WatchPlans = config.plans[self.name]
+        tables = [name for name in ("observer", "watch") if getattr(plans, name) is not None]
+        if tables and config.machine.model.sides:
+            feed = config.feed
+            if not feed.left.material_mass + feed.right.material_mass > 0.0:
+                for table in tables:
+                    yield InputError(
+                        f"{table}: watches for a feed that moves to one side, and feed.left.material_mass and "
+                        f"feed.right.material_mass are 0 kg; give the feed of normal running, or leave [{table}] out",
+                        key=table,
+                    )
+
+    def beside(self, config: Config, drive: Drive) -> Drive:
+        """The drive with its load observer."""
+        from .observation import with_observer
+
+        plans: WatchPlans = config.plans[self.name]
+        return drive if plans.observer is None else with_observer(config, plans.observer, drive)
+
+    def take_estimates(self, config: Config, estimates: Estimates, tables: dict[str, Any]) -> None:
+        """The recording is watched with the errors of the estimates, and the observer knows the false imbalance that
+        they make."""
+        from .observation import false_imbalance_of
+
+        if "watch" in tables:
+            tables["watch"]["identification"] = estimates.file
+        if "observer" in tables:
+            imbalance = false_imbalance_of(config, estimates)
+            tables["observer"] |= {name: float(f"{x:.4g}") for name, x in imbalance.items()}
+
+    def analyses(self) -> Iterable[type[Analysis]]:
+        """Who notices an event."""
+        from .notices import ObserverAnalysis
+
+        return (ObserverAnalysis,)
+
+    def contents(self) -> Mapping[str, Contents]:
+        """Who notices an event."""
+        from . import notices_page as notices
+
+        return {"observer": Contents("Who notices an overload", notices.blocks, notices.PICTURES.files)}
+
+
+CAPABILITY = WatchCapability()

@@ -1,0 +1,28 @@
+"""The command that watches a recording for one-sided overload."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ...report.command_options import OutputFolder
+from ...report.console import carry_out, study_file
+
+
+def watch(
+    config: Annotated[Path, typer.Argument(help="Study file (TOML) with a table [watch].")],
+    output: OutputFolder = Path("watched"),
+) -> None:
+    """Run the load observer over a recording: feed and force of each side over time, and alarms with their grounds.
+
+    Writes report.html, result.json, result.md and pictures into the output folder.
+    """
+    question = study_file(config)
+    from .page import TASK
+
+    carry_out(TASK, question, output)
+
+
+COMMAND = watch

@@ -1,0 +1,123 @@
+"""The load observer of a study: a part of its system that knows the study's machine, motor and feed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ...core.quantities import Layout
+from ...drives.terminal_signals import TerminalSignals, terminal_signals
+from ...machines.load_observer import LoadObserver
+from ...study.arrays import rms
+from ...study.capability import Estimates
+from ...study.config import Config
+from ...study.cycle import cycle
+from ...study.drive import Drive
+from ...system import ModelComponent
+from .false_loads import false_loads
+from .observer_table import ObserverTable
+
+FEED_SPREAD = 0.5
+"""Standard deviation of the feed of a side from the usual one, as a share."""
+OFFSET, OFFSET_CHANGE = 0.15, 1.5e-3
+"""Standard deviation of the offset of the torque, and of its change in a second, in parts of the RMS torque."""
+FORCE_CHANGE, FORCE_FLUCTUATION = 0.01, 0.005
+"""Change of a processing force in a second that is followed, and its natural fluctuation, in parts of an overload."""
+
+
+def with_observer(config: Config, table: ObserverTable, drive: Drive) -> Drive:
+    """The drive with a load observer by that `table`."""
+    p, speed = drive.fmu_parameters, config.run.crank_speed * drive.ratio
+    turn = cycle(drive.machine, config.run.crank_speed, config.feed)
+    torque = np.asarray(turn.crank_torque) / drive.ratio + p.rotor.d * speed
+    signals = terminal_signals(drive.motor, p, speed, float(np.mean(torque)))
+    values = drive.machine.by_name | {"rotor.J": p.rotor.J, "rotor.d": p.rotor.d}
+    values |= weights(signals) | tuning(table, config.feed, speed, rms(torque))
+    component = ModelComponent(LoadObserver, LoadObserver.parameter_layout.from_names(values))
+    wires = {"phi": "phi", "w": "w", **signals.outputs}
+    return replace(drive, observer=component, observed=wires)
+
+
+def weights(signals: TerminalSignals) -> dict[str, float]:
+    """The parameters of the observer that give the torque from signals at the terminals."""
+    return {
+        "signal.current": signals.per_current,
+        "signal.power": signals.per_power,
+        "signal.resistance": signals.resistance,
+    }
+
+
+def usual_loads(feed: Any) -> dict[str, float]:
+    """The parameters of the observer by name that are the loads of normal running: the means of both sides."""
+    return {
+        "feed.expected": 0.5 * (feed.left.material_mass + feed.right.material_mass),
+        "force.expected": 0.5 * (feed.left.processing_force + feed.right.processing_force),
+    }
+
+
+def tuning(table: ObserverTable, feed: Any, speed: float, torque: float) -> dict[str, float]:
+    """Parameters of the observer by name.
+
+    Parameters
+    ----------
+    table : what is known
+    feed : loads of normal running
+    speed : of the motor in normal running [rad/s]
+    torque : RMS torque on the rotor in normal running [N m]
+    """
+    expected = usual_loads(feed)
+    usual = expected["feed.expected"]
+    return expected | {
+        "noise.w": table.speed_noise * speed,
+        "noise.torque": table.signal_noise * torque,
+        "noise.rate": table.rate,
+        "feed.spread": FEED_SPREAD * usual,
+        "feed.change": table.change * usual,
+        "feed.fluctuation": table.fluctuation,
+        "feed.time": table.fluctuation_time,
+        "force.spread": table.force_overload,
+        "force.change": FORCE_CHANGE * table.force_overload,
+        "force.fluctuation": FORCE_FLUCTUATION * table.force_overload,
+        "force.time": table.fluctuation_time,
+        "offset.spread": OFFSET * torque,
+        "offset.change": OFFSET_CHANGE * torque,
+        "imbalance.uncertainty": table.uncertainty,
+        "imbalance.force_uncertainty": table.force_uncertainty,
+        # what one side loses the other one gains
+        "imbalance.overload": 2.0 * table.overload * usual,
+        "imbalance.force_overload": table.force_overload,
+        "alarm.rate": table.false_alarms,
+    }
+
+
+def false_imbalance_of(config: Config, estimates: Estimates) -> dict[str, float]:
+    """The keys of the table [observer] with the false imbalance of an observer of the estimated machine."""
+    values = estimates.values
+    loads = {name.removeprefix("feed."): x for name, x in values.items() if name.startswith("feed.")}
+    feed = Layout(type(config.feed)).from_names(loads, config.feed)
+    own = {name.removeprefix("machine."): x for name, x in values.items()}
+    known = config.machine.by_name | own | usual_loads(feed)
+    return false_imbalance(known, list(own), estimates.covariance, config.run.crank_speed)
+
+
+def false_imbalance(
+    values: Mapping[str, float], names: Sequence[str], covariance: Any, crank_speed: float
+) -> dict[str, float]:
+    """The keys of the table [observer] with the false imbalance that errors of the machine make.
+
+    Parameters
+    ----------
+    values : parameters of the observer by name; others have their declared values
+    names : numbers of which the `covariance`, shape (names, names), is known; a number that the observer does not
+        know counts as right
+    crank_speed : mean speed of the crank [rad/s]
+    """
+    layout = LoadObserver.parameter_layout
+    known = [k for k, name in enumerate(names) if name in layout.names]
+    own = layout.from_names({name: x for name, x in values.items() if name in layout.names})
+    sigma = np.asarray(covariance)[np.ix_(known, known)]
+    loads = false_loads(own, [names[k] for k in known], sigma, crank_speed)
+    return {"uncertainty": loads.imbalance, "force_uncertainty": loads.force_imbalance}

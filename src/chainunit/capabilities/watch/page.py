@@ -1,0 +1,281 @@
+"""The report on a watched recording: loads of both sides over time, and the alarms with their grounds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from ...reading.text import shown_in
+from ...recordings.residuals import EXCESS_NOISE
+from ...report import blocks as b
+from ...report import figure as fig
+from ...report.lines import Name, join, line
+from ...report.task import Task
+from ...study.config import Config
+from .result import as_dict
+from .watch import WatchedRecording, watch
+
+PICTURES = ("loads.png", "imbalance.png")
+_USUAL = {
+    "left.material_mass": "feed, left",
+    "right.material_mass": "feed, right",
+    "imbalance.feed": "imbalance of the feed",
+    "left.processing_force": "processing force, left",
+    "right.processing_force": "processing force, right",
+    "imbalance.force": "imbalance of the forces",
+    "rocker.tau": "rocker torque",
+    "left.web_pull": "web end pull, left",
+    "right.web_pull": "web end pull, right",
+}
+"""The rows of the table of usual values."""
+
+
+def watch_report(watched: WatchedRecording) -> b.Report:
+    """The report on a watched recording."""
+    result = as_dict(watched)
+    s = b.Source(result)
+    with shown_in(watched.config.units):
+        return b.Report(
+            watched.config.title or "Watched recording",
+            "Watch for one-sided overload",
+            result,
+            tuple(_opening(s)),
+            (
+                b.Section("loads", "Loads of both sides", tuple(_loads(s))),
+                b.Section("alarms", "Alarms and their grounds", tuple(_alarms(s))),
+                b.Section("basis", "Basis of the numbers", tuple(_basis(s))),
+            ),
+            source=s.line("Study file: {source} · chainunit {chainunit}"),
+            units=watched.config.units,
+            opening_title="The answer",
+            status="alarm" if result["alarms"] else "no alarm",
+        )
+
+
+TASK: Task[Config, WatchedRecording] = Task(
+    "watch", lambda config, folder, progress: watch(config, progress), watch_report, files=PICTURES
+)
+
+
+def _opening(s: b.Source) -> Iterator[b.Block]:
+    if not s.result["is_described"]:
+        yield b.Judgement(
+            "bad",
+            line(
+                "The machine of this study does not describe the begin of the recording (",
+                join(s.lines("doubts"), "; "),
+                "): its alarms may be those of a wrong machine. ",
+                "If the feed was another one, state it ([feed]), or widen its deviation (watch.feed_deviation)."
+                if s.result["of_feed_alone"]
+                else "Identify the machine first (chainunit identify).",
+            ),
+        )
+    if s.result["failed_identification"]:
+        yield b.Judgement(
+            "warning",
+            s.line(
+                "The identification of this machine failed: its model does not describe its recordings. The errors "
+                "of the machine are not bounded by those of {identification}."
+            ),
+        )
+    for name, of in (("signal", "signal"), ("speed", "measured speed")):
+        if (s.value(f"noise.{name}") or 0.0) > EXCESS_NOISE:
+            louder = f"The noise of the {of} at the begin is {{=noise.{name}:2}} times the stated one (watch.noise)"
+            yield b.Judgement("warning", s.line(f"{louder}: the thresholds are those of the measured noise."))
+    for each in s.lines("constant_parts"):
+        more = ": a sensor that is stuck, a stop or a limit. An alarm in this time may be false."
+        yield b.Judgement("warning", line(each, more))
+    for k in range(len(s.result["gaps"])):
+        words = f"No rows from {{gaps.{k}.from:4}} to {{gaps.{k}.to:4}}: the observer starts anew behind this gap."
+        yield b.Judgement("remark", s.line(words))
+    if not s.result["alarms"]:
+        yield b.Judgement("good", s.line("No alarm in {turns:3} turns ({duration:3})."))
+    for k, each in enumerate(s.result["alarms"]):
+        path = f"alarms.{k}"
+        if each["in_learning"]:
+            yield b.Text(
+                s.line(
+                    "This alarm is within the time of learning: the recording may begin in an overload, or the "
+                    "study's feed is not that of its begin."
+                )
+            )
+        yield b.Judgement(
+            "alarm",
+            s.line(
+                f"Overload of the {{{path}.side}} side from {{{path}.begin:4}} on, by the {{{path}.ground}}."
+            ),
+        )
+    yield b.Text(
+        s.line(
+            "The thresholds of an alarm follow from the permitted false alarms in a million turns "
+            "({=tuning.alarm.rate}). According to the angle of the crank, that of the imbalance of the feed is "
+            "{feed_threshold_least:3} to {feed_threshold_most:3}, that of the processing forces "
+            "{force_threshold_least:3} to {force_threshold_most:3}."
+        )
+    )
+    named = s.result["identification"] is not None
+    if not s.value("uncertainty") and not s.value("force_uncertainty"):
+        remedy = (
+            "The identification sought no number of the machine that the observer knows."
+            if named
+            else "Name the result of an identification (identification) to have their errors in the thresholds."
+        )
+        yield b.Text(f"The thresholds take the numbers of the machine for exact. {remedy}")
+    else:
+        words = "Errors of the machine's parameters make"
+        if named:
+            words = "The machine's parameters are those of an identification. Their errors make"
+        more = (
+            "a false imbalance of {uncertainty:2} and {force_uncertainty:2} (standard deviations); the thresholds of "
+            "feed and forces are wider by the factors {widening:3} and {force_widening:3}."
+        )
+        yield b.Text(s.line(f"{words} {more}"))
+
+
+def _series(s: b.Source, name: str) -> Any:
+    return np.array([np.nan if x is None else x for x in s.result["course"][name]["value"]])
+
+
+def _loads(s: b.Source) -> Iterator[b.Block]:
+    rows = [
+        b.TableRow(
+            (
+                words,
+                *(s.number(f"usual.{name}.{key}", digits=3) for key in ("value", "deviation", "threshold")),
+            )
+        )
+        for name, words in _USUAL.items()
+        if name in s.result["usual"]
+    ]
+    if rows:
+        yield b.Table(
+            tuple(rows),
+            b.heads("quantity", "median", "deviation of the filter", "threshold of an alarm"),
+            title="Estimates after the time of learning and before the first alarm",
+        )
+        yield b.Text(
+            "The deviation of the filter is that of loads that change as fast as it follows (observer.change). "
+            "Normal running scatters less; the threshold follows from that smaller deviation.",
+            "note",
+        )
+    time, axis = _series(s, "time"), fig.Axis("time", "s")
+    panels = []
+    for name, words, unit in (("material_mass", "feed", "kg"), ("processing_force", "processing force", "N")):
+        courses = {side: _series(s, f"{side}.{name}") for side in ("left", "right")}
+        low, high = _span(time, list(courses.values()))
+        items = [fig.Curve(side, time, x, look) for look, (side, x) in enumerate(courses.items())]
+        y = fig.Axis(words, unit, low=low, high=high)
+        panels.append((fig.Panel(axis, y, (*_marks(s), *items)),))
+    yield fig.Figure(
+        "loads",
+        "Estimated loads",
+        "Feed and processing force of both sides over the recording, with the alarms.",
+        tuple(panels),
+        file=PICTURES[0],
+    )
+    panels = []
+    for name, words, unit in (("feed", "left less right, feed", "kg"), ("force", "force", "N")):
+        x, limit = _series(s, f"imbalance.{name}"), _series(s, f"imbalance.{name}_threshold")
+        low, high = _span(time, [x, limit, -limit])
+        band = fig.Between("below the threshold", time, -limit, limit, "band")
+        y = fig.Axis(words, unit, low=low, high=high)
+        panels.append((fig.Panel(axis, y, (*_marks(s), band, fig.Curve("imbalance", time, x, 0))),))
+    yield fig.Figure(
+        "imbalance",
+        "Imbalance and thresholds",
+        "The imbalance of feed and forces, and the thresholds of an alarm.",
+        tuple(panels),
+        file=PICTURES[1],
+    )
+
+
+def _span(time: Any, courses: list[Any]) -> tuple[float, float]:
+    """The ends of an axis: of the values after the first tenth of the time, in which the observer settles."""
+    settled = time > time[0] + 0.1 * (time[-1] - time[0])
+    values = np.concatenate([x[settled] for x in courses])
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    wide = 0.1 * (high - low) or 1.0
+    return low - wide, high + wide
+
+
+def _marks(s: b.Source) -> Iterator[fig.Shade]:
+    """The times of the alarms."""
+    named = set[str]()
+    for each in s.result["alarms"]:
+        name = f"alarm, {each['side']}"
+        ends = each["begin"]["value"], each["end"]["value"]
+        yield fig.Shade(*ends, "" if name in named else name, look=f"{each['side']} alarm")
+        named.add(name)
+
+
+def _alarms(s: b.Source) -> Iterator[b.Block]:
+    rows = []
+    for k in range(len(s.result["alarms"])):
+        path, values = f"alarms.{k}", f"alarms.{k}.values"
+        rows.append(
+            b.TableRow(
+                (
+                    s.words(f"{path}.side"),
+                    s.number(f"{path}.begin", digits=5),
+                    "the end" if s.result["alarms"][k]["lasts"] else s.number(f"{path}.end", digits=5),
+                    s.words(f"{path}.ground"),
+                    s.number(f"{path}.at", digits=5),
+                    s.number(f"{values}.imbalance.feed", digits=3),
+                    s.number(f"{values}.imbalance.feed_threshold", digits=3),
+                    s.number(f"{values}.imbalance.force", digits=3),
+                    s.number(f"{values}.imbalance.force_threshold", digits=3),
+                    s.number(f"{values}.rocker.tau", digits=3),
+                )
+            )
+        )
+    if not rows:
+        yield b.Text("There is none.")
+        return
+    columns = (
+        b.Column("side"),
+        b.Column("from"),
+        b.Column("to"),
+        b.Column("ground"),
+        b.Column("largest at", form="long"),
+        b.Column("imbalance of the feed", "imbalance"),
+        b.Column("threshold"),
+        b.Column("imbalance of the forces", "forces", form="long"),
+        b.Column("threshold", form="long"),
+        b.Column("rocker torque", form="long"),
+    )
+    yield b.Table(
+        tuple(rows),
+        columns,
+        title="Alarms, with the values at the largest imbalance in parts of its threshold",
+    )
+
+
+def _basis(s: b.Source) -> Iterator[b.Block]:
+    rows = [
+        b.TableRow(
+            (
+                Name(name),
+                s.number(f"learned.{name}.value", digits=4),
+                s.number(f"learned.{name}.deviation", digits=2),
+            )
+        )
+        for name in s.result["learned"]
+    ]
+    yield b.Text(
+        s.line(
+            "Angle, zero and loads were learned in the first {=learning}. Alarms of one side with less than two "
+            "turns between them are one."
+        ),
+        "note",
+    )
+    yield b.Table(
+        tuple(rows),
+        b.heads("learned number", "value", "standard deviation by noise"),
+        title="Learned from the begin",
+        form="long",
+    )
+    rows = [b.TableRow((Name(name), s.number(f"tuning.{name}", digits=4))) for name in s.result["tuning"]]
+    yield b.Table(tuple(rows), b.heads("parameter", "value"), title="Tuning of the observer", form="long")
+    yield b.Text(line("Recording: ", s.words("file")), "fine", "long")

@@ -1,0 +1,369 @@
+"""A system of models as one: declarations side by side, and equations in the order of their dependencies.
+
+The description of a system is a text in JSON, from which another process, or an FMU, makes the same model
+(`chainunit.core.system_model.system_model`); `chainunit.system.compiled` writes it. Each component is a group: the
+names are the full names of the system, such as ``motor.armature.R``. Standard library only: FMUs carry this file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from importlib import import_module
+from operator import attrgetter
+from typing import Any
+
+from .errors import InputError
+from .integrators import MAX_STEPS, Solver
+from .model import Model, Requirement, Terminal
+from .quantities import Layout, Value, declaration, declared_class, group, pruned, quantity
+
+_SOLVER = MAX_STEPS.partition(".")[0]
+RESERVED = (_SOLVER, "derived", "of_components")
+"""Names that a component cannot have, as the model has something else by that name."""
+Steps = Sequence[tuple[str, Sequence[str]]]
+"""Outputs that are evaluated together, by component, in order."""
+
+
+@declaration
+class SystemSolver(Solver):
+    """Limits of the internal integrator of a system, in place of those of its components."""
+
+    tolerance: Value = quantity(
+        "1",
+        "relative tolerance of the internal integrator, of each state or its nominal size",
+        default=1e-10,
+        min=1e-12,
+        max=1e-2,
+        tunable=True,
+    )
+
+
+SOLVER = tuple(f"{_SOLVER}.{name}" for name in Layout(SystemSolver).names)
+"""Full names of the parameters of the integrator."""
+
+
+# -- models by reference
+
+
+def reference(model: type[Model]) -> dict[str, Any]:
+    """A model as JSON can hold it: by its name in a module, or by the call that makes it."""
+    made = vars(model).get("made")
+    if made is None:
+        return {"of": _place(model)}
+    function, arguments = made.function, made.arguments
+    return {"of": _place(function), "arguments": [_argument(each) for each in arguments]}
+
+
+def _argument(value: Any) -> Any:
+    return reference(value) if isinstance(value, type) else value
+
+
+def _place(thing: Any) -> str:
+    """Module and name, such as ``.drives.dc_motor:DcMotor``; a module of this package begins with a dot.
+
+    Raises
+    ------
+    InputError
+        for a name that no module has.
+    """
+    module = thing.__module__
+    if "<locals>" in thing.__qualname__:
+        raise InputError(
+            f"{thing.__qualname__}: is defined inside a function; the model of a component must have a name in a "
+            "module, or a `maker`"
+        )
+    own = f"{__package__}."
+    return f"{module[len(own) - 1 :] if module.startswith(own) else module}:{thing.__qualname__}"
+
+
+def model_at(place: Mapping[str, Any]) -> Any:
+    """The model of a `reference`."""
+    module, _, name = place["of"].partition(":")
+    thing = attrgetter(name)(import_module(module, __package__))
+    if "arguments" not in place:
+        return thing
+    return thing(*(model_at(each) if isinstance(each, dict) else each for each in place["arguments"]))
+
+
+def modules_of(place: Mapping[str, Any]) -> set[str]:
+    """The modules of this package that a `reference` names, such as ``drives.dc_motor``."""
+    own = {place["of"].partition(":")[0]}
+    own = {module.removeprefix(".") for module in own if module.startswith(".")}
+    inner = [each for each in place.get("arguments", ()) if isinstance(each, dict)]
+    made = model_at(place).made
+    return own.union(*map(modules_of, inner), made.modules if made else ())
+
+
+# -- the parts of a system
+
+
+@dataclass(frozen=True)
+class Member:
+    """A component: its model, and how its parameters and inputs follow from the parameters and inputs of the system.
+
+    `parameters` has for each parameter a function of the system's parameters; `free` for each input a function of the
+    system's inputs, or None, and `sources` then its source by full name, or None where it has its declared start
+    value.
+    """
+
+    name: str
+    model: type[Model]
+    parameters: Sequence[Any]
+    free: Sequence[Any]
+    sources: Sequence[str | None]
+    sites: Mapping[str, tuple[int, Any]]
+    """by each output that the system takes: the number of its part, and the function that reads it there"""
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """The names of its states."""
+        return self.model.state_layout.names if self.model.state_layout else ()
+
+
+class SystemDescription:
+    """What all values of a system share, from its description.
+
+    The description has the `name` and `title` of the model, a `reference` of each of the `components`, the
+    `connections`, the inputs and outputs that are `left_out`, the free `terminals` by full name, the `extra` outputs
+    besides those of the first parts; the outputs in the order of their dependencies, all (`steps`), those for the
+    derivatives (`rate_steps`) and those for the constraints (`closed_steps`); and the order of the `start`, in which
+    no outputs stand for the states.
+    """
+
+    def __init__(self, data: Mapping[str, Any], models: Iterable[type[Model]]) -> None:
+        self.data = data
+        self.models = {name: model for (name, _), model in zip(data["components"], models, strict=True)}
+        self.sources: dict[str, str] = {target: source for source, target in data["connections"]}
+        self.steps: Steps = data["steps"]
+        self.rate_steps: Steps = data["rate_steps"]
+        self.closed_steps: Steps = data["closed_steps"]
+        self.start: Sequence[tuple[str, Sequence[str] | None]] = data["start"]
+        self.has_states = any(model.state_layout for model in self.models.values())
+        left_out = {*data["left_out"]}
+        common = {f"{name}.{own}": own for name in self.models for own in SOLVER if self.has_states}
+        own = [(_SOLVER, SystemSolver, group(SystemSolver, "internal integrator", default=SystemSolver()))]
+        self.Parameters = self._declared(
+            "Parameters", lambda model: model.Parameters, common, own if self.has_states else ()
+        )
+        inputs = left_out | set(self.sources)
+        self.Inputs = self._declared("Inputs", lambda model: model.Inputs, inputs)
+        self.States = self._declared("States", lambda model: model.States, ())
+        self.Outputs = self._declared("Outputs", lambda model: model.parts[0].layout.cls, left_out)
+        self.Extra = self._extra(data["extra"])
+        self.members = {
+            name: self._member(name, model, inputs, common) for name, model in self.models.items()
+        }
+
+    def _declared(
+        self,
+        name: str,
+        declaration_of: Callable[[type[Model]], type | None],
+        leave_out: Iterable[str],
+        further_fields: Any = (),
+    ) -> Any:
+        """A declaration with a group for each component that has such quantities."""
+        fields = []
+        for component, model in self.models.items():
+            declared = declaration_of(model)
+            inner = pruned(declared, {*leave_out}, f"{component}.") if declared else None
+            if inner is not None:
+                variables = Layout(inner).variables
+                known = all(v.quantity.start is not None for v in variables)
+                default = Layout(inner).from_names({}) if known else None
+                fields.append((component, inner, group(inner, component, default=default)))
+        return declared_class(name, (), [*fields, *further_fields])
+
+    def _extra(self, names: Iterable[str]) -> Any:
+        """A declaration of these outputs of further parts, by full name; None without any."""
+        wanted = {*names}
+        fields = []
+        for component, model in self.models.items():
+            inner = []
+            for part in model.parts[1:]:
+                others = {f"{component}.{name}" for name in part.layout.names} - wanted
+                declared = pruned(part.layout.cls, others, f"{component}.")
+                inner += [declared] if declared else []
+            if inner:
+                of = declared_class("Further", tuple(inner))
+                fields.append((component, of, group(of, component)))
+        return declared_class("FurtherOutputs", (), fields) if fields else None
+
+    def _member(
+        self, name: str, model: type[Model], inputs: Iterable[str], common: Mapping[str, str]
+    ) -> Member:
+        def getter(full: str) -> Any:
+            return attrgetter(full)
+
+        own = [f"{name}.{each}" for each in model.parameter_layout.names]
+        taken = [f"{name}.{each}" for each in model.input_layout.names]
+        return Member(
+            name,
+            model,
+            [getter(common.get(full, full)) for full in own],
+            [None if full in {*inputs} else getter(full) for full in taken],
+            [self.sources.get(full) for full in taken],
+            {
+                output: (k, attrgetter(output))
+                for k, part in reversed([*enumerate(model.parts)])
+                for output in part.layout.names
+            },
+        )
+
+    # -- attributes of the model
+
+    def words(self) -> str:
+        """A text on the model for its users."""
+        kinds = ", ".join(f"{name} is of the model {model.name}" for name, model in self.models.items())
+        joined = ", ".join(f"{source} to {target}" for target, source in self.sources.items())
+        return (
+            f"A system as one model: {kinds}. Each load is evaluated at the present angle and speed of its shaft, so "
+            "that there is no error of a coupling; one integrator, which controls the error to solver.tolerance, "
+            f"makes the steps of all.\n\nConnected inside: {joined or 'nothing'}."
+        )
+
+    def required(
+        self, requirements_of: Callable[[type[Model]], Sequence[Requirement]]
+    ) -> tuple[Requirement, ...]:
+        """The requirements of all components, by full names."""
+        return tuple(
+            replace(
+                requirement,
+                subject=self._full(name, requirement.subject),
+                context=tuple(self._full(name, x) for x in requirement.context),
+                depends=tuple(self._full(name, x) for x in requirement.depends),
+            )
+            for name, model in self.models.items()
+            for requirement in requirements_of(model)
+        )
+
+    def _full(self, name: str, subject: str) -> str:
+        """The subject of a refusal with its component: a full name, or words."""
+        known = (*self.models[name].parameter_layout.names, *self.models[name].input_layout.names)
+        return f"{name}.{subject}" if subject in known else f"{name}: {subject}"
+
+    def terminals(self) -> tuple[Terminal, ...]:
+        """The free terminals, by full name."""
+        terminals = []
+        for full in self.data["terminals"]:
+            name, _, own = full.partition(".")
+            (terminal,) = (each for each in self.models[name].terminals if each.name == own)
+            members = {member: f"{name}.{variable}" for member, variable in terminal.members.items()}
+            words = f"{name}: {terminal.description}"
+            terminals.append(replace(terminal, name=full, description=words, members=members))
+        return tuple(terminals)
+
+    def input_rates(self) -> dict[str, str]:
+        """The free inputs whose derivative is a free input, too."""
+        free = set(Layout(self.Inputs).names)
+        pairs = {
+            f"{name}.{one}": f"{name}.{other}"
+            for name, model in self.models.items()
+            for one, other in model.input_rates.items()
+        }
+        return {one: other for one, other in pairs.items() if {one, other} <= free}
+
+    def by_differences(self) -> frozenset[str]:
+        """The outputs whose derivatives are central differences."""
+        return frozenset(
+            f"{name}.{output}"
+            for name, model in self.models.items()
+            for part in model.parts
+            for output in part.by_differences
+        )
+
+    # -- values
+
+    def parameters(self, p: Any) -> dict[str, Any]:
+        """The parameters of each component; kept with `p`, as they are the same in each evaluation."""
+        kept: dict[str, Any] | None = getattr(p, "of_components", None)
+        if kept is None:
+            kept = {
+                name: member.model.parameter_layout.instance([get(p) for get in member.parameters])
+                for name, member in self.members.items()
+            }
+            object.__setattr__(p, "of_components", kept)
+        return kept
+
+
+class SystemPoint:
+    """A system at one point: the values of its connected outputs as far as they are known.
+
+    Each component is evaluated as often as the order needs: once it knows all its inputs, not again. An input that is
+    not yet known has its declared start value. The order sees to it that no output that is read depends on it.
+    """
+
+    def __init__(self, of: SystemDescription, xp: Any, p: Any, u: Any, states: Mapping[str, Any]) -> None:
+        self._of, self._xp, self._u = of, xp, u
+        self.p = of.parameters(p)
+        self._states = dict(states)
+        self._known: dict[str, Any] = {}
+        self._final: dict[str, tuple[Any, Any, dict[int, Any]]] = {}
+
+    def begin(self, name: str, states: Callable[[], Any]) -> None:
+        """Give a component its states, which are computed when they are needed."""
+        self._states[name] = states
+
+    def states(self, name: str) -> Any:
+        """The states of a component; None where it has none."""
+        states = self._states.get(name)
+        if callable(states):
+            states = self._states[name] = states()
+        return states
+
+    def _source(self, full: str) -> Any:
+        """The value of an output or a state; None where it is not yet known."""
+        if full in self._known:
+            return self._known[full]
+        name, _, variable = full.partition(".")
+        if name in self._states and variable in self._of.members[name].states:
+            self._known[full] = attrgetter(variable)(self.states(name))
+        return self._known.get(full)
+
+    def inputs(self, name: str) -> tuple[Any, bool]:
+        """The inputs of a component, and whether all of them are known."""
+        member, values, complete = self._of.members[name], [], True
+        layout = member.model.input_layout
+        for variable, get, source in zip(layout.variables, member.free, member.sources, strict=True):
+            value = get(self._u) if get else self._source(source) if source else variable.quantity.start
+            if value is None:
+                value, complete = variable.quantity.start, False
+            values.append(value)
+        return layout.instance(values), complete
+
+    def arguments(self, name: str) -> tuple[Any, Any, Any, Any]:
+        """What the equations of a component take: namespace, parameters, inputs as far as they are known, states."""
+        return self._xp, self.p[name], self.inputs(name)[0], self.states(name)
+
+    def advance(self, steps: Steps) -> None:
+        """Compute these outputs."""
+        for name, outputs in steps:
+            missing = [output for output in outputs if self._source(f"{name}.{output}") is None]
+            if missing:
+                self._known |= {f"{name}.{each}": value for each, value in self.outputs(name, missing)}
+
+    def outputs(self, name: str, wanted: Iterable[str]) -> Iterator[tuple[str, Any]]:
+        """These outputs of a component, with the inputs that are known so far."""
+        member, sites = self._of.members[name], self._of.members[name].sites
+        parts = self._parts(name)
+        for output in wanted:
+            k, get = sites[output]
+            if k not in parts[2]:
+                u, shared, computed = parts
+                equations = member.model.parts[k].equations
+                computed[k] = equations(self._xp, self.p[name], u, self.states(name), shared)
+            yield output, get(parts[2][k])
+
+    def _parts(self, name: str) -> tuple[Any, Any, dict[int, Any]]:
+        if name in self._final:
+            return self._final[name]
+        u, complete = self.inputs(name)
+        model = self._of.models[name]
+        parts: tuple[Any, Any, dict[int, Any]] = (
+            u,
+            model.shared(self._xp, self.p[name], u, self.states(name)),
+            {},
+        )
+        if complete:
+            self._final[name] = parts
+        return parts

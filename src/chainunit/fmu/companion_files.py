@@ -1,0 +1,39 @@
+"""The files of an FMU besides its model: documentation, licences, icon and terminals, reference results."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from .description import Interface, licence_text, terminals
+from .documentation import page
+from .pack import xml_bytes
+from .recipe import icon
+from .reference import reference_results
+
+
+def companion_files(
+    interface: Interface, version: str, fmi: int, libraries: Sequence[str] = ()
+) -> dict[str, bytes]:
+    """Files by their path inside the FMU; `libraries` are the packages whose code the FMU contains: their licences
+    are added."""
+    model = interface.model
+    sketch = model.sketch({s.name: s.start for s in interface.signals_of("parameter") if s.start is not None})
+    png, svg = (icon(model, kind, sketch) for kind in ("png", "svg"))
+    files = {
+        "documentation/index.html": page(interface, version, sketch).encode(),
+        "documentation/licenses/license.txt": licence("chainunit", *libraries).encode(),
+    }
+    if fmi == 2:
+        files["model.png"] = png
+    else:
+        files |= {
+            "terminalsAndIcons/terminalsAndIcons.xml": xml_bytes(terminals(interface)),
+            "terminalsAndIcons/icon.png": png,
+            "terminalsAndIcons/icon.svg": svg,
+        }
+    return files | reference_results(interface)
+
+
+def licence(*packages: str) -> str:
+    """The licences of installed packages, in series."""
+    return "\n\n".join(f"{name}\n\n{licence_text(name)}" for name in packages)

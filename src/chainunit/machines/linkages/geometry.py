@@ -1,0 +1,143 @@
+"""The links of a description with values: their points, masses and lines, in the frames of the description and of a
+group.
+
+A description places the points of a link in the link's own frame. A group has frames of its own for its links
+(`chainunit.groups`): a `LinkFrame` is the place of such a frame in that of the description. Standard library only:
+FMUs carry this file.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from ...core.planar import ZERO, Vec2
+from ...groups.body import Mass
+from ...mechanism.assur import GROUND
+from ...mechanism.expressions import value_of
+from .structure import Entry, JointEntry, LinkEntry, Structure
+
+ALONG_X = Vec2(1.0, 0.0)
+
+
+class LinkFrame(NamedTuple):
+    """A frame of a group's link in that of the description: its origin [m] and its x axis, a unit vector."""
+
+    origin: Vec2
+    axis: Vec2
+
+    def coordinates(self, point: Vec2) -> Vec2:
+        """The coordinates of a point in this frame [m]."""
+        return self.components(point - self.origin)
+
+    def components(self, v: Vec2) -> Vec2:
+        """The components of a vector in this frame."""
+        return Vec2(self.axis.dot(v), self.axis.cross(v))
+
+
+OWN = LinkFrame(ZERO, ALONG_X)
+
+
+def rotated(v: Vec2, by: Vec2) -> Vec2:
+    """A vector that is turned by the angle of the unit vector `by`."""
+    return Vec2(v.x * by.x - v.y * by.y, v.x * by.y + v.y * by.x)
+
+
+def mirrored(by: Vec2) -> Vec2:
+    """The unit vector of the opposite angle."""
+    return Vec2(by.x, -by.y)
+
+
+class LinkGeometry:
+    """The links of a `structure` with values: `xp` is the engine, `values` are the quantities by name."""
+
+    def __init__(self, xp: Any, structure: Structure, values: Mapping[str, Any]) -> None:
+        self.xp, self.structure, self.values = xp, structure, values
+        self._points: dict[str, dict[str, Vec2]] = {}
+
+    def number(self, entry: Entry) -> Any:
+        """The value of an entry."""
+        return value_of(self.xp, entry, self.values)
+
+    def vector(self, entries: tuple[Entry, Entry]) -> Vec2:
+        """The value of a point."""
+        return Vec2(self.number(entries[0]), self.number(entries[1]))
+
+    def point(self, link: str, point: str) -> Vec2:
+        """A point of a link in the frame of the description [m]."""
+        known = self._points.setdefault(link, {})
+        if point not in known:
+            entries = self.structure.ground if link == GROUND else self.structure.links[link].points
+            known[point] = self.vector(entries[point])
+        return known[point]
+
+    def mass(self, entry: LinkEntry, frame: LinkFrame) -> Mass | None:
+        """The body of a link: further masses are parts of it."""
+        if not entry.heavy:
+            return None
+        m, c = self.number(entry.mass), self.vector(entry.centroid)
+        inertia = self.number(entry.inertia)
+        for point, added in entry.masses.items():
+            mass, at = self.number(added), self.point(entry.name, point)
+            total = m + mass
+            # a link that is massless as yet has its centroid where the mass is
+            share = mass / (total + 1e-300)
+            inertia = inertia + m * share * (at - c).squared()
+            m, c = total, c + (at - c) * share
+        at = frame.coordinates(c)
+        return Mass(m, at.x, inertia, at.y)
+
+    def span(self, link: str, start: str, end: str) -> tuple[LinkFrame, Any]:
+        """The frame of a link from one of its points to another, and their distance."""
+        a, b = self.point(link, start), self.point(link, end)
+        length = self.xp.sqrt((b - a).squared())
+        return LinkFrame(a, (b - a) * (1.0 / length)), length
+
+    def _turn_of(self, joint: JointEntry) -> Vec2:
+        """The unit vector of the angle of `on` less that of `by`."""
+        angle = self.number(joint.angle)
+        return Vec2(self.xp.cos(angle), self.xp.sin(angle))
+
+    def _line_of(self, joint: JointEntry) -> Vec2:
+        """The direction of a prismatic joint's line in its link `by`, a unit vector."""
+        link, start = joint.by
+        return self.span(link, start, joint.toward)[0].axis
+
+    def across(self, joint: JointEntry, v: Vec2, link: str) -> Vec2:
+        """A vector of a link's frame in that of the link on the other side of the prismatic joint."""
+        turn = self._turn_of(joint)
+        return rotated(v, turn if joint.on[0] == link else mirrored(turn))
+
+    def direction(self, joint: JointEntry, link: str) -> Vec2:
+        """The direction of a prismatic joint's line in the frame of one of its links."""
+        line = self._line_of(joint)
+        return line if joint.by[0] == link else self.across(joint, line, joint.by[0])
+
+    def line_through(self, joint: JointEntry, link: str, point: Vec2) -> Vec2:
+        """The place, in the link on the other side, of a point through which the line of a `point` of the link
+        goes."""
+        own, other = self.point(link, joint.at(link)), joint.other_link(link)
+        return self.point(other, joint.at(other)) + self.across(joint, point - own, link)
+
+
+class RoughPoses:
+    """The links of a `geometry` with numbers where the rough poses of its structure put them, from which the assembly
+    modes follow."""
+
+    def __init__(self, geometry: LinkGeometry) -> None:
+        self._geometry, self._poses = geometry, geometry.structure.poses
+
+    def place(self, link: str, joint: JointEntry) -> Vec2:
+        """The rough place of a joint's point."""
+        return self._place_of(link, self._geometry.point(link, joint.at(link)))
+
+    def _place_of(self, link: str, point: Vec2) -> Vec2:
+        x, y, angle = (0.0, 0.0, 0.0) if link == GROUND else self._poses[link]
+        return Vec2(x, y) + rotated(point, Vec2(math.cos(angle), math.sin(angle)))
+
+    def line(self, joint: JointEntry) -> Vec2:
+        """The rough line of a prismatic joint, from its one point to the other [m]."""
+        link, start = joint.by
+        a, b = (self._place_of(link, self._geometry.point(link, point)) for point in (start, joint.toward))
+        return b - a

@@ -1,0 +1,447 @@
+"""Faults of a recording that would spoil an identification, each with its column and a remedy."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..core.errors import Faults, InputError
+from ..core.messages import unit_behind
+from ..core.units import scale
+from ..study.arrays import rms, stretches
+from .measurands import COUNTS, MEASURANDS, OFFSET_SHARE
+from .plant import MOVING
+from .problem import Problem, likeness, mark_times, measured_speed, speed_column
+from .recording import Recording, name_and_unit
+
+MISSING = 0.2
+"""Largest share of rows that may be missing."""
+LEAST_ROWS = 40.0
+"""Fewest rows in a turn of the crank: the torque has orders up to some 20."""
+FEWEST_TURNS = 3.0
+LONGEST, LONGEST_TURNS = 1200.0, 20.0
+"""Longest recording, in seconds or, where that is longer, in turns of the crank: more tells little more, and is
+simulated again and again."""
+PASSES = 1.5
+"""Factor by which the number of passes of the mark may differ from that of the turns."""
+STUCK = 0.2
+"""Longest time for which a column with noise may keep its value [s]."""
+CLIPPED = 2e-3
+"""Largest share of rows at the same extreme value, in parts of all rows."""
+JUMP = 1e4
+"""Fall of the count of an encoder from which it began anew."""
+STANDS = 0.05
+"""Mean speed, in parts of the expected one, below which the machine stands."""
+SAME = 1.2
+"""Factor by which the mean of a column may differ from the known speed where it is that of the speed."""
+SIGNAL = 0.3
+"""Mean in parts of the RMS from which on a column is more than the zero of a sensor; and standard deviation in parts
+of the mean up to which a column can be that of a steady speed."""
+WANDERS, DRIFT = 0.01, 3
+"""Standard deviation of the mean speeds of turns, in parts of the mean, above which a run is not steady; and the
+degree of a polynomial over the run that is taken off before, as a motor warms up."""
+OFFSETS, LIKE = 3.0, 0.5
+"""Standard deviations of an offset up to which a mean may be that of an offset; and the correlation of a column with
+its simulated course that tells its sign."""
+WIDE, NEAR = 5.0, 1.2
+"""Factors by which the RMS of a column may differ from the simulated one: of a current, power or torque, which depend
+on the sought numbers; and of a speed or a voltage under control."""
+_ROWS_STUCK = 20
+OF_SPEED = ("motor.w", "crank.w", "motor.u")
+"""Quantities whose sizes follow from the speed."""
+
+
+@dataclass(frozen=True)
+class Expectation:
+    """The sizes that a column can have: its RMS lies between `low` and `high`; `words` say from where the upper limit
+    comes. `likeness` is the correlation of the column with its simulated course, 0 where the angle is not known."""
+
+    low: float
+    high: float
+    words: str
+    likeness: float = 0.0
+
+    def admits(self, size: float) -> bool:
+        """Whether the RMS can have this size."""
+        return self.low <= size <= self.high
+
+    def is_reversed(self, mean: float, size: float) -> bool:
+        """Whether a column of a driven machine with this mean and RMS has a wrong sign. Of a motion that takes hardly
+        any energy the mean may be that of an offset, and the course tells the sign."""
+        clear = abs(mean) > OFFSETS * OFFSET_SHARE * size
+        return mean < 0.0 and self.likeness < (LIKE if clear else -LIKE)
+
+
+def inspect_runs(problem: Problem, workers: int) -> None:
+    """Refuse recordings with faults; the expected sizes are simulated with the start values. What needs no
+    simulation is told before it, as with a wrong unit of the time it has no end."""
+    faults, ratio = Faults(), problem.plant.ratio
+    for run in problem.runs:
+        reference = run.values.get("motor.w_ref")
+        speeds = [run.crank_speed, *(w / ratio for _, _, w in getattr(reference, "changes", ()))]
+        faults.add(inspect_motion(run.recording, (min(speeds), max(speeds)), ratio, run.off))
+    faults.refuse()
+    for run in problem.runs:
+        response = problem.simulate(run, problem.start_values, workers)
+        expected, off = dict[str, Expectation](), np.inf if run.off is None else run.off
+        # of less than a turn the RMS is that of an angle
+        known = off - float(run.recording.time[0]) >= 2.0 * np.pi / run.crank_speed
+        has_angle = len(mark_times(run.recording)) > 0
+        for name in run.recording.columns if known else ():
+            rows = response.describes(name, response.time) & (response.time <= off)
+            if MEASURANDS[name].analog and rows.any():
+                size, factor = rms(response.values[name][rows]), NEAR if name in OF_SPEED else WIDE
+                words = f"{1.0 / factor:.2g} to {factor:g} times the simulated one"
+                like = likeness(run.recording, name, response) if has_angle else 0.0
+                expected[name] = Expectation(size / factor, size * factor, words, like)
+        faults.add(inspect_columns(run.recording, expected, run.off))
+    faults.refuse()
+    for run in problem.runs:
+        reference = run.values.get("motor.w_ref")
+        if not hasattr(reference, "changes"):
+            faults.add(inspect_steadiness(run.recording, ratio, run.off, reference is not None))
+    faults.refuse()
+
+
+def inspect_motion(
+    recording: Recording, speeds: tuple[float, float], ratio: float, off: float | None = None
+) -> list[InputError]:
+    """The faults of rows, speed and marks of a recording of a running machine, which are told without a simulation.
+
+    Parameters
+    ----------
+    speeds : least and largest speed of the crank before the motor is switched off [rad/s], as they are known
+    ratio : motor turns per crank turn
+    off : the time at which the motor is switched off [s]
+    """
+    driven = recording if off is None else recording.part(end=off)
+    return [
+        *_rows(recording, speeds[1]),
+        *(_stands(recording, driven, speeds[0], ratio) or _marks(driven, speeds, ratio)),
+        *_counted(recording),
+    ]
+
+
+def inspect_columns(
+    recording: Recording, expected: Mapping[str, Expectation], off: float | None = None
+) -> list[InputError]:
+    """The faults of the columns of a recording of a running machine.
+
+    Parameters
+    ----------
+    expected : by quantity, the sizes that its column can have up to the time `off`, where they are known
+    off : the time at which the motor is switched off [s]; electric quantities are inspected up to it
+    """
+    driven = recording if off is None else recording.part(end=off)
+    faults, sizes = list[InputError](), {name: rms(driven.columns[name]) for name in expected}
+    swapped = _swapped(sizes, expected)
+    if swapped:
+        faults.append(_exchanged(recording, *swapped, sizes))
+    for name in recording.columns:
+        if MEASURANDS[name].analog and not (swapped and name in swapped):
+            inspected = recording if name in MOVING else driven
+            faults += _of_column(inspected, name, driven.columns[name], expected.get(name))
+    return faults
+
+
+def inspect_steadiness(
+    recording: Recording, ratio: float, off: float | None = None, follows: bool = False
+) -> list[InputError]:
+    """That the speed of a run without stated changes of the speed is that of a steady run, as it is simulated.
+
+    Parameters
+    ----------
+    off : the time at which the motor is switched off [s]
+    follows : whether the motor follows a reference of the speed, whose changes can be stated
+    """
+    driven = recording if off is None else recording.part(end=off)
+    name, times = _turns(driven, ratio)
+    if len(times) < FEWEST_TURNS + 1.0:
+        return []
+    at, lasts = 0.5 * (times[1:] + times[:-1]), np.diff(times)
+    # a gap may hide passes of the mark
+    speeds = 2.0 * math.pi * np.round(lasts / np.median(lasts)) / lasts
+    degree = min(DRIFT, (len(speeds) - 2) // 2)
+    slow = np.polynomial.Polynomial.fit(at, speeds, degree)(at)
+    mean, spread = (
+        float(np.mean(speeds)),
+        math.sqrt(np.sum((speeds - slow) ** 2) / (len(speeds) - degree - 1)),
+    )
+    # a mark stands in the first row behind it
+    instant = recording.step / math.sqrt(6.0) / float(np.median(lasts)) if name == "mark" else 0.0
+    if spread <= (WANDERS + 3.0 * instant) * mean:
+        return []
+    remedy = "name a part in which it is steady (begin, end), or record at a constant speed"
+    stated = "state its changes (speeds), " if follows else ""
+    return [
+        _fault(
+            recording, name,
+            f"the mean speed of the crank in a turn wanders from {np.min(speeds):.4g} to {np.max(speeds):.4g} rad/s, "
+            f"with a standard deviation of {100.0 * spread / mean:.2g} %; must be <= {100.0 * WANDERS:g} %, as the "
+            f"run is simulated at a constant speed: {stated}{remedy}",
+        )
+    ]  # fmt: skip
+
+
+def _turns(recording: Recording, ratio: float) -> tuple[str, Any]:
+    """The column that tells the turns of the crank, and the times at which they end, by passes of the mark, by the
+    count of an encoder, or by the measured speed."""
+    passed, time = mark_times(recording), recording.time
+    if len(passed):
+        return "mark", passed
+    if "motor.count" in recording.columns:
+        turned = recording.columns["motor.count"] / (COUNTS * ratio)
+        turned = np.maximum.accumulate(turned - turned[0])
+        return "motor.count", np.interp(np.arange(0.0, turned[-1]), turned, time)
+    speed = measured_speed(recording, ratio)
+    if speed is None:
+        return "", np.zeros(0)
+    turned = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(time))]) / (
+        2.0 * math.pi
+    )
+    turned = np.maximum.accumulate(turned)
+    return speed_column(recording), np.interp(np.arange(0.0, turned[-1]), turned, time)
+
+
+def _of_column(
+    recording: Recording, name: str, driven: Any, expected: Expectation | None
+) -> Iterator[InputError]:
+    """The faults of a column; `driven` are its rows whose RMS and mean are `expected`, where they are known."""
+    x, size, mean = recording.columns[name], rms(driven), float(np.mean(driven))
+    stuck = _longest_constant(recording.time, x)
+    extreme, share, at = _extremes(x)
+    if stuck is not None and not (share > CLIPPED and x[stuck[0]] in (x.min(), x.max())):
+        begin, end = recording.time[list(stuck)]
+        words = "record again"
+        if end - begin <= 0.5 * (recording.time[-1] - recording.time[0]):
+            words = f"leave this part out (begin, end), or {words}"
+        kept = _kept(recording, name, stuck)
+        yield _fault(recording, name, f"{kept}: the sensor or the logger is stuck; {words}")
+        return
+    if expected is not None and not expected.admits(size):
+        yield _fault(recording, name, _scale_words(name, size, expected))
+        return
+    if expected is not None and expected.is_reversed(mean, size):
+        yield _fault(
+            recording, name,
+            f"mean of {_size(name, mean)} at an RMS of {_size(name, size)}, although the motor drives: the sign is "
+            "reversed; change the sign of the column, or turn the sensor round",
+        )  # fmt: skip
+    if share > CLIPPED and at >= 3:
+        yield _fault(
+            recording, name,
+            f"{100.0 * share:.2g} % of the rows have its {extreme} value, "
+            f"{_size(name, float(x.max() if extreme == 'largest' else x.min()))}: it is clipped; record again with a "
+            "larger range of the sensor",
+        )  # fmt: skip
+
+
+def _rows(recording: Recording, crank_speed: float) -> Iterator[InputError]:
+    step, turn = recording.step, 2.0 * math.pi / crank_speed
+    span, longest = float(recording.time[-1] - recording.time[0]), max(LONGEST, LONGEST_TURNS * turn)
+    if turn / step < LEAST_ROWS or span < FEWEST_TURNS * turn:
+        likely = _likely_unit(recording, turn, longest)
+        if likely:
+            words = f"{span:.4g} s with {turn / step:.2g} rows in a turn of the crank"
+            yield _fault(
+                recording, "time", f"{words}: the values look like {likely}; write [{likely}] into its head"
+            )
+            return
+    if span > longest:
+        yield _fault(
+            recording, "time",
+            f"{span:.4g} s; must be <= {longest:.4g} s: name a part (begin, end), of which a minute is enough, or "
+            "write the unit of its times into its head",
+        )  # fmt: skip
+    if turn / step < LEAST_ROWS:
+        yield _fault(
+            recording, "time",
+            f"{1.0 / step:.3g} rows a second are {turn / step:.2g} in a turn of the crank; record >= "
+            f"{LEAST_ROWS / turn:.2g} rows a second, better 200, or write the unit of the times into their head",
+        )  # fmt: skip
+    if recording.missing > MISSING:
+        begin, end = max(recording.gaps, key=lambda gap: gap[1] - gap[0])
+        yield _fault(
+            recording, "time",
+            f"{100.0 * recording.missing:.0f} % of the rows are missing, {end - begin:.3g} s of them in one piece "
+            f"from {begin:.10g} s; must be <= {100.0 * MISSING:.0f} %: name a part without gaps (begin, end), or "
+            "record again",
+        )  # fmt: skip
+    if span < FEWEST_TURNS * turn:
+        yield _fault(
+            recording, "time",
+            f"{span:.3g} s are {span / turn:.2g} turns of the crank; record >= {FEWEST_TURNS:.0f} turns",
+        )  # fmt: skip
+
+
+def _likely_unit(recording: Recording, turn: float, longest: float) -> str:
+    """The unit in which the times would be those of a recording that can be used; empty where there is none."""
+    own = scale(name_and_unit(recording.heads["time"])[1], "s")[0]
+    span = float(recording.time[-1] - recording.time[0])
+    for unit in ("s", "ms", "µs"):
+        factor = scale(unit, "s")[0] / own
+        fits = FEWEST_TURNS * turn <= factor * span <= longest
+        if factor != 1.0 and fits and LEAST_ROWS * factor * recording.step <= turn:
+            return unit
+    return ""
+
+
+def _marks(recording: Recording, speeds: tuple[float, float], ratio: float) -> Iterator[InputError]:
+    """The fault of marks that do not come once a turn. The speed is the one of the run, or the measured one."""
+    if "mark" not in recording.columns or len(recording.time) < 2:
+        return
+    own = measured_speed(recording, ratio)
+    known = [*speeds, *([] if own is None else [float(np.mean(own))])]
+    seen = recording.step * len(recording.time) / (2.0 * math.pi)
+    passes, rows = int(np.sum(recording.columns["mark"] > 0.5)), len(recording.time)
+    if not (passes - 1 <= PASSES * max(known) * seen and PASSES * (passes + 1) >= min(known) * seen):
+        turns = f"{seen * min(known):.3g}"
+        if max(known) > 1.01 * min(known):
+            turns += f" to {seen * max(known):.3g}"
+        yield _fault(
+            recording, "mark",
+            f"is 1 in {'all ' if passes == rows else ''}{passes} rows of {turns} turns of the crank; must be 1 only "
+            "in the first row after the mark, once in a turn: check sensor and crank_speed",
+        )  # fmt: skip
+
+
+def _counted(recording: Recording) -> Iterator[InputError]:
+    """That an encoder counts down, or begins anew."""
+    count = recording.columns.get("motor.count")
+    if count is None:
+        return
+    steps = np.diff(count)
+    place = int(np.argmin(steps))
+    if count[-1] < count[0] and np.median(steps) < 0.0:
+        yield _fault(recording, "motor.count", "counts down, while the motor turns forward: change its sign")
+    elif steps[place] < -JUMP:
+        at = recording.time[place + 1]
+        yield _fault(
+            recording, "motor.count",
+            f"falls by {-steps[place]:.0f} at {at:.10g} s: the counter begins anew; write the count without the jump",
+        )  # fmt: skip
+
+
+def constant_parts(recording: Recording, names: Iterable[str]) -> Iterator[str]:
+    """Words on columns that keep a value over a part: a sensor that is stuck, a stop, or a limit."""
+    for name in names:
+        if (stuck := _longest_constant(recording.time, recording.columns[name])) is not None:
+            yield f"{name} {_kept(recording, name, stuck)}"
+
+
+def _kept(recording: Recording, name: str, rows: tuple[int, int]) -> str:
+    """Words on a column that is constant from a row to another one."""
+    begin, end = recording.time[list(rows)]
+    return f"keeps the value {_size(name, float(recording.columns[name][rows[0]]))} from {begin:.10g} to {end:.10g} s"
+
+
+def _stands(recording: Recording, driven: Recording, crank_speed: float, ratio: float) -> list[InputError]:
+    """That the machine does not turn, by the first column that tells; `driven` is the part before the motor is
+    switched off."""
+    count, passed = driven.columns.get("motor.count"), mark_times(driven)
+    counts = 0.0 if count is None else float(np.ptp(count))
+    for name, of in (("motor.w", ratio), ("crank.w", 1.0)):
+        if name in driven.columns and abs(float(np.mean(driven.columns[name]))) < STANDS * crank_speed * of:
+            words = f"mean of {_size(name, float(np.mean(driven.columns[name])))}"
+            other = _with_speed(driven, name, crank_speed * of)
+            if other:
+                sizes = {each: rms(driven.columns[each]) for each in (name, other)}
+                return [_exchanged(recording, name, other, sizes)]
+            if len(passed) > FEWEST_TURNS or counts > FEWEST_TURNS * COUNTS * ratio:
+                turns = f"the mark is passed {len(passed)} times" if len(passed) else "the encoder counts"
+                remedy = "the sensor is not connected, or the column is another one; mend it, or leave it out"
+                return [_fault(recording, name, f"{words}, although {turns}: {remedy}")]
+            return [_standing(recording, name, words)]
+    if count is not None and counts < 4.0:
+        return [_standing(recording, "motor.count", "does not change")]
+    if "mark" in recording.columns and not np.any(recording.columns["mark"]):
+        turns = (recording.time[-1] - recording.time[0]) * crank_speed / (2.0 * math.pi)
+        if turns > FEWEST_TURNS:
+            return [_standing(recording, "mark", f"is not passed in {turns:.0f} turns")]
+    return []
+
+
+def _with_speed(recording: Recording, name: str, speed: float) -> str:
+    """The column of another quantity that has the values of a speed, where the column `name` of the speed has values
+    that are neither a speed nor the zero of a sensor; empty without one."""
+    x = recording.columns[name]
+    if abs(float(np.mean(x))) < SIGNAL * rms(x) or not np.any(x):
+        return ""
+    for other, y in recording.columns.items():
+        like = MEASURANDS[other].analog and other not in OF_SPEED
+        mean = float(np.mean(y))
+        if like and speed / SAME < mean < SAME * speed and float(np.std(y)) < SIGNAL * mean:
+            return other
+    return ""
+
+
+def _standing(recording: Recording, name: str, words: str) -> InputError:
+    return _fault(
+        recording,
+        name,
+        f"{words}: the machine stands, or the sensor is not connected; record the running machine",
+    )
+
+
+def _exchanged(recording: Recording, first: str, second: str, sizes: Mapping[str, float]) -> InputError:
+    """The fault of two columns that are swapped, with the RMS of each."""
+    return _fault(
+        recording, first,
+        f"RMS of {_size(first, sizes[first])} and of {recording.heads[second]} {_size(second, sizes[second])}: the "
+        "two columns look swapped; exchange their heads",
+    )  # fmt: skip
+
+
+def _scale_words(name: str, size: float, expected: Expectation) -> str:
+    words = f"RMS of {_size(name, size)}"
+    limit = f"must be from {_size(name, expected.low)} to {_size(name, expected.high)} ({expected.words})"
+    unit = MEASURANDS[name].unit
+    for factor, prefix in ((1e-3, "m"), (1e3, "k")):
+        if expected.admits(size * factor):
+            return (
+                f"{words}; {limit}: the values look like {prefix}{unit}; write [{prefix}{unit}] into its head"
+            )
+    more = ", crank_speed and machine.ratio" if name in OF_SPEED else ""
+    return f"{words}; {limit}: check the sensor, the unit in its head{more}"
+
+
+def _swapped(sizes: Mapping[str, float], expected: Mapping[str, Expectation]) -> tuple[str, str] | None:
+    """Two columns of which neither can have its size, and each can have that of the other one."""
+    wrong = [name for name, size in sizes.items() if name in expected and not expected[name].admits(size)]
+    for k, first in enumerate(wrong):
+        for second in wrong[k + 1 :]:
+            if expected[first].admits(sizes[second]) and expected[second].admits(sizes[first]):
+                return first, second
+    return None
+
+
+def _longest(stretched: list[tuple[int, int]]) -> tuple[int, int]:
+    return max(stretched, key=lambda ends: ends[1] - ends[0], default=(0, 0))
+
+
+def _longest_constant(time: Any, x: Any) -> tuple[int, int] | None:
+    """First and last row of the longest part in which the column keeps its value, if that is too long."""
+    begin, end = _longest(stretches(np.diff(x) == 0.0))
+    return (begin, end) if end - begin >= _ROWS_STUCK and time[end] - time[begin] >= STUCK else None
+
+
+def _extremes(x: Any) -> tuple[str, float, int]:
+    """Which extreme value more rows have, their share, and the length of the longest series of them."""
+    found = []
+    for name, value in (("largest", x.max()), ("least", x.min())):
+        begin, end = _longest(stretches(x == value))
+        found.append((float(np.mean(x == value)), end - begin, name))
+    share, longest, name = max(found)
+    return name, share, longest
+
+
+def _size(name: str, x: float) -> str:
+    return f"{x:.4g}{unit_behind(MEASURANDS[name].unit)}"
+
+
+def _fault(recording: Recording, name: str, words: str) -> InputError:
+    return InputError(f"{recording.source}, column {recording.heads[name]}: {words}")

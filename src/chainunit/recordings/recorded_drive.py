@@ -1,0 +1,48 @@
+"""The drive of a study as its recordings show it: with the motor, or as a shaft without motor data."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+
+from ..core.errors import InputError
+from ..core.temporary_folders import scratch
+from ..study.choice import choose
+from ..study.config import Config
+from ..study.drive import Drive
+from ..work.progress import quiet
+from .measurands import OF_TERMINALS
+from .plant import AnyPlant, Plant
+from .recording import Recording
+from .shaft import MEASURED, MeasuredShaft
+
+
+def drive_of(config: Config, recordings: Mapping[str, Recording]) -> Drive:
+    """The drive of the study, tuned where the file does not give the gains of its control.
+
+    Raises
+    ------
+    InputError
+        where the recordings have signals of the motor, and the study has no data of it.
+    """
+    of_motor = sorted({name for each in recordings.values() for name in each.columns if name in OF_TERMINALS})
+    if of_motor and not (config.gives("motor") or config.plate is not None):
+        raise InputError(
+            f"motor: is missing, and the recordings have {', '.join(of_motor)}; add [motor] with its data, or "
+            "system.motor with a motor of the catalogue",
+            "motor",
+        )
+    with scratch() as folder:
+        return choose(config, folder, quiet).drive
+
+
+def is_of_shaft(columns: Collection[str]) -> bool:
+    """Whether the columns are those of a machine whose motor is not recorded."""
+    return all(name in (*MEASURED, "mark") for name in columns)
+
+
+def plant_for(drive: Drive, columns: Collection[str], sought: Sequence[str]) -> AnyPlant:
+    """The plant that has these columns, with derivatives by the `sought` parameters and inputs of the system."""
+    measured = [name for name in columns if name != "mark"]
+    if is_of_shaft(columns):
+        return MeasuredShaft(drive.machine, measured, sought)
+    return Plant(drive, measured, sought)

@@ -1,0 +1,126 @@
+"""What commands show on the terminal: the report, the written files, and the progress of long work."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from ..core.errors import InputError, InterruptedRunError, RemarkWarning, printable
+from ..work import interrupts
+
+if TYPE_CHECKING:
+    from .task import Outcome, Question, Task
+
+
+def terminal_console(**options: Any) -> Console:
+    """A console for words that may come from the user."""
+    # titles and paths come from the user: they may hold text that rich would take for markup
+    return Console(markup=False, highlight=False, **options)
+
+
+def carry_out(
+    task: Task[Question, Outcome],
+    question: Question,
+    output: Path,
+    errors: Console | None = None,
+    **options: Any,
+) -> None:
+    """Run a task in the folder `output`, show its report, and name the files. `errors` is the console of the standard
+    error, for the progress; the options are those of the task.
+
+    Raises
+    ------
+    InputError, RunError
+        see the task.
+    WriteError
+        of the first file that could not be written; the other files are written.
+    typer.Exit, SystemExit
+        with the exit status, where the outcome is not what was sought, and where the computation ended early.
+    """
+    errors = errors or terminal_console(stderr=True)
+    with task.claimed(question, output):
+        with progress_bar(errors) as progress:
+            outcome = task.outcome(question, output, progress, **options)
+        report = task.report(outcome)
+        written, unwritten = task.write(outcome, report, output)
+        from . import terminal
+
+        console = terminal_console()
+        has_remarks = task.tells_remarks and errors.is_terminal and console.is_terminal
+        terminal.show(report, console, remarks=not has_remarks)
+        words = ", ".join(printable(str(path), 500) for path in written)
+        console.print(f"Written: {words}", soft_wrap=True)
+    if (failure := task.failure(outcome)) is not None:
+        sentence = f"The run stopped early: {failure}. What was computed before is in {output}."
+        errors.print(printable(sentence, 2000), soft_wrap=True)
+        sys.exit(exit_status(failure))
+    if unwritten is not None:
+        raise unwritten
+    if (shortfall := task.shortfall(outcome)) is not None:
+        if shortfall:
+            errors.print(shortfall)
+        raise typer.Exit(1)
+
+
+def exit_status(error: BaseException) -> int:
+    """Exit status of a command that failed with `error`."""
+    if isinstance(error, InterruptedRunError):
+        return interrupts.status()
+    return 2 if isinstance(error, InputError) else 1
+
+
+@contextmanager
+def progress_bar(console: Console) -> Iterator[Callable[[str, float, float], None]]:
+    """A progress bar that begins with the first report, so that a fault of the input is shown without a bar.
+    Yields the function that reports the current task, the complete amount of work, and the total amount."""
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        console=console,
+    )
+    task = bar.add_task("", total=1.0)
+
+    def report(what: str, done: float, todo: float) -> None:
+        bar.start()
+        bar.update(task, description=what, completed=done, total=todo)
+
+    try:
+        yield report
+    finally:
+        if bar.live.is_started:
+            bar.stop()
+
+
+def show_only_remarks() -> None:
+    """Show warnings as remarks. Those of libraries are for programmers: they are not shown, except where the user
+    asks Python for them (``python -W``)."""
+    if sys.warnoptions:
+        return
+    warnings.simplefilter("ignore")
+    warnings.simplefilter("default", RemarkWarning)
+    warnings.showwarning = lambda message, *_: show_remark(str(message))
+
+
+def show_remark(sentence: str) -> None:
+    """Show a remark beside the result."""
+    terminal_console(stderr=True).print(f"Remark: {printable(sentence, 2000)}", soft_wrap=True)
+
+
+def study_file(file: Path | None) -> Any:
+    """The study of a file; a value that looks like a slip of a unit is named before any run."""
+    from ..study import config as configuration
+
+    loaded = configuration.load(file)
+    for value in loaded.unusual:
+        show_remark(value.sentence)
+    return loaded

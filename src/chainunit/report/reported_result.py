@@ -1,0 +1,114 @@
+"""The common part of results from Python: a task is run, and its report is shown as text, page and files."""
+
+from __future__ import annotations
+
+import shutil
+from functools import cached_property, partial
+from pathlib import Path
+from typing import Any, ClassVar, Generic, Self
+
+from ..core.errors import WriteError
+from ..core.files import atomic_file
+from ..core.temporary_folders import in_temporary_folder
+from ..work.progress import Report as Progress
+from ..work.progress import quiet
+from . import files, html, terminal
+from .blocks import Report
+from .task import Outcome, Question, Task
+
+
+class ReportedResult(Generic[Question, Outcome]):
+    """The result of a task. Its `repr` shows the report as text."""
+
+    _task: ClassVar[Task[Any, Any]]
+    """the task of the command of the same name"""
+
+    def __init__(self, question: Question, outcome: Outcome, folder: Path | None) -> None:
+        self._question, self._outcome, self._folder = question, outcome, folder
+
+    @classmethod
+    def made(
+        cls, question: Question, folder: str | Path | None, progress: Progress | None, **options: Any
+    ) -> Self:
+        """The result of the task, with its files in a `folder` where one is named.
+
+        Raises
+        ------
+        InputError
+            for a question that is refused, and for a folder that cannot be claimed.
+        RunError
+            of a computation that ended early; its `partial` is the result up to there.
+        WriteError
+            for a file that cannot be written; the others are written.
+        """
+        task = cls._task
+        compute = partial(task.outcome, question, progress=progress or quiet, **options)
+        if folder is not None:
+            with task.claimed(question, Path(folder)) as place:
+                result = cls(question, compute(folder=place), place)
+                result._write(place)
+        elif task.kept is None:
+            result = cls(question, compute(folder=None), None)
+        else:
+            result = in_temporary_folder(lambda place: cls(question, compute(folder=place), place))
+        failure = task.failure(result._outcome)
+        if failure is not None:
+            failure.partial = result
+            raise failure
+        return result
+
+    @cached_property
+    def _report(self) -> Report:
+        return self._task.report(self._outcome)
+
+    @property
+    def _shown(self) -> Report:
+        """The report that `repr` shows."""
+        return self._report
+
+    def to_json(self) -> str:
+        """All numbers with their units, as the text of result.json."""
+        return files.numbers_text(self._shown)
+
+    def save(self, folder: str | Path) -> list[Path]:
+        """Write the files of the command of the same name with ``-o``; returns the files.
+
+        Raises
+        ------
+        InputError
+            for a folder with another kind of result, and one in which a process writes.
+        WriteError
+            for a file that cannot be written; the others are written.
+        """
+        task = self._task
+        with task.claimed(self._question, Path(folder)) as place:
+            if task.kept is None or self._folder is None:
+                task.clear(place)
+            elif place.resolve() != self._folder.resolve():
+                task.clear(place)
+                for kept in task.kept(self._outcome, self._folder):
+                    _copy(kept, place / kept.relative_to(self._folder))
+            return self._write(place)
+
+    def _write(self, folder: Path) -> list[Path]:
+        paths, failure = self._task.write(self._outcome, self._report, folder)
+        if failure is not None:
+            raise WriteError(str(failure)) from failure
+        return paths
+
+    def __repr__(self) -> str:
+        return terminal.plain(self._shown)
+
+    def _repr_html_(self) -> str:
+        """The same as HTML, for notebooks."""
+        return html.fragment(self._shown)
+
+
+def _copy(kept: Path, to: Path) -> None:
+    """Copy a file, or a folder with all that is in it."""
+    if kept.is_dir():
+        shutil.copytree(kept, to, dirs_exist_ok=True)
+        return
+    to.parent.mkdir(exist_ok=True)
+    with atomic_file(to) as part:
+        shutil.copyfile(kept, part)
