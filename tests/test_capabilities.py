@@ -85,7 +85,8 @@ def test_the_rest_works_without(name, tmp_path):
     file.write_text(text.replace(line, ""), "utf-8")
     shutil.copytree(Path(__file__).parents[1] / "fmu", tmp_path / "fmu")
     (tmp_path / "study.toml").write_text(STUDY)
-    tables = list(next(part for part in registered() if part.name == name).tables)
+    own = next(part for part in registered() if part.name == name)
+    tables = [*own.tables, *own.choices]
     call = [sys.executable, "-c", SMOKE, str(tmp_path), *tables]
     env = os.environ | {"PYTHONPATH": str(copy.parent)}
     process = subprocess.run(call, env=env, capture_output=True, text=True, cwd=tmp_path)

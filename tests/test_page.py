@@ -21,6 +21,7 @@ from event_tables import event_line
 from reports import page_of, pictures, said_of, write
 
 from chainunit import EMPTY, InputError, RunError
+from chainunit.capabilities.chains.analysis import rest_forces
 from chainunit.drives.induction_motor import SoftStart
 from chainunit.machines.chain_unit import Feed
 from chainunit.reading.text import DEFAULT_UNITS, digits_text, forms, scales, unit_text
@@ -30,7 +31,6 @@ from chainunit.report import study as study_report
 from chainunit.report.blocks import at
 from chainunit.report.figure import Label, Mark, Shade
 from chainunit.study import config, judgement
-from chainunit.study.chain import rest_forces
 from chainunit.study.cycle import cycle
 from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
@@ -780,7 +780,7 @@ def test_chains_stand_beside_two_bars(chains, tmp_path):
 
 def test_each_snatch_is_in_parts_of_its_own_rest(chains):
     """At rest a chain of 8 rods pulls as two bars do with this feed, but not without: the parts differ by a fifth."""
-    machine, feed, own = chains.drive.machine, chains.config.feed, chains.chain.own
+    machine, feed, own = chains.drive.machine, chains.config.feed, chains.findings["chain"].own
     out = cycle(machine, own.speed, feed).outputs
     at_rest = machine.chamber(0.0, left=feed.left, right=feed.right)
 
@@ -805,7 +805,7 @@ def test_each_snatch_is_in_parts_of_its_own_rest(chains):
 
 def test_the_rods_of_chains_move_as_simulated(chains):
     moving = pictures(study_motion.motion(chains))
-    walls, webs = chains.drive.rods
+    walls, webs = chains.drive.simulated_machine.rods
     organs = {link["name"]: link["joints"] for link in moving["links"]}
     p = chains.drive.machine.p
     for side in ("left", "right"):

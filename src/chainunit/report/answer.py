@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from ..study.measures import MEASURES
 from ..study.record import StudyRecord
 from . import blocks as b
-from . import chains, run_names
+from . import run_names
 from .capability import capabilities
 from .lines import Line, Strong, join, line
 from .runs import number
@@ -42,7 +42,8 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         yield b.Text("The study ended before any run could be evaluated.", "lead", "long")
     for part in capabilities():
         yield from part.answer(s, study)
-    warnings = [*(b.Judgement("warning", each) for each in s.lines("warnings")), *chains.speeds_to_avoid(s)]
+    warnings: list[b.Block] = [b.Judgement("warning", each) for each in s.lines("warnings")]
+    warnings += (each for part in capabilities() for each in part.warnings(s))
     yield from warnings
     if answers and not warnings:
         yield b.Text("No run gives cause for a warning.", "fine", "long")

@@ -17,13 +17,18 @@ from .supplement import Supplement
 
 @dataclass(frozen=True)
 class Contents:
-    """The contents of a section: its heading, its blocks (tables, text, figures), the files of its figures, and
-    whether it comes before the section on the runs."""
+    """The contents of a section: its heading, its blocks (tables, text, figures), the files of its figures, and its
+    place."""
 
     heading: str
     blocks: Callable[[Source, StudyRecord], Iterator[Block]]
     pictures: tuple[str, ...] = ()
+    analysis: str = ""
+    """name of its analysis, if the section has another name"""
+    comes_first: bool = False
+    """whether it stands before the turn at constant speed"""
     leads: bool = False
+    """whether it stands before the section on the runs"""
 
 
 class AnyStudy(Protocol):
@@ -40,7 +45,7 @@ class Capability(StudyCapability):
     name ``CAPABILITY``."""
 
     def contents(self) -> Mapping[str, Contents]:
-        """The sections of a study's report on its findings, by the name of the analysis."""
+        """The sections of a study's report on its findings, by name: that of the analysis."""
         return {}
 
     def question(self, s: Source, study: StudyRecord) -> Line:
@@ -57,6 +62,10 @@ class Capability(StudyCapability):
 
     def answer(self, s: Source, study: StudyRecord) -> Iterator[Block]:
         """Its blocks in the answer of a study."""
+        return iter(())
+
+    def warnings(self, s: Source) -> Iterator[Block]:
+        """Its warnings beside those of the study, to stand at the head of a report."""
         return iter(())
 
     def supplement(self, study: StudyRecord) -> Supplement | None:

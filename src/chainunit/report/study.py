@@ -14,7 +14,7 @@ from ..study.given import GivenSection, description, given_sections
 from ..study.record import StudyRecord
 from ..study.result import as_dict
 from ..study.rig import DIFFERENCE
-from . import answer, chains, figures, run_names, runs, shaft, wording
+from . import answer, figures, run_names, runs, shaft, wording
 from . import blocks as b
 from .analyses import analysis_sections
 from .capability import Contents, capabilities
@@ -34,7 +34,7 @@ def report(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Rep
         sections = [
             b.Section(name, each.heading, tuple(each.blocks(s, study)), beside=name == QUESTION)
             for name, each in _sections().items()
-            if name in study.findings or name not in analysis_sections()
+            if name not in analysis_sections() or (each.analysis or name) in study.findings
         ]
         return b.Report(
             study.config.title,
@@ -219,7 +219,6 @@ def _sections() -> Mapping[str, Contents]:
         **{name: each for name, each in analysis_sections().items() if each.leads},
         "runs": Contents("Every run in numbers", runs.blocks),
         "shaft": Contents("The driveline", shaft.blocks, shaft.PICTURES.files),
-        "chains": Contents("Chains and two bars", chains.blocks, chains.PICTURES.files),
         **analysis_sections(),
         "plots": Contents("Plots", figures.PICTURES.figures, figures.PICTURES.files),
         "motion": Contents("The machine in motion", lambda s, study: iter(_motion(study))),

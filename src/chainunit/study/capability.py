@@ -14,9 +14,11 @@ from typing import Any, ClassVar
 
 from ..core.errors import InputError
 from ..fmu.backends import Backend
+from ..machines.machine import Machine
 from ..work.progress import Report
 from .analysis import Analysis
 from .config import Config
+from .cycle import Cycle
 from .drive import Drive
 from .event_table import RandomEvent
 from .file_reading import FileReading
@@ -24,7 +26,8 @@ from .file_section import FileSection
 from .proposal import DriveProposal
 from .record import StudyRecord
 from .rig import Rig
-from .rules import Rule
+from .rules import OtherModel, Rule
+from .verdict import Verdict
 
 
 @dataclass(frozen=True)
@@ -59,6 +62,12 @@ class StudyCapability:
     motor_table: ClassVar[str] = ""
     """the table of these that leaves the choice of the motor to it; at most one capability has such a table"""
 
+    choices: ClassVar[Mapping[str, Any]] = {}
+    """its keys before all tables, as pydantic fields"""
+
+    other_model: ClassVar[OtherModel | None] = None
+    """the key with which the runs of a machine have another model"""
+
     def rules(self) -> Iterable[Rule]:
         """The rules of its keys that do not go together with others."""
         return ()
@@ -85,6 +94,18 @@ class StudyCapability:
     def files(self, data: Mapping[str, Any]) -> Iterable[FileReference]:
         """The files that its tables of a study file name."""
         return ()
+
+    def machine(self, machine: Machine, values: Mapping[str, Any]) -> Machine:
+        """The machine as the study has it, by the values of the tables; with another model of its runs, if the
+        capability brings one."""
+        return machine
+
+    def turns(
+        self, config: Config, feeds: Iterable[Any], folder: Path, backend: Backend | None
+    ) -> list[Cycle] | None:
+        """Turns of the machine at constant speed with each of the `feeds`, where its other model is run for them. The
+        FMU is written to `folder`. None where `cycle` gives the turn."""
+        return None
 
     def faults(self, config: Config) -> Iterable[InputError]:
         """Refusals of a plan that does not fit the rest of the study."""
@@ -142,6 +163,16 @@ class StudyCapability:
         InputError
             for the keys that ask for them.
         """
+
+    def model_verdict(
+        self, study: StudyRecord, speed: float, actual: float, residuals: Mapping[str, float]
+    ) -> Verdict | None:
+        """The verdict on the model of the machine, if the runs have another one; arguments are those of
+        `chainunit.study.verdict.rigid_links`."""
+        return None
+
+    def remark(self, study: StudyRecord) -> None:
+        """Add remarks on the model of the machine to a study."""
 
     def words(self) -> Mapping[str, str]:
         """By name, the words on the numbers of its results, for a comparison of two."""

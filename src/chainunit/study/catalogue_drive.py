@@ -85,7 +85,6 @@ def catalogue_drive(
         machine,
         follows,
         rated_current=plate.rated_current,
-        chain=config.chain,
         gear_inertia=config.gear.J,
         gear_friction=drag,
     )

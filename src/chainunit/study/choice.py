@@ -56,7 +56,7 @@ def _drive_of_file(config: Config) -> Drive:
         drive = catalogue_drive(config, config.plate, turn.crank_torque)
     else:
         motor, p = config.motor_type, config.motor
-        drive = Drive(motor, p, config.machine, motor.follows(p), chain=config.chain)
+        drive = Drive(motor, p, config.machine, motor.follows(p))
     flywheel = sum(part.shaft_inertia(config) for part in registered())
     return with_wheel(config, replace(drive, feed_forward=config.feed_forward), flywheel)
 
@@ -136,7 +136,6 @@ def with_motor(config: Config, file: Path, names: Mapping[str, str] | None = Non
             config.machine,
             follows,
             feed_forward=config.feed_forward,
-            chain=config.chain,
             foreign=motor,
         )
     )

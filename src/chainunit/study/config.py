@@ -40,19 +40,17 @@ from .file_reading import FileReading
 from .file_section import FileSection
 from .first_checks import check_values, independent, missing_recordings, plate_of, without
 from .foreign_machine import ForeignMachine, ForeignModel
-from .organ_limits import highest_of_sweep
 from .parts import Parts, beside, example, over_example, with_linkage
 from .registry import registered
 from .run_checks import endless, loads_beyond
 from .sections import (
-    CHOICES,
-    ChainOrgans,
     Coupling,
     Driveline,
     ForeignMotor,
     Ratios,
     Run,
     Starter,
+    all_choices,
 )
 
 
@@ -87,8 +85,6 @@ class Config:
     """place of the driveline, one of `PLACES`"""
     damping_ratio: float | None
     """damping ratio of the driveline's torsion, in place of d2 and d3"""
-    chain: ChainOrgans | None
-    """the organs as chains, or None for two bars"""
     foreign: ForeignMotor | None
     """the motor, if it is a foreign FMU; `motor` then has no meaning"""
     source: str
@@ -288,7 +284,7 @@ def _with_hints(fault: InputError, unusual: Iterable[UnusualValue]) -> InputErro
 
 _OF_PARTS = ("machine", "ratios", "motor")
 """Tables whose values follow from others, too: `Config` has them as machine and motor."""
-_OWN_TABLES = ("feed", "run", "coupling", "gear", "starter", "driveline", "chain")
+_OWN_TABLES = ("feed", "run", "coupling", "gear", "starter", "driveline")
 """Tables whose values are fields of a `Config`."""
 
 
@@ -309,7 +305,7 @@ def _config(
         for name, each in sections.items()
         if name not in _OF_PARTS
     }
-    chain, own_motors = values["chain"] if checked.organ == "chain" else None, None
+    own_motors = None
     with faults.collected(), refusal_prefix("catalogue = ", "catalogue"):
         own_motors = beside(checked.catalogue, source) if checked.catalogue else None
     machine: Any = None
@@ -330,10 +326,10 @@ def _config(
         with faults.collected():
             plans[capability.name] = capability.plan(reading)
     faults.refuse()
-    if chain is not None and "sweep_highest" not in tables["chain"]:
-        highest = highest_of_sweep(machine, values["feed"], values["run"].crank_speed)
-        chain = dataclasses.replace(chain, sweep_highest=max(highest, chain.sweep_lowest))
-    of_study["chain"] = chain
+    for name, own in of_study.items():
+        of_study[name] = None if own is None else sections[name].completed(own, reading)
+    for capability in registered():
+        machine = capability.machine(machine, of_study)
     config = Config(
         title=checked.title,
         machine=machine,
@@ -388,7 +384,7 @@ def _read_sections(
 
 def _choices(checked: Any, parts: Parts) -> dict[str, Any]:
     """All values of a file that are no quantities of a table."""
-    known = {name: getattr(checked, name) for name in CHOICES}
+    known = {name: getattr(checked, name) for name in all_choices()}
     for name, section in parts.sections.items():
         known |= {f"{name}.{key}": getattr(getattr(checked, name), key) for key in section.keys}
     if checked.driveline.damping_ratio is not None:

@@ -19,12 +19,9 @@ from ..drives.gear import Gear
 from ..drives.motor import Motor
 from ..fmu.backends import Backend, Origin
 from ..fmu.backends import export as export_fmu
-from ..machines.api import ChainUnitMachine, machine_of
-from ..machines.chain_organs import OrganLaw
-from ..machines.flexible import flexible
-from ..machines.hanging import split
+from ..machines.api import ChainUnitMachine
 from ..machines.machine import Machine
-from ..mechanism.models import DirectMachine, InverseMachine
+from ..mechanism.models import DirectMachine
 from ..system import (
     Bond,
     Component,
@@ -51,6 +48,10 @@ class AbsentError(InputError):
         self.part = part
 
 
+def _component(machine: Machine) -> ModelComponent:
+    return ModelComponent(machine.model, machine.p)
+
+
 @dataclass(frozen=True)
 class Drive:
     """A `motor` with its `parameters` that turns a `machine`; `follows` says whether it follows the reference
@@ -65,9 +66,6 @@ class Drive:
     feed_forward: bool = False
     """whether the speed control has feed-forward: a second machine FMU computes the torque of the machine
     with its normal feed, at the motor's angle and speed and the requested acceleration"""
-
-    chain: Any = None
-    """the organs as chains, a `sections.ChainOrgans`; None for two bars"""
 
     line: Any = None
     """parameters of the driveline between motor and machine, or None; its `ratio` is that of the gear before
@@ -174,12 +172,6 @@ class Drive:
         return through(run, self._first_bond)
 
     @property
-    def rods(self) -> tuple[int, int]:
-        """Numbers of rods of wall and web, where the organs are chains."""
-        walls, webs = split((self.machine.p.l1, self.machine.p.l2), int(self.chain.rods))
-        return walls, webs
-
-    @property
     def outsider(self) -> ForeignMachine | None:
         """The machine as the shaft behind the driveline drives it, if it is a foreign FMU; else None."""
         return self.driven_machine if isinstance(self.driven_machine, ForeignMachine) else None
@@ -190,18 +182,10 @@ class Drive:
         parts = self.outsider and self.outsider.component, self.foreign
         return [part.title for part in parts if part]
 
-    def load_model(self, machine: Machine | None = None) -> tuple[type[InverseMachine], Any]:
-        """Model of a machine, with two bars or chains, and its parameters; by default of the `driven_machine`."""
-        machine = machine or self.driven_machine
-        if self.chain is None:
-            return machine.model, machine.p
-        model = flexible(*self.rods)
-        return model, model.parameter_layout.from_names(machine.by_name | self.organ())
-
     @cached_property
     def simulated_machine(self) -> Machine:
-        """The machine as its FMU has it, with chains where the organs are chains."""
-        return self.driven_machine if self.chain is None else machine_of(*self.load_model())
+        """The machine as its FMU has it, with the model of its runs."""
+        return self.driven_machine.simulated
 
     def machine_series(self, run: xr.Dataset) -> dict[str, Any]:
         """The variables of the machine in a run by name, each of shape (time,)."""
@@ -210,13 +194,6 @@ class Drive:
             for name in map(str, run.data_vars)
             if name.startswith("machine.")
         }
-
-    def organ(self) -> dict[str, float]:
-        """The parameters that the model with chains has beside those of the model with two bars."""
-        if self.chain is None:
-            return {}
-        law = Layout(type(self.chain)).by_name(self.chain)
-        return {f"organ.{name}": law[name] for name in Layout(OrganLaw).names}
 
     @cached_property
     def graph(self) -> System:
@@ -230,7 +207,7 @@ class Drive:
             between["driveline"] = ModelComponent(CardanDriveline, self.line)
         system = in_line(
             {
-                "machine": outsider.component if outsider else ModelComponent(*self.load_model()),
+                "machine": outsider.component if outsider else _component(self.simulated_machine),
                 **between,
                 "motor": self.foreign or ModelComponent(self.motor, self.fmu_parameters),
             }
@@ -239,7 +216,7 @@ class Drive:
         wires: list[Connection] = []
         if self.feed_forward:
             # the second machine turns with the motor's shaft, before the driveline
-            beside["model"] = ModelComponent(*self.load_model(self.machine))
+            beside["model"] = _component(self.machine.simulated)
             wires += [("motor.phi", "model.phi"), ("motor.w", "model.w"), ("model.tau", "motor.tau_ff")]
         if self.observer is not None:
             beside["observer"] = self.observer
@@ -343,9 +320,9 @@ class Drive:
 
     def export_machine(self, folder: Path, backend: Backend | None = None) -> Path:
         """Write only the machine's FMU, as `export` writes it."""
-        model, p = self.load_model()
-        file = folder / f"{model.name}.fmu"
-        export_fmu(model, file, model.parameter_layout.by_name(p), backend=backend)
+        machine = self.simulated_machine
+        file = folder / f"{machine.model.name}.fmu"
+        export_fmu(machine.model, file, machine.by_name, backend=backend)
         return file
 
     def system(self, files: Mapping[str, Path]) -> System:

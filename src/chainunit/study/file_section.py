@@ -35,6 +35,9 @@ class FileSection:
     form: Callable[..., type[BaseModel]] = schema
     values: Callable[[Any], dict[str, Any]] = given_values
     """the values of a checked table, by the name of the quantity"""
+    completed: Callable[[Any, Any], Any] = lambda values, reading: values
+    """gets the values and the `FileReading`; gives the values with those that follow from the rest of the file, or
+    None where the study does not use the table"""
     entries: Mapping[str, TableList] = field(default_factory=dict)
     """by key, the lists of tables in it"""
     follows: Mapping[str, str] = field(default_factory=dict)

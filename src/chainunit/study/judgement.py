@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from ..reading.text import entry, number, turning
 from . import verdict
-from .chain import HIGH
 from .limits import Check, given_motor, reaches
-from .measures import Answers
 from .organ_limits import slack_and_mode
-from .quantiles import runs_needed
 from .record import StudyRecord
+from .registry import registered
 from .rig import worst_residual
+from .rules import other_models
 from .start_runs import longest_of
 from .starts import StartAnalysis
 from .verdict import RESIDUAL, STEADY, Holds, Verdict, shown_speed
@@ -26,37 +24,25 @@ def model_verdict(study: StudyRecord) -> Verdict:
     steady = answers.get(STEADY)
     mean = steady.speed_mean if steady else config.run.crank_speed
     speed, residuals = max(config.run.crank_speed, mean), _residuals(study)
-    runs: dict[str, Answers] = {**answers}
-    if study.start is not None:
-        runs[verdict.START] = study.start
-    if study.settling is not None:
-        runs[verdict.SETTLING] = study.settling
     if study.drive.outsider:
         return verdict.outsider(speed, residuals, actual=mean)
     if not study.drive.machine.model.sides:
         return verdict.rigid_links(speed, residuals, actual=mean)
-    if config.chain is None:
-        empty = {name for name in study.overloads if config.events[name].empties}
-        always = 0.0 in (config.feed.left.material_mass, config.feed.right.material_mass)
-        slack_speed, resonance = slack_and_mode(study.drive.chain_unit, config.feed)
-        return verdict.two_bars(
-            speed,
-            resonance,
-            slack_speed,
-            study.pulls,
-            residuals,
-            empty={""} if always else empty,
-            actual=mean,
-        )
-    folds = {name: a.fold_largest for name, a in runs.items()}
-    slack = {name: a.slack_time for name, a in runs.items()}
-    least_turns, turns = runs_needed(HIGH), math.inf
-    if study.chain is not None:
-        own = study.chain.own
-        folds["constant"], slack["constant"] = own.fold_largest, own.slack_time
-        residuals["constant"], turns = own.energy_residual, own.independent_turns
-    return verdict.chains(
-        speed, residuals, folds, config.chain.fold_limit, slack, turns, least_turns, actual=mean
+    for part in registered():
+        if (own := part.model_verdict(study, speed, mean, residuals)) is not None:
+            return own
+    empty = {name for name in study.overloads if config.events[name].empties}
+    always = 0.0 in (config.feed.left.material_mass, config.feed.right.material_mass)
+    slack_speed, resonance = slack_and_mode(study.drive.chain_unit, config.feed)
+    return verdict.two_bars(
+        speed,
+        resonance,
+        slack_speed,
+        study.pulls,
+        residuals,
+        empty={""} if always else empty,
+        actual=mean,
+        finer="; ".join(other.remedy for other in other_models()),
     )
 
 

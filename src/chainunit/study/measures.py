@@ -92,7 +92,7 @@ def _relay(w: Window) -> float | None:
 
 def _slack_time(w: Window) -> float | None:
     """Share of the time in which at least one rod of a chain is slack."""
-    if w.drive.chain is None:
+    if "machine.left.slack_share" not in w.run:
         return None
 
     def some_slack(run: xr.Dataset) -> Any:
@@ -103,7 +103,7 @@ def _slack_time(w: Window) -> float | None:
 
 
 def _fold(w: Window) -> float | None:
-    if w.drive.chain is None:
+    if "machine.left.fold_largest" not in w.run:
         return None
     return max((float(np.max(w.value(f"machine.{side}.fold_largest"))) for side in w.sides), default=0.0)
 

@@ -13,7 +13,8 @@ from ..core.temporary_folders import scratch
 from ..drives.driveline import CardanDriveline
 from ..drives.motor import Motor
 from ..fmu.backends import Backend
-from ..machines.chain_organs import LEAST, MOST
+from ..machines.api import ChainedUnit
+from ..machines.chain_organs import LEAST, MOST, USUAL
 from ..machines.chain_unit import ChamberForces
 from ..machines.flexible import ChainedModel, flexible
 from ..machines.hanging import split
@@ -27,7 +28,6 @@ from ..system.ssp import export
 from .choice import choose, with_parts_beside
 from .config import Config
 from .drive import Drive
-from .sections import ChainOrgans
 
 
 def study_system(config: Config, drive: Drive) -> System:
@@ -70,8 +70,8 @@ def start_of(
     if not issubclass(model, Motor):
         if not _is_of(model, drive):
             raise InputError(f"the study's machine is {drive.driven_machine.model.name}, not {model.name}")
-        values = _machine(config, model, drive.driven_machine)
-        return values | (drive.organ() if issubclass(model, ChainedModel) else {})
+        own = drive.simulated_machine if issubclass(model, ChainedModel) else drive.driven_machine
+        return _machine(config, model, own)
     if drive.motor is not model:
         title = drive.graph.components["motor"].title
         raise InputError(f"the study's motor is {title}, not {model.name}")
@@ -120,7 +120,8 @@ def model_and_start(
     start = start_of(config, model, backend=backend, report=report) if config else {}
     if name == "ChainUnitFlexible":
         if rods is None:
-            rods = int(((config and config.chain) or ChainOrgans()).rods)
+            machine = config and config.machine.simulated
+            rods = sum(machine.rods) if isinstance(machine, ChainedUnit) else USUAL
         model = with_rods(rods, start)
     return model, start
 

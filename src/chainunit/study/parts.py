@@ -23,7 +23,7 @@ from ..reading.tables import Title, file_form, given_values, merged, packaged, r
 from .file_section import FileSection
 from .foreign_machine import foreign_model
 from .registry import registered
-from .sections import CHOICES, SystemTable, sections_of
+from .sections import SystemTable, all_choices, sections_of
 
 
 def _as_text(value: Any) -> Any:
@@ -107,7 +107,7 @@ def _form(machine: type[MachineModel], motor: type[Motor]) -> type[BaseModel]:
         for name, section in sections_of(machine, motor).items()
     }
     tables |= {"report": ReportTable, "system": SystemTable}
-    return file_form("Config", tables, **CHOICES, event=(list[Any], []))
+    return file_form("Config", tables, **all_choices(), event=(list[Any], []))
 
 
 LINKAGE, FMU = ".toml", ".fmu"

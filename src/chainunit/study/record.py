@@ -17,7 +17,6 @@ from ..reading.results import InUnit, part, result
 from ..reading.text import number
 from . import verdict
 from .catalogue_drive import SLIP
-from .chain import ChainResult
 from .config import Config
 from .drive import Drive
 from .limits import reaches
@@ -129,8 +128,6 @@ class StudyRecord:
     """trip class of the thermal relay that holds in the start, of a motor of the catalogue on the line"""
     findings: dict[str, Any] = field(default_factory=dict)
     """`Findings` of each analysis, by its name"""
-    chain: ChainResult | None = None
-    """results of the organs as chains at constant speed, where the study has chains"""
     verdict: Verdict | None = None
     """the verdict on the model, once there are runs"""
     remarks: list[Remark] = field(default_factory=list)
@@ -158,7 +155,7 @@ class StudyRecord:
     def titles(self) -> dict[str, str]:
         """By run, its title for use in sentences."""
         titles = {STEADY: "steady running", verdict.START: "start-up"}
-        titles |= {verdict.SETTLING: "settling under the feed", "constant": "chains at constant speed"}
+        titles |= {verdict.SETTLING: "settling under the feed"}
         return titles | {name: event.title for name, event in self.config.events.items()}
 
     def title_of(self, run: str) -> str:

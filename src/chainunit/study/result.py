@@ -157,14 +157,11 @@ def _spread(study: StudyRecord, name: str) -> dict[str, Any]:
 
 def _parts(study: StudyRecord) -> dict[str, Any]:
     """The parts of the result that only some studies have."""
-    config = study.config
     more = {name: x for part in registered() for name, x in part.additions(study).items()}
     parts: dict[str, Any] = as_data({name: x for name, x in study.findings.items() if name not in more})
     parts |= more
     if study.statics.torsion is not None:
         parts |= _driveline(study)
-    if config.chain:
-        parts["chain"] = study.chain.as_dict() if study.chain else {}
     return parts
 
 

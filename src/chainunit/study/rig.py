@@ -276,7 +276,7 @@ class Rig:
         since = run.sel(time=slice(steady_from, None))
         turns = self.drive.whole_turns(since, turns_asked)
         if turns is not None and self.drive.turns(turns) > turns_asked - 0.5:
-            if self.drive.chain is not None or is_settled(self.drive, turns):
+            if is_settled(self.drive, turns):
                 return None, steady_from
             # as if one turn more had been waited for
             steady_from = float(whole_turns(self.drive, since, 1)["time"][-1])

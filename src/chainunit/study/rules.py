@@ -90,7 +90,6 @@ def _any(conditions: list[Condition]) -> Condition:
 
 
 MACHINE_FMU, MOTOR_FMU = ends_with("system.machine", FMU), ends_with("system.motor", FMU)
-CHAINS = is_one_of("organ", "chain")
 
 
 @cache
@@ -133,7 +132,25 @@ def _with_motors(names: tuple[str, ...]) -> tuple[Rule, ...]:
 
 BESIDE_MOTOR = "given beside system.motor = {motor}, which is the motor; leave out one of the two"
 NEEDS_MODEL = "needs a model of the machine, which is an FMU; leave it out"
-TWO_BARS = 'quantities of a turn are of organs with two bars; leave out organ = "chain"'
+OF_CHAIN_UNIT = "is of the chain unit, and the machine is {machine}; leave it out"
+
+
+@dataclass(frozen=True)
+class OtherModel:
+    """A key with which the runs of a machine have another model than its turns without a run."""
+
+    on: Condition
+    words: str
+    """what is then another one, such as "organs are chains\""""
+    refusal: str
+    """why there are no quantities of a turn, and the remedy"""
+    remedy: str
+    """what to do where the usual model does not hold"""
+
+
+def other_models() -> list[OtherModel]:
+    """Those of all capabilities."""
+    return [part.other_model for part in registered() if part.other_model]
 
 
 def _of_parts() -> Iterator[Rule]:
@@ -152,12 +169,7 @@ def _of_parts() -> Iterator[Rule]:
 
 def _of_sides() -> Iterator[Rule]:
     """Rules of keys of the chain unit, which has two sides."""
-    for name in ("ratios", "chain", "organ"):
-        words = "is of the chain unit, and the machine is {machine}; leave it out"
-        yield Rule(name, ~has_sides(), words)
-    yield Rule(
-        "chain", has_sides() & ~CHAINS, 'is of organs that are chains; add organ = "chain", or leave it out'
-    )
+    yield Rule("ratios", ~has_sides(), OF_CHAIN_UNIT)
     for name in ratios(**filled(Ratios, {})):
         words = "given beside [ratios], which sets it; leave out one of the two"
         yield Rule(f"machine.{name}", has_sides() & has_entries("ratios"), words)

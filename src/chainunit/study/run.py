@@ -6,7 +6,8 @@ the same steady state, which is saved once.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,7 +22,6 @@ from . import verdict
 from .analyses import all_analyses
 from .analysis import Work
 from .bearings import pin_loads
-from .chain import study_chain
 from .choice import as_chosen, choose, with_parts_beside
 from .config import Config
 from .event import Event
@@ -89,26 +89,38 @@ def run_study(
                 "install gcc or clang, or the compiler that comes with pip install 'chainunit[cross]'.",
             )
         runner = Runner(study, Rig(config, drive, files), report)
-        try:
+        with _ending(study):
             runner.run(check, lambda: drive.coasting(folder / "fmu", backend))
-            _analyse(study, Work(runner.rig, report, folder, scheduler, runner.stop), needs_runs=True)
-        except RunError as error:
-            if error.partial is not None:
-                study.runs["unfinished"] = error.partial
-            study.failure = error
-        except KeyboardInterrupt:
-            # Ctrl-C came between two runs, or in a run that is not a co-simulation
-            study.failure = InterruptedRunError("interrupted")
-        if drive.chain is not None and not isinstance(study.failure, InterruptedRunError):
-            _chains(study, files["machine"], report)
+            work = Work(runner.rig, report, folder, scheduler, runner.stop)
+            _analyse(study, work, needs_runs=True)
+        if not isinstance(study.failure, InterruptedRunError):
+            with _ending(study):
+                _analyse(study, Work(runner.rig, report), needs_runs=True, at_end=True)
         conclude(study)
         return study
 
 
-def _analyse(study: StudyRecord, work: Work, *, needs_runs: bool) -> None:
+@contextmanager
+def _ending(study: StudyRecord) -> Iterator[None]:
+    """Record the error that ends a part of the study early; the first one counts."""
+    error: RunError | None = None
+    try:
+        yield
+    except RunError as ended:
+        error = ended
+        if error.partial is not None:
+            study.runs["unfinished"] = error.partial
+    except KeyboardInterrupt:
+        # Ctrl-C came between two runs, or in a run that is not a co-simulation
+        error = InterruptedRunError("interrupted")
+    study.failure = study.failure or error
+
+
+def _analyse(study: StudyRecord, work: Work, *, needs_runs: bool, at_end: bool = False) -> None:
     """Make every analysis for which the system has the parts."""
     for analysis in all_analyses():
-        if analysis.needs_runs == needs_runs and analysis.applies(study.config, study.drive):
+        is_due = (analysis.needs_runs, analysis.at_end) == (needs_runs, at_end)
+        if is_due and analysis.applies(study.config, study.drive):
             findings = analysis.find(study, work)
             if findings is not None:
                 study.findings[analysis.name] = findings
@@ -130,24 +142,6 @@ def _with_class_of_all_starts(study: StudyRecord) -> None:
             window = study.window(phase, from_event_on(study, name), study.event[name])
             later = read_measure("thermal_trip_time", window)
             study.answers[name] = replace(study.answers[name], thermal_trip_time=later)
-
-
-def _chains(study: StudyRecord, file: Path, report: Report) -> None:
-    """Run the chains at constant speed. They are left out without native code, as an FMU in Python would take
-    hours."""
-    if study.fmus["machine"].backend != "native":
-        study.note(
-            "chains left out",
-            "chains at constant speed and the sweep are left out: they need native code, that is a C compiler.",
-        )
-        return
-    try:
-        study.chain, failure = study_chain(study.config, study.drive, file, report)
-    except RunError as error:
-        failure = error
-    except KeyboardInterrupt:
-        failure = InterruptedRunError("interrupted")
-    study.failure = study.failure or failure
 
 
 class Runner:

@@ -8,7 +8,7 @@ from ...report.capability import Capability
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
 from ...study.parts import motor_is_left
-from ...study.rules import CHAINS, MACHINE_FMU, NEEDS_MODEL, TWO_BARS, Rule
+from ...study.rules import MACHINE_FMU, NEEDS_MODEL, Rule, other_models
 from .table import FIELDS, Optimize, read_wishes
 from .wishes import Wishes
 
@@ -33,7 +33,7 @@ class OptimizeCapability(Capability):
     def rules(self) -> Iterable[Rule]:
         """It needs a model of the machine, with two bars."""
         yield Rule("optimize", MACHINE_FMU, NEEDS_MODEL)
-        yield Rule("optimize", CHAINS, TWO_BARS)
+        yield from (Rule("optimize", other.on, other.refusal) for other in other_models())
 
     def plan(self, reading: FileReading) -> Wishes | None:
         """The wishes that the table states."""

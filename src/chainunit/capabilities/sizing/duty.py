@@ -1,6 +1,6 @@
 """The duty of any drive of a machine: turns at constant speed, and the inertia that evens the speed.
 
-The turns are computed by inverse dynamics; chains are run by their FMU."""
+The turns are computed by inverse dynamics, or by the capability whose model the machine has in its runs."""
 
 from __future__ import annotations
 
@@ -13,17 +13,14 @@ from typing import Any
 import numpy as np
 
 from ...core.quantities import Value, declaration, quantity
-from ...drives.motor import Motor
 from ...fmu.backends import Backend
 from ...machines.chain_unit import SIDES, SideName
 from ...reading.text import entries
-from ...study.chain import HIGH
-from ...study.chain import duty as chain_duty
 from ...study.config import Config
 from ...study.cycle import Cycle, cycle, energy_swing, needed_inertia
-from ...study.drive import Drive
 from ...study.one_sided import all_on_one
-from ...system.instance import Fmu
+from ...study.quantiles import HIGH
+from ...study.registry import registered
 from .table import Sizing, plan_of
 
 
@@ -55,8 +52,8 @@ class CycleNumbers:
 class Duty:
     """The duty of any drive, at constant speed of the crank: the turn with the feed of normal running and,
     for a machine with two sides, the turns with all feed on one side. `heavier` is the side with the larger
-    RMS torque of two bars; the sides differ, as the rocker swings farther to one of them. With chains each is
-    many turns."""
+    RMS torque of two bars; the sides differ, as the rocker swings farther to one of them. Each is many turns of a
+    machine that never repeats one."""
 
     normal: Cycle
     one_sided: Mapping[SideName, Cycle]
@@ -71,7 +68,7 @@ class Duty:
 
 
 def duty_of(config: Config, folder: Path, backend: Backend | None) -> Duty:
-    """The duty of a study with [sizing]; chains are run by an FMU that is written to `folder`."""
+    """The duty of a study with [sizing]; an FMU of a machine that has to be run for it is written to `folder`."""
     feed, w = config.feed, config.run.crank_speed
     loads = {side: all_on_one(side, feed) for side in SIDES if side in config.machine.model.sides}
     normal = cycle(config.machine, w, feed)
@@ -79,21 +76,17 @@ def duty_of(config: Config, folder: Path, backend: Backend | None) -> Duty:
     sizes = [(rms((1.0, turn.crank_torque)), side) for side, turn in one_sided.items()]
     # if both sides are alike it is the left one
     heavier = min(sizes, key=lambda each: -each[0])[1] if sizes else None
-    if config.chain is not None:
-        drive = Drive(Motor, None, config.machine, chain=config.chain)
-        fmu = Fmu(drive.export_machine(folder, backend))
-        try:
-            normal = chain_duty(fmu, drive, w, feed)
-            one_sided = {side: chain_duty(fmu, drive, w, case) for side, case in loads.items()}
-        finally:
-            fmu.close()
+    for part in registered():
+        if turns := part.turns(config, (feed, *loads.values()), folder, backend):
+            normal, *others = turns
+            one_sided = dict(zip(loads, others, strict=True))
     demands, ratio = plan_of(config).demands, config.machine.ratio
     return Duty(normal, one_sided, heavier, cycle_numbers(demands, w, ratio, normal, one_sided, heavier))
 
 
 def _peak(cycle: Cycle) -> float:
-    """Largest crank torque of a cycle; for the many turns of chains the quantile of their peaks, as no single
-    peak is a prediction."""
+    """Largest crank torque of a cycle; of many turns the quantile of their peaks, as no single peak is a
+    prediction."""
     peaks = np.max(np.abs(np.atleast_2d(cycle.crank_torque)), axis=1)
     return float(np.quantile(peaks, HIGH))
 

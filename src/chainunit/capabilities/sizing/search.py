@@ -18,9 +18,9 @@ from ...drives.catalogue import CatalogueMotor, catalogue
 from ...drives.gear_ratios import UNITS, nearest
 from ...fmu.backends import Backend
 from ...reading.text import number
-from ...study.chain import HIGH
 from ...study.config import Config
 from ...study.limits import SPEED_DEVIATION
+from ...study.quantiles import HIGH
 from ...study.relay import HEAVIEST, LIGHT, class_words
 from ...study.sections import SOFTER
 from ...work.progress import Report
@@ -71,7 +71,7 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
         "Catalogue data are typical; iron losses are not in the motor model.",
         "The gear's losses act as viscous drag on the motor shaft, with the mean power that its efficiency costs.",
     ]
-    if config.chain is not None:
+    if config.machine.in_place:
         notes.append(
             f"Peaks of the cycle and the flywheel are those of single turns, {100 * HIGH:g} % quantile over all "
             "turns of all starts of the chains."

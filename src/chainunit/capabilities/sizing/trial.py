@@ -342,17 +342,16 @@ def try_motor(
             shifts.append((all_feed_on(side), shift))
             one_sided[side] = simulation.run(simulation.time + turn, rig.step)
     trial = Trial(config, motor, drive, duty.heavier, start, steady, tuple(shifts), one_sided)
-    if not worst_start or drive.chain is not None or trial.start_time is None:
+    if not worst_start or drive.simulated_machine.model.never_repeats or trial.start_time is None:
         return trial
     return dataclasses.replace(trial, starts=starts_from_all(rig, longest_start(config, trial.start_time)))
 
 
 def _until_settled(rig: Rig, simulation: Simulation, stop: float) -> list[xr.Dataset]:
-    """Runs of two turns, the first to the time `stop` [s], until the turns of a run close; those of chains
-    never close."""
+    """Runs of two turns, the first to the time `stop` [s], until the turns of a run close."""
     turn, drive = rig.config.turn, rig.drive
     runs = [simulation.run(stop, rig.step)]
-    while drive.chain is None and simulation.time < stop + PATIENCE * turn:
+    while simulation.time < stop + PATIENCE * turn:
         turns = drive.whole_turns(runs[-1])
         if turns is None or is_settled(drive, turns):
             break
