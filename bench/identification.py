@@ -31,6 +31,7 @@ from chainunit.capabilities.identification.posterior import posterior
 from chainunit.capabilities.identification.score_tests import score_tests
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor
+from chainunit.machines.api import ChainUnitOfChains
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.recordings.fit import fit
 from chainunit.recordings.plant import Plant
@@ -40,7 +41,6 @@ from chainunit.recordings.shaft import MeasuredShaft
 from chainunit.recordings.unknown import Unknown
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
-from chainunit.study.sections import ChainOrgans
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "examples" / "identification"))
 from synthetic import HiddenRun, Logger, synthetic
@@ -146,10 +146,11 @@ def drive(kind: str, wrong: str = "") -> Drive:
     if wrong.startswith("crank"):
         machine = machine.replace(r=1.02 * machine.by_name["r"])
     induction = layout.from_names(INDUCTION, InductionMotor.Parameters())
-    chain = ChainOrgans() if wrong == "chains" else None
+    if wrong == "chains":
+        machine = ChainUnitOfChains(machine.p)
     if kind == "im":
-        return Drive(InductionMotor, induction, machine, chain=chain)
-    return Drive(DcMotor, config.motor, machine, chain=chain)
+        return Drive(InductionMotor, induction, machine)
+    return Drive(DcMotor, config.motor, machine)
 
 
 @lru_cache(maxsize=16)

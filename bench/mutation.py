@@ -58,8 +58,8 @@ MODULES = (
     "system/graph.py",
     "study/cycle_quantities.py",
     "study/events.py",
-    "study/preference.py",
-    "study/protection.py",
+    "capabilities/sizing/preference.py",
+    "capabilities/sizing/protection.py",
 )
 """The modules that most of the others rest on, and those that decide what a study recommends."""
 FAST, SECOND = "not slow and not second", "second and not slow"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 from chainunit.core.quantities import Layout
 from chainunit.study.event import TYPES
 
@@ -40,3 +42,10 @@ right = { material_mass = 300, processing_force = 120 }
 step = 0.002
 """
 """Ten times as heavy as the packaged one."""
+
+
+def demanding(config, **demands):
+    """The study with [sizing], with other demands on the motor."""
+    plan = config.plans["sizing"]
+    plan = dataclasses.replace(plan, demands=dataclasses.replace(plan.demands, **demands))
+    return dataclasses.replace(config, plans={**config.plans, "sizing": plan})

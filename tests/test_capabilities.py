@@ -55,6 +55,7 @@ def test_the_list_names_the_folders():
     folders = {path.name for path in (PACKAGE / "capabilities").iterdir() if (path / "__init__.py").exists()}
     assert folders == set(NAMES) and len(NAMES) == len(folders)
     assert [part.name for part in capabilities()] == list(NAMES)
+    assert len([part for part in capabilities() if part.motor_table]) <= 1
 
 
 def test_nothing_outside_a_folder_imports_from_it():
@@ -84,7 +85,8 @@ def test_the_rest_works_without(name, tmp_path):
     file.write_text(text.replace(line, ""), "utf-8")
     shutil.copytree(Path(__file__).parents[1] / "fmu", tmp_path / "fmu")
     (tmp_path / "study.toml").write_text(STUDY)
-    tables = list(next(part for part in capabilities() if part.name == name).tables)
+    own = next(part for part in capabilities() if part.name == name)
+    tables = [*own.tables, *own.choices]
     call = [sys.executable, "-c", SMOKE, str(tmp_path), *tables]
     env = os.environ | {"PYTHONPATH": str(copy.parent)}
     process = subprocess.run(call, env=env, capture_output=True, text=True, cwd=tmp_path)

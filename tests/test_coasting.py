@@ -42,7 +42,7 @@ LINE = '[driveline]\nJ4 = 2\nc2 = 6000\nc3 = 6000\nd2 = 15\nd3 = 15\nalpha1 = "5
 def test_it_goes_on_as_the_same_machine(organ, more, trip, tmp_path, monkeypatch):
     """Positions, speeds and energy do not jump as the coupling opens; from then on the loss of energy is its
     dissipation."""
-    monkeypatch.setattr("chainunit.study.run._chains", lambda *_: None)
+    monkeypatch.setattr("chainunit.capabilities.chains.analysis.ChainAnalysis.find", lambda *_: None)
     text = STUDY.format(organ=organ, more=more, trip=trip)
     study = run_study(config.parse(text), tmp_path)
     assert study.failure is None and study.answers["jam_left"].coupling_trip_time is not None
@@ -83,7 +83,7 @@ def test_it_goes_on_as_the_same_machine(organ, more, trip, tmp_path, monkeypatch
 
 def test_the_axis_of_time_ends_where_the_crank_stands(tmp_path, monkeypatch):
     """The run behind the open coupling lasts on: it took nine tenths of the figure of a jam, at rest."""
-    monkeypatch.setattr("chainunit.study.run._chains", lambda *_: None)
+    monkeypatch.setattr("chainunit.capabilities.chains.analysis.ChainAnalysis.find", lambda *_: None)
     study = run_study(config.parse(STUDY.format(organ="two-bar", more="", trip=250)), tmp_path)
     assert study.failure is None
     figure = next(each for each in report(study).figures if each.name == "time-jam-left")

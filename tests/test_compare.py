@@ -8,8 +8,8 @@ import shutil
 import pytest
 from command import chainunit
 
+from chainunit.capabilities.comparison.comparison import compare, read_result
 from chainunit.reading.text import number as shown
-from chainunit.study.comparison import compare, read_result
 from chainunit.study.config import parse
 from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
@@ -116,16 +116,25 @@ def test_verdicts_and_warnings_of_one_alone_come_first(folder):
         assert all(f"Warning: only {name.upper()}: {text}" in printed for text in data["warnings"][name])
 
 
-def test_warnings_are_compared_without_their_numbers(folder, tmp_path):
+def test_warnings_are_compared_by_their_kinds_and_runs(folder, tmp_path):
+    """No sentence is read: the same kind in the same runs is the same warning, whatever its words."""
+    speed, far, hot = (
+        ("Speed 3.1 rad/s, too high: 1", "model speed"),
+        ("Not so far: 2", "far"),
+        ("Hot", "hot"),
+    )
     results = []
-    for name, texts in (("a", ["Speed 3.1 rad/s, too high: 1", "Common: 2"]), ("b", ["Common: 3", "Hot"])):
+    for name, warnings in (("a", [speed, far]), ("b", [("Far off: 3", "far"), ("Hot", "model speed"), hot])):
         data = numbers(folder, name)
-        data["warnings"] = [{"kind": "x", "text": text, "runs": []} for text in texts]
+        data["warnings"] = [
+            {"kind": kind, "text": text, "runs": [name] if kind == "model speed" else []}
+            for text, kind in warnings
+        ]
         (tmp_path / name).mkdir()
         (tmp_path / name / "result.json").write_text(json.dumps(data))
         results.append(read_result(tmp_path / name))
     alone = compare(*results)["warnings"]
-    assert alone == {"a": ["Speed 3.1 rad/s, too high: 1"], "b": ["Hot"]}
+    assert alone == {"a": ["Speed 3.1 rad/s, too high: 1"], "b": ["Hot", "Hot"]}
 
 
 def test_keys_keep_their_letters(folder):

@@ -268,7 +268,7 @@ def test_a_sweep_of_chains_ends_at_twice_the_speed_or_beyond_the_resonance():
     def ends(text):
         values = parse(f'organ = "chain"\n{text}')
         modes = values.machine.chain_modes(values.feed.left, values.feed.right)
-        return values.chain.sweep_highest, float(modes.frequency[0])
+        return values.table("chain").sweep_highest, float(modes.frequency[0])
 
     highest, mode = ends("[run]\ncrank_speed = 1.57\n")
     assert highest == pytest.approx(1.2 * mode) and highest > 2.0 * 1.57

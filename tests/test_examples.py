@@ -147,7 +147,8 @@ def test_chains_run_near_their_resonance():
     loaded = config.load(EXAMPLES / "chains_near_resonance.toml")
     resonance = float(loaded.machine.chain_modes(loaded.feed.left, loaded.feed.right).frequency[0])
     assert 0.7 * resonance < loaded.run.crank_speed < 0.9 * resonance
-    assert loaded.chain.sweep_lowest < 0.5 * resonance and loaded.chain.sweep_highest > 2.0 * resonance
+    chain = loaded.table("chain")
+    assert chain.sweep_lowest < 0.5 * resonance and chain.sweep_highest > 2.0 * resonance
 
 
 @pytest.mark.parametrize("script", sorted(EXAMPLES.glob("*.py")), ids=lambda script: script.stem)

@@ -20,6 +20,7 @@ from systems import pair
 from test_chain import DATA, M
 
 from chainunit import ChainUnitMachine, GeometryError, InputError, RunError
+from chainunit.capabilities.chains.analysis import numbers_at, study_chain
 from chainunit.core.engines import MATH
 from chainunit.core.errors import InterruptedRunError
 from chainunit.core.native.compilers import compiler
@@ -33,7 +34,6 @@ from chainunit.machines.flexible import flexible
 from chainunit.machines.parts import Pin, Processing, Stop
 from chainunit.mechanism.machine import MachineState, Mechanism
 from chainunit.study import config
-from chainunit.study.chain import numbers_at, study_chain
 from chainunit.study.drive import Drive
 from chainunit.system import CoSimulation, hold_loads, monolithic
 from chainunit.system.instance import Fmu, Instance
@@ -1051,14 +1051,14 @@ def undamped(files):
     study = config.parse(
         'organ = "chain"\n[run]\ncrank_speed = 8\n[chain]\nrods = 2\neta = 0\nend_damping = 0\nsweep_points = 4\n'
     )
-    return files(1, 1), study, Drive(DcMotor, DcMotor.Parameters(), study.machine, chain=study.chain)
+    return files(1, 1), study, Drive(DcMotor, DcMotor.Parameters(), study.machine)
 
 
 @native
 def test_numbers_of_two_rods_are_those_of_two_bars(undamped):
     """Slack, snatch and torques have the same definition for chains and for two bars."""
     fmu, study, drive = undamped
-    result, by_rod = numbers_at(fmu, drive, study, 8.0)
+    result, by_rod = numbers_at(fmu, drive, study.table("chain"), study.feed, 8.0)
     assert 0.05 < result.slack_time == pytest.approx(result.two_bar_slack_time, abs=0.005)
     assert result.snatch_median == pytest.approx(result.two_bar_snatch, rel=1e-3)
     assert result.rocker_torque_median == pytest.approx(result.two_bar_rocker_torque, rel=1e-3)
@@ -1080,6 +1080,6 @@ def test_an_interrupted_sweep_keeps_what_it_has(undamped):
         if len(set(reports)) == 3:
             signal.raise_signal(signal.SIGINT)
 
-    result, ended = study_chain(study, drive, fmu.archive, report)
+    result, ended = study_chain(drive, study.table("chain"), study.feed, 8.0, fmu.archive, report)
     assert isinstance(ended, InterruptedRunError) and "interrupted at" in str(ended)
     assert [round(n.speed, 3) for n in result.sweep] == [1.0, 8.0] and result.own.speed == 8.0

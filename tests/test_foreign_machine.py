@@ -23,6 +23,7 @@ from test_ssp import TOOLS, connections
 from test_ssp import run as run_in
 
 from chainunit import InputError, Study
+from chainunit.capabilities.sizing.search import size
 from chainunit.core.quantities import Value, declaration, quantity
 from chainunit.reading.text import number as text_of
 from chainunit.study import config
@@ -35,7 +36,6 @@ from chainunit.study.package import study_system
 from chainunit.study.readings import crank_torque
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
-from chainunit.study.sizing import size
 from chainunit.system import CoSimulation, Profile, certify
 
 SCRIPT = Path(__file__).parent / "foreign_machine.py"
@@ -296,7 +296,7 @@ SIZED = (
 def compare_with_pump(best):
     """Torque at the crank and inertia at the motor, of the candidate, with those of the pump."""
     torque, inertia = pump(np.linspace(0.0, 2.0 * math.pi, 720), SPEED, PRESSURE)
-    assert best.duty.torque == pytest.approx(np.max(np.abs(torque)), rel=0.05)
+    assert best.trial.duty.torque == pytest.approx(np.max(np.abs(torque)), rel=0.05)
     rotor, plate = best.drive.fmu_parameters.rotor.J, best.motor.nameplate.J
     reflected = np.max(inertia) / best.drive.ratio**2
     assert best.checks["inertia"].value == pytest.approx((reflected + rotor - plate) / plate, rel=1e-3)
@@ -304,10 +304,10 @@ def compare_with_pump(best):
 
 def test_sizing_finds_a_motor_for_it(folder):
     study = run_study(parse(folder, SIZED), folder / "sized")
-    assert study.failure is None and study.sizing.chosen_candidate is not None
+    assert study.failure is None and study.findings["sizing"].chosen_candidate is not None
     assert study.answers["steady"].speed_mean == pytest.approx(SPEED, rel=1e-2)
     assert study.drive.graph.components["gear"].parameters.ratio == study.drive.ratio
-    compare_with_pump(study.sizing.best)
+    compare_with_pump(study.findings["sizing"].best)
 
 
 def test_sizing_does_without_its_torque(tmp_path):

@@ -398,8 +398,8 @@ fluctuation = "10 %"
 def test_a_study_finds_a_motor(name, speed, tmp_path):
     study = run_study(parse(SIZED.format(name=name, speed=speed), str(FOLDER / "study.toml")), tmp_path)
     assert study.failure is None
-    best = study.sizing.best
-    assert study.sizing.chosen_candidate is best and best.fits
+    best = study.findings["sizing"].best
+    assert study.findings["sizing"].chosen_candidate is best and best.fits
     # the motor carries the cycle of the linkage, and not with twice the power that it needs
     angular_speed = study.config.run.crank_speed
     mean = float(np.mean(turn(name, angular_speed).power))

@@ -36,7 +36,7 @@ KNIFE = example("knife")
 def study_of(config, folder):
     """The study before its first run."""
     choice = choose(config, folder, lambda *_: None)
-    study = StudyRecord(config, choice.drive, statics(config, choice.drive), choice.sizing)
+    study = StudyRecord(config, choice.drive, statics(config, choice.drive), choice.proposal)
     conclude(study)
     return study
 
@@ -91,8 +91,9 @@ def test_the_slip_compensation_that_is_used_is_shown(tmp_path):
     ):
         more = f'[starter.inverter]\nslip = "{given}"\n' if given else ""
         config = parse(f'start = "inverter"\n{text}\n{more}')
-        drive = drive_of(config, tmp_path)
-        study = dataclasses.replace(study_of(config, tmp_path), config=as_chosen(config, drive))
+        choice = choose(config, tmp_path, lambda *_: None)
+        drive = choice.drive
+        study = dataclasses.replace(study_of(config, tmp_path), config=as_chosen(config, choice))
         result = as_dict(study)
         assert drive.parameters.inverter.slip == pytest.approx(used, rel=1e-12)
         assert result["motor"]["inverter.slip"]["value"] == drive.parameters.inverter.slip

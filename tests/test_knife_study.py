@@ -272,7 +272,7 @@ def test_the_flywheels(done):
     said = {remark.kind: remark.text for remark in study.remarks}
     assert said["least flywheel"].startswith("A fluctuation of 5.00 % takes a flywheel of")
     ripple = number(by[1].speed_ripple, "1", "percent")
-    assert f"the speed fluctuates by {ripple} with the study's flywheel" in said["fluctuation"]
+    assert f"The speed fluctuates by {ripple} with the study's flywheel" in said["fluctuation"]
     # rated current is passed by the light flywheels alone
     rated = study.config.plate.nameplate.rated_current
     hot = next(remark for remark in study.warnings if remark.kind == "rated current")

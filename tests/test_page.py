@@ -13,6 +13,7 @@ import re
 import shutil
 import subprocess
 from html.parser import HTMLParser
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from event_tables import event_line
 from reports import page_of, pictures, said_of, write
 
 from chainunit import EMPTY, InputError, RunError
+from chainunit.capabilities.chains.analysis import rest_forces
 from chainunit.drives.induction_motor import SoftStart
 from chainunit.machines.chain_unit import Feed
 from chainunit.reading.text import DEFAULT_UNITS, digits_text, forms, scales, unit_text
@@ -29,7 +31,6 @@ from chainunit.report import study as study_report
 from chainunit.report.blocks import at
 from chainunit.report.figure import Label, Mark, Shade
 from chainunit.study import config, judgement
-from chainunit.study.chain import rest_forces
 from chainunit.study.cycle import cycle
 from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
@@ -482,8 +483,8 @@ def test_a_motor_that_sizing_found_insufficient_is_not_praised(study, monkeypatc
     assert as_dict(study)["verdict"]["motor"]["holds"] == "in part"
     monkeypatch.setattr(judgement, "AMPLE", 0.0)
     assert as_dict(study)["verdict"]["motor"]["holds"] == "true"
-    monkeypatch.setattr(type(study), "insufficient", True)
-    motor = as_dict(study)["verdict"]["motor"]
+    nearest = SimpleNamespace(name="sizing", insufficient="No motor fits.", motor=None, duty=None, keys={})
+    motor = as_dict(dataclasses.replace(study, proposal=nearest))["verdict"]["motor"]
     assert motor["holds"] == "in part" and "insufficient" in motor["text"]
 
 
@@ -602,7 +603,7 @@ def test_a_long_study_is_thinned_out(study, monkeypatch):
 
 def test_the_drive_stands_first_with_its_shares(study):
     result = {**as_dict(study), "sizing": SIZING}
-    text = page_of(study, result)
+    text = page_of(dataclasses.replace(study, findings=study.findings | {"sizing": None}), result)
     reader = Reader(text)
     check_traced(reader, result)
     assert text.index('id="answer"') < text.index('id="sizing"') < text.index('id="plots"')
@@ -633,7 +634,8 @@ def test_no_candidate_fits(study):
     sizing = copy.deepcopy(SIZING)
     sizing["chosen"] = None
     sizing["candidates"] = sizing["candidates"][2:]
-    text = page_of(study, {**as_dict(study), "sizing": sizing})
+    result = {**as_dict(study), "sizing": sizing}
+    text = page_of(dataclasses.replace(study, findings=study.findings | {"sizing": None}), result)
     assert "No candidate fits. The reasons:" in text and "too weak by 31 %" in text
 
 
@@ -778,7 +780,7 @@ def test_chains_stand_beside_two_bars(chains, tmp_path):
 
 def test_each_snatch_is_in_parts_of_its_own_rest(chains):
     """At rest a chain of 8 rods pulls as two bars do with this feed, but not without: the parts differ by a fifth."""
-    machine, feed, own = chains.drive.machine, chains.config.feed, chains.chain.own
+    machine, feed, own = chains.drive.machine, chains.config.feed, chains.findings["chain"].own
     out = cycle(machine, own.speed, feed).outputs
     at_rest = machine.chamber(0.0, left=feed.left, right=feed.right)
 
@@ -803,7 +805,7 @@ def test_each_snatch_is_in_parts_of_its_own_rest(chains):
 
 def test_the_rods_of_chains_move_as_simulated(chains):
     moving = pictures(study_motion.motion(chains))
-    walls, webs = chains.drive.rods
+    walls, webs = chains.drive.simulated_machine.rods
     organs = {link["name"]: link["joints"] for link in moving["links"]}
     p = chains.drive.machine.p
     for side in ("left", "right"):

@@ -9,8 +9,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from event_tables import HEAVY_MACHINE
+from event_tables import HEAVY_MACHINE, demanding
 
+from chainunit.capabilities.sizing import search as sizing
+from chainunit.capabilities.sizing.candidate import Candidate, Criterion, Standing, TrialResult
+from chainunit.capabilities.sizing.duty import duty_of
+from chainunit.capabilities.sizing.inverter import inverter_needs, least_boost, misses_by_a_hair
+from chainunit.capabilities.sizing.motor_trials import MotorTrials
+from chainunit.capabilities.sizing.preference import ORDER, poles_rank, rank
 from chainunit.drives.catalogue import catalogue
 from chainunit.drives.disc import DENSITY, steel_disc
 from chainunit.drives.gear_ratios import (
@@ -24,15 +30,10 @@ from chainunit.drives.gear_ratios import (
 )
 from chainunit.drives.gearing import START_FACTOR, ordered_torque
 from chainunit.reading.text import number
-from chainunit.study import sizing
-from chainunit.study.candidate import Candidate, Criterion, Standing
 from chainunit.study.catalogue_drive import gear_with
-from chainunit.study.choice import as_chosen
+from chainunit.study.choice import Choice, as_chosen
 from chainunit.study.config import parse
-from chainunit.study.duty import duty_of
-from chainunit.study.inverter import inverter_needs, least_boost, misses_by_a_hair
 from chainunit.study.limits import Check
-from chainunit.study.preference import ORDER, poles_rank, rank
 from chainunit.study.relay import HEAVIER, start_class
 from chainunit.study.rig import Rig
 from chainunit.study.start_runs import exceeded_for, starts_from_all, time_above
@@ -184,8 +185,9 @@ def made(name, power=2200.0, poles=4.0, flywheel=0.0, used=0.5, **more):
     )
     drive = SimpleNamespace(flywheel=flywheel, ratio=50.0, follows=False)
     checks = {"temperature": Check("heat", used, 1.0, "1"), "crank_speed": Check("speed", 0.95, 1.0, "1")}
-    more = {"unit": gear_unit("helical", 50.0), "start_class": 10, "margin": 0.1} | more
-    return Candidate(motor, drive, checks, **more)
+    measured = {name: more.pop(name) for name in ("start_class", "frequency") if name in more}
+    trial = TrialResult(checks, **({"start_class": 10} | measured))
+    return Candidate(motor, drive, trial, **({"unit": gear_unit("helical", 50.0), "margin": 0.1} | more))
 
 
 def ranked(*candidates, larger=2.0):
@@ -291,7 +293,9 @@ def test_a_motor_in_field_weakening_stands_behind_one_at_its_rated_frequency():
     checks = {"start": Check("time to start", 1.0, 2.0, "s")}
     small, large = (
         dataclasses.replace(
-            c, motor=next(m for m in catalogue() if m.designation == name), checks=checks, frequency=f
+            c,
+            motor=next(m for m in catalogue() if m.designation == name),
+            trial=TrialResult(checks, frequency=f),
         )
         for name, f in (("IE3 6-pole 1.1 kW, 90L", 75.0), ("IE3 4-pole 1.5 kW, 90L", 51.5))
     )
@@ -300,8 +304,7 @@ def test_a_motor_in_field_weakening_stands_behind_one_at_its_rated_frequency():
     assert ranking == [large, small] and small.weakened and not large.weakened
     assert small.criterion is Criterion.FIELD and "75.0 Hz in field weakening" in small.reason
     assert "runs at 51.5 Hz, where IE3 6-pole 1.1 kW, 90L" in large.reason
-    config, _ = proposed("[sizing]\n", start="inverter")
-    assert any("75.0 Hz, above its rated 50.0 Hz" in note for note in inverter_needs(small, config))
+    assert any("75.0 Hz, above its rated 50.0 Hz" in note for note in inverter_needs(small, 1.5, False))
 
 
 @pytest.mark.parametrize("length, held", [(120.0, 12.0), (59.0, 0.0)])
@@ -333,7 +336,7 @@ def proposed(more, motor="IE3 4-pole 1.1 kW, 90S", start="direct"):
     config = parse(f'start = "{start}"\n{HEAVY_MACHINE}{more}')
     plate = next(m for m in catalogue() if m.designation == motor)
     turn = SimpleNamespace(crank_torque=np.full(10, 60.0))
-    return config, sizing.proposal(config, plate, SimpleNamespace(normal=turn))
+    return config, MotorTrials(config, SimpleNamespace(normal=turn)).candidate(plate)
 
 
 def test_a_file_chooses_the_ratios():
@@ -349,25 +352,28 @@ def test_a_file_chooses_the_ratios():
 
 def test_the_kind_of_gear_has_its_efficiency_and_its_unit():
     config, c = proposed('[sizing]\ngear_kind = "worm"\n')
-    assert gear_with(config, c.drive.ratio).efficiency == 0.7 and c.unit.title == "worm gear"
+    assert (
+        gear_with(config, c.drive.ratio, config.plans["sizing"].offer).efficiency == 0.7
+        and c.unit.title == "worm gear"
+    )
     config, _ = proposed('[sizing]\ngear_kind = "worm"\n[gear]\nefficiency = "80 %"\n')
-    assert gear_with(config, 50.0).efficiency == 0.8
+    assert gear_with(config, 50.0, config.plans["sizing"].offer).efficiency == 0.8
     config, c = proposed("[sizing]\n")
-    assert gear_with(config, c.drive.ratio).efficiency == pytest.approx(0.98**3)
+    assert gear_with(config, c.drive.ratio, config.plans["sizing"].offer).efficiency == pytest.approx(0.98**3)
     assert c.unit.title == "three-stage helical gear"
 
 
 def test_a_heavy_start_and_a_second_gear_are_named():
-    config = parse(f"{HEAVY_MACHINE}[sizing]\n")
-    assert [*sizing._needs(made("a"), config)] == []
-    (relay,) = sizing._needs(made("a", start_class=20), config)
+    trials = MotorTrials(parse(f"{HEAVY_MACHINE}[sizing]\n"), SimpleNamespace())
+    assert [*sizing._needs(made("a"), trials)] == []
+    (relay,) = sizing._needs(made("a", start_class=20), trials)
     assert relay == "The start takes an overload relay of class 20; one of class 10 may trip in it."
-    (relay,) = sizing._needs(made("a", start_class=HEAVIER), config)
+    (relay,) = sizing._needs(made("a", start_class=HEAVIER), trials)
     assert "heavier than class 30" in relay
-    (gear,) = sizing._needs(made("a", unit=None), config)
+    (gear,) = sizing._needs(made("a", unit=None), trials)
     assert gear.endswith("takes two gear units: a three-stage helical gear ends at about 250.")
     # a ratio that the file gives takes two only beyond all that makers have in one unit, and the reason is told
-    given = parse(f"{HEAVY_MACHINE}[sizing]\n[gear]\nratio = 400\n")
+    given = dataclasses.replace(trials, config=parse(f"{HEAVY_MACHINE}[sizing]\n[gear]\nratio = 400\n"))
     (gear,) = sizing._needs(made("a", unit=gear_unit("helical", 400.0, is_given=True)), given)
     assert gear.endswith("a three-stage helical gear even of makers with large ratios ends at about 350.")
     assert [*sizing._needs(made("a", unit=gear_unit("helical", 300.0, is_given=True)), given)] == []
@@ -378,24 +384,24 @@ def test_a_heavy_start_and_a_second_gear_are_named():
 
 
 def sized(name, tmp_path, monkeypatch, *designations, more="", **demands):
-    """The result of sizing for an example, with `more` lines, and with these motors alone."""
+    """The study of an example, and the result of sizing for it, with `more` lines, and with these motors alone."""
     motors = [m for m in catalogue() if m.designation in designations]
     monkeypatch.setattr(sizing, "catalogue", lambda extra: motors)
     text = (EXAMPLES / f"{name}.toml").read_text("utf-8")
     config = parse(f"{text}\n{more}", str(EXAMPLES / f"{name}.toml"))
-    config = dataclasses.replace(config, sizing=dataclasses.replace(config.sizing, **demands))
-    return sizing.size(config, tmp_path, lambda *said: None)
+    config = demanding(config, **demands)
+    return config, sizing.size(config, tmp_path, lambda *said: None)
 
 
-def check_order(first, name, tmp_path, monkeypatch, *motors):
+def check_order(config, first, name, tmp_path, monkeypatch, *motors):
     """A study with the gear that is ordered chooses the same motor, ratio and flywheel, and so it does with a gear
     that the start takes nearly wholly."""
     best = first.chosen_candidate
-    start = max(each.gear_torque for each in starts_from_all(Rig(first.config, best.drive, None), 3.0))
-    order = ordered_torque(max(best.duty.torque, start / START_FACTOR), 0.1)
+    start = max(each.gear_torque for each in starts_from_all(Rig(config, best.drive, None), 3.0))
+    order = ordered_torque(max(best.trial.duty.torque, start / START_FACTOR), 0.1)
     for torque in (order, 0.92 * order):
         more = f"[gear]\ntorque_limit = {torque}\n"
-        result = sized(name, tmp_path, monkeypatch, *motors, more=more, candidates=float(len(motors)))
+        _, result = sized(name, tmp_path, monkeypatch, *motors, more=more, candidates=float(len(motors)))
         again = result.chosen_candidate
         assert again is not None and again.keeps_margin
         assert (again.motor, again.drive.ratio) == (best.motor, best.drive.ratio)
@@ -409,14 +415,14 @@ def test_the_heavy_mill_gets_the_motor_without_a_flywheel(tmp_path, monkeypatch)
     """It got 0.55 kW with 2 poles, a ratio of 199, a flywheel of 200 rotors, and a start of 7.3 s; with the gear that
     was ordered for 0.75 kW it got that again."""
     motors = "IE3 2-pole 0.55 kW, 71M", "IE3 4-pole 0.75 kW, 80M"
-    result = sized("heavy_mill", tmp_path, monkeypatch, *motors, candidates=2.0)
+    config, result = sized("heavy_mill", tmp_path, monkeypatch, *motors, candidates=2.0)
     best, small = result.candidates
     assert result.chosen_candidate is best and best.motor.designation == "IE3 4-pole 0.75 kW, 80M"
     assert best.drive.flywheel == 0.0 and best.checks["start"].value < 0.2
     assert (best.drive.ratio, best.series) == (100.0, "R20")
     assert best.use <= 0.9
     # its start is that from the worst angle, which takes longer than that from 0 deg
-    starts = starts_from_all(Rig(result.config, best.drive, None), 2.0)
+    starts = starts_from_all(Rig(config, best.drive, None), 2.0)
     slowest = max(start.start_time for start in starts)
     assert best.worst_start and best.checks["start"].value == pytest.approx(slowest, rel=0.02)
     # the smaller one fits, too, and the result has the trade
@@ -426,13 +432,13 @@ def test_the_heavy_mill_gets_the_motor_without_a_flywheel(tmp_path, monkeypatch)
     numbers = result.as_dict()["candidates"][1]["flywheel"]
     mass, diameter = numbers["mass"]["value"], numbers["diameter"]["value"]
     assert mass * diameter**2 / 8.0 == pytest.approx(numbers["J"]["value"])
-    check_order(result, "heavy_mill", tmp_path, monkeypatch, *motors)
+    check_order(config, result, "heavy_mill", tmp_path, monkeypatch, *motors)
 
 
 def test_the_beam_pump_gets_four_poles_and_one_gear(tmp_path, monkeypatch):
     """It got 2 poles and a ratio of 369, and again with the gear that was ordered."""
     motors = "IE3 2-pole 11 kW, 160M", "IE3 4-pole 11 kW, 160M", "IE3 6-pole 11 kW, 160L"
-    result = sized("beam_pump", tmp_path, monkeypatch, *motors, candidates=3.0)
+    config, result = sized("beam_pump", tmp_path, monkeypatch, *motors, candidates=3.0)
     assert [c.motor.nameplate.poles for c in result.candidates] == [4.0, 6.0, 2.0]
     best, six, two = result.candidates
     assert (best.drive.ratio, best.unit.title) == (185.0, "three-stage helical gear")
@@ -440,12 +446,12 @@ def test_the_beam_pump_gets_four_poles_and_one_gear(tmp_path, monkeypatch):
     assert (six.criterion, two.criterion) == (Criterion.POLES, Criterion.GEAR)
     assert all(c.fits for c in result.candidates) and result.trade is None
     # the start of the chosen one is that from the worst of the crank angles
-    starts = starts_from_all(Rig(result.config, best.drive, None), 3.0)
+    starts = starts_from_all(Rig(config, best.drive, None), 3.0)
     slowest = max(start.start_time for start in starts)
     assert best.worst_start and not six.worst_start
     assert best.checks["start"].value == pytest.approx(slowest, rel=0.02)
-    assert best.start_class == max(start.start_class for start in starts)
-    check_order(result, "beam_pump", tmp_path, monkeypatch, *motors)
+    assert best.trial.start_class == max(start.start_class for start in starts)
+    check_order(config, result, "beam_pump", tmp_path, monkeypatch, *motors)
 
 
 def test_a_gear_that_the_start_alone_breaks_asks_for_a_soft_start(tmp_path, monkeypatch):
@@ -453,18 +459,18 @@ def test_a_gear_that_the_start_alone_breaks_asks_for_a_soft_start(tmp_path, monk
     start is the softest, with two gear units; where that fits, a note names the better one."""
     motors = "IE3 2-pole 11 kW, 160M", "IE3 4-pole 11 kW, 160M"
     gear = "[gear]\ntorque_limit = {}\n"
-    result = sized("beam_pump", tmp_path, monkeypatch, *motors, more=gear.format(20e3))
+    _, result = sized("beam_pump", tmp_path, monkeypatch, *motors, more=gear.format(20e3))
     best = result.best
     assert result.chosen_candidate is None and best.motor.designation == motors[1] and best.breaks_gear
     assert best.violation > result.candidates[1].violation > 1.0
     # the soft start, computed by itself
     text = (EXAMPLES / "beam_pump.toml").read_text("utf-8")
     config = parse(f'start = "soft"\n{text}', str(EXAMPLES / "beam_pump.toml"))
-    drive = sizing.proposal(config, best.motor, result.duty).drive
+    drive = MotorTrials(config, result.duty).candidate(best.motor).drive
     hardest = max(each.gear_torque for each in starts_from_all(Rig(config, drive, None), 3.0))
     words = f'with start = "soft" it fits, and puts {number(hardest, "N.m")} on the gear in a start'
     assert words in result.answer
-    result = sized("beam_pump", tmp_path, monkeypatch, *motors, more=gear.format(25e3))
+    _, result = sized("beam_pump", tmp_path, monkeypatch, *motors, more=gear.format(25e3))
     assert result.chosen_candidate.motor.designation == motors[0]
     (note,) = (each for each in result.notes if "would be preferred" in each)
     assert note.startswith(motors[1]) and words in note
@@ -477,27 +483,27 @@ def test_an_inverter_takes_the_next_ratio_before_a_larger_motor(tmp_path, monkey
     )
     file = EXAMPLES / "beam_pump.toml"
     config = parse(f'start = "inverter"\n{file.read_text("utf-8")}', str(file))
-    config = dataclasses.replace(config, sizing=dataclasses.replace(config.sizing, candidates=2.0))
+    config = demanding(config, candidates=2.0)
     result = sizing.size(config, tmp_path, lambda *said: None)
     best = result.best
     assert result.chosen_candidate is best and best.motor.designation == "IE3 4-pole 11 kW, 160M"
     assert (best.drive.ratio, best.series) == (185.0, "R80") and best.use <= 0.9
-    bare = sizing.proposal(config, best.motor, duty_of(config, tmp_path, None))
-    sizing.judge(config, bare, result.duty, None)
+    bare = MotorTrials(config, duty_of(config, tmp_path, None)).candidate(best.motor)
+    MotorTrials(config, result.duty).judged(bare)
     assert bare.drive.ratio == 180.0 and misses_by_a_hair(bare) and 0.9 < bare.sizes["rms_torque"] < 0.95
     # the inverter: boost, current, and no class of a relay
     rated = best.motor.nameplate.rated_current
-    assert best.start_class is None and best.drive.parameters.inverter.boost == 0.05
-    assert best.inverter_current == pytest.approx(max(rated, best.start_current / 1.5))
-    assert "inverter_current" not in best.checks and 0.0 < best.overload_time < 60.0
+    assert best.trial.start_class is None and best.drive.parameters.inverter.boost == 0.05
+    assert best.trial.inverter_current == pytest.approx(max(rated, best.trial.start_current / 1.5))
+    assert "inverter_current" not in best.checks and 0.0 < best.trial.overload_time < 60.0
     w = best.drive.ratio * config.run.crank_speed
-    assert best.speed == pytest.approx(w, rel=0.03) and not best.weakened
+    assert best.trial.speed == pytest.approx(w, rel=0.03) and not best.weakened
     # the frequency is that of the speed asked for, and the compensation of the slip of the mean torque
-    assert w / math.pi < best.frequency < (w / math.pi) * 1.03
+    assert w / math.pi < best.trial.frequency < (w / math.pi) * 1.03
     notes = " ".join(result.notes)
     assert "needs a voltage boost of 5 %" in notes and "electronic motor protection" in notes
-    assert number(best.inverter_current, "A") in notes and "relay of" not in notes
-    chosen = as_chosen(config, best.drive)
+    assert number(best.trial.inverter_current, "A") in notes and "relay of" not in notes
+    chosen = as_chosen(config, Choice(best.drive, proposal=result.proposal(config)))
     assert chosen.gear.efficiency == pytest.approx(0.98**3) and chosen.starter.inverter.boost == 0.05
 
 
@@ -506,18 +512,18 @@ PUMP_MOTORS = "IE3 4-pole 11 kW, 160M", "IE3 4-pole 15 kW, 160L"
 
 def test_the_least_boost_with_which_it_starts_is_taken():
     """5 %, then 10 and 15; a boost that the file gives is kept."""
-    config, c = proposed("[sizing]\n", start="inverter")
+    _, c = proposed("[sizing]\n", start="inverter")
 
     def judged(needed):
         def judge(each):
             value = 1.0 if each.drive.parameters.inverter.boost >= needed else None
-            each.checks = {"start": Check("time to start", value, 2.0, "s")}
+            each.trial = TrialResult({"start": Check("time to start", value, 2.0, "s")})
             return each
 
         return judge
 
     for needed, taken in ((0.0, 0.05), (0.08, 0.10), (0.12, 0.15), (0.3, 0.05)):
-        best = least_boost(config, c, judged(needed))
+        best = least_boost(c, judged(needed), False)
         assert best.drive.parameters.inverter.boost == taken and best.starts is (needed < 0.2)
     # a run that fails with a higher boost hides neither the first trial nor the boost behind it
 
@@ -525,35 +531,35 @@ def test_the_least_boost_with_which_it_starts_is_taken():
         def judge(each):
             each = judged(needed)(each)
             if each.drive.parameters.inverter.boost == 0.10:
-                each.checks, each.reason = {}, "its run failed: no step"
+                each.trial, each.reason = TrialResult(), "its run failed: no step"
             return each
 
         return judge
 
-    assert least_boost(config, c, failing(0.12)).drive.parameters.inverter.boost == 0.15
-    first = least_boost(config, c, failing(0.3))
+    assert least_boost(c, failing(0.12), False).drive.parameters.inverter.boost == 0.15
+    first = least_boost(c, failing(0.3), False)
     assert first.drive.parameters.inverter.boost == 0.05 and first.checks
-    (boost, _) = inverter_needs(least_boost(config, c, judged(0.12)), config)
+    (boost, _) = inverter_needs(least_boost(c, judged(0.12), False), 1.5, False)
     assert boost.startswith("The inverter needs a voltage boost of 15 % ") and "with less" in boost
     given, c = proposed("[starter.inverter]\nboost = 0.08\n[sizing]\n", start="inverter")
-    assert least_boost(given, c, judged(0.3)).drive.parameters.inverter.boost == 0.08
+    is_given = MotorTrials(given, SimpleNamespace()).has_given_boost
+    assert is_given and least_boost(c, judged(0.3), is_given).drive.parameters.inverter.boost == 0.08
 
 
 def test_a_motor_that_fails_from_the_worst_angle_makes_room_for_the_next(monkeypatch):
     """The search goes on behind it, up to a motor that starts from every angle."""
     motors = [m for m in catalogue() if m.nameplate.poles == 4.0][:5]
 
-    def judge(config, c, duty, files, *, worst_start=False):
+    def judged(self, c, *, worst_start=False):
         time = 5.0 if worst_start and c.power < motors[2].nameplate.power else 1.0
-        c.worst_start, c.checks = worst_start, {"start": Check("time to start", time, 2.0, "s")}
+        c.worst_start, c.trial = worst_start, TrialResult({"start": Check("time to start", time, 2.0, "s")})
+        return c
 
-    monkeypatch.setattr(sizing, "judge", judge)
-    monkeypatch.setattr(
-        sizing, "with_flywheel", lambda config, c, duty, files: judge(config, c, duty, files) or c
-    )
+    monkeypatch.setattr(MotorTrials, "judged", judged)
+    monkeypatch.setattr(MotorTrials, "with_flywheel", judged)
     config, _ = proposed("[sizing]\ncandidates = 1\n")
     duty = SimpleNamespace(normal=SimpleNamespace(crank_torque=np.full(10, 60.0)))
-    best, *others = sizing._search(config, motors, duty, Path(), lambda *said: None, None)
+    best, *others = sizing._search(MotorTrials(config, duty), motors, lambda *said: None)
     assert best.motor is motors[2] and best.fits and best.worst_start
     assert sorted(c.power for c in others) == [m.nameplate.power for m in motors[:2]] and not any(
         c.fits for c in others
@@ -564,7 +570,7 @@ def test_a_motor_that_fails_from_the_worst_angle_makes_room_for_the_next(monkeyp
 def test_the_next_motor_without_a_flywheel_is_sought_beyond_the_candidates(tmp_path, monkeypatch):
     """With `larger` = 1 the smallest motor is chosen, with its flywheel; beside it stands the one that needs none."""
     four = [m.designation for m in catalogue() if m.nameplate.poles == 4.0][:6]
-    result = sized("heavy_mill", tmp_path, monkeypatch, *four, candidates=1.0, larger=1.0)
+    _, result = sized("heavy_mill", tmp_path, monkeypatch, *four, candidates=1.0, larger=1.0)
     small, large = result.trade
     assert small is result.chosen_candidate and small.motor.nameplate.power == 550.0
     assert large.motor.nameplate.power == 750.0 and large.criterion is Criterion.LARGER
@@ -622,7 +628,7 @@ def test_a_motor_that_stalls_without_a_flywheel_is_told_so(tmp_path, monkeypatch
     (c,) = result.candidates
     assert result.chosen_candidate is None
     bare = dataclasses.replace(c, drive=dataclasses.replace(c.drive, flywheel=0.0))
-    sizing.judge(parse(PRESS, str(EXAMPLES / "linkages" / "press.toml")), bare, result.duty, None)
+    MotorTrials(parse(PRESS, str(EXAMPLES / "linkages" / "press.toml")), result.duty).judged(bare)
     rank(alone := [bare], 2.0)
     assert "without a flywheel it stalls at 2" in alone[0].reason and "deg" in alone[0].reason
     assert c.reason.endswith("and no flywheel that sizing.inertia_ratio = 2 permits carries it through")
@@ -631,7 +637,7 @@ def test_a_motor_that_stalls_without_a_flywheel_is_told_so(tmp_path, monkeypatch
     # the ram meets the workpiece 10 mm above its lower dead centre, on the way down
     turn = result.duty.normal
     hard = turn.angle[np.abs(turn.crank_torque) > 0.5 * result.duty.numbers.torque_peak]
-    assert hard[0] - 0.2 < bare.stall_angle < hard[-1]
+    assert hard[0] - 0.2 < bare.trial.stall_angle < hard[-1]
 
 
 def test_a_candidate_that_leaves_no_margin_is_told_apart():
@@ -648,35 +654,36 @@ def test_the_next_motor_without_a_flywheel_is_found_below_a_gear_that_the_larges
     motors = [m for m in catalogue() if m.nameplate.poles == 4.0][:9]
     tried = []
 
-    def bare(config, motor, duty):
+    def bare(self, motor):
         return made(motor.designation, motor.nameplate.power)
 
-    def judge(config, c, duty, files):
+    def judged(self, c, **options):
         tried.append(c.power)
         load, hard = (Check("", used, 1.0, "1") for used in (1800.0 / c.power, c.power / 4000.0))
-        c.checks = {"rms_torque": load, "gear_start": hard}
+        c.trial = TrialResult({"rms_torque": load, "gear_start": hard})
+        return c
 
-    monkeypatch.setattr(sizing, "proposal", bare)
-    monkeypatch.setattr(sizing, "least_boost", lambda config, c, judged: judged(c))
-    monkeypatch.setattr(sizing, "judge", judge)
+    monkeypatch.setattr(MotorTrials, "candidate", bare)
+    monkeypatch.setattr(MotorTrials, "with_least_boost", judged)
     small = made("small", 550.0, flywheel=0.5)
-    found = sizing._without_flywheel(config, motors, [small], SimpleNamespace(), None)
+    found = sizing._without_flywheel(MotorTrials(config, SimpleNamespace()), motors, [small])
     assert found.power == 2200.0 and len(tried) <= 4
 
 
 def test_the_next_motor_without_a_flywheel_gets_its_boost(monkeypatch):
     """A larger motor that starts with a boost of 10 % alone counted as one that does not start."""
     config, small = proposed("[sizing]\nlarger = 1\n", start="inverter")
-    small.checks = {"start": Check("time to start", 1.0, 2.0, "s")}
+    small.trial = TrialResult({"start": Check("time to start", 1.0, 2.0, "s")})
     small.drive = dataclasses.replace(small.drive, flywheel=0.5)
     motors = [m for m in catalogue() if m.nameplate.poles == small.motor.nameplate.poles][:6]
 
-    def judge(config, c, duty, files):
+    def judged(self, c, **options):
         starts = c.drive.parameters.inverter.boost >= 0.1
-        c.checks = {"start": Check("time to start", 1.0 if starts else None, 2.0, "s")}
+        c.trial = TrialResult({"start": Check("time to start", 1.0 if starts else None, 2.0, "s")})
+        return c
 
-    monkeypatch.setattr(sizing, "judge", judge)
+    monkeypatch.setattr(MotorTrials, "judged", judged)
     duty = SimpleNamespace(normal=SimpleNamespace(crank_torque=np.full(10, 60.0)))
-    found = sizing._without_flywheel(config, motors, [small], duty, None)
+    found = sizing._without_flywheel(MotorTrials(config, duty), motors, [small])
     larger = [m for m in motors if m.nameplate.power > small.power]
     assert found.motor is larger[0] and found.drive.parameters.inverter.boost == 0.1

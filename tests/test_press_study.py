@@ -15,6 +15,8 @@ import numpy as np
 import pytest
 from reports import page_of, pictures
 
+from chainunit.capabilities.sizing.coupling import effects
+from chainunit.capabilities.sizing.protection import CouplingEffect, spares
 from chainunit.reading.text import DEFAULT_UNITS
 from chainunit.report import load_figures, page_figures, study_motion
 from chainunit.report import study as study_report
@@ -22,8 +24,6 @@ from chainunit.report.figure import Between, Curve
 from chainunit.report.linkage_loads import loads_on_slides
 from chainunit.report.study_motion import machine_state
 from chainunit.study import config
-from chainunit.study.event_torques import effects
-from chainunit.study.protection import CouplingEffect, spares
 from chainunit.study.readings import crank_motion, crank_torque
 from chainunit.study.run import run_study
 

@@ -12,6 +12,19 @@ from event_tables import HEAVY_MACHINE, event_line
 from reports import said_of
 from scipy.integrate import solve_ivp
 
+from chainunit.capabilities.sizing import alternatives as coupling_alternatives
+from chainunit.capabilities.sizing import search as sizing
+from chainunit.capabilities.sizing.alternatives import (
+    _before_flywheel,
+    _in_time,
+    _rocker_until,
+    on_motor_side,
+    slip_run,
+)
+from chainunit.capabilities.sizing.coupling import effects, recommended_setting
+from chainunit.capabilities.sizing.coupling_words import coupling_sentence, way_words
+from chainunit.capabilities.sizing.page import _best, _starter
+from chainunit.capabilities.sizing.protection import CouplingEffect, Obstacle, Setting, Way
 from chainunit.core.engines import MATH
 from chainunit.core.errors import InputError
 from chainunit.drives.induction_motor import InductionMotor, steady
@@ -20,26 +33,15 @@ from chainunit.drives.slip_clutch import SlipClutch
 from chainunit.machines.chain_unit import SIDES
 from chainunit.reading.text import entry
 from chainunit.report import blocks, terminal
-from chainunit.report.sizing import _best, _starter
-from chainunit.study import config, coupling_alternatives, run, sizing
+from chainunit.study import config, run
 from chainunit.study.analyses import all_analyses
 from chainunit.study.analysis import Analysis, Work
 from chainunit.study.bearings import hardest_run, mean_load
-from chainunit.study.coupling import coupling_sentence, recommended_setting, way_words
-from chainunit.study.coupling_alternatives import (
-    _before_flywheel,
-    _in_time,
-    _rocker_until,
-    on_motor_side,
-    slip_run,
-)
 from chainunit.study.drive import Drive
 from chainunit.study.drive_fmus import coasting_model, coasting_parameters
-from chainunit.study.event_torques import effects
 from chainunit.study.gear_loss import GearAnalysis
 from chainunit.study.judgement import motor_verdict
-from chainunit.study.measures import read_answers
-from chainunit.study.protection import CouplingEffect, Obstacle, Setting, Way, stall
+from chainunit.study.measures import read_answers, stall
 from chainunit.study.readings import crank_torque, largest_torque, pull_out_torque
 from chainunit.study.relay import CLASSES, MULTIPLE, relay_trip, start_class
 from chainunit.study.result import as_dict
@@ -51,6 +53,20 @@ from chainunit.study.starts import StartAnalysis
 from chainunit.study.transients import follow
 from chainunit.study.window import Phase
 from chainunit.system import ModelComponent, System, monolithic
+
+
+def sizing_of(study):
+    return study.findings["sizing"]
+
+
+def having(study, **changes):
+    """The study with another setting, or other ways to a coupling."""
+    own = dataclasses.replace(sizing_of(study), **changes)
+    return dataclasses.replace(study, findings=study.findings | {"sizing": own})
+
+
+def sentence(study):
+    return coupling_sentence(study, sizing_of(study).setting, sizing_of(study).alternatives)
 
 
 def test_a_relay_of_class_10_trips_when_its_class_says():
@@ -274,31 +290,31 @@ def on_line(tmp_path_factory):
 
 def test_a_drive_whose_start_is_harder_than_its_shocks_has_no_coupling(on_line):
     """The study says so, with the numbers, and gives ways to one that can be bought."""
-    setting = on_line.setting
+    setting = sizing_of(on_line).setting
     hardest = max(start.coupling_torque for start in on_line.findings["starts"].starts)
     assert setting.obstacle is Obstacle.START and setting.start == pytest.approx(hardest, rel=1e-3)
     # the rows of the start-up are two milliseconds apart and miss some of the peak
     assert 0.9 * hardest < largest(on_line, "start_up") < 1.001 * hardest
     assert setting.least > max(setting.overloads.values()) > setting.least_in_running
-    words = coupling_sentence(on_line)
+    words = sentence(on_line)
     assert words.startswith("No safety coupling protects this drive as it starts now: ")
     assert "held" not in words and not on_line.insufficient
     # all feed on the right is normal duty, and its torque the larger
-    assert setting.running > 1.15 * max(on_line.sizing.duty.numbers.torque_peak, 208.0)
-    ways = {each.way: each for each in on_line.alternatives}
+    assert setting.running > 1.15 * max(sizing_of(on_line).duty.numbers.torque_peak, 208.0)
+    ways = {each.way: each for each in sizing_of(on_line).alternatives}
     assert set(ways) == {Way.SOFT_STARTER, Way.INVERTER, Way.SLIP_CLUTCH, Way.HIGHER}
-    assert not ways[Way.HIGHER].opens and "protects nothing" in way_words(on_line, ways[Way.HIGHER])
+    assert not ways[Way.HIGHER].opens and "protects nothing" in way_words(on_line, ways[Way.HIGHER], setting)
     assert all(each.numbers.setting and each.opens for way, each in ways.items() if way is not Way.HIGHER)
     entries = as_dict(on_line)["sizing"]["protection"]
     assert entries["trip_torque"]["value"] is None and entries["obstacle"] == "the start"
     assert [each["words"] for each in entries["alternatives"]] == [
-        way_words(on_line, each) for each in on_line.alternatives
+        way_words(on_line, each, setting) for each in sizing_of(on_line).alternatives
     ]
     said = said_of(on_line)
     assert "No safety coupling protects this drive as it starts now" in said
     assert "With a soft starter" in said and "slip clutch" in said
     # what has to be ordered, with the reason where nothing is
-    plate, gear = on_line.sizing.best.motor.nameplate, as_dict(on_line)["sizing"]["gear"]
+    plate, gear = sizing_of(on_line).best.motor.nameplate, as_dict(on_line)["sizing"]["gear"]
     start = on_line.findings["starts"].worst.gear_torque
     assert gear["rated_torque"]["value"] == pytest.approx(start / 2.0 / 0.9, rel=0.01)
     assert gear["rated_torque"]["value"] >= max(gear["running"]["value"], start / 2.0) / 0.9
@@ -314,13 +330,13 @@ def test_a_drive_whose_start_is_harder_than_its_shocks_has_no_coupling(on_line):
     own = dataclasses.replace(
         on_line,
         config=dataclasses.replace(on_line.config, gear=quick, given=given),
-        findings={"starts": gentle},
+        findings=on_line.findings | {"starts": gentle},
     )
     ordered = as_dict(own)["sizing"]["gear"]
     assert ordered["rated_torque"]["value"] == pytest.approx(block / 0.9, rel=0.01)
     assert ordered["decided_by"].startswith("an overload (the rocker is blocked)")
     spared = {"blocked": CouplingEffect(block, 500.0), "jam_left": CouplingEffect(420.0, 410.0)}
-    own.setting = Setting(280.0, 0.0, 3000.0, 900.0, setting.overloads, effects=spared)
+    own = having(own, setting=Setting(280.0, 0.0, 3000.0, 900.0, setting.overloads, effects=spared))
     ordered = as_dict(own)["sizing"]["gear"]
     assert ordered["overload"]["value"] < 0.6 * block
     assert f"{plate.torque:.2f} N m" in said and "no safety coupling (a start puts 1" in said
@@ -331,7 +347,7 @@ def test_a_drive_whose_start_is_harder_than_its_shocks_has_no_coupling(on_line):
 def test_a_starter_that_is_recommended_holds_in_a_study_of_its_own(on_line, way, tmp_path):
     """With starter and setting as the sentence gives them the coupling stays shut in the start and in running, and
     opens in just the overloads that are named."""
-    (each,) = [each for each in on_line.alternatives if each.way is way]
+    (each,) = [each for each in sizing_of(on_line).alternatives if each.way is way]
     numbers = each.numbers
     start = (
         f'start = "soft"\n{{}}[starter]\nsoft_start = {{{{ voltage = {numbers.voltage}, time = {numbers.ramp} }}}}\n'
@@ -352,10 +368,10 @@ def test_a_starter_that_is_recommended_holds_in_a_study_of_its_own(on_line, way,
         peak, size = trial.answers[name].crank_torque_peak, effect.with_coupling
         assert 0.98 * size < peak < 1.02 * size + late * (size - numbers.setting)
         assert f"{size:.0f} N m at the output of the gear in place of {effect.without:.0f} N m" in way_words(
-            on_line, each
+            on_line, each, sizing_of(on_line).setting
         )
     assert list(each.effects) == list(each.opens)
-    shocks = set(on_line.setting.overloads)
+    shocks = set(sizing_of(on_line).setting.overloads)
     opened = {n for n, a in trial.answers.items() if a.coupling_trip_time is not None} & shocks
     assert opened == set(each.opens) and opened
     assert largest(trial, "start_up") <= 1.001 * max(numbers.start, numbers.running) < numbers.setting
@@ -375,11 +391,13 @@ def test_an_inverter_as_a_way_is_tried_with_more_boost(on_line, monkeypatch):
     monkeypatch.setattr(coupling_alternatives, "_gentlest", gentlest)
     monkeypatch.setattr(coupling_alternatives, "_runs", lambda study, rig, of: (1.0, {}))
     rig = Rig(on_line.config, on_line.drive, None)
-    found = coupling_alternatives._inverter(on_line, rig, on_line.setting)
+    found = coupling_alternatives._inverter(on_line, rig, sizing_of(on_line).setting)
     assert tried == [({0.05}, 5), ({0.10}, 5), ({0.15}, 5)] and found.numbers.boost == 0.15
     given = dataclasses.replace(on_line.config, given=on_line.config.given | {"starter.inverter.boost"})
     tried.clear()
-    none = coupling_alternatives._inverter(dataclasses.replace(on_line, config=given), rig, on_line.setting)
+    none = coupling_alternatives._inverter(
+        dataclasses.replace(on_line, config=given), rig, sizing_of(on_line).setting
+    )
     assert tried == [({0.05}, 5)] and none.numbers.start is None
 
 
@@ -397,34 +415,35 @@ def test_a_recommendation_rests_on_right_runs_alone(on_line):
     ordered = as_dict(without("blocked"))["sizing"]["gear"]["decided_by"]
     assert ordered.endswith("; left out, as the energy balance is not kept: the rocker is blocked")
     assert _rocker_until(on_line, right) < _rocker_until(on_line, kept)
-    assert set(kept.overloads) == set(on_line.setting.overloads) - {"blocked"} and kept.wrong == ["blocked"]
+    assert set(kept.overloads) == set(sizing_of(on_line).setting.overloads) - {"blocked"} and kept.wrong == [
+        "blocked"
+    ]
     for name in ("start_up", "feed_right"):
-        study = without(name)
-        study.setting = recommended_setting(study)
+        study = having(without(name), setting=recommended_setting(without(name)))
         assert "left out" not in as_dict(study)["sizing"]["gear"]["decided_by"]
-        assert study.setting.obstacle is Obstacle.ENERGY and not study.setting.overloads
-        assert "the energy balance is not kept in" in coupling_sentence(study)
+        assert sizing_of(study).setting.obstacle is Obstacle.ENERGY and not sizing_of(study).setting.overloads
+        assert "the energy balance is not kept in" in sentence(study)
 
 
 def test_the_sentence_on_a_coupling_names_both_shafts_and_its_effect(on_line):
     """It is withdrawn where it saves nothing; where it leaves more than the gear may carry, it says how much more."""
-    shocks, ratio = on_line.setting.overloads, on_line.drive.ratio
+    shocks, ratio = sizing_of(on_line).setting.overloads, on_line.drive.ratio
     own = Setting(280.0, 0.0, 3000.0, 900.0, shocks)
     spared, late = (
         dataclasses.replace(own, effects={"blocked": CouplingEffect(1324.0, peak)})
         for peak in (700.0, 1300.0)
     )
-    words = coupling_sentence(dataclasses.replace(on_line, setting=spared))
+    words = sentence(having(on_line, setting=spared))
     assert f"350 N m at the crank, {350.0 / ratio:.2f} N m at the motor's shaft" in words
     assert (
         "It opens where the rocker is blocked (700 N m at the output of the gear in place of 1324 N m)"
         in words
     )
-    study = dataclasses.replace(on_line, setting=late)
-    assert "opens too late" in coupling_sentence(study) and "That saves nothing." in coupling_sentence(study)
+    study = having(on_line, setting=late)
+    assert "opens too late" in sentence(study) and "That saves nothing." in sentence(study)
     assert as_dict(study)["sizing"]["protection"]["why_none"] == "it opens too late"
     over = dataclasses.replace(own, effects={"blocked": CouplingEffect(1324.0, 1100.0, 900.0, 0.002)})
-    words = coupling_sentence(dataclasses.replace(on_line, setting=over, alternatives=()))
+    words = sentence(having(on_line, setting=over, alternatives=()))
     assert words.startswith("Recommended safety coupling")
     assert (
         "too late to keep below the 900 N m" in words
@@ -447,7 +466,7 @@ def test_a_coupling_before_the_flywheel_carries_each_start_and_one_sided_feed(on
     drive = dataclasses.replace(on_line.drive, flywheel=2.0 * on_line.drive.parameters.rotor.J)
     study = dataclasses.replace(on_line, config=dataclasses.replace(on_line.config, events={}))
     rig = Rig(study.config, drive, None)
-    way = _before_flywheel(study, rig, on_line.setting)
+    way = _before_flywheel(study, rig, sizing_of(on_line).setting)
     hardest = max(on_line.findings["starts"].starts, key=lambda start: start.coupling_torque)
     with from_angle(rig, hardest.angle).from_rest() as simulation:
         run = simulation.run(1.0, 1e-3)
@@ -466,7 +485,7 @@ def test_a_coupling_before_the_flywheel_carries_each_start_and_one_sided_feed(on
 
 def test_a_coupling_that_starts_open_ends_the_study(on_line, tmp_path, monkeypatch):
     """The message names the torque of the start, and no coupling is held shut."""
-    coupling = f"[coupling]\ntrip_torque = {on_line.setting.least_in_running}\n"
+    coupling = f"[coupling]\ntrip_torque = {sizing_of(on_line).setting.least_in_running}\n"
     study = ran(heavy() + coupling, tmp_path, monkeypatch)
     message = str(study.failure)
     assert "opens in the start-up" in message and "held" not in message
@@ -478,17 +497,17 @@ def test_a_coupling_that_starts_open_ends_the_study(on_line, tmp_path, monkeypat
 def test_a_higher_setting_and_a_dip_that_opens_it(on_line, tmp_path, monkeypatch):
     """A given coupling is judged and no other recommended: it opens where its setting is passed; a dip of the voltage
     that opens it is a nuisance. The stiffer stops of the assumption run without it."""
-    peaks = on_line.setting.overloads
+    peaks = sizing_of(on_line).setting.overloads
     trip = 0.95 * min(peaks.values())
     text = f'start = "soft"\n{heavy(*SIX)}[starter]\nsoft_start = {{ voltage = 0.3, time = 5 }}\n'
     trials = ran(f"{text}[coupling]\ntrip_torque = {trip}\n", tmp_path, monkeypatch)
     assert trials.failure is None
     opened = {n for n, a in trials.answers.items() if a.coupling_trip_time is not None}
-    assert opened == {*peaks, "dip"} and on_line.setting.disturbances["dip"] > trip
+    assert opened == {*peaks, "dip"} and sizing_of(on_line).setting.disturbances["dip"] > trip
     (nuisance,) = [warning for warning in trials.warnings if warning.kind == "nuisance trip"]
     assert "nuisance trip that protects nothing: the voltage dips." in nuisance.text
     assert nuisance.runs == ("dip",)
-    assert trials.setting is None and set(as_dict(trials)["sizing"]["protection"]) == {
+    assert sizing_of(trials).setting is None and set(as_dict(trials)["sizing"]["protection"]) == {
         "relay_current",
         "relay_class",
         "device",
@@ -516,7 +535,7 @@ def test_the_torque_through_a_coupling_by_hand(on_line):
 
 def test_a_slip_clutch_slips_for_as_long_as_two_shafts_apart(on_line):
     """While it slips it passes its setting on: motor and machine run as if each had this torque alone."""
-    (clutch,) = [each for each in on_line.alternatives if each.way is Way.SLIP_CLUTCH]
+    (clutch,) = [each for each in sizing_of(on_line).alternatives if each.way is Way.SLIP_CLUTCH]
     drive, capacity = on_line.drive, clutch.numbers.setting / on_line.drive.ratio
     starts = on_line.findings["starts"].starts
     angle = max(starts, key=lambda start: start.start_time).angle * drive.ratio
@@ -539,7 +558,7 @@ def test_a_slip_clutch_slips_for_as_long_as_two_shafts_apart(on_line):
 
 def test_the_energy_of_a_start_with_a_slip_clutch(on_line):
     """The motor's energy is the heat of the slip, and the energy that the machine stores and loses."""
-    setting = on_line.setting.least_in_running
+    setting = sizing_of(on_line).setting.least_in_running
     rig = Rig(on_line.config, on_line.drive, None)
     slowest = max(on_line.findings["starts"].starts, key=lambda start: start.start_time)
     run = slip_run(rig, slowest, setting)
@@ -549,7 +568,7 @@ def test_the_energy_of_a_start_with_a_slip_clutch(on_line):
     lost = np.trapezoid(run["machine.dissipated_power"].values, time)
     machine = float(stored[-1] - stored[0]) + lost
     assert float(run["motor.load_energy"][-1]) == pytest.approx(heat + machine, rel=1e-3)
-    (clutch,) = [each for each in on_line.alternatives if each.way is Way.SLIP_CLUTCH]
+    (clutch,) = [each for each in sizing_of(on_line).alternatives if each.way is Way.SLIP_CLUTCH]
     assert clutch.numbers.slip_energy == pytest.approx(heat, rel=1e-6)
     power = run["clutch.dissipated_power"].values
     slips = np.trapezoid((power > 0.01 * np.max(power)).astype(float), time)
@@ -580,7 +599,7 @@ def test_a_slip_clutch_by_hand():
 
 def test_without_a_shock_no_coupling_is_recommended(tmp_path, monkeypatch):
     study = ran(heavy("feed_left", "feed_right"), tmp_path, monkeypatch)
-    assert study.setting.obstacle is Obstacle.OVERLOADS
+    assert sizing_of(study).setting.obstacle is Obstacle.OVERLOADS
     numbers = as_dict(study)["sizing"]["protection"]
     assert numbers["trip_torque"]["value"] is None and numbers["coupling"].startswith("No safety coupling")
 
@@ -591,15 +610,17 @@ def test_one_sided_feed_and_a_loaded_soft_start_are_normal_duty(tmp_path, monkey
     text = 'start = "soft"\n' + heavy("feed_right", "start_loaded_left", "jam_right")
     study = ran(text + "[gear]\ntorque_limit = 450\n", tmp_path, monkeypatch)
     assert study.failure is None and not study.insufficient
-    result = study.setting
+    result = sizing_of(study).setting
     assert set(result.overloads) == {"jam_right"} and not result.disturbances
-    assert study.alternatives == ()
+    assert sizing_of(study).alternatives == ()
     start = float(abs(study.runs["start_loaded_left"]["motor.tau"]).max()) * study.drive.ratio
     hardest = max(each.coupling_torque for each in study.findings["starts"].starts)
-    assert result.normal == pytest.approx(max(start, hardest, study.sizing.best.duty.torque), rel=1e-3)
+    assert result.normal == pytest.approx(
+        max(start, hardest, sizing_of(study).best.trial.duty.torque), rel=1e-3
+    )
     fed = float(abs(study.runs["feed_right"]["motor.tau"]).max()) * study.drive.ratio
-    assert study.sizing.best.duty.torque == pytest.approx(fed, rel=0.01)
-    assert study.sizing.best.duty.run == "all_feed_on_the_right"
+    assert sizing_of(study).best.trial.duty.torque == pytest.approx(fed, rel=0.01)
+    assert sizing_of(study).best.trial.duty.run == "all_feed_on_the_right"
     (warning,) = [warning for warning in study.warnings if warning.kind == "gear passed"]
     assert "the gear's permitted 450 N m" in warning.text and study.title_of("jam_right") in warning.text
     assert warning.runs == ("jam_right",) and warning.quantities["passed"][:2] == (450.0, "N.m")
@@ -684,7 +705,7 @@ def test_the_order_names_the_starter():
 
 def test_an_insufficient_motor_gets_no_advice(tmp_path, monkeypatch):
     study = ran(heavy("jam_left") + "[gear]\ntorque_limit = 250\n", tmp_path, monkeypatch)
-    assert study.insufficient and study.setting is None
+    assert study.insufficient and sizing_of(study).setting is None
     assert as_dict(study)["sizing"]["protection"] == {}
     text = said_of(study)
     assert "Insufficient motor:" in text and "relay at" not in text
@@ -810,5 +831,5 @@ def test_the_coming_of_the_feed_belongs_to_the_start_of_a_coupling(tmp_path, mon
     )
     first = largest(sized, "start_up", end=sized.started.rig.fed_from)
     fed = largest(sized, "start_up", sized.started.rig.fed_from, sized.steady_begin)
-    assert sized.failure is None and sized.setting.least_in_running < min(first, fed)
-    assert sized.setting.start >= max(first, fed)
+    assert sized.failure is None and sizing_of(sized).setting.least_in_running < min(first, fed)
+    assert sizing_of(sized).setting.start >= max(first, fed)

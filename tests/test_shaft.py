@@ -277,8 +277,8 @@ def test_without_a_motor_that_fits_the_shaft_is_that_of_the_nearest(tmp_path):
     sizing = "[sizing]\ncandidates = 1\ninertia_ratio = 1e-6\npoles_least = 2\npoles_most = 2\n"
     text = f"event = []\n{LINE}{sizing}[run]\nstep = 0.002\n"
     study = run_study(config.parse(text), tmp_path)
-    assert study.sizing.chosen_candidate is None and study.insufficient
-    assert study.drive.ratio == study.sizing.best.drive.ratio
+    assert study.findings["sizing"].chosen_candidate is None and study.insufficient
+    assert study.drive.ratio == study.findings["sizing"].best.drive.ratio
     assert (
         set(as_dict(study)["shaft"]) == {"start_up", *study.answers}
         and "steady" in shaft_findings(study).answers

@@ -11,10 +11,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
-from event_tables import HEAVY_MACHINE, event_line
+from event_tables import HEAVY_MACHINE, demanding, event_line
 from systems import component
 from typer.testing import CliRunner
 
+from chainunit.capabilities.sizing import motor_trials
+from chainunit.capabilities.sizing import search as sizing
+from chainunit.capabilities.sizing.candidate import Criterion, Standing, TrialResult
+from chainunit.capabilities.sizing.duty import duty_of, rms
+from chainunit.capabilities.sizing.motor_trials import MotorTrials, torque_evening_inertia
+from chainunit.capabilities.sizing.trial import Trial, permitted_starts, try_motor
 from chainunit.core.engines import MATH
 from chainunit.core.errors import InputError, InterruptedRunError
 from chainunit.drives.catalogue import catalogue
@@ -23,18 +29,13 @@ from chainunit.drives.induction_motor import InductionMotor, breakdown, steady
 from chainunit.drives.motor import T_RATED
 from chainunit.fmu.backends import export
 from chainunit.machines.chain_unit import Feed, SideLoads
-from chainunit.study import sizing
-from chainunit.study.candidate import Criterion, Standing
-from chainunit.study.catalogue_drive import check_ratios
 from chainunit.study.config import parse
 from chainunit.study.cycle import cycle, energy_swing, needed_inertia
 from chainunit.study.drive import Drive
 from chainunit.study.drive_fmus import export_drive, with_files
-from chainunit.study.duty import duty_of, rms
 from chainunit.study.limits import Check
 from chainunit.study.measures import time_to_start
 from chainunit.study.rig import Rig
-from chainunit.study.trial import Trial, permitted_starts, try_motor
 from chainunit.system import CompiledSimulation, CoSimulation, Profile, System
 
 ANGLE = np.linspace(0.0, 2.0 * math.pi, 7200, endpoint=False)
@@ -160,22 +161,22 @@ def wheel_of(monkeypatch, wanted, inertia, sizes):
     their limits with a flywheel; there are 0.25 kg m2 on the shaft, and `inertia` at the crank."""
     trials = []
 
-    def judge(config, candidate, duty, files):
+    def judged(self, candidate):
         trials.append(candidate.drive.flywheel)
-        candidate.checks = {
-            name: Check(name, used, 1.0, "1") for name, used in sizes(candidate.drive.flywheel).items()
-        }
+        used = sizes(candidate.drive.flywheel)
+        candidate.trial = TrialResult({name: Check(name, share, 1.0, "1") for name, share in used.items()})
+        return candidate
 
-    monkeypatch.setattr(sizing, "judge", judge)
+    monkeypatch.setattr(MotorTrials, "judged", judged)
     # of the mean alone, so that the range follows from the speed
     numbers = SimpleNamespace(
         inertia_wanted=wanted, inertia_mean=inertia, torque_mean=1.0, torque_rms=1.0, torque_peak=1.0
     )
     numbers.torque_peak_one_sided = None
     plate = SimpleNamespace(torque=10.0, synchronous=105.0, speed=100.0)
-    bare = sizing.Candidate(SimpleNamespace(nameplate=plate), Wheeled(), {})
+    bare = sizing.Candidate(SimpleNamespace(nameplate=plate), Wheeled())
     config = SimpleNamespace(run=SimpleNamespace(crank_speed=2.0), start="direct")
-    return sizing.with_flywheel(config, bare, SimpleNamespace(numbers=numbers), {}), trials
+    return MotorTrials(config, SimpleNamespace(numbers=numbers)).with_flywheel(bare), trials
 
 
 def test_the_inertia_that_evens_the_torque():
@@ -188,7 +189,7 @@ def test_the_inertia_that_evens_the_torque():
     motor = SimpleNamespace(nameplate=plate)
 
     def inertia(**checks):
-        return sizing.torque_evening_inertia(sizing.Candidate(motor, Wheeled(), checks), numbers, 2.0)
+        return torque_evening_inertia(sizing.Candidate(motor, Wheeled(), TrialResult(checks)), numbers, 2.0)
 
     J = inertia(rms_torque=Check("", 8.0, 7.0, "N.m"))
     assert 32.0 / (1.0 + (2.0 * J / 2.0) ** 2) == pytest.approx(13.0)
@@ -280,14 +281,14 @@ def test_peaks_are_of_both_sides(sized, tmp_path):
         loaded = simulation.run(6.0 + 2.0 * math.pi / config.run.crank_speed, config.run.step)
     peak = float(np.max(np.abs(loaded["motor.air_gap_tau"])))
     assert best.checks["peak_torque"].value == pytest.approx(peak, rel=0.01)
-    assert best.duty.torque > 1.1 * peaks["left"]
+    assert best.trial.duty.torque > 1.1 * peaks["left"]
 
 
 @pytest.mark.parametrize(("series", "tolerance"), [("exact", 0.01), ("preferred", 0.03)])
 def test_the_crank_turns_as_asked(sized, tmp_path, series, tolerance):
     """With the exact ratio; with a preferred one nearly."""
     config = parse(f'{HEAVY}ratio_series = "{series}"\n')
-    drive = sizing.proposal(config, sized.chosen_candidate.motor, sized.duty).drive
+    drive = MotorTrials(config, sized.duty).candidate(sized.chosen_candidate.motor).drive
     files, _ = export_drive(drive, tmp_path)
     with Rig(config, drive, files).from_rest() as simulation:
         simulation.run(8.0, 1e-3)
@@ -297,7 +298,7 @@ def test_the_crank_turns_as_asked(sized, tmp_path, series, tolerance):
 
 def one_candidate(more, **asked):
     config = parse(HEAVY + more)
-    return dataclasses.replace(config, sizing=dataclasses.replace(config.sizing, candidates=1.0, **asked))
+    return demanding(config, candidates=1.0, **asked)
 
 
 def test_a_fixed_ratio_is_kept_and_must_give_the_speed(tmp_path, monkeypatch):
@@ -377,7 +378,7 @@ def test_a_limit_of_the_inertia_ratio_is_for_who_asks_for_it(tmp_path, monkeypat
     asked = found("inertia_ratio = 5\n").best
     assert asked.checks["inertia"].limit == 5.0
     # nor for an inverter: the limit is a rule for servo drives
-    assert parse('start = "inverter"\n' + HEAVY).sizing.inertia_ratio == math.inf
+    assert parse('start = "inverter"\n' + HEAVY).plans["sizing"].demands.inertia_ratio == math.inf
 
 
 def test_poles_that_no_motor_has_are_refused(tmp_path):
@@ -397,7 +398,8 @@ def test_ratios_with_which_no_motor_keeps_the_speed_are_refused_before_any_run(t
     with pytest.raises(InputError, match=r"about 50 \(4 poles\) is needed, the nearest on offer is 7;"):
         sizing.size(parse(slow), tmp_path, report)
     for more in ('start = "inverter"\n' + slow, slow + "[gear]\nratio = 62\n", slow.replace("7]", "52]")):
-        check_ratios(parse(more), catalogue())
+        with pytest.raises(AssertionError, match="the machine at constant speed"):
+            sizing.size(parse(more), tmp_path, report)
 
 
 def test_without_a_fit_the_study_goes_on_with_the_nearest(tmp_path, monkeypatch):
@@ -475,8 +477,8 @@ def test_above_the_corner_an_inverter_has_less_torque(tmp_path, monkeypatch):
     config = dataclasses.replace(config, run=dataclasses.replace(config.run, ramp=3.0))
     outcome = sizing.size(config, tmp_path, lambda *said: None)
     (c,) = outcome.candidates
-    at_50_hz = float(breakdown(c.drive.parameters, T=config.sizing.temperature).air_gap_tau)
-    breakdown_torque = c.checks["peak_torque"].limit * config.sizing.breakdown_margin
+    at_50_hz = float(breakdown(c.drive.parameters, T=config.plans["sizing"].demands.temperature).air_gap_tau)
+    breakdown_torque = c.checks["peak_torque"].limit * config.plans["sizing"].demands.breakdown_margin
     assert 0.15 * at_50_hz < breakdown_torque < 0.4 * at_50_hz
     rated = c.motor.nameplate.torque
     assert c.checks["rms_torque"].limit == pytest.approx(0.5 * rated, rel=0.1)
@@ -487,9 +489,9 @@ def test_above_the_corner_an_inverter_has_less_torque(tmp_path, monkeypatch):
     lighter = dataclasses.replace(
         c, drive=dataclasses.replace(c.drive, flywheel=(1.0 - step) * c.drive.flywheel)
     )
-    sizing.judge(config, lighter, outcome.duty, None)
+    MotorTrials(config, outcome.duty).judged(lighter)
     assert lighter.sizes["peak_torque"] > 0.9
-    monkeypatch.setattr(sizing, "torque_evening_inertia", lambda *of: 0.0)
+    monkeypatch.setattr(motor_trials, "torque_evening_inertia", lambda *of: 0.0)
     (light,) = sizing.size(config, tmp_path, lambda *said: None).candidates
     assert light.verdict is Standing.INSUFFICIENT and "peak torque" in light.reason
     assert light.drive.flywheel < 0.1 * c.drive.flywheel
@@ -499,7 +501,7 @@ def test_the_peak_torque_is_that_of_the_feed_that_moves_too(tmp_path, monkeypatc
     """A motor that breaks down while the feed moves to one side stalls there."""
     config = one_candidate("", fluctuation=0.9)
     duty = duty_of(config, tmp_path, None)
-    c = sizing.proposal(config, small(1)[0], duty)
+    c = MotorTrials(config, duty).candidate(small(1)[0])
     trial = try_motor(config, c.motor, c.drive, duty, None)
     assert len(trial.shifts) >= 2
     longest = max(trial.shifts, key=lambda shift: np.max(np.abs(shift[1]["motor.air_gap_tau"].values)))[1]

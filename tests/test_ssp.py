@@ -22,10 +22,11 @@ from systems import component, pair
 
 from chainunit import InputError, RunError
 from chainunit.app import cli
+from chainunit.capabilities.sizing import search as sizing
 from chainunit.core.errors import WriteError
 from chainunit.drives.catalogue import catalogue
 from chainunit.models import MODELS
-from chainunit.study import config, sizing
+from chainunit.study import config
 from chainunit.study.choice import choose
 from chainunit.study.package import export_study, start_of
 from chainunit.system import CoSimulation, System, fmu_component, shaft_joints, ssp

@@ -12,14 +12,15 @@ import pytest
 from typer.testing import CliRunner
 
 from chainunit.app import cli
+from chainunit.capabilities.sizing import search as sizing
+from chainunit.capabilities.sizing.candidate import Candidate, TrialResult
+from chainunit.capabilities.sizing.preference import rank
 from chainunit.machines.api import machine_of
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.reading.results import as_data
-from chainunit.study import config, sizing
-from chainunit.study.candidate import Candidate
+from chainunit.study import config
 from chainunit.study.cycle import cycle
 from chainunit.study.limits import Check
-from chainunit.study.preference import rank
 from chainunit.study.ram_force import rams
 from chainunit.study.readings import crank_angle
 from chainunit.study.rig import Rig
@@ -106,8 +107,8 @@ def test_no_start_is_permitted_where_running_alone_is_too_hot():
     drive = SimpleNamespace(flywheel=0.0, ratio=50.0)
     hot = Check("rise of temperature", 100.0, 80.0, "K", "difference")
     lost = Check("time to start", None, 10.0, "s")
-    first = Candidate(motor, drive, {"start": lost, "starts": none})
-    second = Candidate(motor, drive, {"temperature": hot, "starts": none})
+    first = Candidate(motor, drive, TrialResult({"start": lost, "starts": none}))
+    second = Candidate(motor, drive, TrialResult({"temperature": hot, "starts": none}))
     candidates = [first, second]
     rank(candidates, larger=2.0)
     assert candidates[0] is second and second.reason.endswith(words) and "1000" not in second.reason

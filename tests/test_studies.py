@@ -117,7 +117,7 @@ def test_verdict_warnings_and_notes_are_texts(result, monkeypatch):
     assert "The model of the organs does not hold" in result.verdict
     assert result.warnings == [each["text"] for each in numbers["warnings"]] and len(result.warnings) >= 2
     assert any("Friction is smoothed" in note for note in result.notes)
-    monkeypatch.setattr(StudyRecord, "insufficient", True)
+    monkeypatch.setattr(StudyRecord, "insufficient", "All runs are with one which is insufficient.")
     assert result.verdict.endswith("which is insufficient.")
 
 

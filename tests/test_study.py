@@ -7,6 +7,7 @@ import math
 import re
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -728,8 +729,9 @@ def test_feed_forward_of_chains_is_told_by_chains(tmp_path, monkeypatch):
     from chainunit.study import config
     from chainunit.study.drive import Drive
     from chainunit.study.run import run_study
+    from chainunit.system import ModelComponent
 
-    monkeypatch.setattr("chainunit.study.run._chains", lambda *_: None)
+    monkeypatch.setattr("chainunit.capabilities.chains.analysis.ChainAnalysis.find", lambda *_: None)
     text = """
 organ = "chain"
 feed_forward = true
@@ -741,10 +743,12 @@ crank_speed = 3
 ramp = 1
 settle_turns = 2
 """
-    whole, ripples = Drive.load_model, []
+    whole, ripples = Drive.graph.func, []
 
-    def bars(drive, machine=None):
-        return (machine.model, machine.p) if machine else whole(drive)
+    def bars(drive):
+        system, machine = whole(drive), drive.machine
+        model = {"model": ModelComponent(machine.model, machine.p)}
+        return replace(system, components={**system.components, **model})
 
     for name in ("chains", "bars"):
         study = run_study(config.parse(text), tmp_path / name)
@@ -753,5 +757,5 @@ settle_turns = 2
         kinds = {part: c.model.name for part, c in study.drive.graph.components.items()}
         model = "ChainUnitFlexible" if name == "chains" else "ChamberForces"
         assert (kinds["machine"], kinds["model"]) == ("ChainUnitFlexible", model)
-        monkeypatch.setattr(Drive, "load_model", bars)
+        monkeypatch.setattr(Drive, "graph", property(bars))
     assert ripples[0] < 0.4 * ripples[1] < 0.2 * study.findings["ripple_without_feed_forward"].ripple

@@ -85,7 +85,7 @@ def test_the_coupling_opens_at_the_instant_at_which_its_torque_is_reached(studie
 @pytest.mark.slow
 def test_chains_and_a_line(tmp_path, monkeypatch):
     """A chain asks for events of its own; the twin with a rigid shaft runs in the same way."""
-    monkeypatch.setattr("chainunit.study.run._chains", lambda *_: None)
+    monkeypatch.setattr("chainunit.capabilities.chains.analysis.ChainAnalysis.find", lambda *_: None)
     text = """
 simulation = "me"
 organ = "chain"

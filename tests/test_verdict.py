@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from chainunit.capabilities.chains.judgement import chains
 from chainunit.reading.results import as_data
 from chainunit.study.pulls import LeastPull
 from chainunit.study.verdict import (
@@ -15,7 +16,6 @@ from chainunit.study.verdict import (
     RESIDUAL,
     ROCKER_GOOD,
     ROCKER_GOOD_EMPTY,
-    chains,
     outsider,
     rigid_links,
     two_bars,
@@ -36,7 +36,7 @@ CALLED = {"steady": "steady running", "jam_left": "a lump jams"}
 
 
 def bars(speed=1.0, mode=5.0, slack=4.5, pulls=PULLED, residuals=KEPT, **more):
-    return two_bars(speed, mode, slack, pulls, residuals, **more)
+    return two_bars(speed, mode, slack, pulls, residuals, finer='take organ = "chain"', **more)
 
 
 def below(x):
@@ -71,8 +71,8 @@ def test_a_rod_of_which_only_an_end_is_pushed_is_no_slack_rod():
     verdict = bars(pulls={"steady": heavy, "jam_left": heavy})
     assert verdict.holds == "in part" and verdict.caveat is None
     assert verdict.text.endswith("; an end of a bar is pushed, where a chain sags, in steady running, too.")
-    (line,) = verdict.details(CALLED)
-    assert line == (
+    ((topic, line),) = verdict.details(CALLED)
+    assert topic == "end pushed" and line == (
         "Bars that are pushed at an end, though pulled in the mean: a chain sags there, which changes the force in "
         "that pin and hardly the torques: steady running (web end pull at B -341 N); a lump jams (web end "
         "pull at B -341 N)."
@@ -88,10 +88,11 @@ def test_a_pull_below_zero_in_the_start_up_is_told_by_name():
     started = PULLED | {"start_up": least(-1304.0, -433.0)}
     verdict = bars(pulls=started)
     assert verdict.holds == "in part" and "would go slack and snatch, in the start-up; take" in verdict.text
-    assert verdict.details(CALLED | {"start_up": "start-up"}) == [
+    words = (
         "Bars that are pushed, where a chain would go slack and snatch: start-up (web mean pull "
         "-1304 N, wall mean pull -433 N)."
-    ]
+    )
+    assert verdict.details(CALLED | {"start_up": "start-up"}) == [("pushed", words)]
     both = bars(pulls=started | {"jam_left": least(-1.0, 1.0)})
     assert ", in the start-up and in overloads; " in both.text
 
@@ -100,11 +101,11 @@ def test_the_speed_is_the_one_that_the_crank_has():
     """Judged at the larger one that is asked for, which is named as such."""
     slow = bars(30.0, 50.0, 4.58, actual=1.57)
     assert "two bars, the crank at 1.57 rad/s, judged at the 30.0 rad/s asked for; " in slow.text
-    assert slow.details(CALLED)[0] == ("A web goes slack from a crank speed of 4.58 rad/s on.")
+    assert slow.details(CALLED)[0] == ("slack speed", "A web goes slack from a crank speed of 4.58 rad/s on.")
     data = as_data(slow)
     assert (data["speed"]["value"], data["reached"]["value"]) == (30.0, 1.57)
     assert "asked" not in bars(3.0, actual=2.999).text
-    rest = bars(1.57, 50.0, 0.0).details(CALLED)[0]
+    _, rest = bars(1.57, 50.0, 0.0).details(CALLED)[0]
     assert rest == "A web is slack at rest already."
 
 
@@ -202,11 +203,12 @@ def test_words_and_data():
         'resonates; take organ = "chain".'
     )
     # once, with all runs, webs and walls
-    assert verdict.details(CALLED | {"feed_left": "feed to left"}) == [
+    topics, lines = zip(*verdict.details(CALLED | {"feed_left": "feed to left"}), strict=True)
+    assert topics == ("pushed", "rocker torque") and lines == (
         "Bars that are pushed, where a chain would go slack and snatch: feed to left (web mean pull -44.3 N, "
         "wall mean pull -26.2 N); a lump jams (wall mean pull -995 N).",
         "The rocker torque of two bars is good to 10 % only up to a crank speed of 2.00 rad/s.",
-    ]
+    )
     data = as_data(verdict)
     assert data["holds"] == "in part" and data["speed"] == {"value": 3.0, "unit": "rad/s", "kind": "speed"}
     assert data["reasons"][2] == {

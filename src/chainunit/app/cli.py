@@ -118,24 +118,6 @@ def study(
     carry_out(TASK, question, output, check=check, backend=backend and backend.value, scheduler=scheduler)
 
 
-@app.command()
-def compare(
-    first: Annotated[Path, typer.Argument(help="Folder of a study, or its result.json.")],
-    second: Annotated[Path, typer.Argument(help="Folder of the other study, or its result.json.")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the comparison.")] = Path(
-        "comparison"
-    ),
-) -> None:
-    """Show two results side by side: the given values that differ, and every measure of each run of both.
-
-    Writes report.html, comparison.json and comparison.md into the output folder.
-    """
-    from ..report.comparison import TASK
-    from ..study.comparison import read_result
-
-    carry_out(TASK, (read_result(first), read_result(second)), output)
-
-
 for module in modules("command"):
     app.command()(module.COMMAND)
 app.command(cls=ExportCommand)(export)

@@ -32,7 +32,7 @@ from ..study.config import Config
 from ..study.foreign_machine import ForeignMachine
 from ..study.measures import Answers, measures_of
 from ..study.parts import over_example, parts_of
-from ..study.record import INSUFFICIENT, StudyRecord
+from ..study.record import StudyRecord
 from ..study.result import as_dict
 from ..study.window import Phase
 from ..work.progress import Report as Progress
@@ -210,7 +210,7 @@ class Study:
         config = self.config
         with shown_in(config.units):
             speed = number(config.run.crank_speed, "rad/s", "speed")
-        motor = "a motor that sizing chooses" if config.sizing else config.choices["system.motor"]
+        motor = "a motor that sizing chooses" if config.chooses_motor else config.choices["system.motor"]
         changes = f" with {self._changed}" if self._changes else ""
         return (
             f"<Study {config.title or self._source!r}{changes}: {config.choices['system.machine']} with {motor}, "
@@ -281,13 +281,11 @@ class StudyResult(ReportedResult[Config, StudyRecord]):
 
     @property
     def verdict(self) -> str:
-        """The verdicts, a line each: on the model, on the motor, and, where it found no motor that fits, on
-        the sizing."""
+        """The verdicts, a line each: on the model, on the motor, and, where no motor fits, on
+        the choice of the drive."""
         verdicts = self._numbers["verdict"].values()
         lines = [verdict["text"] for verdict in verdicts if verdict is not None]
-        if self.record.insufficient:
-            lines.append(INSUFFICIENT)
-        return "\n".join(lines)
+        return "\n".join([*lines, self.record.insufficient]).rstrip()
 
     @property
     def warnings(self) -> list[str]:

@@ -8,6 +8,8 @@ from importlib.resources import files
 from typing import Any
 
 NAMES = (
+    "chains",
+    "sizing",
     "sides",
     "blade",
     "random_overloads",
@@ -17,6 +19,7 @@ NAMES = (
     "identification",
     "watch",
     "sweep",
+    "comparison",
 )
 """The folders of the capabilities, in the order in which their tables, results and sections come."""
 

@@ -13,9 +13,10 @@ import numpy as np
 from ..core.engines import MATH, numpy_
 from ..core.errors import GeometryError
 from ..core.ports import PortSlopes
-from ..core.quantities import Quantity, Variable
+from ..core.quantities import Layout, Quantity, Variable
 from ..mechanism.models import InverseMachine
 from . import chain_unit
+from .chain_organs import USUAL, OrganLaw
 from .chain_unit import (
     RODS,
     SIDES,
@@ -29,7 +30,7 @@ from .chain_unit import (
     SideLoads,
 )
 from .crank_rocker import rocker_extremes
-from .flexible import ChainedModel
+from .flexible import ChainedModel, flexible
 from .hanging import Hanging, Modes, modes, rods, split
 from .machine import Machine, admit
 from .parts import Stop
@@ -361,6 +362,12 @@ def ratios(rho: float, lam: float, mu: float, zeta: float, l: float, l1: float) 
 class ChainedUnit(Machine):
     """A chain unit with chains. Its outputs depend on its states, so that its results come from runs of its model."""
 
+    @property
+    def rods(self) -> tuple[int, int]:
+        """Numbers of rods in wall and web of an organ."""
+        assert issubclass(self.model, ChainedModel)
+        return self.model.organs.walls, self.model.organs.webs
+
     def pin_turns(self, run: Mapping[str, Any]) -> dict[str, Any]:
         """See `Machine`; the angles in A2, B and A1 of each side come from the angles of the rods."""
         assert issubclass(self.model, ChainedModel)
@@ -376,6 +383,39 @@ class ChainedUnit(Machine):
     def stored_per_unit(self) -> Mapping[str, Callable[[Mapping[str, Any]], Any]]:
         """See `Machine`: the material of both organs, distributed over their chains."""
         return {f"{side}.material_mass": itemgetter(f"{side}.energy_per_kg") for side in SIDES}
+
+
+class ChainUnitOfChains(ChainUnitMachine):
+    """A chain unit in whose runs each organ is a chain of `number` rods with a `law` of their pins. Its results
+    without a run are those of two bars."""
+
+    in_place = "two bars in place of the chains"
+
+    def __init__(
+        self,
+        parameters: Parameters | Mapping[str, float] | None = None,
+        /,
+        *,
+        law: OrganLaw | None = None,
+        number: int = USUAL,
+        **options: Any,
+    ) -> None:
+        super().__init__(parameters, **options)
+        law = law or OrganLaw()
+        self._law = {f"organ.{name}": getattr(law, name) for name in Layout(OrganLaw).names}
+        self._number = number
+
+    @property
+    def simulated(self) -> ChainedUnit:
+        """See `Machine`.
+
+        Raises
+        ------
+        GeometryError
+            for chains without mass.
+        """
+        rods = split((self.p.l1, self.p.l2), self._number)
+        return ChainedUnit(flexible(*rods), self.by_name | self._law)
 
 
 def machine_of(model: type[InverseMachine], parameters: Any = None, /, **values: float) -> Machine:

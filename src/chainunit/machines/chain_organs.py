@@ -31,8 +31,8 @@ _CLOSED = 1e-6
 _ANY_FOLD = 1e6
 """Angle beyond any fold [rad]."""
 _NO_PULL = 1e-6  # N, range of the pull in which a rod changes from taut to slack
-LEAST, MOST = 2, 24
-"""Least and largest number of rods of an organ."""
+LEAST, USUAL, MOST = 2, 8, 24
+"""Least, usual and largest number of rods of an organ."""
 
 
 @declaration

@@ -65,6 +65,7 @@ class ChainedModel(LinkageModel):
     """A model of the chain unit with chains. Its internal integrator controls the error to `tolerance`."""
 
     organs: ClassVar[Organs]
+    never_repeats: ClassVar[str] = "chains do not repeat a turn"
     controlled = True
 
     def __init_subclass__(cls) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
@@ -50,6 +50,9 @@ class Machine:
     3.41
     """
 
+    in_place: ClassVar[str] = ""
+    """Words on what the results without a run are of, where the runs have another model; else empty."""
+
     def __init__(self, model: type[InverseMachine], parameters: Any = None, /, **values: float) -> None:
         base = parameters if isinstance(parameters, model.Parameters) else model.Parameters()
         by_name = {} if isinstance(parameters, model.Parameters) else dict(parameters or {})
@@ -81,6 +84,11 @@ class Machine:
     def ratio(self) -> float:
         """Motor turns per crank turn."""
         return float(self.p.ratio)
+
+    @property
+    def simulated(self) -> Machine:
+        """The machine as its runs have it: this one, or one with another model."""
+        return self
 
     @property
     def by_name(self) -> dict[str, float]:

@@ -108,6 +108,8 @@ class MachineModel(Model):
     side have the same name."""
     cuts: ClassVar[bool] = False
     """Whether its outputs have a `blade`, and its parameters a `stack` that the blade cuts."""
+    never_repeats: ClassVar[str] = ""
+    """The reason, in words, why no turn of its runs is like the one before; empty where steady turns are alike."""
 
 
 class InverseMachine(LinkageModel, MachineModel):

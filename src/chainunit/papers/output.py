@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from types import ModuleType
 
 from .. import __version__
+from ..reading.results import as_data
 from ..reading.text import DEFAULT_UNITS
 from ..report.blocks import Column, Report, Section, Table, TableRow, Text
 from ..report.markdown import block_lines
@@ -76,7 +77,7 @@ def report(rows: Sequence[PaperNumber]) -> Report:
     return Report(
         "The papers, reproduced and corrected",
         "Every number that the papers print, beside the computed one",
-        {"chainunit": __version__, "rows": [row.as_dict() for row in rows]},
+        {"chainunit": __version__, "rows": as_data(rows)},
         (),
         (*sections, Section("count", "Count", (Text((count,)),))),
     )

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 
+from ..reading.results import GIVEN, derived, part, result
 from ..reading.tables import packaged, toml
 
 PICK: dict[str, Callable[[Any], Any]] = {"least": np.min, "largest": np.max, "mean": np.mean}
 """By the word in the table, the function that takes one number of many."""
 
 
-@dataclass(frozen=True)
+@result
 class PaperNumber:
     """A number of a paper.
 
@@ -24,33 +24,27 @@ class PaperNumber:
     number. `digits` are decimals; -1 shows only the order of magnitude.
     """
 
-    paper: str
-    item: str
-    where: str
-    quantity: str
-    printed: str | None
-    computed: float
-    unit: str
+    paper: str = part("number of the paper")
+    item: str = part("number of the finding in the list of errata")
+    where: str = part("place in the paper")
+    quantity: str = part("the quantity")
+    printed: str | None = part("the number of the paper")
+    computed: float = part("the computed number", unit=GIVEN)
+    unit: str = part("their unit")
     digits: int
     rebuilt: float | None
-    verdict: str
-    """``agrees``, ``corrected`` or ``not stated``"""
-    reason: str
+    verdict: str = part("agrees, corrected, or not stated")
+    reason: str = part("the reason of the verdict")
 
-    @property
+    @derived(name="shown")
     def text(self) -> str:
         """The computed value with `digits` decimals."""
         return _text(self.computed, self.digits)
 
-    @property
+    @derived(name="rebuilt")
     def rebuilt_text(self) -> str | None:
         """The rebuilt value with the same decimals."""
         return None if self.rebuilt is None else _text(self.rebuilt, self.digits)
-
-    def as_dict(self) -> dict[str, Any]:
-        """For reproduction.json."""
-        own = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "digits"}
-        return own | {"shown": self.text, "rebuilt": self.rebuilt_text}
 
 
 def rows(paper: str, functions: ModuleType) -> list[PaperNumber]:

@@ -21,6 +21,10 @@ OWN = "own"
 """Unit of a part whose unit and kind are the fields `unit` and `kind` of the same result; it may have no kind."""
 
 
+GIVEN = "given"
+"""Unit of a part that stands in the data as it is, such as a list of a study file."""
+
+
 class InUnit(NamedTuple):
     """A number, or an array, whose unit, kind and title are known only when it is computed."""
 
@@ -152,6 +156,8 @@ def _data(x: Any, unit: str, kind: str, titled: bool) -> Any:
         return entry(x.value, x.unit, x.kind) | ends
     if isinstance(x, Mapping):
         return {str(key): _data(each, unit, kind, titled) for key, each in x.items()}
+    if unit == GIVEN:
+        return list(x) if isinstance(x, tuple) else x
     if unit:
         return _number(x, unit, kind)
     if dataclasses.is_dataclass(x) and parts(type(x)):  # type: ignore[arg-type]
@@ -199,7 +205,7 @@ def documented(of: type, prefix: str = "") -> Iterator[tuple[str, str, str]]:
         own = prefix if each.inline else f"{prefix}{each.name}."
         name = f"{own.removesuffix('.')}{steps}".removeprefix(".")
         if inner is None or each.unit:
-            yield name, each.unit.replace(OWN, ""), each.description
+            yield name, "" if each.unit in (OWN, GIVEN) else each.unit, each.description
         else:
             yield from documented(inner, name and f"{name}.")
 

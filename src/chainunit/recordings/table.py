@@ -16,7 +16,7 @@ from ..reading.lists import Entry, leaves
 from ..reading.tables import instance
 from ..study.conditions import given
 from ..study.entry_values import filled_text
-from ..study.rules import CHAINS, MACHINE_FMU, MOTOR_FMU, Rule
+from ..study.rules import MACHINE_FMU, MOTOR_FMU, Rule, other_models
 from .measurands import MEASURANDS
 from .recording import Recording, read_signal
 
@@ -75,7 +75,7 @@ def recording_rules(table: str) -> Iterator[Rule]:
         (MOTOR_FMU, "motor is an FMU"),
         (given("sizing"), "motor is not known before it is chosen"),
         (given("driveline"), "driveline stands between motor and machine"),
-        (CHAINS, "organs are chains"),
+        *((other.on, other.words) for other in other_models()),
     ):
         yield Rule(
             table, condition, f"needs a motor and a machine of two-bar organs as models, and here the {words}"

@@ -12,6 +12,10 @@ from .capability import Contents, capabilities
 @cache
 def analysis_sections() -> Mapping[str, Contents]:
     """All of them, in the order in which a report has them."""
-    first = {"constant_speed": Contents("A turn at constant speed", turn.blocks, (turn.PICTURE,))}
     others = {name: each for part in capabilities() for name, each in part.contents().items()}
-    return {**first, **others, "starts": Contents("Starts", starts.blocks)}
+    return {
+        **{name: each for name, each in others.items() if each.comes_first},
+        "constant_speed": Contents("A turn at constant speed", turn.blocks, (turn.PICTURE,)),
+        **others,
+        "starts": Contents("Starts", starts.blocks),
+    }

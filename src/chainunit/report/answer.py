@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from ..study.measures import MEASURES
 from ..study.record import StudyRecord
 from . import blocks as b
-from . import chains, run_names, sizing
+from . import run_names
 from .capability import capabilities
 from .lines import Line, Strong, join, line
 from .runs import number
@@ -16,8 +16,9 @@ _HOLDS: dict[str, b.Severity] = {"true": "good", "in part": "partly", "false": "
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
-    """The drive that sizing chose, the verdicts, the cards and the warnings."""
-    yield from sizing.answer(s)
+    """The drive where it was chosen, the verdicts, the cards and the warnings."""
+    for part in capabilities():
+        yield from part.head(s, study)
     for of in ("model", "motor"):
         verdict = s.result["verdict"][of]
         if verdict is not None:
@@ -25,11 +26,8 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     if slips := s.result["slips"]:
         items = tuple(s.words(f"slips.{i}.said") for i in range(len(slips)))
         yield b.Judgement("remark", Strong("Is this what was meant?"), items=items)
-    nearest = s.result["sizing"].get("nearest") if "sizing" in s.result else None
-    if nearest is not None:
-        best = f"sizing.candidates.{nearest}"
-        rest = f" All runs are with {{{best}.motor}}, which is insufficient: {{{best}.reason}}."
-        yield b.Judgement("alarm", line(Strong("No motor of the catalogue fits."), s.line(rest)), form="long")
+    for part in capabilities():
+        yield from part.judgements(s, study)
     answers = s.result["answers"]
     if answers:
         reference = "steady" if "steady" in answers else next(iter(answers))
@@ -44,7 +42,8 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         yield b.Text("The study ended before any run could be evaluated.", "lead", "long")
     for part in capabilities():
         yield from part.answer(s, study)
-    warnings = [*(b.Judgement("warning", each) for each in s.lines("warnings")), *chains.speeds_to_avoid(s)]
+    warnings: list[b.Block] = [b.Judgement("warning", each) for each in s.lines("warnings")]
+    warnings += (each for part in capabilities() for each in part.warnings(s))
     yield from warnings
     if answers and not warnings:
         yield b.Text("No run gives cause for a warning.", "fine", "long")

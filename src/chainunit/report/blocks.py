@@ -21,7 +21,6 @@ Form = Literal["both", "short", "long"]
 Severity = Literal["good", "partly", "bad", "warning", "alarm", "remark"]
 Content: TypeAlias = "Number | Words | str"
 """The content of a given value: a number, words of the result, or the text of a switch or a list."""
-Origin = Literal["", "file", "example", "declared", "tuned", "catalogue", "sizing"]
 
 
 @dataclass(frozen=True)
@@ -125,7 +124,8 @@ class GivenValue:
     name: str
     description: str
     value: Content
-    origin: Origin = ""
+    origin: str = ""
+    """see `chainunit.study.record.StudyRecord.origin`; empty where it is not known"""
 
 
 @dataclass(frozen=True)
@@ -323,9 +323,9 @@ class Source:
                     value = self.number(f"{path}.{v.name}", as_given=True, none="none")
                     yield GivenValue(full, v.description, value, origin)
 
-    def origin(self, path: str) -> Origin:
+    def origin(self, path: str) -> str:
         """The origin of the given value at `path`; empty where the result has no origins."""
         if "origins" not in self.result:
             return ""
-        origin: Origin = self.result["origins"].get(path, "declared")
+        origin: str = self.result["origins"].get(path, "declared")
         return origin

@@ -17,11 +17,18 @@ from .supplement import Supplement
 
 @dataclass(frozen=True)
 class Contents:
-    """The contents of a section: its heading, its blocks (tables, text, figures), and the files of its figures."""
+    """The contents of a section: its heading, its blocks (tables, text, figures), the files of its figures, and its
+    place."""
 
     heading: str
     blocks: Callable[[Source, StudyRecord], Iterator[Block]]
     pictures: tuple[str, ...] = ()
+    analysis: str = ""
+    """name of its analysis, if the section has another name"""
+    comes_first: bool = False
+    """whether it stands before the turn at constant speed"""
+    leads: bool = False
+    """whether it stands before the section on the runs"""
 
 
 class AnyStudy(Protocol):
@@ -38,15 +45,27 @@ class Capability(StudyCapability):
     name ``CAPABILITY``."""
 
     def contents(self) -> Mapping[str, Contents]:
-        """The sections of a study's report on its findings, by the name of the analysis."""
+        """The sections of a study's report on its findings, by name: that of the analysis."""
         return {}
 
     def question(self, s: Source, study: StudyRecord) -> Line:
         """The sentence on it in the question of a study; empty where it asks for nothing."""
         return ()
 
+    def head(self, s: Source, study: StudyRecord) -> Iterator[Block]:
+        """Its blocks at the head of the answer of a study, before the verdicts on model and motor."""
+        return iter(())
+
+    def judgements(self, s: Source, study: StudyRecord) -> Iterator[Block]:
+        """Its judgements on a study, behind these verdicts."""
+        return iter(())
+
     def answer(self, s: Source, study: StudyRecord) -> Iterator[Block]:
         """Its blocks in the answer of a study."""
+        return iter(())
+
+    def warnings(self, s: Source) -> Iterator[Block]:
+        """Its warnings beside those of the study, to stand at the head of a report."""
         return iter(())
 
     def supplement(self, study: StudyRecord) -> Supplement | None:

@@ -42,8 +42,6 @@ _ORIGIN = {
     "example": "the example's",
     "tuned": "tuned to the machine",
     "catalogue": "from the row of the catalogue",
-    "sizing": "chosen by sizing",
-    "declared": "the declared start value",
 }
 
 
@@ -135,10 +133,16 @@ def _resource(name: str) -> str:
     return (resources.files(__package__) / name).read_text("utf-8")
 
 
+def _origin_words(origin: str) -> str:
+    """The origin of a given value in words; another origin than those of a study is the question that chose it."""
+    return _ORIGIN.get(origin, "the declared start value" if origin == "declared" else f"chosen by {origin}")
+
+
 def _marks(block: b.Given) -> str:
     """The legend of the marks that stand beside given values."""
     origins = {value.origin for _, values in block.sections for value in values} - {"", "file"}
-    words = (f"{origin[0]}: {words}" for origin, words in _ORIGIN.items() if origin in origins)
+    others = sorted(origins - _ORIGIN.keys(), key=lambda origin: origin == "declared")
+    words = (f"{o[0]}: {_origin_words(o)}" for o in (*_ORIGIN, *others) if o in origins)
     return f'<p class="hint marks">Not in the study file: {"; ".join(words)}.</p>' if origins else ""
 
 
@@ -316,7 +320,7 @@ class _Page:
         """A mark at a value that the study file does not give."""
         if value.origin in ("", "file"):
             return ""
-        return f'<abbr class="from" title="{escape(_ORIGIN[value.origin])}">{value.origin[0]}</abbr>'
+        return f'<abbr class="from" title="{escape(_origin_words(value.origin))}">{value.origin[0]}</abbr>'
 
     def _figure(self, figure: Figure) -> str:
         height = page_figures.height(figure)

@@ -14,7 +14,7 @@ from ..study.given import GivenSection, description, given_sections
 from ..study.record import StudyRecord
 from ..study.result import as_dict
 from ..study.transients import DIFFERENCE
-from . import answer, chains, figures, run_names, runs, shaft, sizing, wording
+from . import answer, figures, run_names, runs, shaft, wording
 from . import blocks as b
 from .analyses import analysis_sections
 from .capability import Contents, capabilities
@@ -34,7 +34,7 @@ def report(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Rep
         sections = [
             b.Section(name, each.heading, tuple(each.blocks(s, study)), beside=name == QUESTION)
             for name, each in _sections().items()
-            if name in study.findings or name not in analysis_sections()
+            if name not in analysis_sections() or (each.analysis or name) in study.findings
         ]
         return b.Report(
             study.config.title,
@@ -84,16 +84,16 @@ def _motion(study: StudyRecord) -> list[b.Block]:
 # -- the question
 
 
+_GIVEN_DRIVE = (
+    "What does the motor of {noun} have to give? It turns the crank through a gear of ratio {=machine.ratio}, in "
+    "normal running at {=run.crank_speed:4}."
+)
+
+
 def _question(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     # a linkage has its title in place of a noun
     noun = f"this {study.noun}" if study.noun[:1].islower() else f'the machine "{study.noun}"'
-    question = s.line(
-        "Which motor, gear and flywheel does {noun} need? Its crank turns at {=run.crank_speed:4}."
-        if "sizing" in s.result
-        else "What does the motor of {noun} have to give? It turns the crank through a gear of ratio "
-        "{=machine.ratio}, in normal running at {=run.crank_speed:4}.",
-        noun=noun,
-    )
+    question = s.line(_GIVEN_DRIVE if study.proposal is None else study.proposal.question, noun=noun)
     if study.answers:
         question += s.line(
             " The machine starts from rest{ramp} and is evaluated over {=run.turns} {turns} when steady.",
@@ -106,11 +106,11 @@ def _question(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     for part in capabilities():
         question = line(question, part.question(s, study))
     yield b.Text(question, form="long")
-    has_sizing, feed = "sizing" in s.result, study.config.feed
+    is_chosen, feed = study.proposal is not None, study.config.feed
     parts = {"machine": study.drive.machine.p, "run": study.config.run}
-    given_names = [("run", "crank_speed"), *([] if has_sizing else [("machine", "ratio")])]
+    given_names = [("run", "crank_speed"), *([] if is_chosen else [("machine", "ratio")])]
     rows = [
-        *([] if has_sizing else [b.TableRow(("motor", s.words("motor.title")))]),
+        *([] if is_chosen else [b.TableRow(("motor", s.words("motor.title")))]),
         *(row for of, name in given_names for row in s.rows(type(parts[of]), of, only=name, as_given=True)),
         *s.rows(type(feed), "feed", as_given=True),
     ]
@@ -124,9 +124,9 @@ def _question(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
 
 def _given(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """All given values of the study, by section."""
-    # a motor on the line follows no reference; a machine without sides has no one-sided feed
+    # a motor on the line follows no reference
     unused_names = [] if study.drive.follows else ["run.ramp"]
-    unused_names += [] if study.config.machine.model.sides else ["sizing.one_sided_share"]
+    unused_names += [name for part in capabilities() for name in part.unused_values(study.config)]
     yield b.Given(
         tuple((section.title, tuple(_values(s, section, unused_names))) for section in given_sections(study))
     )
@@ -216,10 +216,9 @@ def _sections() -> Mapping[str, Contents]:
     return {
         "answer": Contents("The answer", answer.blocks),
         QUESTION: Contents("The question", _question),
-        "sizing": Contents("The drive", sizing.blocks),
+        **{name: each for name, each in analysis_sections().items() if each.leads},
         "runs": Contents("Every run in numbers", runs.blocks),
         "shaft": Contents("The driveline", shaft.blocks, shaft.PICTURES.files),
-        "chains": Contents("Chains and two bars", chains.blocks, chains.PICTURES.files),
         **analysis_sections(),
         "plots": Contents("Plots", figures.PICTURES.figures, figures.PICTURES.files),
         "motion": Contents("The machine in motion", lambda s, study: iter(_motion(study))),

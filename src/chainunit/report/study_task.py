@@ -9,7 +9,7 @@ from typing import Any
 from ..models import MODELS
 from ..study.choice import check_files
 from ..study.config import Config
-from ..study.record import INSUFFICIENT, LOAD_CYCLE, SPEED_MISSED, StudyRecord
+from ..study.record import LOAD_CYCLE, SPEED_MISSED, StudyRecord
 from ..study.registry import registered
 from ..study.run import run_study
 from ..work.progress import Report as Progress
@@ -49,9 +49,7 @@ def _kept(record: StudyRecord, folder: Path) -> Iterator[Path]:
 
 
 def _shortfall(record: StudyRecord) -> str | None:
-    if record.insufficient:
-        return INSUFFICIENT
-    return None if record.reaches else SPEED_MISSED
+    return record.insufficient or (None if record.reaches else SPEED_MISSED)
 
 
 TASK: Task[Config, StudyRecord] = Task(

@@ -55,6 +55,8 @@ class Analysis(ABC):
     needs_runs: ClassVar[bool] = False
     """whether it comes after the runs of the study and uses the FMUs; otherwise it comes before any FMU is
     made"""
+    at_end: ClassVar[bool] = False
+    """whether it comes after all others, also where a run of the study has failed"""
 
     @staticmethod
     def applies(config: Config, drive: Drive) -> bool:

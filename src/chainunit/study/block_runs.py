@@ -368,8 +368,8 @@ def _turns(point: RunPoint, run: xr.Dataset) -> xr.Dataset:
 
 
 def _settles(point: RunPoint, run: xr.Dataset) -> bool:
-    """Whether a point is in steady running. Chains never repeat a turn."""
-    return point.rig.drive.chain is not None or is_settled(point.rig.drive, _turns(point, run))
+    """Whether a point is in steady running."""
+    return is_settled(point.rig.drive, _turns(point, run))
 
 
 class EventSimulation:

@@ -9,19 +9,27 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..core.errors import InputError
 from .file_section import FileSection
 
 if TYPE_CHECKING:
+    from ..fmu.backends import Backend
+    from ..machines.machine import Machine
+    from ..work.progress import Report
     from .analysis import Analysis
     from .config import Config
+    from .cycle import Cycle
     from .drive import Drive
     from .event_table import RandomEvent
     from .file_reading import FileReading
+    from .proposal import DriveProposal
+    from .record import StudyRecord
     from .rig import Rig
-    from .rules import Rule
+    from .rules import OtherModel, Rule
+    from .verdict import Verdict
 
 
 @dataclass(frozen=True)
@@ -53,6 +61,14 @@ class StudyCapability:
 
     tables: ClassVar[Mapping[str, FileSection]] = {}
     """its tables of the study file, by name"""
+    motor_table: ClassVar[str] = ""
+    """the table of these that leaves the choice of the motor to it; at most one capability has such a table"""
+
+    choices: ClassVar[Mapping[str, Any]] = {}
+    """its keys before all tables, as pydantic fields"""
+
+    other_model: ClassVar[OtherModel | None] = None
+    """the key with which the runs of a machine have another model"""
 
     def rules(self) -> Iterable[Rule]:
         """The rules of its keys that do not go together with others."""
@@ -81,9 +97,36 @@ class StudyCapability:
         """The files that its tables of a study file name."""
         return ()
 
+    def machine(self, machine: Machine, values: Mapping[str, Any]) -> Machine:
+        """The machine as the study has it, by the values of the tables; with another model of its runs, if the
+        capability brings one."""
+        return machine
+
+    def turns(
+        self, config: Config, feeds: Iterable[Any], folder: Path, backend: Backend | None
+    ) -> list[Cycle] | None:
+        """Turns of the machine at constant speed with each of the `feeds`, where its other model is run for them. The
+        FMU is written to `folder`. None where `cycle` gives the turn."""
+        return None
+
     def faults(self, config: Config) -> Iterable[InputError]:
         """Refusals of a plan that does not fit the rest of the study."""
         return ()
+
+    def unused_values(self, config: Config) -> Iterable[str]:
+        """Names of the values of its tables that have no meaning in a study."""
+        return ()
+
+    def drive(
+        self, config: Config, folder: Path, report: Report, backend: Backend | None
+    ) -> DriveProposal | None:
+        """The drive that it chooses; None for a study whose file gives one. The FMUs that it needs are written to
+        `folder`."""
+        return None
+
+    def permitted_temperature(self, config: Config) -> tuple[str, float] | None:
+        """Permitted temperature of the winding of the motor that it chooses [K], after its name in the study file."""
+        return None
 
     def random_events(self, config: Config) -> Mapping[str, RandomEvent]:
         """By the key that states it, the events with ranges that its runs have."""
@@ -123,8 +166,23 @@ class StudyCapability:
             for the keys that ask for them.
         """
 
+    def model_verdict(
+        self, study: StudyRecord, speed: float, actual: float, residuals: Mapping[str, float]
+    ) -> Verdict | None:
+        """The verdict on the model of the machine, if the runs have another one; arguments are those of
+        `chainunit.study.verdict.rigid_links`."""
+        return None
+
+    def remark(self, study: StudyRecord) -> None:
+        """Add remarks on the model of the machine to a study."""
+
     def words(self) -> Mapping[str, str]:
         """By name, the words on the numbers of its results, for a comparison of two."""
+        return {}
+
+    def additions(self, study: StudyRecord) -> Mapping[str, Mapping[str, Any]]:
+        """By name, parts of the result that follow from the whole study, ready for JSON; they stand in place of those
+        of findings of the same name."""
         return {}
 
     def take_estimates(self, config: Config, estimates: Estimates, tables: dict[str, Any]) -> None:

@@ -5,25 +5,35 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..core.engines import numpy_
-from ..core.errors import InputError
 from ..drives.catalogue import CatalogueMotor
-from ..drives.gear_ratios import nearest, typical_efficiency
+from ..drives.gear_ratios import typical_efficiency
 from ..drives.gearing import Transmission, motor_side
 from ..drives.induction_motor import Inverter
 from ..drives.nameplate import Nameplate
-from ..reading.text import number
 from .config import Config
 from .drive import Drive
-from .limits import SPEED_DEVIATION
 
 SLIP = "starter.inverter.slip"
 """Key of the slip compensation."""
+
+
+@dataclass(frozen=True)
+class GearOffer:
+    """Gears on offer: their `kind`, a key of `chainunit.drives.gear_ratios.UNITS`, and whether their ratios are those
+    of gears that are made."""
+
+    kind: str = "helical"
+    is_made: bool = False
+
+
+HELICAL = GearOffer()
+"""Helical gears, of any ratio."""
 
 
 def catalogue_drive(
@@ -32,6 +42,7 @@ def catalogue_drive(
     crank_torque: Any,
     ambient: float | None = None,
     gear_ratio: float | None = None,
+    offer: GearOffer = HELICAL,
 ) -> Drive:
     """The motor with the gear ratio at which the crank has its speed, or with the ratio that the file gives.
 
@@ -41,6 +52,7 @@ def catalogue_drive(
         chains
     ambient : temperature of the surroundings [K]; by default that of the motor's declaration
     gear_ratio : the ratio, where it is chosen already
+    offer : the gears from which that of the drive is taken
 
     Raises
     ------
@@ -56,7 +68,7 @@ def catalogue_drive(
     ratio = rated_speed / w if gear_ratio is None else gear_ratio
     speed, drag = rated_speed, config.gear.d
     for _ in range(3):
-        shaft = motor_side(numpy_(), gear_with(config, ratio), crank_torque, speed)
+        shaft = motor_side(numpy_(), gear_with(config, ratio, offer), crank_torque, speed)
         mean = float(np.mean(shaft))
         # the slip is proportional to the torque; the reference of an inverter has the speed of the crank
         speed = rated_speed if follows else synchronous - (synchronous - rated_speed) * mean / rated_torque
@@ -73,52 +85,19 @@ def catalogue_drive(
         machine,
         follows,
         rated_current=plate.rated_current,
-        chain=config.chain,
         gear_inertia=config.gear.J,
         gear_friction=drag,
     )
 
 
-def check_ratios(config: Config, motors: Sequence[CatalogueMotor]) -> None:
-    """Refuse `sizing.ratios` with which none of the `motors`, the smallest first, keeps the speed of the crank on the
-    line, at any slip up to the rated one. An inverter keeps the speed with any ratio.
-
-    Raises
-    ------
-    InputError
-        with the ratios that are needed.
-    """
-    ratios, w = config.choices["sizing.ratios"], config.run.crank_speed
-    if not ratios or config.start == "inverter" or "gear.ratio" in config.given:
-        return
-    needed: dict[float, float] = {}
-    for plate in (motor.nameplate for motor in motors):
-        least, most = plate.speed / w, plate.synchronous / w
-        if any((1.0 - SPEED_DEVIATION) * least <= x <= (1.0 + SPEED_DEVIATION) * most for x in ratios):
-            return
-        needed.setdefault(plate.poles, least)
-    wanted = sorted((ratio, poles) for poles, ratio in needed.items())
-    near, _ = min(wanted, key=lambda each: abs(math.log(each[0] / nearest(each[0], ratios))))
-    words = " or ".join(f"{number(ratio, '1', digits=2)} ({poles:g} poles)" for ratio, poles in wanted)
-    raise InputError(
-        f"sizing.ratios: no ratio on offer brings the crank to {number(w, 'rad/s', 'speed')} with a motor of the "
-        f"catalogue: about {words} is needed, the nearest on offer is {nearest(near, ratios):g}; add such a ratio, "
-        "change run.crank_speed, or take an inverter (start)",
-        "sizing.ratios",
-    )
-
-
-def is_of_a_gear(config: Config) -> bool:
-    """Whether the ratios are those of gears that there are: the file gives one, or a list of them."""
-    return "gear.ratio" in config.given or bool(config.choices["sizing.ratios"])
-
-
-def gear_with(config: Config, ratio: float) -> Transmission:
+def gear_with(config: Config, ratio: float, offer: GearOffer = HELICAL) -> Transmission:
     """The gear of a study with that ratio; its efficiency is the typical one of its kind and stages, unless the file
     gives one."""
-    typical = typical_efficiency(config.choices["sizing.gear_kind"], ratio, is_of_a_gear(config))
-    efficiency = config.gear.efficiency if "gear.efficiency" in config.given else typical
-    return dataclasses.replace(config.gear, ratio=ratio, efficiency=efficiency)
+    gear, given = config.gear, config.given
+    if "gear.efficiency" in given:
+        return dataclasses.replace(gear, ratio=ratio)
+    is_made = "gear.ratio" in given or offer.is_made
+    return dataclasses.replace(gear, ratio=ratio, efficiency=typical_efficiency(offer.kind, ratio, is_made))
 
 
 def with_starter(p: Any, plate: Nameplate, config: Config) -> Any:

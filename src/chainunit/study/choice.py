@@ -1,4 +1,4 @@
-"""The drive of a study: the tuned motor of the file, the motor that sizing chooses, or the foreign FMU that
+"""The drive of a study: the tuned motor of the file, the motor that a capability chooses, or the foreign FMU that
 the file names."""
 
 from __future__ import annotations
@@ -19,27 +19,27 @@ from .catalogue_drive import catalogue_drive, gear_with, with_wheel
 from .config import Config
 from .cycle import cycle
 from .drive import Drive
+from .proposal import DriveProposal
 from .registry import parts_of_line, registered
-from .sizing import SizingResult, size
 
 
 @dataclass(frozen=True)
 class Choice:
-    """The drive, with the sizing by which it was chosen."""
+    """The drive, with the proposal by which it was chosen."""
 
     drive: Drive
-    sizing: SizingResult | None = None
+    proposal: DriveProposal | None = None
 
 
 def choose(config: Config, folder: Path, report: Report, backend: Backend | None = None) -> Choice:
-    """The drive of a study; it has the nearest motor where sizing finds none that fits. The FMUs for sizing
-    are written to `folder`."""
+    """The drive of a study. A capability that chooses it writes its FMUs to `folder`."""
     if config.foreign is not None:
         return _with_foreign(config)
-    if config.sizing is None:
-        return Choice(tune(config, with_line(config, _drive_of_file(config))))
-    sizing = size(config, folder, report, backend)
-    return Choice(with_line(config, sizing.best.drive), sizing=sizing)
+    for part in registered():
+        proposal = part.drive(config, folder, report, backend)
+        if proposal is not None:
+            return Choice(with_line(config, proposal.drive), proposal=proposal)
+    return Choice(tune(config, with_line(config, _drive_of_file(config))))
 
 
 def _drive_of_file(config: Config) -> Drive:
@@ -50,24 +50,24 @@ def _drive_of_file(config: Config) -> Drive:
         drive = catalogue_drive(config, config.plate, turn.crank_torque)
     else:
         motor, p = config.motor_type, config.motor
-        drive = Drive(motor, p, config.machine, motor.follows(p), chain=config.chain)
+        drive = Drive(motor, p, config.machine, motor.follows(p))
     flywheel = sum(part.shaft_inertia(config) for part in registered())
     return with_wheel(config, replace(drive, feed_forward=config.feed_forward), flywheel)
 
 
-def as_chosen(config: Config, drive: Drive) -> Config:
+def as_chosen(config: Config, choice: Choice) -> Config:
     """The study with the values that follow from the drive with a motor of the catalogue: the efficiency of the gear
     by its stages, and boost and slip compensation of the inverter."""
     if not config.of_catalogue:
         return config
-    inverter = config.starter.inverter
+    drive, proposal, inverter = choice.drive, choice.proposal, config.starter.inverter
     if drive.follows:
         used = drive.parameters.inverter
         inverter = replace(inverter, boost=used.boost, slip=used.slip)
-    efficiency = gear_with(config, drive.ratio).efficiency
+    gear = gear_with(config, drive.ratio) if proposal is None else proposal.gear
     return replace(
         config,
-        gear=replace(config.gear, efficiency=efficiency),
+        gear=replace(config.gear, efficiency=gear.efficiency),
         starter=replace(config.starter, inverter=inverter),
     )
 
@@ -87,7 +87,7 @@ def check_files(config: Config) -> None:
     InputError
         see `chainunit.drives.catalogue.check_own` and `with_motor`.
     """
-    if config.sizing is not None:
+    if config.chooses_motor:
         with refusal_prefix("catalogue = ", "catalogue"):
             check_own(config.catalogue)
     if config.foreign is not None:
@@ -128,7 +128,6 @@ def with_motor(config: Config, file: Path, names: Mapping[str, str] | None = Non
             config.machine,
             follows,
             feed_forward=config.feed_forward,
-            chain=config.chain,
             foreign=motor,
         )
     )

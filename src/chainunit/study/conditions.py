@@ -56,6 +56,18 @@ class _Not(Condition):
         return {"not": self.of.schema()}
 
 
+class _Never(Condition):
+    def holds(self, data: Mapping[str, Any]) -> bool:
+        return False
+
+    def schema(self) -> Schema:
+        return {"not": {}}
+
+
+NEVER = _Never()
+"""No file meets it."""
+
+
 @dataclass(frozen=True)
 class _Value(Condition):
     """Whether a file gives the key `path`, with a value that passes `test`; `form` is the JSON Schema of these."""

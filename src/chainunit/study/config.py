@@ -39,20 +39,17 @@ from .file_reading import FileReading
 from .file_section import FileSection
 from .first_checks import check_values, independent, missing_recordings, plate_of, without
 from .foreign_machine import ForeignMachine, ForeignModel
-from .organ_limits import highest_of_sweep
 from .parts import Parts, beside, example, over_example, with_linkage
 from .registry import registered
 from .run_checks import endless, loads_beyond
 from .sections import (
-    CHOICES,
-    ChainOrgans,
     Coupling,
     ForeignMotor,
     Ratios,
     Run,
     Starter,
+    all_choices,
 )
-from .sizing_table import Sizing
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,7 +70,6 @@ class Config:
     feed_forward: bool
     empty_start: bool
     """whether the feed comes once the machine runs"""
-    sizing: Sizing | None
     plate: CatalogueMotor | None
     """the motor, where the file names one of the catalogue"""
     gear: Transmission
@@ -82,8 +78,6 @@ class Config:
     simulation: str
     """one of `SIMULATIONS`"""
     catalogue: Path | None
-    chain: ChainOrgans | None
-    """the organs as chains, or None for two bars"""
     foreign: ForeignMotor | None
     """the motor, if it is a foreign FMU; `motor` then has no meaning"""
     source: str
@@ -143,14 +137,20 @@ class Config:
     def permitted_temperature(self) -> tuple[str, float]:
         """Permitted temperature of the winding if the steady turns go on for ever [K], after its name in the
         study file."""
-        if self.sizing is not None:
-            return "sizing.temperature", float(self.sizing.temperature)
+        for part in registered():
+            if (own := part.permitted_temperature(self)) is not None:
+                return own[0], own[1]
         return "run.winding_temperature", float(self.run.winding_temperature)
 
     @property
     def of_catalogue(self) -> bool:
         """Whether the motor is one of the catalogue."""
-        return self.plate is not None or self.sizing is not None
+        return self.plate is not None or self.chooses_motor
+
+    @property
+    def chooses_motor(self) -> bool:
+        """Whether a capability chooses the motor of the catalogue."""
+        return any(self.values.get(part.motor_table) is not None for part in registered())
 
     def table(self, name: str) -> Any:
         """The values of a table; None for an optional table that the file does not
@@ -277,7 +277,7 @@ def _with_hints(fault: InputError, unusual: Iterable[UnusualValue]) -> InputErro
 
 _OF_PARTS = ("machine", "ratios", "motor")
 """Tables whose values follow from others, too: `Config` has them as machine and motor."""
-_OWN_TABLES = ("feed", "run", "coupling", "sizing", "gear", "starter", "chain")
+_OWN_TABLES = ("feed", "run", "coupling", "gear", "starter")
 """Tables whose values are fields of a `Config`."""
 
 
@@ -298,10 +298,7 @@ def _config(
         for name, each in sections.items()
         if name not in _OF_PARTS
     }
-    if "sizing" in data and "inertia_ratio" not in tables["sizing"]:
-        # a rule for servo drives: time, current and heat of its start limit the inertia of an induction motor
-        of_study["sizing"] = dataclasses.replace(of_study["sizing"], inertia_ratio=math.inf)
-    chain, own_motors = values["chain"] if checked.organ == "chain" else None, None
+    own_motors = None
     with faults.collected(), refusal_prefix("catalogue = ", "catalogue"):
         own_motors = beside(checked.catalogue, source) if checked.catalogue else None
     machine: Any = None
@@ -319,10 +316,10 @@ def _config(
         with faults.collected():
             plans[capability.name] = capability.plan(reading)
     faults.refuse()
-    if chain is not None and "sweep_highest" not in tables["chain"]:
-        highest = highest_of_sweep(machine, values["feed"], values["run"].crank_speed)
-        chain = dataclasses.replace(chain, sweep_highest=max(highest, chain.sweep_lowest))
-    of_study["chain"] = chain
+    for name, own in of_study.items():
+        of_study[name] = None if own is None else sections[name].completed(own, reading)
+    for capability in registered():
+        machine = capability.machine(machine, of_study)
     config = Config(
         title=checked.title,
         machine=machine,
@@ -375,7 +372,7 @@ def _read_sections(
 
 def _choices(checked: Any, parts: Parts) -> dict[str, Any]:
     """All values of a file that are no quantities of a table."""
-    known = {name: getattr(checked, name) for name in CHOICES}
+    known = {name: getattr(checked, name) for name in all_choices()}
     for name, section in parts.sections.items():
         table = getattr(checked, name)
         known |= {f"{name}.{key}": getattr(table, key) for key in section.keys}

@@ -12,12 +12,8 @@ from ..core.quantities import Layout
 from ..drives.gear import Gear
 from ..drives.motor import Motor
 from ..drives.speed_control import Tuning
-from ..machines.api import ChainUnitMachine, machine_of
-from ..machines.chain_organs import OrganLaw
-from ..machines.flexible import flexible
-from ..machines.hanging import split
+from ..machines.api import ChainUnitMachine
 from ..machines.machine import Machine
-from ..mechanism.models import InverseMachine
 from ..system import (
     Bond,
     Component,
@@ -41,6 +37,10 @@ class AbsentError(InputError):
         self.part = part
 
 
+def _component(machine: Machine) -> ModelComponent:
+    return ModelComponent(machine.model, machine.p)
+
+
 @dataclass(frozen=True)
 class Drive:
     """A `motor` with its `parameters` that turns a `machine`; `follows` says whether it follows the reference
@@ -58,9 +58,6 @@ class Drive:
 
     tuning: Tuning | None = None
     """the tuning of the gains of its control, where they were tuned"""
-
-    chain: Any = None
-    """the organs as chains, a `sections.ChainOrgans`; None for two bars"""
 
     line: Line = field(default_factory=Line)
 
@@ -136,12 +133,6 @@ class Drive:
         raise AbsentError("machine", f"{self.machine.model.name}: has no organs")
 
     @property
-    def rods(self) -> tuple[int, int]:
-        """Numbers of rods of wall and web, where the organs are chains."""
-        walls, webs = split((self.machine.p.l1, self.machine.p.l2), int(self.chain.rods))
-        return walls, webs
-
-    @property
     def outsider(self) -> ForeignMachine | None:
         """The machine as the shaft behind the driveline drives it, if it is a foreign FMU; else None."""
         return self.driven_machine if isinstance(self.driven_machine, ForeignMachine) else None
@@ -152,25 +143,10 @@ class Drive:
         parts = self.outsider and self.outsider.component, self.foreign
         return [part.title for part in parts if part]
 
-    def load_model(self, machine: Machine | None = None) -> tuple[type[InverseMachine], Any]:
-        """Model of a machine, with two bars or chains, and its parameters; by default of the `driven_machine`."""
-        machine = machine or self.driven_machine
-        if self.chain is None:
-            return machine.model, machine.p
-        model = flexible(*self.rods)
-        return model, model.parameter_layout.from_names(machine.by_name | self.organ())
-
     @cached_property
     def simulated_machine(self) -> Machine:
-        """The machine as its FMU has it, with chains where the organs are chains."""
-        return self.driven_machine if self.chain is None else machine_of(*self.load_model())
-
-    def organ(self) -> dict[str, float]:
-        """The parameters that the model with chains has beside those of the model with two bars."""
-        if self.chain is None:
-            return {}
-        law = Layout(type(self.chain)).by_name(self.chain)
-        return {f"organ.{name}": law[name] for name in Layout(OrganLaw).names}
+        """The machine as its FMU has it, with the model of its runs."""
+        return self.driven_machine.simulated
 
     @cached_property
     def graph(self) -> System:
@@ -179,7 +155,7 @@ class Drive:
         outsider = self.outsider
         system = in_line(
             {
-                "machine": outsider.component if outsider else ModelComponent(*self.load_model()),
+                "machine": outsider.component if outsider else _component(self.simulated_machine),
                 **{part.name: part.component for part in reversed(self.whole_line.parts)},
                 "motor": self.foreign or ModelComponent(self.motor, self.fmu_parameters),
             }
@@ -188,7 +164,7 @@ class Drive:
         wires: list[Connection] = []
         if self.feed_forward:
             # the second machine turns with the motor's shaft, before the line
-            beside["model"] = ModelComponent(*self.load_model(self.machine))
+            beside["model"] = _component(self.machine.simulated)
             wires += [("motor.phi", "model.phi"), ("motor.w", "model.w"), ("model.tau", "motor.tau_ff")]
         if self.observer is not None:
             beside["observer"] = self.observer

@@ -35,9 +35,9 @@ def with_files(drive: Drive, files: Mapping[str, Path]) -> System:
 
 def export_machine(drive: Drive, folder: Path, backend: Backend | None = None) -> Path:
     """Write only the machine's FMU, as `export_drive` writes it."""
-    model, p = drive.load_model()
-    file = folder / f"{model.name}.fmu"
-    export_fmu(model, file, model.parameter_layout.by_name(p), backend=backend)
+    machine = drive.simulated_machine
+    file = folder / f"{machine.model.name}.fmu"
+    export_fmu(machine.model, file, machine.by_name, backend=backend)
     return file
 
 

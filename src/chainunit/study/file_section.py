@@ -39,6 +39,8 @@ class FileSection:
     optional: bool = False
     keys: Mapping[str, Any] = field(default_factory=dict)
     """other keys than quantities, as pydantic fields with their descriptions"""
+    before: str = ""
+    """table of the base before which it stands; empty for one behind them"""
     title: str = ""
     """title of the table in a report"""
     is_used: Callable[[Any], bool] = lambda config: True
@@ -48,6 +50,9 @@ class FileSection:
     apart: bool = False
     """whether the result has other things of the same names"""
     form: TableForm = field(default_factory=TableForm)
+    completed: Callable[[Any, Any], Any] = lambda values, reading: values
+    """gets the values and the `FileReading`; gives the values with those that follow from the rest of the file, or
+    None where the study does not use the table"""
     entries: Mapping[str, TableList] = field(default_factory=dict)
     """by key, the lists of tables in it"""
     follows: Mapping[str, str] = field(default_factory=dict)

@@ -12,7 +12,8 @@ from ..reading.text import entry
 from .config import Config
 from .record import StudyRecord
 from .registry import registered
-from .sections import CHOICES, SystemTable, all_sections
+from .rules import all_rules
+from .sections import SystemTable, all_choices, all_sections
 
 
 @dataclass(frozen=True)
@@ -84,16 +85,10 @@ def given_sections(study: StudyRecord) -> list[GivenSection]:
 
 
 def _of_study(config: Config) -> dict[str, Any]:
-    is_used = {
-        "organ": bool(config.machine.model.sides),
-        "start": config.of_catalogue,
-        "catalogue": config.of_catalogue,
-    }
-    return {
-        name: x
-        for name, x in config.choices.items()
-        if name in CHOICES and x != "" and is_used.get(name, True)
-    }
+    # a key that a file of this kind may not have is not used either
+    refused = {rule.key for rule in all_rules() if rule.refused is None and rule.on.holds(config.tables)}
+    used = all_choices().keys() - refused
+    return {name: x for name, x in config.choices.items() if name in used and x != ""}
 
 
 def _system(config: Config) -> dict[str, Any]:
@@ -101,7 +96,7 @@ def _system(config: Config) -> dict[str, Any]:
     own = {
         name.removeprefix("system."): x for name, x in config.choices.items() if name.startswith("system.")
     }
-    return {name: x for name, x in own.items() if x and (name != "motor" or config.sizing is None)}
+    return {name: x for name, x in own.items() if x and (name != "motor" or not config.chooses_motor)}
 
 
 def _tables(study: StudyRecord) -> Iterator[GivenSection]:
@@ -131,8 +126,8 @@ def _tables(study: StudyRecord) -> Iterator[GivenSection]:
 def description(name: str) -> str:
     """The description of a key that is no quantity, by its name in a study file."""
     table, _, key = name.partition(".")
-    if name in CHOICES:
-        return str(CHOICES[name][1].description)
+    if name in all_choices():
+        return str(all_choices()[name][1].description)
     if table == "system":
         field = SystemTable.model_fields.get(key)
         return str(field.description) if field else "name of it in the FMU"

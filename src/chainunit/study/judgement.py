@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from ..reading.text import entry, number, turning
 from . import verdict
-from .chain import HIGH
 from .limits import Check, given_motor, reaches
-from .measures import Answers
 from .organ_limits import slack_and_mode
-from .quantiles import runs_needed
 from .readings import has_turn
 from .record import StudyRecord
+from .registry import registered
 from .rig import worst_residual
+from .rules import other_models
 from .start_runs import longest_of
 from .starts import StartAnalysis
 from .verdict import RESIDUAL, STEADY, Holds, Verdict, shown_speed
@@ -27,37 +25,25 @@ def model_verdict(study: StudyRecord) -> Verdict:
     steady = answers.get(STEADY)
     mean = steady.speed_mean if steady else config.run.crank_speed
     speed, residuals = max(config.run.crank_speed, mean), _residuals(study)
-    runs: dict[str, Answers] = {**answers}
-    if study.start is not None:
-        runs[verdict.START] = study.start
-    if study.settling is not None:
-        runs[verdict.SETTLING] = study.settling
     if study.drive.outsider:
         return verdict.outsider(speed, residuals, actual=mean)
     if not study.drive.machine.model.sides:
         return verdict.rigid_links(speed, residuals, actual=mean)
-    if config.chain is None:
-        empty = {name for name in study.overloads if config.events[name].empties}
-        always = 0.0 in (config.feed.left.material_mass, config.feed.right.material_mass)
-        slack_speed, resonance = slack_and_mode(study.drive.chain_unit, config.feed)
-        return verdict.two_bars(
-            speed,
-            resonance,
-            slack_speed,
-            study.pulls,
-            residuals,
-            empty={""} if always else empty,
-            actual=mean,
-        )
-    folds = {name: a.fold_largest for name, a in runs.items()}
-    slack = {name: a.slack_time for name, a in runs.items()}
-    least_turns, turns = runs_needed(HIGH), math.inf
-    if study.chain is not None:
-        own = study.chain.own
-        folds["constant"], slack["constant"] = own.fold_largest, own.slack_time
-        residuals["constant"], turns = own.energy_residual, own.independent_turns
-    return verdict.chains(
-        speed, residuals, folds, config.chain.fold_limit, slack, turns, least_turns, actual=mean
+    for part in registered():
+        if (own := part.model_verdict(study, speed, mean, residuals)) is not None:
+            return own
+    empty = {name for name in study.overloads if config.events[name].empties}
+    always = 0.0 in (config.feed.left.material_mass, config.feed.right.material_mass)
+    slack_speed, resonance = slack_and_mode(study.drive.chain_unit, config.feed)
+    return verdict.two_bars(
+        speed,
+        resonance,
+        slack_speed,
+        study.pulls,
+        residuals,
+        empty={""} if always else empty,
+        actual=mean,
+        finer="; ".join(other.remedy for other in other_models()),
     )
 
 
@@ -77,8 +63,8 @@ def _residuals(study: StudyRecord) -> dict[str, float]:
 
 
 def motor_limits(study: StudyRecord) -> dict[str, Check]:
-    """The values of the motor in its start and in steady running beside its limits, by name. For a motor that
-    sizing chose only the temperature is checked here, as sizing checks its starts and its duty."""
+    """The values of the motor in its start and in steady running beside its limits, by name. Of a
+    proposed motor only the temperature is checked here, as its starts and its duty were checked before."""
     steady, start = study.answers.get(STEADY), study.start
     if steady is None or start is None:
         return {}
@@ -138,7 +124,7 @@ def _no_judgement(study: StudyRecord, speed: str) -> str:
 def motor_verdict(study: StudyRecord) -> dict[str, Any] | None:
     """The verdict on the motor, ready for JSON; None without steady running. It is "false" where the motor
     does not reach the speed or becomes too hot. It is "in part" where no reserve of torque is left or known,
-    another limit is exceeded, or sizing found the motor insufficient. The least reserve is given with its
+    another limit is exceeded, or no motor was found that suffices. The least reserve is given with its
     run. Runs whose energy balance is not kept are left out, as they say nothing about the motor."""
     steady, requested = study.answers.get(STEADY), study.config.run.crank_speed
     if steady is None:
@@ -169,7 +155,8 @@ def motor_verdict(study: StudyRecord) -> dict[str, Any] | None:
     else:
         text = f"The motor does NOT reach the speed: {speed} in place of {requested_text}"
     if study.insufficient:
-        text += f"{', but it' if keeps_speed else '; it'} is insufficient by the limits of the sizing"
+        assert study.proposal is not None
+        text += f"{', but it' if keeps_speed else '; it'} is insufficient by the limits of the {study.proposal.name}"
     limits = {} if STEADY in left_out else motor_limits(study)
     excesses = [
         name for name, check in limits.items() if check.utilisation is None or check.utilisation > 1.0

@@ -25,7 +25,7 @@ from .config import Config, parse
 from .event import TYPES, Event
 from .file_section import FileSection
 from .parts import ReportTable
-from .sections import CHOICES, Ratios, SystemTable, all_sections
+from .sections import Ratios, SystemTable, all_choices, all_sections
 
 _OF_MOTORS = {
     "speed_control.kp": "tuned",
@@ -120,7 +120,9 @@ def key_tables() -> tuple[KeyTable, ...]:
     """All tables of a study file, in the order in which a file has them."""
     return (
         KeyTable(
-            "", "Study", (Key("title", "title of the study", sort="text"), *_of_fields(CHOICES, _study()))
+            "",
+            "Study",
+            (Key("title", "title of the study", sort="text"), *_of_fields(all_choices(), _study())),
         ),
         KeyTable("system", "Machine and motor", tuple(_of_system())),
         *(

@@ -1,4 +1,4 @@
-"""The limits of a motor: sizing checks its candidates by them, and a study checks a given motor."""
+"""The limits of a motor: a study checks its motor by them, and a search for one its candidates."""
 
 from __future__ import annotations
 

@@ -14,7 +14,6 @@ from ..core.quantities import Layout, Value, Variable, declaration, quantity
 from .arrays import peak
 from .drive import AbsentError, Drive
 from .limits import reaches
-from .protection import stall
 from .readings import crank_speed, crank_torque, largest_torque, shaft_power
 from .relay import relay_trip
 from .stored import energy_gap, energy_held, stored_shares
@@ -30,6 +29,17 @@ _STEADY = frozenset({Phase.STEADY})
 _EVENTS = frozenset({Phase.EVENT, Phase.LOADED_START})
 # a start begins at rest, and for a moment its motor gives more torque than it ever does in running
 _AT_SPEED = frozenset({Phase.STEADY, Phase.EVENT})
+
+
+def stall(time: Any, speed: Any, requested: float, share: float = 0.1) -> float | None:
+    """Time [s] from which the speed stays below `share` of the `requested` speed until the end of the run;
+    None where it does not, or only in the last tenth of the run."""
+    below = np.abs(np.asarray(speed)) < share * requested
+    if not below[-1]:
+        return None
+    moving = np.flatnonzero(~below)
+    first = int(moving[-1]) + 1 if moving.size else 0
+    return float(time[first]) if first < 0.9 * len(below) else None
 
 
 def torque_reserve(limit: Any, torque: Any) -> float:
@@ -83,7 +93,7 @@ def _relay(w: Window) -> float | None:
 
 def _slack_time(w: Window) -> float | None:
     """Share of the time in which at least one rod of a chain is slack."""
-    if w.drive.chain is None:
+    if "machine.left.slack_share" not in w.run:
         return None
 
     def some_slack(drive: Drive, run: xr.Dataset) -> Any:
@@ -94,7 +104,7 @@ def _slack_time(w: Window) -> float | None:
 
 
 def _fold(w: Window) -> float | None:
-    if w.drive.chain is None:
+    if "machine.left.fold_largest" not in w.run:
         return None
     return max((float(np.max(w.value(f"machine.{side}.fold_largest"))) for side in w.sides), default=0.0)
 

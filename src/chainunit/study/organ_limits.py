@@ -10,8 +10,6 @@ from ..machines.api import ChainUnitMachine
 from ..machines.machine import Machine
 from .verdict import SpeedLimit, speed_limits
 
-_BEYOND = 1.2
-"""Highest speed of a sweep, over the lowest natural frequency."""
 _UNITS_OF_MOTION = ("1", "rad", "rad/s", "rad/s2", "m", "m/s", "m/s2")
 """Units of quantities of a turn that the loads of the organs do not change."""
 
@@ -22,13 +20,6 @@ def slack_and_mode(machine: ChainUnitMachine, feed: Any) -> tuple[float, float]:
     modes = machine.chain_modes(feed.left, feed.right)
     slack = machine.slack_speed(feed.left, feed.right)
     return slack, math.inf if modes is None else float(modes.frequency[0])
-
-
-def highest_of_sweep(machine: ChainUnitMachine, feed: Any, speed: float) -> float:
-    """The crank speed [rad/s] up to which a sweep over speeds shows chains: twice the `speed` of normal running, or a
-    fifth beyond the lowest natural frequency of an organ where that is higher."""
-    _, mode = slack_and_mode(machine, feed)
-    return max(2.0 * speed, _BEYOND * mode) if math.isfinite(mode) else 2.0 * speed
 
 
 def limits_of_organs(

@@ -2,27 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Literal, TypeAlias
-
 from .catalogue_drive import SLIP
 from .config import Config
 from .parts import LENGTHS
 from .record import StudyRecord
 
 _CHOSEN = ("gear.efficiency", "starter.inverter.boost", SLIP)
-"""Values that sizing chooses where the file leaves them out, see `chainunit.study.choice.as_chosen`."""
-
-Origins: TypeAlias = Literal["file", "example", "declared", "tuned", "catalogue", "sizing"]
-"""The origin of a value."""
+"""Values that follow from a proposed drive where the file leaves them out, see `chainunit.study.choice.as_chosen`."""
 
 
-def origin_of(study: StudyRecord, name: str) -> Origins:
-    """The origin of the value of a quantity, by its name in a study file ("motor.rotor.J"): the file, the
-    example, tuning, the catalogue (by the motor that the file names or that sizing chose), or its
-    declaration."""
+def origin_of(study: StudyRecord, name: str) -> str:
+    """The origin of the value of a quantity, by its name in a study file ("motor.rotor.J"): "file", "example",
+    "tuned", "catalogue" (by the motor that the file names), the name of a proposal, or "declared"."""
     config, (section, _, parameter) = study.config, name.partition(".")
-    if name in _CHOSEN and study.sizing is not None and _of(config, name) == "declared":
-        return "sizing"
+    if name in _CHOSEN and study.proposal is not None and _of(config, name) == "declared":
+        return study.proposal.name
     if name == SLIP and config.start == "inverter" and _of(config, name) == "declared":
         return "catalogue"
     if section == "motor" and (tuning := study.drive.tuning) and parameter in tuning.parameters:
@@ -32,22 +26,25 @@ def origin_of(study: StudyRecord, name: str) -> Origins:
     if section == "machine" and parameter in LENGTHS and "ratios.rho" in config.of_example:
         return "example"
     if config.of_catalogue and (name == "machine.ratio" or section == "motor"):
-        name_in_file = _name_in_file(config, parameter)
+        name_in_file = _name_in_file(study, parameter)
         if not name_in_file:
-            return "catalogue" if study.sizing is None else "sizing"
+            return "catalogue" if study.proposal is None else study.proposal.name
         name = name_in_file
     return _of(config, name)
 
 
-def _of(config: Config, name: str) -> Origins:
+def _of(config: Config, name: str) -> str:
     """The origin of a value that only the study file or the example can give."""
     if name in config.given:
         return "file"
     return "example" if name in config.of_example else "declared"
 
 
-def _name_in_file(config: Config, parameter: str) -> str:
+def _name_in_file(study: StudyRecord, parameter: str) -> str:
     """The name in a study file of a motor's `parameter`; empty for one that the catalogue sets."""
+    config, proposal = study.config, study.proposal
+    if proposal is not None and parameter in proposal.keys:
+        return proposal.keys[parameter]
     if parameter == "ratio":
         return "gear.ratio" if _of(config, "gear.ratio") != "declared" else ""
     group = parameter.partition(".")[0]
@@ -57,6 +54,5 @@ def _name_in_file(config: Config, parameter: str) -> str:
         return ""
     if group in ("soft_start", "inverter"):
         return f"starter.{parameter}"
-    if parameter in ("phi_start", "w_start") or group == "solver":
-        return f"motor.{parameter}"
-    return "sizing.ambient" if parameter == "ambient.T" else ""
+    is_own = parameter in ("phi_start", "w_start", "ambient.T") or group == "solver"
+    return f"motor.{parameter}" if is_own else ""

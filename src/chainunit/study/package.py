@@ -12,7 +12,8 @@ from ..core.quantities import Layout
 from ..core.temporary_folders import scratch
 from ..drives.motor import Motor
 from ..fmu.backends import Backend
-from ..machines.chain_organs import LEAST, MOST
+from ..machines.api import ChainedUnit
+from ..machines.chain_organs import LEAST, MOST, USUAL
 from ..machines.chain_unit import ChamberForces
 from ..machines.flexible import ChainedModel, flexible
 from ..machines.hanging import split
@@ -27,7 +28,6 @@ from .choice import choose, with_parts_beside
 from .config import Config
 from .drive import Drive
 from .registry import parts_of_line
-from .sections import ChainOrgans
 
 
 def study_system(config: Config, drive: Drive) -> System:
@@ -53,14 +53,14 @@ def start_of(
     report: Callable[[str], None] = lambda what: None,
 ) -> dict[str, float]:
     """Start values of the parameters and inputs of the `model`, by name, with the values of the study: with
-    tuned gains, or with the motor and the ratio that sizing chooses.
+    tuned gains, or with the motor and the ratio that are chosen.
 
     Raises
     ------
     InputError
         where the study has another motor or machine, or lacks the part of the line.
     RunError
-        where sizing finds no motor.
+        where no motor is found.
     """
     drive = _drive(config, backend, report)
     for kind in parts_of_line():
@@ -71,8 +71,8 @@ def start_of(
     if not issubclass(model, Motor):
         if not _is_of(model, drive):
             raise InputError(f"the study's machine is {drive.driven_machine.model.name}, not {model.name}")
-        values = _machine(config, model, drive.driven_machine)
-        return values | (drive.organ() if issubclass(model, ChainedModel) else {})
+        own = drive.simulated_machine if issubclass(model, ChainedModel) else drive.driven_machine
+        return _machine(config, model, own)
     if drive.motor is not model:
         title = drive.graph.components["motor"].title
         raise InputError(f"the study's motor is {title}, not {model.name}")
@@ -113,7 +113,7 @@ def model_and_start(
     InputError
         see `start_of`, `whole_system` and `chainunit.models.model_named`.
     RunError
-        where sizing finds no motor.
+        where no motor is found.
     """
     if config and is_study_file(name):
         return whole_system(config, backend=backend, report=report)
@@ -121,7 +121,8 @@ def model_and_start(
     start = start_of(config, model, backend=backend, report=report) if config else {}
     if name == "ChainUnitFlexible":
         if rods is None:
-            rods = int(((config and config.chain) or ChainOrgans()).rods)
+            machine = config and config.machine.simulated
+            rods = sum(machine.rods) if isinstance(machine, ChainedUnit) else USUAL
         model = with_rods(rods, start)
     return model, start
 
@@ -133,14 +134,14 @@ def whole_system(
     report: Callable[[str], None] = lambda what: None,
 ) -> tuple[type[Model], dict[str, float]]:
     """The one model of the whole system of a study, and its start values by name: parameters, the speed reference and
-    the loads of normal running. With `sizing` the motor is chosen first.
+    the loads of normal running. Where the file leaves the motor open it is chosen first.
 
     Raises
     ------
     InputError
         where motor or machine is a foreign FMU.
     RunError
-        where sizing finds no motor.
+        where no motor is found.
     """
     drive = _drive(config, backend, report)
     system = study_system(config, drive)
@@ -209,8 +210,8 @@ def _machine(config: Config, model: type[Model], machine: Machine) -> dict[str, 
 def _drive(config: Config, backend: Backend | None, report: Callable[[str], None]) -> Drive:
     with scratch() as folder:
         choice = choose(config, folder, lambda what, done, todo: report(what), backend)
-    if choice.sizing is not None and choice.sizing.chosen_candidate is None:
-        raise RunError(f"[sizing]: {choice.sizing.answer}")
+    if choice.proposal is not None and choice.proposal.insufficient:
+        raise RunError(f"[{choice.proposal.name}]: {choice.proposal.answer}")
     return with_parts_beside(config, choice.drive)
 
 
@@ -221,13 +222,14 @@ def export_study(
     backend: Backend | None = None,
     report: Callable[[str], None] = lambda what: None,
 ) -> str:
-    """Write machine and motor of a study as an SSP package; returns its contents in words. With `sizing` the
-    motor is chosen first. The default experiment is as long as the study's start-up and steady running.
+    """Write machine and motor of a study as an SSP package; returns its contents in words. Where the
+    file leaves the motor open it is chosen first. The default experiment is as long as the study's
+    start-up and steady running.
 
     Raises
     ------
     InputError, RunError
-        see `chainunit.system.ssp.export`; also where sizing finds no motor, or the motor is a foreign FMU.
+        see `chainunit.system.ssp.export`; also where no motor is found, or the motor is a foreign FMU.
     """
     drive = _drive(config, backend, report)
     return export(

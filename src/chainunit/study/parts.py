@@ -21,7 +21,8 @@ from ..models import MACHINES
 from ..reading.tables import Title, file_form, given_values, merged, packaged, read_table, toml
 from .file_section import FileSection
 from .foreign_machine import foreign_model
-from .sections import CHOICES, SystemTable, all_sections, sections_of
+from .registry import registered
+from .sections import SystemTable, all_choices, all_sections, sections_of
 
 
 def _as_text(value: Any) -> Any:
@@ -105,7 +106,7 @@ def _form(machine: type[MachineModel], motor: type[Motor]) -> type[BaseModel]:
         for name, section in sections_of(machine, motor).items()
     }
     tables |= {"report": ReportTable, "system": SystemTable}
-    return file_form("Config", tables, **CHOICES, event=(list[Any], []))
+    return file_form("Config", tables, **all_choices(), event=(list[Any], []))
 
 
 LINKAGE, FMU = ".toml", ".fmu"
@@ -140,7 +141,7 @@ def parts_of(data: Mapping[str, Any], source: str) -> Parts:
         machine = _machine_model(table, source)
     faults.refuse()
     parts = Parts(machine, MOTORS["DcMotor"])
-    if not motor and "motor" not in data and "sizing" not in data:
+    if not motor and "motor" not in data and not motor_is_left(data):
         motor = parts.example.get("system", {}).get("motor", "")
     if not motor:
         return parts
@@ -149,6 +150,11 @@ def parts_of(data: Mapping[str, Any], source: str) -> Parts:
     if motor in MOTORS:
         return Parts(machine, MOTORS[motor])
     return Parts(machine, MOTORS["InductionMotor"], designation=motor)
+
+
+def motor_is_left(data: Mapping[str, Any]) -> bool:
+    """Whether a file leaves the choice of the motor to a capability."""
+    return any(part.motor_table and part.motor_table in data for part in registered())
 
 
 def _machine_model(table: Any, source: str) -> type[MachineModel]:
@@ -256,7 +262,7 @@ def over_example(data: Mapping[str, Any], parts: Parts) -> dict[str, Any]:
         base.pop("ratios", None)
     if parts.motor is not parts_of(base, "").motor:
         base.pop("motor", None)
-    if "motor" in named_table(data, "system") or "sizing" in data or "motor" in data:
+    if "motor" in named_table(data, "system") or motor_is_left(data) or "motor" in data:
         base.get("system", {}).pop("motor", None)
         for name in ("gear", "start", "starter"):
             base.pop(name, None)

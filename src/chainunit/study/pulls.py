@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from ..core.quantities import Layout
+from ..machines.api import ChainUnitMachine
 from ..machines.chain_unit import RODS, SIDES, RodName, SideLoads
 from .drive import Drive
 
@@ -23,15 +24,17 @@ class LeastPull:
 
 
 def least_pulls(drive: Drive, run: xr.Dataset, sides: tuple[str, ...]) -> dict[RodName, LeastPull]:
-    """The least pulls in webs and walls of the `sides`; empty where there is none, and for chains."""
-    if drive.chain is not None or not sides:
+    """The least pulls in webs and walls of the `sides`; empty where there is none, and where the organs of the run
+    are not two bars."""
+    machine = drive.simulated_machine
+    if not sides or not isinstance(machine, ChainUnitMachine):
         return {}
     left, right = (
         SideLoads(**{load: run[f"machine.{side}.{load}"].values for load in Layout(SideLoads).names})
         for side in SIDES
     )
     psi, w, a = (run[f"machine.rocker.{name}"].values for name in ("psi", "w", "a"))
-    pulls = drive.chain_unit.organ_pulls(psi, w, a, left, right)
+    pulls = machine.organ_pulls(psi, w, a, left, right)
     least: dict[RodName, LeastPull] = {}
     for rod in RODS:
         ends = {

@@ -22,6 +22,8 @@ LESS_ALIKE = 0.9
 """Confidence that the values of one run are no more alike than assumed."""
 CONFIDENCE = 0.95
 """Confidence of all intervals; the rest is divided equally between both ends."""
+HIGH = 0.95
+"""The quantile that is given beside the median."""
 ALIKE = 0.05
 """Values of several runs that differ by less than this share of their median count as alike, as in a motion
 that repeats itself: then nothing is random, and the interval holds all values."""

@@ -9,20 +9,19 @@ from typing import Any, Literal, TypeAlias
 import xarray as xr
 
 from ..core.errors import RunError
+from ..drives.catalogue import CatalogueMotor
 from ..fmu.backends import Origin
 from ..machines.chain_unit import RodName
 from ..reading.results import InUnit, part, result
 from ..reading.text import number
 from . import verdict
-from .chain import ChainResult
 from .config import Config
 from .drive import Drive
 from .limits import reaches
 from .measures import Answers, not_known
-from .protection import Alternative, Setting
+from .proposal import DriveProposal
 from .pulls import LeastPull
 from .relay import LIGHT
-from .sizing import SizingResult
 from .start_up import StartUp
 from .statics import DriveStatics
 from .verdict import STEADY, Verdict
@@ -32,8 +31,6 @@ LOAD_CYCLE = "load_cycle.csv"
 """Name of the file with torque and speed of the motor's shaft in the steady turns."""
 
 
-INSUFFICIENT = "No motor of the catalogue fits; all runs are with the nearest, which is insufficient."
-"""The sentence on a study whose sizing found no motor that fits."""
 SPEED_MISSED = "The motor does not keep the speed asked for."
 """The sentence on a study whose crank does not turn at the requested speed."""
 
@@ -90,7 +87,8 @@ class StudyRecord:
     config: Config
     drive: Drive
     statics: DriveStatics
-    sizing: SizingResult | None = None
+    proposal: DriveProposal | None = None
+    """the drive, where a capability chose it"""
     fmus: dict[str, Origin] = field(default_factory=dict)
     """the origin of each FMU"""
     runs: dict[str, xr.Dataset] = field(default_factory=dict)
@@ -110,17 +108,10 @@ class StudyRecord:
     certificate: dict[str, dict[str, float]] = field(default_factory=dict)
     spreads: dict[str, Spread] = field(default_factory=dict)
     """the spread of each event that rests on an assumption"""
-    setting: Setting | None = None
-    """the recommended safety coupling of a sized drive; None where the file gives a coupling, as that one
-    cuts off the peaks from which the setting follows"""
-    alternatives: tuple[Alternative, ...] = ()
-    """ways to a coupling that a start does not open, where the start is more than running"""
     relay_class: int = LIGHT
     """trip class of the thermal relay that holds in the start, of a motor of the catalogue on the line"""
     findings: dict[str, Any] = field(default_factory=dict)
     """`Findings` of each analysis, by its name"""
-    chain: ChainResult | None = None
-    """results of the organs as chains at constant speed, where the study has chains"""
     verdict: Verdict | None = None
     """the verdict on the model, once there are runs"""
     remarks: list[Remark] = field(default_factory=list)
@@ -148,7 +139,7 @@ class StudyRecord:
     def titles(self) -> dict[str, str]:
         """By run, its title for use in sentences."""
         titles = {STEADY: "steady running", verdict.START: "start-up"}
-        titles |= {verdict.SETTLING: "settling under the feed", "constant": "chains at constant speed"}
+        titles |= {verdict.SETTLING: "settling under the feed"}
         return titles | {name: event.title for name, event in self.config.events.items()}
 
     def title_of(self, run: str) -> str:
@@ -194,9 +185,14 @@ class StudyRecord:
         return self.config.steady_begin if self.started is None else self.started.steady_from
 
     @property
-    def insufficient(self) -> bool:
-        """Whether sizing found no motor that fits, so that all is run with the nearest."""
-        return self.sizing is not None and self.sizing.chosen_candidate is None
+    def plate(self) -> CatalogueMotor | None:
+        """The motor of the catalogue that the file names or that was chosen, if it is one."""
+        return self.config.plate if self.proposal is None else self.proposal.motor
+
+    @property
+    def insufficient(self) -> str:
+        """The sentence on a drive of which none fits, so that all is run with the nearest; empty where one fits."""
+        return "" if self.proposal is None else self.proposal.insufficient
 
     @property
     def not_known(self) -> frozenset[str]:

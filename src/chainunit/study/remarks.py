@@ -12,14 +12,12 @@ from ..reading.text import number
 from .catalogue_drive import SLIP
 from .coupling import remark_on_coupling, remark_on_rams
 from .event_torques import peaks_in_events
-from .events import Jam
 from .judgement import lasts, model_verdict, motor_limits, no_reserve
 from .measures import STARTED, Answers
 from .readings import breakdown_speed, crank_speed, has_turn
 from .record import LOAD_CYCLE, Amount, StudyRecord
-from .registry import parts_of_line
-from .sections import ChainOrgans
-from .verdict import RESIDUAL, START, STEADY, shown_speed
+from .registry import capabilities, parts_of_line
+from .verdict import START, STEADY, shown_speed
 from .window import CLOSED, DRIFT, STORED
 
 
@@ -56,30 +54,29 @@ def conclude(study: StudyRecord) -> None:
         )
     if study.answers:
         study.verdict = replace(model_verdict(study), step=config.run.step)
-        for line in study.verdict.details(study.titles):
-            study.warn("model", "{line}", line=line)
-    if config.chain is not None:
-        _on_chains(study, config.chain)
+        for topic, line in study.verdict.details(study.titles):
+            study.warn(f"model {topic}", "{line}", line=line)
+    for part in capabilities():
+        part.remark(study)
     if STEADY in study.answers:
         _on_start(study)
         _on_limits(study)
         _on_steady_running(study, study.answers[STEADY])
-    if study.sizing is not None:
-        for text in study.sizing.notes:
-            note("sizing", "{text}", text=text)
-        if study.insufficient:
-            answer = study.sizing.answer
-            study.warn("insufficient motor", "{answer}. All runs are with it.", answer=answer)
-    if config.coupling is not None and STEADY in study.answers:
-        remark_on_coupling(study, config.coupling.trip_torque)
-    remark_on_rams(study)
+    of_drive = None if study.proposal is None else study.proposal.findings
+    if of_drive is not None:
+        of_drive.remark(study)
+    if config.coupling is not None:
+        if STEADY in study.answers:
+            remark_on_coupling(study, config.coupling.trip_torque)
+        remark_on_rams(study, config.coupling.trip_torque)
     _on_runs(study)
     _on_inverter(study)
     _on_assumptions(study)
     for part in parts_of_line():
         part.remark(study)
     for findings in study.findings.values():
-        findings.remark(study)
+        if findings is not of_drive:
+            findings.remark(study)
 
 
 _RATING = ("limit.i", "limit.v", "armature.k")
@@ -95,7 +92,7 @@ def _left_out(study: StudyRecord) -> Iterator[str]:
         yield f"coupling.trip_torque ({number(coupling.trip_torque, 'N.m', full=False)})"
     if config.plate is not None and "system.motor" in config.of_example:
         yield f"the motor ({config.plate.designation})"
-    elif config.sizing is None and config.foreign is None:
+    elif study.proposal is None and config.foreign is None:
         values = study.drive.motor.parameter_layout.by_name(study.drive.parameters)
         units = {v.name: v.unit for v in study.drive.motor.parameter_layout.variables}
         names = [name for name in _RATING if f"motor.{name}" in config.of_example]
@@ -198,6 +195,7 @@ def _why_missed(study: StudyRecord, steady: Answers) -> str:
 
 def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
     requested, warn = study.config.run.crank_speed, study.warn
+    never = study.drive.simulated_machine.model.never_repeats
     if not study.reaches:
         why, addition = _why_missed(study, steady), ""
         if any(not study.config.events[name].from_rest for name in study.overloads):
@@ -228,9 +226,9 @@ def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
             STEADY,
             cycle_gap=(steady.cycle_gap, "1", "percent"),
             refused="" if lasts(study) else _REFUSED,
-            repeats="chains do not repeat a turn" if study.config.chain else "the machine has not settled",
+            repeats=never or "the machine has not settled",
         )
-    elif abs(steady.speed_drift) > DRIFT and not study.config.chain:
+    elif abs(steady.speed_drift) > DRIFT and not never:
         warn(
             "speed drifts",
             "steady running: the machine still {moves}: the change of its speed over the evaluated turns is "
@@ -240,7 +238,7 @@ def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
             moves="speeds up" if steady.speed_drift > 0.0 else "slows down",
             speed_drift=(abs(steady.speed_drift), "1", "percent"),
         )
-    elif abs(steady.energy_gap) > STORED and not study.config.chain:
+    elif abs(steady.energy_gap) > STORED and not never:
         warn(
             "energy taken up",
             "steady running: the moving masses {take}, over the evaluated turns {energy_gap} of the energy that "
@@ -344,7 +342,7 @@ def _on_inverter(study: StudyRecord) -> None:
         )
         study.note("slip compensation", compensated if slip else without, slip=(slip, "Hz/(N.m)"))
     limit = study.config.starter.overload
-    ordered = study.sizing.best.inverter_current if study.sizing else None
+    ordered = study.proposal and study.proposal.inverter_current
     rated_current, whose = (
         (ordered, "to be ordered") if ordered else (rated_current, "with the rated current of the motor")
     )
@@ -387,56 +385,3 @@ def _on_assumptions(study: StudyRecord) -> None:
             crank_torque_low=(low, "N.m"),
             crank_torque_high=(high, "N.m"),
         )
-
-
-def _on_chains(study: StudyRecord, chain: ChainOrgans) -> None:
-    """The remarks on chains."""
-    (walls, webs), result = study.drive.rods, study.chain
-    warn, note = study.warn, study.note
-    note(
-        "chains",
-        f"The organs are chains of {walls} + {webs} rods; their damping (eta {chain.eta:g} N m2 s, ends "
-        f"{chain.end_damping:g} N m s), which has to be larger for a heavier organ, and their folding are assumed.",
-    )
-    if walls + webs < 4:
-        few = f"{walls + webs} rods have {walls + webs - 2} natural frequencies; 8 rods show a chain well."
-        note("few rods", f"chains: {few}")
-    _on_folding(study)
-    if result is None:
-        return
-    speed = result.own.speed
-    for band in result.avoid:
-        if band.low <= speed <= band.high:
-            text = "chains: the crank speed lies in a range to avoid, {band}: {why}."
-            warn("speed to avoid", text, band=str(band), why=band.why, speed=(speed, "rad/s", "speed"))
-    for missing, why in result.failures.items():
-        text = "chains: {speed} is missing in the sweep: {why}"
-        warn("speed missing", text, why=str(why), speed=(missing, "rad/s", "speed"))
-    residual = max(n.energy_residual for n in result.sweep)
-    if not residual < RESIDUAL:
-        text = (
-            "chains: the energy residual reaches {residual} of the energy moved; lower chain.fold_stiffness."
-        )
-        warn("energy of chains", text, residual=(residual, "1"))
-
-
-FELT = 1.1
-"""The drive hardly feels a lump whose peak torque is below this multiple of the peak in steady running."""
-
-
-def _on_folding(study: StudyRecord) -> None:
-    """Warn of lumps on the stroke on which the web folds: the drive feels a lump only on the other stroke."""
-    steady = study.answers.get(STEADY)
-    for run, event in study.config.events.items():
-        answers = study.answers.get(run)
-        if not isinstance(event, Jam) or steady is None or answers is None:
-            continue
-        if answers.crank_torque_peak < FELT * steady.crank_torque_peak:
-            study.warn(
-                "lump not felt",
-                "{run}: the drive hardly feels the lump, as the web folds before it on this stroke; on the other "
-                "stroke the web is pulled: try crank_angle = {angle}.",
-                run,
-                run=study.title_of(run),
-                angle=f'"{math.degrees((event.p.crank_angle + math.pi) % (2.0 * math.pi)):.4g} deg"',
-            )

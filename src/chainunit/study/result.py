@@ -2,31 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 from .. import __version__
 from ..core.quantities import variables
 from ..drives.catalogue import CatalogueMotor
 from ..reading.results import as_data
-from ..reading.text import entries, entry, number, shown_in, turning
-from .coupling import coupling_sentence, way_words, why_none
-from .gear_order import gear_order
+from ..reading.text import entries, entry, shown_in, turning
 from .given import given_sections
 from .judgement import motor_verdict
 from .line.shaft import driveline_of
 from .line.shaft_runs import shaft_findings
 from .measures import measures_of
 from .origins import origin_of
-from .protection import CouplingEffect, Obstacle
 from .record import StudyRecord
-from .relay import class_words
+from .registry import registered
 from .window import Phase
 
 
 def _motor(study: StudyRecord) -> dict[str, Any]:
     kind = study.drive.graph.components["motor"].title
-    plate = study.sizing.best.motor if study.sizing else study.config.plate
+    plate = study.plate
     titles = {"kind": kind, "title": plate.designation if plate else kind}
     # the parameters of a foreign motor are not known
     return titles | _rating(plate) | ({} if study.motor is None else entries(study.motor))
@@ -164,130 +160,12 @@ def _spread(study: StudyRecord, name: str) -> dict[str, Any]:
 
 def _parts(study: StudyRecord) -> dict[str, Any]:
     """The parts of the result that only some studies have."""
-    config = study.config
-    parts = as_data(study.findings)
-    if study.sizing:
-        parts["sizing"] = study.sizing.as_dict() | {"gear": _gear(study), "protection": _protection(study)}
+    more = {name: x for part in registered() for name, x in part.additions(study).items()}
+    parts: dict[str, Any] = as_data({name: x for name, x in study.findings.items() if name not in more})
+    parts |= more
     if study.statics.torsion is not None:
         parts |= _driveline(study)
-    if config.chain:
-        parts["chain"] = study.chain.as_dict() if study.chain else {}
     return parts
-
-
-def _gear(study: StudyRecord) -> dict[str, Any]:
-    """The gear to order, and the load that decides; empty where there is no drive to order."""
-    order = gear_order(study)
-    if order is None:
-        return {}
-    assert study.config.sizing is not None
-    decides, margin = order.decides, study.config.sizing.margin
-    reason = decides.words
-    if decides.times != 1.0:
-        reason += f", in which it may carry {decides.times:g} times that"
-    if order.left_out:
-        names = ", ".join(map(study.title_of, order.left_out))
-        reason += f"; left out, as the energy balance is not kept: {names}"
-    free = number(margin, "1", "percent", full=False)
-    return {
-        "rated_torque": entry(order.rated, "N.m")
-        | {"title": f"gear, rated output torque at least, with the margin of {free}; decided by {reason}"},
-        **{
-            name: entry(load.torque, "N.m")
-            | {"title": f"largest torque of {load.words} on the output of the gear"}
-            for name, load in order.loads.items()
-        },
-        "decided_by": reason,
-    }
-
-
-_UNTRIED = "not judged: this study has no overload; add [[event]]"
-
-
-def _protection(study: StudyRecord) -> dict[str, Any]:
-    """Settings of the protection of the drive that sizing chose; empty where the motor is insufficient."""
-    assert study.sizing is not None
-    if study.insufficient:
-        return {}
-    current = study.sizing.best.motor.nameplate.rated_current
-    relay = _relay(study, current)
-    setting = study.setting
-    if setting is None:
-        return relay
-
-    def torque(value: float | None, title: str) -> dict[str, Any]:
-        return entry(value, "N.m") | {"title": title}
-
-    return {
-        "trip_torque": torque(setting.torque, "safety coupling, trip torque at the crank"),
-        "trip_torque_at_motor": torque(
-            setting.torque and setting.torque / study.drive.ratio,
-            "safety coupling, trip torque at the motor's shaft",
-        ),
-        **relay,
-        "coupling": coupling_sentence(study),
-        "obstacle": setting.obstacle,
-        "why_none": why_none(study)
-        if setting.overloads or setting.obstacle is not Obstacle.OVERLOADS
-        else _UNTRIED,
-        "normal_torque": torque(
-            setting.normal, "largest torque of normal duty on the coupling, at the crank"
-        ),
-        "running_torque": torque(setting.running, "largest torque of running on the coupling"),
-        "start_torque": torque(setting.start, "largest torque of a start on the coupling"),
-        "breakdown_torque": torque(setting.motor, "most that the motor gives at the crank"),
-        "effects": _effects(study, setting.effects),
-        "overloads": {
-            name: torque(
-                peak, f"{study.title_of(name)}: {'opens it' if name in setting.opens else 'leaves it shut'}"
-            )
-            for name, peak in setting.overloads.items()
-        },
-        "disturbances": {
-            name: torque(
-                peak,
-                f"{study.title_of(name)}: {'a nuisance trip' if name in setting.nuisances else 'leaves it shut'}",
-            )
-            for name, peak in setting.disturbances.items()
-        },
-        "alternatives": [
-            {
-                "way": each.way,
-                "words": way_words(study, each),
-                **entries(each.numbers, with_titles=True),
-                "opens": {name: entry(peak, "N.m") for name, peak in each.opens.items()},
-                "effects": _effects(study, each.effects),
-            }
-            for each in study.alternatives
-        ],
-    }
-
-
-def _effects(study: StudyRecord, effects: Mapping[str, CouplingEffect]) -> dict[str, Any]:
-    """The effects of a safety coupling as it was tried, by overload."""
-    titles = {"without": "without a coupling", "with_coupling": "with it"}
-    return {
-        name: {
-            key: entry(getattr(effect, key), "N.m")
-            | {"title": f"{study.title_of(name)}: peak at the output of the gear, {words}"}
-            for key, words in titles.items()
-        }
-        for name, effect in effects.items()
-    }
-
-
-def _relay(study: StudyRecord, rated: float) -> dict[str, Any]:
-    """The device that protects the motor from heat, its setting, and its trip class, which that of an inverter does
-    not need."""
-    if study.drive.follows:
-        device = "electronic motor protection of the inverter"
-        return {"relay_current": entry(rated, "A") | {"title": f"{device}, setting"}, "device": device}
-    words = class_words(study.relay_class)
-    return {
-        "relay_current": entry(rated, "A") | {"title": "thermal relay, setting"},
-        "relay_class": {"value": words, "unit": "1", "title": "thermal relay, trip class of IEC 60947-4-1"},
-        "device": "relay",
-    }
 
 
 def _driveline(study: StudyRecord) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from ..machines.api import ratios
 from ..models import MACHINES
 from ..reading.tables import filled
 from .conditions import (
+    NEVER,
     Condition,
     Schema,
     ends_with,
@@ -82,14 +83,13 @@ def _default(machine: str = "") -> Parts:
 
 
 def _any(conditions: list[Condition]) -> Condition:
-    joined, *rest = conditions
+    joined, *rest = conditions or [NEVER]
     for each in rest:
         joined = joined | each
     return joined
 
 
 MACHINE_FMU, MOTOR_FMU = ends_with("system.machine", FMU), ends_with("system.motor", FMU)
-CHAINS = is_one_of("organ", "chain")
 
 
 @cache
@@ -106,7 +106,16 @@ def names_designation() -> Condition:
 def motor_of_catalogue() -> Condition:
     """Whether the motor is one of a catalogue, by its designation or that of the machine's example."""
     by_example = _any([machine_is(name) for name in MACHINES if _default(name).designation])
-    return names_designation() | (by_example & ~(given("system.motor") | given("motor") | given("sizing")))
+    return names_designation() | (by_example & ~(given("system.motor") | given("motor") | motor_is_chosen()))
+
+
+def motor_is_chosen() -> Condition:
+    """Whether the file leaves the choice of the motor to a capability."""
+    return _any([given(table) for table in _choosing_tables()])
+
+
+def _choosing_tables() -> list[str]:
+    return [part.motor_table for part in registered() if part.motor_table]
 
 
 def all_rules() -> tuple[Rule, ...]:
@@ -121,8 +130,27 @@ def _with_motors(names: tuple[str, ...]) -> tuple[Rule, ...]:
     return (*_of_parts(), *_of_sides(), *_of_motors(), *own)
 
 
+BESIDE_MOTOR = "given beside system.motor = {motor}, which is the motor; leave out one of the two"
 NEEDS_MODEL = "needs a model of the machine, which is an FMU; leave it out"
-TWO_BARS = 'quantities of a turn are of organs with two bars; leave out organ = "chain"'
+OF_CHAIN_UNIT = "is of the chain unit, and the machine is {machine}; leave it out"
+
+
+@dataclass(frozen=True)
+class OtherModel:
+    """A key with which the runs of a machine have another model than its turns without a run."""
+
+    on: Condition
+    words: str
+    """what is then another one, such as "organs are chains\""""
+    refusal: str
+    """why there are no quantities of a turn, and the remedy"""
+    remedy: str
+    """what to do where the usual model does not hold"""
+
+
+def other_models() -> list[OtherModel]:
+    """Those of all capabilities."""
+    return [part.other_model for part in registered() if part.other_model]
 
 
 def _of_parts() -> Iterator[Rule]:
@@ -141,13 +169,7 @@ def _of_parts() -> Iterator[Rule]:
 
 def _of_sides() -> Iterator[Rule]:
     """Rules of keys of the chain unit, which has two sides."""
-    for name in ("ratios", "chain", "organ"):
-        words = "is of the chain unit, and the machine is {machine}; leave it out"
-        yield Rule(name, ~has_sides(), words)
-    yield Rule("sizing.one_sided_share", ~has_sides(), "the {name} has no sides; leave it out")
-    yield Rule(
-        "chain", has_sides() & ~CHAINS, 'is of organs that are chains; add organ = "chain", or leave it out'
-    )
+    yield Rule("ratios", ~has_sides(), OF_CHAIN_UNIT)
     for name in ratios(**filled(Ratios, {})):
         words = "given beside [ratios], which sets it; leave out one of the two"
         yield Rule(f"machine.{name}", has_sides() & has_entries("ratios"), words)
@@ -155,22 +177,14 @@ def _of_sides() -> Iterator[Rule]:
 
 def _of_motors() -> Iterator[Rule]:
     """Rules of the motor and of the tables that choose one."""
-    beside = "given beside system.motor = {motor}, which is the motor; leave out one of the two"
-    yield Rule("motor", names_designation() | MOTOR_FMU, beside)
-    yield Rule("sizing", given("system.motor"), beside)
+    yield Rule("motor", names_designation() | MOTOR_FMU, BESIDE_MOTOR)
     deaf = motor_is(*(name for name, motor in MOTORS.items() if "tau_ff" not in motor.input_layout.names))
     words = "a motor of the type {type} has no input for the torque; leave it out"
-    switched_on = is_one_of("feed_forward", True)
-    yield Rule("feed_forward", ~given("sizing") & (motor_of_catalogue() | deaf), words, switched_on)
-    another = "is of the DC motor, and [sizing] picks another; leave out one of the two"
-    yield Rule("motor", given("sizing"), another, has_entries("motor"))
-    yield Rule("feed_forward", given("sizing"), another, switched_on)
-    yield Rule(
-        "run.winding_temperature", given("sizing"), "is sizing.temperature with [sizing]; leave it out"
-    )
-    yield Rule("machine.ratio", given("sizing"), "[sizing] finds it; to have it kept, give gear.ratio")
+    chosen, switched_on = motor_is_chosen(), is_one_of("feed_forward", True)
+    yield Rule("feed_forward", ~chosen & (motor_of_catalogue() | deaf), words, switched_on)
+    keys = " or ".join([*(f"[{table}]" for table in _choosing_tables()), "system.motor"])
     for name in ("gear", "start", "starter", "catalogue"):
-        words = "is of a motor of the catalogue; add [sizing] or system.motor, or leave it out"
-        yield Rule(name, ~(given("sizing") | motor_of_catalogue()), words)
+        words = f"is of a motor of the catalogue; add {keys}, or leave it out"
+        yield Rule(name, ~(chosen | motor_of_catalogue()), words)
     words = "follows from the motor's rated speed; to have another, give gear.ratio"
-    yield Rule("machine.ratio", ~given("sizing") & motor_of_catalogue(), words)
+    yield Rule("machine.ratio", ~chosen & motor_of_catalogue(), words)

@@ -6,7 +6,8 @@ the same steady state, which is saved once.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,11 +22,8 @@ from . import verdict
 from .analyses import all_analyses
 from .analysis import Work
 from .bearings import pin_loads
-from .chain import study_chain
 from .choice import as_chosen, choose, with_parts_beside
 from .config import Config
-from .coupling import recommended_setting
-from .coupling_alternatives import alternatives
 from .drive_fmus import export_coasting, export_drive
 from .event import Event
 from .event_torques import from_event_on
@@ -68,18 +66,20 @@ def run_study(
     Raises
     ------
     InputError
-        for a communication step that is too long for the driveline, a catalogue that sizing cannot use,
+        for a communication step that is too long for the driveline, a catalogue from which no motor can be chosen,
         random overloads for which the drive has no inputs, and a foreign motor that does not fit or cannot
         save its state.
     """
     with shown_in(config.units):
         choice = choose(config, folder / "fmu", report, backend)
-        config = as_chosen(config, choice.drive)
+        config = as_chosen(config, choice)
         drive = with_parts_beside(config, choice.drive)
         if check and drive.outsiders:
             titles = " and ".join(drive.outsiders)
             raise InputError(f"--check: the equations of {titles} are not known; leave --check out")
-        study = StudyRecord(config, drive, statics(config, drive), choice.sizing)
+        study = StudyRecord(config, drive, statics(config, drive), choice.proposal)
+        if choice.proposal is not None:
+            study.findings[choice.proposal.name] = choice.proposal.findings
         unmade = Rig(config, drive, {})
         for part in registered():
             part.check_runs(config, unmade)
@@ -92,29 +92,38 @@ def run_study(
                 "install gcc or clang, or the compiler that comes with pip install 'chainunit[cross]'.",
             )
         runner = Runner(study, Rig(config, drive, files), report)
-        try:
+        with _ending(study):
             runner.run(check, lambda: export_coasting(drive, folder / "fmu", backend))
-            _analyse(study, Work(runner.rig, report, folder, scheduler, runner.stop), needs_runs=True)
-            study.setting = recommended_setting(study)
-            study.alternatives = alternatives(study, runner.rig, report)
-        except RunError as error:
-            if error.partial is not None:
-                study.runs["unfinished"] = error.partial
-            study.failure = error
-        except KeyboardInterrupt:
-            # Ctrl-C came between two runs, or in a run that is not a co-simulation
-            study.failure = InterruptedRunError("interrupted")
-        study.setting = study.setting or recommended_setting(study)
-        if drive.chain is not None and not isinstance(study.failure, InterruptedRunError):
-            _chains(study, files["machine"], report)
+            work = Work(runner.rig, report, folder, scheduler, runner.stop)
+            _analyse(study, work, needs_runs=True)
+        if not isinstance(study.failure, InterruptedRunError):
+            with _ending(study):
+                _analyse(study, Work(runner.rig, report), needs_runs=True, at_end=True)
         conclude(study)
         return study
 
 
-def _analyse(study: StudyRecord, work: Work, *, needs_runs: bool) -> None:
+@contextmanager
+def _ending(study: StudyRecord) -> Iterator[None]:
+    """Record the error that ends a part of the study early; the first one counts."""
+    error: RunError | None = None
+    try:
+        yield
+    except RunError as ended:
+        error = ended
+        if error.partial is not None:
+            study.runs["unfinished"] = error.partial
+    except KeyboardInterrupt:
+        # Ctrl-C came between two runs, or in a run that is not a co-simulation
+        error = InterruptedRunError("interrupted")
+    study.failure = study.failure or error
+
+
+def _analyse(study: StudyRecord, work: Work, *, needs_runs: bool, at_end: bool = False) -> None:
     """Make every analysis for which the system has the parts."""
     for analysis in all_analyses():
-        if analysis.needs_runs == needs_runs and analysis.applies(study.config, study.drive):
+        is_due = (analysis.needs_runs, analysis.at_end) == (needs_runs, at_end)
+        if is_due and analysis.applies(study.config, study.drive):
             findings = analysis.find(study, work)
             if findings is not None:
                 study.findings[analysis.name] = findings
@@ -136,24 +145,6 @@ def _with_class_of_all_starts(study: StudyRecord) -> None:
             window = study.window(phase, from_event_on(study, name), study.event[name])
             later = read_measure("thermal_trip_time", window)
             study.answers[name] = replace(study.answers[name], thermal_trip_time=later)
-
-
-def _chains(study: StudyRecord, file: Path, report: Report) -> None:
-    """Run the chains at constant speed. They are left out without native code, as an FMU in Python would take
-    hours."""
-    if study.fmus["machine"].backend != "native":
-        study.note(
-            "chains left out",
-            "chains at constant speed and the sweep are left out: they need native code, that is a C compiler.",
-        )
-        return
-    try:
-        study.chain, failure = study_chain(study.config, study.drive, file, report)
-    except RunError as error:
-        failure = error
-    except KeyboardInterrupt:
-        failure = InterruptedRunError("interrupted")
-    study.failure = study.failure or failure
 
 
 class Runner:
@@ -252,7 +243,7 @@ class Runner:
             )
 
     def _relay(self, run: xr.Dataset) -> None:
-        """Record the trip class of the relay that the start-up needs; that of a motor chosen by sizing holds from
+        """Record the trip class of the relay that the start-up needs; that of a proposed drive holds from
         every crank angle."""
         study, drive = self.study, self.rig.drive
         assert study.start is not None
@@ -262,8 +253,8 @@ class Runner:
         rise = run.sel(time=slice(None, time))
         current = rise[f"motor.{drive.motor.current}"].values
         study.relay_class = start_class(rise["time"].values, current, rated)
-        if study.sizing is not None:
-            study.relay_class = max(study.relay_class, study.sizing.best.start_class or 0)
+        if study.proposal is not None:
+            study.relay_class = max(study.relay_class, study.proposal.start_class)
 
     def _event(self, simulation: Simulation, event: Event, begin: float, before: float) -> Transient:
         stop = begin + event.follow(self.study.config.turn)

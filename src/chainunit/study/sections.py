@@ -14,12 +14,10 @@ from ..core.quantities import Value, declaration, group, quantity
 from ..drives.gearing import KINDS, Transmission
 from ..drives.induction_motor import InverterControl, SoftStart
 from ..drives.motor import Motor
-from ..machines.chain_organs import LEAST, MOST, OrganLaw
 from ..mechanism.models import MachineModel
 from ..system import NAMES
 from .file_section import FileSection
 from .registry import registered
-from .sizing_table import SIZING_KEYS, Sizing
 
 
 @declaration
@@ -107,46 +105,6 @@ class Starter:
     )
 
 
-@declaration
-class ChainOrgans(OrganLaw):
-    """The organs as chains, where `organ` is "chain", and the sweep over crank speeds with them."""
-
-    rods: Value = quantity("1", "number of rods of an organ", default=8, min=LEAST, max=MOST, type="Integer")
-    sweep_lowest: Value = quantity(
-        "rad/s", "lowest crank speed of the sweep", default=1.0, min=0.01, max=1000.0
-    )
-    sweep_highest: Value = quantity(
-        "rad/s", "highest crank speed of the sweep", default=15.0, above=0.0, max=1000.0
-    )
-    sweep_points: Value = quantity(
-        "1",
-        "number of speeds of the sweep, to which run.crank_speed is added; with 0 it is alone",
-        default=15,
-        min=0,
-        max=200,
-        type="Integer",
-    )
-    starts: Value = quantity(
-        "1",
-        "starts at each speed, evenly over the turn: at least 10",
-        default=10,
-        min=10,
-        max=1000,
-        type="Integer",
-    )
-    turns: Value = quantity(
-        "1",
-        "crank turns that are evaluated of each start: at least 30",
-        default=30,
-        min=30,
-        max=10_000,
-        type="Integer",
-    )
-
-
-ORGANS = ("two-bar", "chain")
-"""The models of the organs."""
-
 SIMULATIONS = ("cs", "me")
 """The methods of simulation: as a co-simulation, or as one ODE of Model Exchange FMUs."""
 
@@ -181,18 +139,18 @@ CHOICES: Mapping[str, Any] = {
             "cs", description="how the system runs: as a co-simulation, or as one ODE of Model Exchange FMUs"
         ),
     ),
-    "organ": (
-        Literal[ORGANS],
-        Field(
-            "two-bar", description="model of the organs: two rigid bars each, or chains of rods, see [chain]"
-        ),
-    ),
     "catalogue": (
         str,
         Field("", description="file with motors of your own, beside the packaged ones (CSV or TOML)"),
     ),
 }
-"""Keys of a study file that stand before all tables, as pydantic fields."""
+"""Keys of every study file that stand before all tables, as pydantic fields."""
+
+
+@cache
+def all_choices() -> dict[str, Any]:
+    """The keys before all tables, those of the capabilities included."""
+    return dict(CHOICES) | {name: each for part in registered() for name, each in part.choices.items()}
 
 
 def _names_form(title: str, names: Sequence[str]) -> type[BaseModel]:
@@ -238,15 +196,6 @@ class ForeignMotor:
 SECTIONS: Mapping[str, FileSection] = {
     "run": FileSection(Run, title="Run"),
     "coupling": FileSection(Coupling, optional=True, title="Safety coupling"),
-    "sizing": FileSection(
-        Sizing,
-        optional=True,
-        keys=SIZING_KEYS,
-        title="Demands on the motor",
-        apart=True,
-        follows={"inertia_ratio": "none"},
-        order=(("poles_least", ">=", "poles_most"), ("ambient", ">", "temperature")),
-    ),
     "gear": FileSection(
         Transmission,
         default=KINDS["gear"],
@@ -267,14 +216,6 @@ SECTIONS: Mapping[str, FileSection] = {
             "inverter.slip": "that of the rated slip of the motor; none with a flywheel, against which it works",
         },
     ),
-    "chain": FileSection(
-        ChainOrgans,
-        title="Chains",
-        follows={
-            "sweep_highest": "twice run.crank_speed, or 1.2 times the lowest mode of an organ if that is more"
-        },
-        order=(("sweep_lowest", ">", "sweep_highest"),),
-    ),
 }
 """The tables of every study file beside those of its machine, its feed, its motor, of the parts of the line, and of
 the capabilities."""
@@ -284,7 +225,11 @@ the capabilities."""
 def all_sections() -> dict[str, FileSection]:
     """The tables of a study file, those of parts of the line and of capabilities included, by name; without those of
     machine and motor."""
-    return dict(SECTIONS) | {name: each for part in registered() for name, each in part.tables.items()}
+    own = {name: each for part in registered() for name, each in part.tables.items()}
+    tables: dict[str, FileSection] = {}
+    for table, section in SECTIONS.items():
+        tables |= {name: each for name, each in own.items() if each.before == table} | {table: section}
+    return tables | own
 
 
 def sections_of(machine: type[MachineModel], motor: type[Motor]) -> dict[str, FileSection]:

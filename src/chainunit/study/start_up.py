@@ -97,7 +97,7 @@ def _missing(rig: Rig, run: xr.Dataset, steady_from: float) -> tuple[float | Non
     since = run.sel(time=slice(steady_from, None))
     turns = only_whole_turns(rig.drive, since, turns_asked)
     if turns is not None and turns_made(rig.drive, turns) > turns_asked - 0.5:
-        if rig.drive.chain is not None or is_settled(rig.drive, turns):
+        if is_settled(rig.drive, turns):
             return None, steady_from
         # as if one turn more had been waited for
         steady_from = float(whole_turns(rig.drive, since, 1)["time"][-1])

@@ -108,8 +108,8 @@ class StartAnalysis(Analysis):
 
     @staticmethod
     def applies(config: Config, drive: Drive) -> bool:
-        """Where the motor is of the catalogue; chains take too long."""
-        return config.of_catalogue and drive.chain is None
+        """Where the motor is of the catalogue; a machine that never repeats a turn takes too long."""
+        return config.of_catalogue and not drive.simulated_machine.model.never_repeats
 
     @staticmethod
     def find(study: StudyRecord, work: Work) -> StartFindings | None:

@@ -1,16 +1,16 @@
 """Whether the model of the organs holds for a machine at its speed: a rule on numbers, and its words.
 
 Two bars are a good model of a chain as long as no bar is pushed and the crank turns well below the lowest
-natural frequency of the chain. Chains are a good model as long as their energy balance is kept, no rod folds
-through its stop, and the peaks do not depend on the start. Only the energy balance is judged for a machine
-whose links are not known.
+natural frequency of the chain. Only the energy balance is judged for a machine whose links are not known. A
+capability that brings another model brings its verdict, too.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Mapping
-from typing import Any, Literal
+from dataclasses import field
+from typing import Any, Literal, NamedTuple
 
 from ..core.quantities import quantity
 from ..machines.chain_unit import RodName
@@ -31,8 +31,6 @@ START = "start_up"
 SETTLING = "settling"
 """Run of a machine that starts empty, from the coming of its feed to normal running."""
 
-_CHAINS = 'take organ = "chain"'
-
 Holds = Literal["true", "in part", "false"]
 Subject = Literal["organs", "machine", "energy balance"]
 """The subject of the verdict: the model of the organs, the model of the machine, or only the energy balance,
@@ -43,61 +41,51 @@ _SUBJECTS: Mapping[Subject, str] = {
     "energy balance": "The machine is an FMU whose own model is not known; its energy balance",
 }
 
-_TOPICS = {
-    "pushed": (
+
+class Topic(NamedTuple):
+    """The words on a kind of fault: in the verdict, at the begin of the line with its numbers, and its remedy."""
+
+    short: str
+    begin: str
+    remedy: str = ""
+
+
+_FINER = "{finer}"
+"""In place of a remedy: the model that is good where two bars are not, see `Verdict.finer`."""
+TOPICS: Mapping[str, Topic] = {
+    "pushed": Topic(
         "bars are pushed, where a chain would go slack and snatch",
         "Bars that are pushed, where a chain would go slack and snatch",
-        _CHAINS,
+        _FINER,
     ),
-    "end pushed": (
+    "end pushed": Topic(
         "an end of a bar is pushed, where a chain sags",
         "Bars that are pushed at an end, though pulled in the mean: a chain sags there, which changes the force in "
         "that pin and hardly the torques",
-        "",
     ),
-    "slack speed": (
+    "slack speed": Topic(
         "the crank turns faster than the speed at which a web goes slack",
         "Crank speed at or above the speed at which a web goes slack",
-        _CHAINS,
+        _FINER,
     ),
-    "crank torque": (
+    "crank torque": Topic(
         "the torques of rocker and crank may be off by more than 10 %, as a chain resonates",
         "Crank speed too high for the crank torque of two bars, which may be off by more than 10 %; the limit for "
         "the rocker torque is lower",
-        _CHAINS,
+        _FINER,
     ),
-    "rocker torque": (
+    "rocker torque": Topic(
         "the rocker torque may be off by more than 10 %, as a chain resonates",
         "Crank speed too high for the rocker torque of two bars, which may be off by more than 10 %",
-        _CHAINS,
+        _FINER,
     ),
-    "energy": (
+    "energy": Topic(
         "the energy balance is not kept",
         "Energy residual over the energy moved; a run above the limit counts as wrong",
         "shorten run.step",
     ),
-    "folded through": (
-        "rods fold through their stop",
-        "Rods that fold through their stop",
-        "raise chain.fold_stiffness, or assume that the machine breaks",
-    ),
-    "folded": (
-        "rods meet the stop between them, whose stiffness is assumed",
-        "Rods that fold and meet the stop between them",
-        "",
-    ),
-    "slack": (
-        "rods go slack and snatch: a single peak is no prediction",
-        "Share of the time with a slack rod; no single peak of a snatching chain is a prediction",
-        "",
-    ),
-    "starts": (
-        "the starts differ so much that they do not determine the quantile of peaks",
-        "Turns that count as independent, too few for the quantile, as the starts differ",
-        "raise chain.starts",
-    ),
 }
-"""By kind of fault: its words in the verdict, the begin of the line with its numbers, and its remedy."""
+"""By kind of fault, its words."""
 _UP_TO = {
     "slack speed": "A web goes slack from a crank speed of {} on",
     "crank torque": "The crank torque of two bars is good to 10 % only up to a crank speed of {}, the rocker torque "
@@ -127,12 +115,11 @@ class Reason:
 
     @property
     def numbers(self) -> str:
-        """The value in words, with the limit if the words of the topic do not give it."""
+        """The value in words, with the limit if that is not 0, which the words of the topic give."""
         rod = f"{self.rod} {'mean' if self.topic == 'pushed' else 'end'} pull " if self.rod else ""
         rod += f"at {self.place} " if self.place else ""
-        names_limit = self.topic in ("pushed", "end pushed", "slack")
         value, limit = (number(x, self.unit, self.kind, beside=False) for x in (self.value, self.limit))
-        return f"{rod}{value}{'' if names_limit else f', limit {limit}'}"
+        return f"{rod}{value}{f', limit {limit}' if self.limit else ''}"
 
     @property
     def speed_limit(self) -> str:
@@ -156,6 +143,12 @@ class Verdict:
     """crank speed in the runs [rad/s], if the model is judged at the requested speed instead; else None"""
     step: float | None = None
     """communication step of the runs [s]; None where it is not known"""
+    finer: str = ""
+    """the remedy where two bars are no model of the organs; empty where there is none"""
+    topics: Mapping[str, Topic] = field(default_factory=lambda: TOPICS)
+    """by kind of fault, its words"""
+    titles: Mapping[str, str] = field(default_factory=dict)
+    """the titles of runs that only this verdict knows"""
 
     @derived()
     def holds(self) -> Holds:
@@ -216,20 +209,21 @@ class Verdict:
             else self._judged_speed
         )
         why, remedies = [], []
-        for topic, (short, _, remedy) in _TOPICS.items():
+        for topic, (short, _, remedy) in self.topics.items():
             runs = {reason.run for reason in self.reasons if reason.topic == topic}
             if runs:
                 why.append(short + _where(runs))
+                remedy = remedy.format(finer=self.finer)
                 # a crank that hardly turns moves no energy that a residual could be compared with
                 remedy += self._shorter if topic == "energy" else ""
                 remedies.append("" if topic == "energy" and self._stalls else remedy)
         # a remedy for several faults is named once
         return "; ".join((line, *why, *dict.fromkeys(filter(None, remedies)))) + "."
 
-    def details(self, titles: Mapping[str, str]) -> list[str]:
-        """A line for each topic: the runs, by their `titles`, with their numbers."""
-        lines = []
-        for topic, (_, begin, _) in _TOPICS.items():
+    def details(self, titles: Mapping[str, str]) -> list[tuple[str, str]]:
+        """The topics, each with its line: the runs, by their `titles`, with their numbers."""
+        lines, titles = [], {**titles, **self.titles}
+        for topic, (_, begin, _) in self.topics.items():
             runs: dict[str, list[str]] = {}
             limits: dict[str, list[str]] = {}
             for reason in self.reasons:
@@ -241,13 +235,13 @@ class Verdict:
                     runs.setdefault(reason.run, []).append(reason.numbers)
             for limit, where in limits.items():
                 of = "; ".join(titles.get(run, run) for run in where if run)
-                lines.append(f"{limit}{of and f': {of}'}.")
+                lines.append((topic, f"{limit}{of and f': {of}'}."))
             each = [
                 f"{titles.get(run, run)} ({', '.join(sizes)})" if run else ", ".join(sizes)
                 for run, sizes in runs.items()
             ]
             if each:
-                lines.append(f"{begin}: {'; '.join(each)}.")
+                lines.append((topic, f"{begin}: {'; '.join(each)}."))
         return lines
 
     @derived("rad/s", "speed")
@@ -305,7 +299,7 @@ class SpeedLimit:
     @derived(name="text")
     def words(self) -> str:
         """The begin of a sentence on speeds beyond it."""
-        return _TOPICS[self.topic][1]
+        return TOPICS[self.topic].begin
 
 
 def speed_limits(slack_speed: float, mode: float, empty: bool = False) -> tuple[SpeedLimit, ...]:
@@ -340,6 +334,7 @@ def two_bars(
     *,
     empty: Collection[str] = (),
     actual: float | None = None,
+    finer: str = "",
 ) -> Verdict:
     """The verdict on two bars an organ.
 
@@ -353,6 +348,7 @@ def two_bars(
     residuals : by run, the energy residual over the energy moved
     empty : runs in which a side carries no material; "" stands for all runs
     actual : crank speed in the runs, if that is another [rad/s]
+    finer : see `Verdict`
     """
     reasons = []
     for run, rods in pulls.items():
@@ -373,7 +369,7 @@ def two_bars(
         runs = [""] if "" in empty else sorted(empty)
         of_empty = passed_limits(speed_limits(math.inf, mode, empty=True), speed)
         reasons += [_at_speed(each.topic, speed, each.speed, run) for each in of_empty for run in runs]
-    return Verdict("organs", "two bars", speed, (*reasons, *_balance_faults(residuals)), actual)
+    return Verdict("organs", "two bars", speed, (*reasons, *balance_faults(residuals)), actual, finer=finer)
 
 
 def rigid_links(speed: float, residuals: Mapping[str, float], *, actual: float | None = None) -> Verdict:
@@ -384,7 +380,7 @@ def rigid_links(speed: float, residuals: Mapping[str, float], *, actual: float |
     speed, actual : crank speed at which the model is judged, and crank speed in the runs, if that is another [rad/s]
     residuals : by run, the energy residual over the energy moved
     """
-    return Verdict("machine", "rigid links", speed, tuple(_balance_faults(residuals)), actual)
+    return Verdict("machine", "rigid links", speed, tuple(balance_faults(residuals)), actual)
 
 
 def outsider(speed: float, residuals: Mapping[str, float], *, actual: float | None = None) -> Verdict:
@@ -394,49 +390,11 @@ def outsider(speed: float, residuals: Mapping[str, float], *, actual: float | No
     ----------
     speed, actual, residuals : see `rigid_links`
     """
-    return Verdict("energy balance", None, speed, tuple(_balance_faults(residuals)), actual)
+    return Verdict("energy balance", None, speed, tuple(balance_faults(residuals)), actual)
 
 
-def chains(
-    speed: float,
-    residuals: Mapping[str, float],
-    folds: Mapping[str, float],
-    fold_limit: float,
-    slack: Mapping[str, float],
-    independent: float,
-    least_turns: float,
-    *,
-    actual: float | None = None,
-) -> Verdict:
-    """The verdict on organs as chains.
-
-    Parameters
-    ----------
-    speed : crank speed at which the model is judged [rad/s]
-    residuals, folds, slack : by run, the energy residual over the energy moved, the largest angle between two rods
-        [rad], the share of the time with a slack rod
-    fold_limit : angle at which two rods meet the stop between them [rad]
-    independent, least_turns : turns at constant speed that count as independent, and the number that the quantile
-        needs
-    actual : crank speed in the runs, if that is another [rad/s]
-    """
-    reasons: list[Reason] = []
-    for run, fold in folds.items():
-        if fold > math.pi:
-            reasons.append(
-                Reason("folded through", "fold_largest", fold, math.pi, "rad", run, grave=run == STEADY)
-            )
-        elif fold > fold_limit:
-            reasons.append(Reason("folded", "fold_largest", fold, fold_limit, "rad", run))
-    for run, share in slack.items():
-        if share > 0.0:
-            reasons.append(Reason("slack", "slack_time", share, 0.0, "1", run, "percent"))
-    if independent < least_turns:
-        reasons.append(Reason("starts", "independent_turns", independent, least_turns, "1"))
-    return Verdict("organs", "chains", speed, (*reasons, *_balance_faults(residuals)), actual)
-
-
-def _balance_faults(residuals: Mapping[str, float]) -> list[Reason]:
+def balance_faults(residuals: Mapping[str, float]) -> list[Reason]:
+    """The runs, by their energy residual over the energy moved, whose balance is not kept."""
     return [
         Reason("energy", "energy_residual", share, RESIDUAL, "1", run, grave=run == STEADY)
         for run, share in residuals.items()

@@ -147,8 +147,8 @@ class Window:
     @cached_property
     def lasts(self) -> bool:
         """Whether means of steady running stand for running that lasts. They do not where the moving masses take up
-        more than `LASTING`, or the crank turns and makes no whole turn. Chains never repeat a turn."""
-        if self.phase is not Phase.STEADY or self.drive.chain is not None:
+        more than `LASTING`, or the crank turns and makes no whole turn. Some machines never repeat a turn."""
+        if self.phase is not Phase.STEADY or self.drive.simulated_machine.model.never_repeats:
             return True
         if not has_turn(self.drive, self.run):
             return bool(abs(self.speed_mean) < CREEPS * self.requested_speed)
@@ -239,5 +239,7 @@ def closes(gap: float, drifts: float, energy: float) -> bool:
 
 
 def is_settled(drive: Drive, turns: xr.Dataset) -> bool:
-    """Whether `turns` close."""
+    """Whether `turns` close, or are of a machine that never repeats a turn."""
+    if drive.simulated_machine.model.never_repeats:
+        return True
     return closes(end_gap(drive, turns), drift(drive, turns), energy_gap(drive, turns))

@@ -9,12 +9,12 @@ from pydantic import Field
 
 from ...report.capability import Capability, Contents
 from ...study.analysis import Analysis
-from ...study.conditions import given, has_entries
+from ...study.conditions import has_entries
 from ...study.config import Config
 from ...study.entry_values import numbers
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
-from ...study.rules import Rule
+from ...study.rules import Rule, motor_is_chosen
 from .table import FlywheelTable
 
 
@@ -47,7 +47,7 @@ class FlywheelCapability(Capability):
     def rules(self) -> Iterable[Rule]:
         """Sizing has flywheels of its own."""
         words = "sizing finds its own; leave out one of the two"
-        yield Rule("flywheel", given("sizing"), words, has_entries("flywheel"))
+        yield Rule("flywheel", motor_is_chosen(), words, has_entries("flywheel"))
 
     def plan(self, reading: FileReading) -> FlywheelPlan | None:
         """The plan of the table."""

@@ -48,14 +48,14 @@ class FlywheelFindings(Findings):
 
     own: float
     """flywheel of the study [kg m2]"""
+    permitted_fluctuation: float = part(
+        "permitted ripple of the speed", unit="1", kind="percent", name="permitted"
+    )
     swing: float
     speed: float
     bare: float
     mean_torque: float
     """mean torque of the machine at the motor's shaft, at constant speed [N m]"""
-    permitted_fluctuation: float = part(
-        "permitted ripple of the speed", unit="1", kind="percent", name="permitted"
-    )
     wheels: list[Wheel] = part("the flywheels that are compared", name="compared", default_factory=list)
     least: Wheel | None = None
     is_searched: bool = False

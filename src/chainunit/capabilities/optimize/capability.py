@@ -7,7 +7,8 @@ from collections.abc import Iterable
 from ...report.capability import Capability
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
-from ...study.rules import CHAINS, MACHINE_FMU, NEEDS_MODEL, TWO_BARS, Rule
+from ...study.parts import motor_is_left
+from ...study.rules import MACHINE_FMU, NEEDS_MODEL, Rule, other_models
 from .table import FIELDS, Optimize, read_wishes
 from .wishes import Wishes
 
@@ -32,14 +33,14 @@ class OptimizeCapability(Capability):
     def rules(self) -> Iterable[Rule]:
         """It needs a model of the machine, with two bars."""
         yield Rule("optimize", MACHINE_FMU, NEEDS_MODEL)
-        yield Rule("optimize", CHAINS, TWO_BARS)
+        yield from (Rule("optimize", other.on, other.refusal) for other in other_models())
 
     def plan(self, reading: FileReading) -> Wishes | None:
         """The wishes that the table states."""
         if "optimize" not in reading.data:
             return None
         loads, run = reading.values["feed"], reading.values["run"]
-        by_motor = bool(reading.parts.designation or "sizing" in reading.data)
+        by_motor = bool(reading.parts.designation or motor_is_left(reading.data))
         table, form = reading.values["optimize"], reading.form.optimize
         return read_wishes(
             table, form, reading.parts.machine, reading.machine, loads, run.crank_speed, by_motor

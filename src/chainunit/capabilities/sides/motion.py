@@ -8,6 +8,7 @@ from ...core.engines import numpy_
 from ...core.planar import Vec2
 from ...groups.chain import pins
 from ...groups.loads import Resistance
+from ...machines.api import ChainedUnit
 from ...machines.chain_unit import NAMES, ON_SIDE, OrganNames, SideName
 from ...mechanism.machine import MachineState
 from ...report.motion import Arrow
@@ -24,7 +25,7 @@ _CAPTION = (
 
 def organ_motion(study: StudyRecord) -> Supplement:
     """The supplement with the organs of both sides, each side in its colour."""
-    walls, _ = rods = (1, 1) if study.drive.chain is None else study.drive.rods
+    walls, _ = rods = _rods(study)
     joints = {side: _joints(names, rods) for side, names in NAMES.items()}
     links = {
         link: tuple(joints[side][span])
@@ -49,6 +50,12 @@ def organ_motion(study: StudyRecord) -> Supplement:
     )
 
 
+def _rods(study: StudyRecord) -> tuple[int, int]:
+    """Numbers of rods in wall and web of an organ."""
+    machine = study.drive.simulated_machine
+    return machine.rods if isinstance(machine, ChainedUnit) else (1, 1)
+
+
 def _joints(names: OrganNames, rods: tuple[int, int]) -> list[str]:
     """The joints of an organ from A1 to A2."""
     walls, webs = rods
@@ -68,9 +75,9 @@ class OrganMotion(Supplement):
         arrows = []
         for side, names in NAMES.items():
             force = state.effects[names.processing].wrenches[0].force
-            if self.study.drive.chain is not None:
+            if self.study.drive.machine.in_place:
                 inner, force = self._chain(part, state, side)
-                between = _joints(names, self.study.drive.rods)[1:-1]
+                between = _joints(names, _rods(self.study))[1:-1]
                 joints |= {pin: (at.x, at.y) for pin, at in zip(between, inner, strict=True)}
             arrows.append(Arrow(f"processing force {side}", names.b, force.x, force.y, "P", side, load=True))
             material = part[f"machine.{side}.material_mass"].values
@@ -80,7 +87,7 @@ class OrganMotion(Supplement):
     def _chain(self, part: Any, state: MachineState, side: SideName) -> tuple[list[Vec2], Vec2]:
         """The places of the inner joints of a chain [m], and its processing force [N]."""
         drive, names = self.study.drive, NAMES[side]
-        p, (walls, webs) = drive.machine.p, drive.rods
+        p, (walls, webs) = drive.machine.p, _rods(self.study)
         theta, omega = (
             [part[f"machine.{side}.{x}_{k}"].values for k in range(1, walls + webs + 1)]
             for x in ("theta", "omega")

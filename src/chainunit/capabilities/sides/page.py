@@ -39,8 +39,7 @@ def _factors(s: b.Source, study: StudyRecord) -> b.Table:
         )
         for name in sides[first]
     )
-    # chains have no cycle at constant speed: the factors are those of two bars in every study
-    by = "" if study.drive.chain is None else ", of two bars in place of the chains"
+    by = f", of {words}" if (words := study.drive.machine.in_place) else ""
     title = s.line("Overload factor, one side against both, at {=run.crank_speed:4}" + by)
     return b.Table(tuple(rows), b.heads("factor", *sides, "use"), title=title, numeric=False)
 
@@ -48,7 +47,7 @@ def _factors(s: b.Source, study: StudyRecord) -> b.Table:
 def _limits(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     swing = "Rocker swings from {organs.limits.rocker_extreme_left} to {organs.limits.rocker_extreme_right}; margin "
     yield b.Text(s.line(swing + "{organs.limits.margin}."), form="short")
-    web = "a web" if study.drive.chain is None else "with two bars a web"
+    web = "with two bars a web" if study.drive.machine.in_place else "a web"
     cases = [
         f"{case}, {web} "
         + (

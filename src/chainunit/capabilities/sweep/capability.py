@@ -8,7 +8,7 @@ from ...report.capability import Capability
 from ...study.conditions import given, has_entries, has_entry, is_one_of
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
-from ...study.rules import CHAINS, MACHINE_FMU, MOTOR_FMU, NEEDS_MODEL, TWO_BARS, Rule
+from ...study.rules import MACHINE_FMU, MOTOR_FMU, NEEDS_MODEL, Rule, motor_is_chosen, other_models
 from .plan import SweepPlan
 from .reading import Sweepable, read_plan
 from .table import FIELDS, MEASURES_OF_SWEEP, MOST_RESULTS, MOST_VALUES, SWEPT, SweepTable
@@ -53,7 +53,7 @@ class SweepCapability(Capability):
         """It varies one drive, of which the models are known."""
         yield Rule("sweep", MACHINE_FMU, NEEDS_MODEL)
         yield Rule(
-            "sweep", given("sizing"), "varies one drive, and [sizing] tries many; leave out one of the two"
+            "sweep", motor_is_chosen(), "varies one drive, and [sizing] tries many; leave out one of the two"
         )
         yield Rule(
             "sweep.points",
@@ -68,8 +68,9 @@ class SweepCapability(Capability):
         )
         words = "need a model of the motor, which is an FMU; leave them out"
         yield Rule("sweep.measures", MOTOR_FMU, words, has_entries("sweep.measures"))
-        words = f"{TWO_BARS}, or give measures"
-        yield Rule("sweep.quantities", CHAINS, words, has_entries("sweep.quantities"))
+        for other in other_models():
+            words = f"{other.refusal}, or give measures"
+            yield Rule("sweep.quantities", other.on, words, has_entries("sweep.quantities"))
 
     def plan(self, reading: FileReading) -> SweepPlan | None:
         """The plan of the table; None for a machine that was refused."""

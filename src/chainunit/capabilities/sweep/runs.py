@@ -34,7 +34,7 @@ def check_drive(rig: Rig, plan: SweepPlan) -> None:
     event, faults = rig.config.events[plan.event], Faults()
     if not rig.takes(event):
         faults.add([InputError(f"sweep.event = {plan.event}: {event.without}", "sweep.event")])
-    known = rig.drive.load_model()[0].parameter_layout.names
+    known = rig.drive.simulated_machine.model.parameter_layout.names
     for name in (each.name for each in plan.parameters):
         words = ""
         if name == SPEED and not rig.drive.follows:

@@ -298,7 +298,7 @@ def _organs(findings: SweepFindings) -> list[tuple[SpeedLimit, int]]:
     """The limits of the crank speed for two bars as organs, of the study's machine and feed, each with the number
     of points beyond it; only those that a point passes, and none where no result depends on the organs."""
     config, plan, task = findings.config, findings.plan, findings.task
-    if config.chain is not None:
+    if config.machine.in_place:
         return []
     units = ["N"] if plan.measures else [findings.variables[name].unit for name in plan.quantities]
     empties = bool(plan.event) and config.events[plan.event].empties

@@ -164,7 +164,7 @@ def _observed(steady: xr.Dataset, normal: float) -> Observed:
 
 
 def _resonance(study: StudyRecord) -> float | None:
-    if study.drive.chain is None:
+    if not study.drive.machine.in_place:
         return None
     _, mode = slack_and_mode(study.drive.chain_unit, study.config.feed)
     return study.config.run.crank_speed / mode

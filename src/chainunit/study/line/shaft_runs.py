@@ -119,9 +119,6 @@ def remark(study: StudyRecord) -> None:
         return
     line = driveline_of(study.drive)
     warn, note = study.warn, study.note
-    if study.sizing is not None:
-        rigid = "Sizing took the shafts as rigid and the driveline as massless; the runs include it."
-        note("sized without line", rigid)
     if line.d2 == 0.0 and line.d3 == 0.0:
         text = "The driveline has no damping: a vibration, once excited, does not decay; give d2 and d3."
         note("undamped line", text)

@@ -13,22 +13,20 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..core.engines import MATH
-from ..drives.catalogue import CatalogueMotor
-from ..drives.induction_motor import volts_per_hertz
-from ..drives.motor import T_RATED
-from ..machines.chain_unit import SideName
-from ..system import Simulation
-from .arrays import peak
-from .config import Config
-from .drive import Drive
-from .duty import Duty, rms
-from .limits import Check, heating, keeping_speed, starting
-from .measures import time_to_start
-from .readings import crank_angle, load_inertia, only_whole_turns, turns_made
-from .relay import start_class
-from .rig import Rig
-from .start_runs import (
+from ...core.engines import MATH
+from ...drives.catalogue import CatalogueMotor
+from ...drives.induction_motor import volts_per_hertz
+from ...drives.motor import T_RATED
+from ...machines.chain_unit import SideName
+from ...study.arrays import peak
+from ...study.config import Config
+from ...study.drive import Drive
+from ...study.limits import Check, heating, keeping_speed, starting
+from ...study.measures import time_to_start
+from ...study.readings import crank_angle, load_inertia, only_whole_turns, turns_made
+from ...study.relay import start_class
+from ...study.rig import Rig
+from ...study.start_runs import (
     OVERLOADED,
     StartNumbers,
     exceeded_for,
@@ -37,11 +35,15 @@ from .start_runs import (
     starts_from_all,
     time_above,
 )
-from .start_up import PATIENCE
-from .torques import DutyPeak, all_feed_on, at_gear, duty_peak
-from .transients import follow
-from .verdict import CREEPS, SETTLING, STEADY
-from .window import BURNT, is_settled
+from ...study.start_up import PATIENCE
+from ...study.torques import DutyPeak, all_feed_on, at_gear, duty_peak
+from ...study.transients import follow
+from ...study.verdict import CREEPS, SETTLING, STEADY
+from ...study.window import BURNT, is_settled
+from ...system import Simulation
+from .candidate import TrialResult
+from .duty import Duty, rms
+from .table import Sizing, plan_of
 
 _GAP = "motor.air_gap_tau"
 _STANDS = 0.25
@@ -101,15 +103,12 @@ class Trial:
         first = start_class(time[starting], current[starting], self.motor.nameplate.rated_current)
         return max(first, *(start.start_class for start in self.starts), 0)
 
-    def _peak_current(self, *runs: xr.Dataset) -> float:
-        return max(peak(run[f"motor.{self.drive.motor.current}"].values) for run in runs)
-
     @cached_property
     def start_current(self) -> float | None:
         """Largest current in a start [A]; None without a start."""
         if self.start_time is None:
             return None
-        return max([self._peak_current(self.start), *(start.current for start in self.starts)])
+        return max([peak(self._start_currents[1]), *(start.current for start in self.starts)])
 
     @cached_property
     def overload_time(self) -> float | None:
@@ -133,11 +132,10 @@ class Trial:
         if not self.drive.follows or self.start_current is None:
             return None
         name = f"motor.{self.drive.motor.current}"
-        highest = max(self.start_current, self._peak_current(*self._running))
+        highest = max(self.start_current, *(peak(run[name].values) for run in self._running))
         lasting = [exceeded_for(*self._start_currents, OVERLOADED), *(s.long_current for s in self.starts)]
-        duty = rms(*((share, run[name].values) for share, run in self._cases))
         rated = float(self.motor.nameplate.rated_current)
-        return max(rated, duty, highest / self.config.starter.overload, *lasting)
+        return max(rated, self._rms(name), highest / self.config.starter.overload, *lasting)
 
     @cached_property
     def speed(self) -> float:
@@ -169,19 +167,17 @@ class Trial:
     def breakdown_torque(self) -> float:
         """Breakdown torque of the motor [N m] at its permitted temperature and at the frequency at which it
         runs: above the corner frequency the voltage of an inverter does not rise any more."""
-        assert self.config.sizing is not None
         p = self.drive.fmu_parameters
         voltage = float(volts_per_hertz(MATH, p, self.frequency)) if self.drive.follows else 1.0
-        T = self.config.sizing.temperature
+        T = self._demands.temperature
         return float(self.drive.motor.largest_torque(p, T, voltage * p.supply.V, self.frequency))
 
     @cached_property
     def temperature(self) -> float:
         """Final temperature of the winding if the duty with its starts goes on for ever [K]; `BURNT` where
         there is none."""
-        assert self.config.sizing is not None
         steady, extra = self._heat
-        mean = steady + self.config.sizing.starts_per_hour * extra / 3600.0
+        mean = steady + self._demands.starts_per_hour * extra / 3600.0
         p, motor = self.drive.fmu_parameters, self.drive.motor
         return min(BURNT, motor.settled_temperature(p, mean, self._ran_at, self.speed))
 
@@ -189,15 +185,12 @@ class Trial:
     def permitted_starts(self) -> float:
         """Starts per hour that the winding permits; for a motor on the line at most those that the catalogue
         permits."""
-        assert self.config.sizing is not None
         p, plate = self.drive.fmu_parameters, self.motor.nameplate
-        warm, cold = (
-            1.0 + p.stator.alpha * (T - T_RATED) for T in (self.config.sizing.temperature, self._ran_at)
-        )
+        warm, cold = (1.0 + p.stator.alpha * (T - T_RATED) for T in (self._demands.temperature, self._ran_at))
         # the runs are short and their winding is as cold as the surroundings; a warm winding has larger
         # losses
         running, start = (warm / cold * heat for heat in self._heat)
-        starts = permitted_starts(p, running, start, self._cooling, self.config.sizing.temperature)
+        starts = permitted_starts(p, running, start, self._cooling, self._demands.temperature)
         if plate.starts and self.config.start == "direct":
             # the number of starts in the catalogue is that of the bare rotor
             total = p.rotor.J + float(np.mean(load_inertia(self.drive, self.steady)))
@@ -225,6 +218,14 @@ class Trial:
         extra += [start.heat - after * start.followed for start in self.starts]
         return steady, max(0.0, *extra)
 
+    def _rms(self, name: str) -> float:
+        """RMS of a variable over the duty."""
+        return rms(*((share, run[name].values) for share, run in self._cases))
+
+    @property
+    def _demands(self) -> Sizing:
+        return plan_of(self.config).demands
+
     @property
     def _running(self) -> tuple[xr.Dataset, ...]:
         """The runs of running: steady, with all feed on each side, and those in which the feed comes or moves."""
@@ -233,23 +234,31 @@ class Trial:
     @property
     def _cases(self) -> list[tuple[float, xr.Dataset]]:
         """The runs of the duty, each with its share of the time."""
-        assert self.config.sizing is not None
         if self.heavier is None:
             return [(1.0, self.steady)]
-        share = float(self.config.sizing.one_sided_share)
+        share = float(self._demands.one_sided_share)
         return [(1.0 - share, self.steady), (share, self.one_sided[self.heavier])]
+
+    def result(self) -> TrialResult:
+        """Its results."""
+        is_started = self.start_time is not None
+        return TrialResult(
+            checks=self.checks(),
+            start_class=self.start_class,
+            start_current=self.start_current,
+            overload_time=self.overload_time,
+            inverter_current=self.inverter_current,
+            speed=self.speed if is_started else None,
+            frequency=self.frequency if is_started else None,
+            duty=self.duty,
+            fluctuation=self.fluctuation,
+            stall_angle=self.stall_angle,
+        )
 
     def checks(self) -> dict[str, Check]:
         """Each value beside its limit, by name; the value is None where the machine does not get up to
         speed."""
-        demands, plate, p = self.config.sizing, self.motor.nameplate, self.drive.fmu_parameters
-        assert demands is not None
-
-        def at_speed(check: Check) -> Check:
-            return check if self.start_time is not None else dataclasses.replace(check, value=None)
-
-        def check(title: str, value: float, limit: float, unit: str, kind: str = "") -> Check:
-            return at_speed(Check(title, value, limit, unit, kind))
+        demands, plate, p = self._demands, self.motor.nameplate, self.drive.fmu_parameters
 
         start = starting(self.start_time, plate)
         if self.drive.follows:
@@ -261,33 +270,23 @@ class Trial:
         )
         breakdown = self.breakdown_torque / demands.breakdown_margin
         requested_speed = self.drive.ratio * self.config.run.crank_speed
+        peak_torque = max(peak(run[_GAP]) for run in self._running)
+        too_hot = "no start is permitted, as running alone is too hot"
         checks = {
             "start": start,
-            "rms_torque": check(
-                "RMS torque",
-                rms(*((share, run[_GAP].values) for share, run in self._cases)),
-                plate.torque * weaker * math.sqrt(min(1.0, cooling)),
-                "N.m",
+            "rms_torque": Check(
+                "RMS torque", self._rms(_GAP), plate.torque * weaker * math.sqrt(min(1.0, cooling)), "N.m"
             ),
-            "peak_torque": check(
-                "peak torque",
-                max(peak(run[_GAP]) for run in self._running),
-                breakdown,
-                "N.m",
+            "peak_torque": Check("peak torque", peak_torque, breakdown, "N.m"),
+            "temperature": heating(self.temperature, p.ambient.T, demands.temperature),
+            "starts": Check(
+                "starts per hour", demands.starts_per_hour, self.permitted_starts, "1", forbidden=too_hot
             ),
-            "temperature": at_speed(heating(self.temperature, p.ambient.T, demands.temperature)),
-            "starts": at_speed(
-                Check(
-                    "starts per hour",
-                    demands.starts_per_hour,
-                    self.permitted_starts,
-                    "1",
-                    forbidden="no start is permitted, as running alone is too hot",
-                )
-            ),
-            "crank_speed": at_speed(keeping_speed(self.speed, requested_speed)),
-            "speed": check("speed fluctuation", self.fluctuation, demands.fluctuation, "1", "percent"),
+            "crank_speed": keeping_speed(self.speed, requested_speed),
+            "speed": Check("speed fluctuation", self.fluctuation, demands.fluctuation, "1", "percent"),
         }
+        if self.start_time is None:
+            checks = {name: dataclasses.replace(check, value=None) for name, check in checks.items()}
         if math.isfinite(demands.inertia_ratio):
             inertia = float(np.max(load_inertia(self.drive, self.steady)))
             ratio = (inertia + p.rotor.J - plate.J) / plate.J
@@ -346,17 +345,16 @@ def try_motor(
             shifts.append((all_feed_on(side), shift))
             one_sided[side] = simulation.run(simulation.time + turn, rig.step)
     trial = Trial(config, motor, drive, duty.heavier, start, steady, tuple(shifts), one_sided)
-    if not worst_start or drive.chain is not None or trial.start_time is None:
+    if not worst_start or drive.simulated_machine.model.never_repeats or trial.start_time is None:
         return trial
     return dataclasses.replace(trial, starts=starts_from_all(rig, longest_start(config, trial.start_time)))
 
 
 def _until_settled(rig: Rig, simulation: Simulation, stop: float) -> list[xr.Dataset]:
-    """Runs of two turns, the first to the time `stop` [s], until the turns of a run close; those of chains
-    never close."""
+    """Runs of two turns, the first to the time `stop` [s], until the turns of a run close."""
     turn, drive = rig.config.turn, rig.drive
     runs = [simulation.run(stop, rig.step)]
-    while drive.chain is None and simulation.time < stop + PATIENCE * turn:
+    while simulation.time < stop + PATIENCE * turn:
         turns = only_whole_turns(drive, runs[-1])
         if turns is None or is_settled(drive, turns):
             break

@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from ..study.chain import HIGH
-from ..study.record import StudyRecord
-from . import blocks as b
-from . import figure as fig
-from .lines import Line, join, line
-from .pictures import Pictures
-from .style import WIDE
+from ...report import blocks as b
+from ...report import figure as fig
+from ...report.lines import Line, join, line
+from ...report.pictures import Pictures
+from ...report.style import WIDE
+from ...study.quantiles import HIGH
+from ...study.record import StudyRecord
+from .result import ChainResult
 
 PICTURES = Pictures()
 _OWN = (
@@ -42,8 +43,6 @@ _ORDERS = (
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """Text, tables and figure."""
-    if study.chain is None:
-        return
     chain = s.result["chain"]
     lead = (
         "The organs are chains of {=chain.rods_of_wall} rods in the wall and {=chain.rods_of_web} in the web. The "
@@ -157,33 +156,35 @@ def _critical(s: b.Source, chain: Mapping[str, Any], study: StudyRecord) -> Iter
     orders = (s.line(f"order {{={path}.{i}.order}}") for i in next(iter(places.values())).values())
     title = f"Critical crank speeds. {_ORDERS}"
     yield b.Table(tuple(rows), b.heads("", *orders), title=title, form="long")
-    assert study.chain is not None
+    found: ChainResult = study.findings["chain"]
     inside = [
-        s.line(f"{{{path}.{places[mode][order]}.speed}} (mode {mode}, order {order})")
-        for mode, order, _ in sorted(study.chain.within_sweep(), key=lambda each: each[2])
+        s.line(f"{{{path}.{places[each.mode][each.order]}.speed}} (mode {each.mode}, order {each.order})")
+        for each in sorted(found.within_sweep(), key=lambda each: each.speed)
     ]
     if inside:
         yield b.Text(line("Critical speeds within the sweep: ", join(inside), f". {_ORDERS}"), form="short")
 
 
-@PICTURES.declare(lambda study: study.chain is not None and len(study.chain.sweep) > 1, "chain_sweep.png")
+@PICTURES.declare(lambda study: len(study.findings["chain"].sweep) > 1, "chain_sweep.png")
 def _over_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
     """Torques of chains and two bars, and the share of the time with a slack rod, over the crank speed."""
-    result = study.chain
-    assert result is not None
+    result: ChainResult = study.findings["chain"]
     rows = result.sweep
     speed = np.array([n.speed for n in rows])
     x = fig.Axis("crank speed", "rad/s", "speed", low=float(speed[0]), high=float(speed[-1]))
     # the least distance of 5 % keeps labels apart on a narrow screen, too
     words: list[fig.Item] = [
         fig.Mark(
-            at, words=f"mode {mode}" + (f", order {order}" if order > 1 else ""), look="thin", upright=True
+            each.speed,
+            words=f"mode {each.mode}" + (f", order {each.order}" if each.order > 1 else ""),
+            look="thin",
+            upright=True,
         )
-        for mode, order, at in result.within_sweep(0.05)
+        for each in result.within_sweep(0.05)
     ]
     marks: list[fig.Item] = [
         *(fig.Shade(band.low, band.high, "to avoid") for band in result.avoid),
-        *(fig.Mark(at, look="thin") for _, _, at in result.within_sweep()),
+        *(fig.Mark(each.speed, look="thin") for each in result.within_sweep()),
         fig.Mark(result.own.speed, "the study's speed", look=2),
     ]
 

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..drives.gearing import ordered_torque
-from .event import Role
-from .event_torques import peaks_in_events, running_peak, running_words
-from .judgement import wrong_runs
-from .record import StudyRecord
-from .starts import StartAnalysis
-from .torques import at_gear
-from .verdict import STEADY
+from ...drives.gearing import ordered_torque
+from ...study.event import Role
+from ...study.event_torques import peaks_in_events, running_peak, running_words
+from ...study.judgement import wrong_runs
+from ...study.record import StudyRecord
+from ...study.starts import StartAnalysis
+from ...study.torques import at_gear
+from ...study.verdict import STEADY
+from .protection import Setting
 
 
 @dataclass(frozen=True)
@@ -44,31 +45,31 @@ class GearOrder:
         return max(self.loads.values(), key=lambda load: load.rated)
 
 
-def gear_order(study: StudyRecord) -> GearOrder | None:
-    """The gear to order; None without steady running, and for an insufficient motor. A start and an overload may put
-    `gear.start_factor` times the rated torque on it."""
-    assert study.config.sizing is not None
+def gear_order(study: StudyRecord, setting: Setting | None, margin: float) -> GearOrder | None:
+    """The gear to order, which leaves the `margin` free, with a coupling of that `setting`; None without steady
+    running, and for an insufficient motor. A start and an overload may put `gear.start_factor` times the rated torque
+    on it."""
     if study.insufficient or STEADY not in study.answers:
         return None
     running, factor = running_peak(study, at_gear), study.config.gear.start_factor
     loads = {"running": GearLoad(running.torque, running_words(study, running.run))}
     if starts := study.findings.get(StartAnalysis.name):
         loads["start"] = GearLoad(starts.worst.gear_torque, "a start", factor)
-    peaks, wrong = _overloads(study), wrong_runs(study)
+    peaks, wrong = _overloads(study, setting), wrong_runs(study)
     if kept := {name: peak for name, peak in peaks.items() if name not in wrong}:
         name = max(kept, key=lambda each: kept[each])
-        with_coupling = study.setting is not None and study.setting.torque and name in study.setting.effects
+        with_coupling = setting is not None and setting.torque and name in setting.effects
         words = f"an overload ({study.title_of(name)}{', with the coupling' if with_coupling else ''})"
         loads["overload"] = GearLoad(kept[name], words, factor)
     least = max(load.rated for load in loads.values())
     left_out = tuple(name for name in wrong if name in peaks)
-    return GearOrder(ordered_torque(least, study.config.sizing.margin), loads, left_out)
+    return GearOrder(ordered_torque(least, margin), loads, left_out)
 
 
-def _overloads(study: StudyRecord) -> dict[str, float]:
+def _overloads(study: StudyRecord, setting: Setting | None) -> dict[str, float]:
     """Peak torque at the output of the gear in each shock and disturbance [N m], by name: that which passes the
     coupling where one is recommended."""
     peaks = peaks_in_events(study, Role.SHOCK, Role.DISTURBANCE, of=at_gear)
-    if study.setting is not None and study.setting.torque is not None:
-        peaks |= {name: effect.with_coupling for name, effect in study.setting.effects.items()}
+    if setting is not None and setting.torque is not None:
+        peaks |= {name: effect.with_coupling for name, effect in setting.effects.items()}
     return peaks

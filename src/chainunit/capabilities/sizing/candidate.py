@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
-from ..core.quantities import Value, declaration, quantity
-from ..drives.catalogue import CatalogueMotor
-from ..drives.disc import Disc, steel_disc
-from ..drives.gear_ratios import GearUnit
-from ..reading.results import as_data
-from ..reading.text import entries, number
-from .drive import Drive
-from .limits import Check
-from .torques import DutyPeak
+from ...core.quantities import Value, declaration, quantity
+from ...drives.catalogue import CatalogueMotor
+from ...drives.disc import Disc, steel_disc
+from ...drives.gear_ratios import GearUnit
+from ...reading.results import as_data
+from ...reading.text import entries, number
+from ...study.drive import Drive
+from ...study.limits import Check
+from ...study.torques import DutyPeak
 
 TOLERANCES = ("crank_speed",)
 """Checks of a tolerance, which a drive may use wholly: the gear's ratio takes it, and no load does."""
@@ -82,19 +83,11 @@ class Criterion(StrEnum):
     USE = "use"
 
 
-@dataclass
-class Candidate:
-    """A motor behind a gear, with the results of its runs."""
+@dataclass(frozen=True)
+class TrialResult:
+    """The results of a candidate's runs; nothing is known before them, and where one fails."""
 
-    motor: CatalogueMotor
-    drive: Drive
-    checks: dict[str, Check]
-    margin: float = 0.0
-    """share of each limit that should remain free"""
-    unit: GearUnit | None = None
-    """the gear unit of the ratio; None where one unit does not suffice"""
-    series: str = ""
-    """source of the ratio, such as a series of preferred numbers; empty for an exact or a given one"""
+    checks: Mapping[str, Check] = field(default_factory=dict)
     start_class: int | None = None
     """see `chainunit.study.relay`; None for an inverter, or where there is no start"""
     start_current: float | None = None
@@ -113,6 +106,21 @@ class Candidate:
     fluctuation: float = math.nan
     stall_angle: float | None = None
     """crank angle at which the load stalls the motor [rad]; None for a motor that starts"""
+
+
+@dataclass
+class Candidate:
+    """A motor behind a gear, with the results of its runs."""
+
+    motor: CatalogueMotor
+    drive: Drive
+    trial: TrialResult = TrialResult()
+    margin: float = 0.0
+    """share of each limit that should remain free"""
+    unit: GearUnit | None = None
+    """the gear unit of the ratio; None where one unit does not suffice"""
+    series: str = ""
+    """source of the ratio, such as a series of preferred numbers; empty for an exact or a given one"""
     heaviest: float = 0.0
     """the heaviest flywheel that was tried with the motor [kg m2]"""
     bound: float | None = None
@@ -126,6 +134,11 @@ class Candidate:
     reason: str = ""
     remedy: str = ""
     """what makes a candidate fit that only fails in the torque of the gear in its start, in words"""
+
+    @property
+    def checks(self) -> Mapping[str, Check]:
+        """The values of its runs beside their limits, by name; empty where a run failed."""
+        return self.trial.checks
 
     @property
     def sizes(self) -> dict[str, float]:
@@ -183,7 +196,8 @@ class Candidate:
     def weakened(self) -> bool:
         """Whether an inverter runs the motor well above its rated frequency, where it has less torque."""
         rated = float(self.motor.nameplate.frequency)
-        return self.frequency is not None and self.frequency > FIELD_WEAKENING * rated
+        frequency = self.trial.frequency
+        return frequency is not None and frequency > FIELD_WEAKENING * rated
 
     @property
     def disc(self) -> Disc | None:
@@ -213,16 +227,16 @@ class Candidate:
             diameter=disc and disc.diameter,
             width=disc and disc.width,
             rim_speed=disc and disc.rim_speed(self.motor.nameplate.speed),
-            fluctuation=self.fluctuation,
+            fluctuation=self.trial.fluctuation,
         )
 
     def as_dict(self) -> dict[str, Any]:
         """Ready for JSON, each number with its unit."""
         numbers = DriveNumbers(
-            start_class=self.start_class,
-            inverter_current=self.inverter_current,
-            frequency=self.frequency,
-            speed=self.speed,
+            start_class=self.trial.start_class,
+            inverter_current=self.trial.inverter_current,
+            frequency=self.trial.frequency,
+            speed=self.trial.speed,
             mass=self.mass,
             price=self.motor.nameplate.price or None,
         )

@@ -1,4 +1,4 @@
-"""The protection of a drive by a safety coupling, and the stall from which it protects."""
+"""The protection of a drive by a safety coupling."""
 
 from __future__ import annotations
 
@@ -6,16 +6,11 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
 
-import numpy as np
-
-from ..core.quantities import Value, declaration, quantity, variables
+from ...core.quantities import Value, declaration, quantity, variables
 
 MARGIN = 1.25
 """Ratio of the setting of a safety coupling to the largest torque of normal duty."""
-
-
 _MARKED = 1.1
 """Ratio of the torque of a start to that of running from which on the start decides the setting."""
 
@@ -215,14 +210,3 @@ class Alternative:
     numbers: WayNumbers
     opens: Mapping[str, float]
     effects: Mapping[str, CouplingEffect] = field(default_factory=dict)
-
-
-def stall(time: Any, speed: Any, requested: float, share: float = 0.1) -> float | None:
-    """Time [s] from which the speed stays below `share` of the `requested` speed until the end of the run;
-    None where it does not, or only in the last tenth of the run."""
-    below = np.abs(np.asarray(speed)) < share * requested
-    if not below[-1]:
-        return None
-    moving = np.flatnonzero(~below)
-    first = int(moving[-1]) + 1 if moving.size else 0
-    return float(time[first]) if first < 0.9 * len(below) else None

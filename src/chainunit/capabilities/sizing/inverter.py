@@ -5,9 +5,8 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterator
 
-from ..reading.text import number
+from ...reading.text import number
 from .candidate import Candidate
-from .config import Config
 
 BOOSTS = (0.05, 0.10, 0.15)
 """Shares of the voltage at frequency zero that are tried, in this order."""
@@ -18,11 +17,9 @@ _RELIEVED = ("rms_torque", "peak_torque", "temperature")
 """Checks that a larger ratio improves: the motor turns faster and gives less torque."""
 
 
-def boosts(config: Config, own: float) -> list[float]:
+def boosts(own: float, is_given: bool) -> list[float]:
     """The boosts to try, the `own` one first; it alone where the file gives it."""
-    if "starter.inverter.boost" in config.given:
-        return [own]
-    return [own, *(boost for boost in BOOSTS if boost > own)]
+    return [own, *(boost for boost in BOOSTS if boost > own and not is_given)]
 
 
 def _with_boost(c: Candidate, boost: float) -> Candidate:
@@ -31,14 +28,14 @@ def _with_boost(c: Candidate, boost: float) -> Candidate:
     return dataclasses.replace(c, drive=dataclasses.replace(c.drive, parameters=p))
 
 
-def least_boost(config: Config, c: Candidate, judged: Callable[[Candidate], Candidate]) -> Candidate:
+def least_boost(c: Candidate, judged: Callable[[Candidate], Candidate], is_given: bool) -> Candidate:
     """The candidate, as `judged`, with the least boost with which it starts; where it starts with none, with the
-    first. A boost with which the run fails is none with which it starts."""
+    first. A boost with which the run fails is none with which it starts; one that the file gives is kept."""
     own = float(c.drive.parameters.inverter.boost)
     first = judged(_with_boost(c, own))
     if first.starts or not c.drive.follows:
         return first
-    others = (judged(_with_boost(c, boost)) for boost in boosts(config, own)[1:])
+    others = (judged(_with_boost(c, boost)) for boost in boosts(own, is_given)[1:])
     return next((each for each in others if each.starts), first)
 
 
@@ -50,27 +47,28 @@ def misses_by_a_hair(c: Candidate) -> bool:
     return bool(over) and all(name in _RELIEVED and c.sizes[name] <= left for name in over)
 
 
-def inverter_needs(best: Candidate, config: Config) -> Iterator[str]:
-    """What the inverter has to be, and what it has to be set to."""
-    boost = best.drive.parameters.inverter.boost
-    if "starter.inverter.boost" not in config.given and best.starts:
+def inverter_needs(best: Candidate, overload: float, is_given: bool) -> Iterator[str]:
+    """The inverter and its settings: it carries `overload` times its rated current; its boost may be given."""
+    boost, trial = best.drive.parameters.inverter.boost, best.trial
+    if best.starts and not is_given:
         text = f"The inverter needs a voltage boost of {_percent(boost)} at frequency zero (starter.inverter.boost)"
         less = "; with less the motor does not start the machine from every crank angle"
         yield f"{text}{less if boost > BOOSTS[0] else ''}."
-    if best.inverter_current is not None and best.start_current is not None:
-        rated, overload = float(best.motor.nameplate.rated_current), _percent(config.starter.overload)
-        text = f"The inverter carries {overload} of its rated current for up to 60 s (starter.overload)"
-        if best.inverter_current <= rated:
+    ordered, highest = trial.inverter_current, trial.start_current
+    if ordered is not None and highest is not None:
+        rated = float(best.motor.nameplate.rated_current)
+        text = f"The inverter carries {_percent(overload)} of its rated current for up to 60 s (starter.overload)"
+        if ordered <= rated:
             yield f"{text}: one with the rated current of the motor suffices, also for the start."
         else:
             yield (
-                f"{text}. The start takes up to {number(best.start_current, 'A')}, "
-                f"{best.start_current / rated:.2g} times the rated current of the motor, and more than this current "
-                f"for {number(best.overload_time, 's')}: order one of at least {number(best.inverter_current, 'A')}."
+                f"{text}. The start takes up to {number(highest, 'A')}, "
+                f"{highest / rated:.2g} times the rated current of the motor, and more than this current "
+                f"for {number(trial.overload_time, 's')}: order one of at least {number(ordered, 'A')}."
             )
     if best.weakened:
         yield (
-            f"The motor runs at {number(best.frequency, 'Hz')}, above its rated "
+            f"The motor runs at {number(trial.frequency, 'Hz')}, above its rated "
             f"{number(best.motor.nameplate.frequency, 'Hz')}: in field weakening, where its breakdown torque falls "
             "with the square of the frequency; gear.ratio or sizing.ratios lead there."
         )

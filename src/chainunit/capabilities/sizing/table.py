@@ -1,16 +1,19 @@
-"""The table [sizing] of a study file: declarations only."""
+"""The table [sizing] of a study file, and the plan that it states."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Literal
 
 from pydantic import Field
 
-from ..core.quantities import Value, declaration, quantity
-from ..drives.gear_ratios import UNITS
-from ..drives.gearing import Transmission
-from .entry_values import numbers
+from ...core.quantities import Value, declaration, quantity
+from ...drives.gear_ratios import UNITS
+from ...drives.gearing import Transmission
+from ...study.catalogue_drive import GearOffer
+from ...study.config import Config
+from ...study.entry_values import numbers
 
 
 @declaration
@@ -97,3 +100,29 @@ SIZING_KEYS: Mapping[str, Any] = {
         Field([], description="gear ratios on offer, of a catalogue of gears, in place of the series"),
     ),
 }
+
+
+@dataclass(frozen=True)
+class SizingPlan:
+    """The demands on a motor of the catalogue, and the ratios of gears on offer, empty for those of the series."""
+
+    demands: Sizing
+    gear_kind: str
+    ratio_series: str
+    ratios: Sequence[float]
+
+    @property
+    def offer(self) -> GearOffer:
+        """The gears on offer."""
+        return GearOffer(self.gear_kind, bool(self.ratios))
+
+    @property
+    def words(self) -> dict[str, Any]:
+        """The words and lists of the table, by key, without empty ones."""
+        return {key: x for key in SIZING_KEYS if (x := getattr(self, key))}
+
+
+def plan_of(config: Config) -> SizingPlan:
+    """The plan of a study with [sizing]."""
+    plan: SizingPlan = config.plans["sizing"]
+    return plan

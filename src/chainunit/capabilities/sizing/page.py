@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from ..study.candidate import Standing
-from ..study.record import StudyRecord
-from . import blocks as b
-from .lines import Aside, Line, Number, Strong, capital, join, line, spoken
+from ...report import blocks as b
+from ...report.lines import Aside, Line, Number, Strong, capital, join, line, spoken
+from ...study.record import StudyRecord
+from .candidate import Standing
 
 _REASONS = 5  # of the candidates that do not fit; the table has all
 _SIGN = {Standing.CHOSEN: "✓", Standing.FITS: "○", Standing.BARELY: "△"}
@@ -45,6 +45,15 @@ def answer(s: b.Source) -> Iterator[b.Block]:
     if rows:
         title = "Share of each limit that the drive takes; the line in the bar is the limit"
         yield b.Table(rows, b.heads("check", "share"), title=title, numeric=False, form="long")
+
+
+def judgements(s: b.Source) -> Iterator[b.Block]:
+    """The alarm where no motor fits."""
+    nearest = s.result.get("sizing", {}).get("nearest")
+    if nearest is not None:
+        best = f"sizing.candidates.{nearest}"
+        rest = f" All runs are with {{{best}.motor}}, which is insufficient: {{{best}.reason}}."
+        yield b.Judgement("alarm", line(Strong("No motor of the catalogue fits."), s.line(rest)), form="long")
 
 
 def _best_path(s: b.Source) -> str | None:
@@ -139,8 +148,6 @@ def _class(s: b.Source) -> Line:
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The choice, the candidates with the share that each takes of the limits, and the demands on the drive."""
-    if "sizing" not in s.result:
-        return
     section = s.result["sizing"]
     choice, candidates = section.get("chosen"), section.get("candidates")
     best = _best_path(s)
@@ -167,7 +174,8 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
             weak = "; too weak by the nameplate: {=sizing.weak}" if s.value("sizing.weak") else ""
             trials = "Tried: {=sizing.tried} of {=sizing.motors} motors of the catalogue"
             yield b.Text(s.line(f"{trials}{weak}."))
-        row_count = int(study.config.sizing.candidates) if study.config.sizing else len(candidates)
+        plan = study.config.plans["sizing"]
+        row_count = len(candidates) if plan is None else int(plan.demands.candidates)
         yield from _trade(s)
         yield _candidates(s, row_count)
         if len(candidates) > row_count:

@@ -10,31 +10,32 @@ from collections.abc import Callable, Iterator, Mapping
 import numpy as np
 import xarray as xr
 
-from ..core.errors import InterruptedRunError, RunError
-from ..drives.induction_motor import SoftStart
-from ..drives.slip_clutch import SlipClutch
-from ..system import ModelComponent, monolithic
-from ..system.graph import in_line
-from ..work.progress import Report
-from .arrays import peak
-from .catalogue_drive import with_starter, with_wheel
-from .cycle import cycle
-from .drive import Drive
-from .event import Event, Role
-from .event_torques import effects, from_event_on
+from ...core.errors import InterruptedRunError, RunError
+from ...drives.induction_motor import SoftStart
+from ...drives.slip_clutch import SlipClutch
+from ...study.arrays import peak
+from ...study.catalogue_drive import with_starter, with_wheel
+from ...study.cycle import cycle
+from ...study.drive import Drive
+from ...study.event import Event, Role
+from ...study.event_torques import from_event_on
+from ...study.limits import starting
+from ...study.measures import STARTED
+from ...study.readings import crank_motion
+from ...study.record import StudyRecord
+from ...study.rig import Rig, join
+from ...study.start_runs import StartNumbers, from_angle, hardest, longest_start, start_from, starts_from_all
+from ...study.start_up import start_up
+from ...study.starts import StartAnalysis
+from ...study.torques import PeakOf, all_feed_on, duty_peak, on_coupling
+from ...study.transients import follow, lead_times
+from ...study.verdict import STEADY
+from ...system import ModelComponent, monolithic
+from ...system.graph import in_line
+from ...work.progress import Report
+from .coupling import effects
 from .inverter import boosts
-from .limits import starting
-from .measures import STARTED
 from .protection import MARGIN, Alternative, Setting, Way, WayNumbers
-from .readings import crank_motion
-from .record import StudyRecord
-from .rig import Rig, join
-from .start_runs import StartNumbers, from_angle, hardest, longest_start, start_from, starts_from_all
-from .start_up import start_up
-from .starts import StartAnalysis
-from .torques import PeakOf, all_feed_on, duty_peak, on_coupling
-from .transients import follow, lead_times
-from .verdict import STEADY
 
 SOFT_STARTERS = ((0.5, 1.0), (0.5, 3.0), (0.4, 2.0), (0.4, 5.0), (0.3, 5.0), (0.3, 10.0))
 """Share of the voltage and ramp [s] of the soft starters that are tried, in this order."""
@@ -52,11 +53,9 @@ _SMOOTH, _FASTEST, _STUCK = 2e-3, 2e4, 5.0
 clutch counts as stuck: there it passes 98 % of its setting."""
 
 
-def alternatives(study: StudyRecord, rig: Rig, report: Report) -> tuple[Alternative, ...]:
+def alternatives(study: StudyRecord, setting: Setting, rig: Rig, report: Report) -> tuple[Alternative, ...]:
     """The ways to a coupling that saves what the least setting does not, and to one that a start does not open."""
-    if study.setting is None:
-        return ()
-    return *_in_time(study, study.setting), *_for_starts(study, study.setting, rig, report)
+    return *_in_time(study, setting), *_for_starts(study, setting, rig, report)
 
 
 def _in_time(study: StudyRecord, setting: Setting) -> Iterator[Alternative]:
@@ -166,8 +165,8 @@ def _as_numbers(setting: Setting, running: float, starts: list[StartNumbers], **
 def _soft_starter(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative:
     """The same motor with a soft starter; at its full voltage the drive is that of the study."""
     config = study.config
-    assert study.sizing is not None and study.start is not None
-    plate = study.sizing.best.motor.nameplate
+    assert study.plate is not None and study.start is not None
+    plate = study.plate.nameplate
     usual = longest_start(config, study.start.start_time)
 
     def rigs() -> Iterator[_Trial]:
@@ -215,8 +214,8 @@ def _inverter(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative:
     """The same motor and gear with an inverter, which keeps the speed better: its running and its overloads are those
     of runs of its own."""
     config = study.config
-    assert study.sizing is not None
-    plate = study.sizing.best.motor.nameplate
+    assert study.plate is not None
+    plate = study.plate.nameplate
 
     def rigs(boost: float) -> Iterator[_Trial]:
         inverter = dataclasses.replace(config.starter.inverter, boost=boost)
@@ -229,7 +228,7 @@ def _inverter(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative:
             fed = dataclasses.replace(rig, config=own, drive=with_wheel(own, drive, drive.flywheel))
             yield fed, 1.5 * ramp + 1.0, {"ramp": ramp, "boost": boost}
 
-    for boost in boosts(config, config.starter.inverter.boost):
+    for boost in boosts(config.starter.inverter.boost, "starter.inverter.boost" in config.given):
         best = _gentlest(rigs(boost), study, setting.running, math.inf)
         if best is not None:
             break
@@ -270,8 +269,7 @@ def _runs(study: StudyRecord, rig: Rig, of: PeakOf) -> tuple[float, dict[str, xr
                 duty.append((name, run))
             elif event.role is Role.SHOCK:
                 shocks[name] = run
-        assert study.sizing is not None
-        for side in study.sizing.duty.one_sided:
+        for side in study.findings["sizing"].duty.one_sided:
             event = config.one_sided(side)
             run = follow(rig, simulation, event, begin, begin + event.p.shift + 2.0 * config.turn).run
             duty.append((all_feed_on(side), run))

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, nullcontext
 from dataclasses import dataclass
@@ -20,72 +20,36 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import InterruptedRunError, RunError
-from ..core.quantities import Layout, Value, declaration, quantity
-from ..machines.api import ChainUnitMachine
-from ..machines.chain_unit import SIDES, Feed
-from ..reading.text import entries, entry, number
-from ..system.instance import Fmu, Instance
-from ..work.interrupts import stoppable
-from ..work.progress import Progress, Report
-from .arrays import peak
-from .config import Config
-from .cycle import Cycle, cycle
-from .drive import Drive
-from .quantiles import CONFIDENCE, independent_count, quantile
+from ...core.errors import InterruptedRunError, RunError
+from ...core.quantities import Layout
+from ...drives.motor import Motor
+from ...fmu.backends import Backend
+from ...machines.api import ChainedUnit, ChainUnitMachine
+from ...machines.chain_unit import SIDES, Feed
+from ...study.analysis import Analysis, Work
+from ...study.arrays import peak
+from ...study.config import Config
+from ...study.cycle import Cycle, cycle
+from ...study.drive import Drive
+from ...study.drive_fmus import export_machine
+from ...study.quantiles import HIGH, independent_count, quantile
+from ...study.record import StudyRecord
+from ...system.instance import Fmu, Instance
+from ...work.interrupts import stoppable
+from ...work.progress import Progress, Report
+from .result import Band, ChainResult, CriticalSpeed, RodSlack, SpeedNumbers
+from .table import ChainOrgans
 
 SETTLE = 5
 """Number of turns at the begin of each start that are not evaluated."""
 POINTS = 256
 """Number of points of a turn at which outputs are read."""
-HIGH = 0.95
-"""The quantile that is given beside the median."""
 AVOID_RATIO = 1.25
 """A speed is to be avoided where the rocker torque of chains exceeds that of two bars by this factor, both at
 this speed and at rest. The torque at rest counts, as the torque of two bars has a minimum where weight and
 inertia cancel; there a larger torque of chains loads the machine no more than lower speeds do."""
 AVOID_SLACK = 0.01
 """A speed is to be avoided, too, where a rod is slack for more than this share of the time."""
-
-
-@declaration
-class SpeedNumbers:
-    """Chains and two bars at one crank speed. Peaks are those of single turns, over all turns of all starts.
-
-    The turns of a start are not independent. Where they count as too few independent ones, the interval of a
-    quantile is NaN."""
-
-    speed: Value = quantity("rad/s", "crank speed", kind="speed")
-    crank_torque_median: Value = quantity("N.m", "crank torque, peak of a turn, median")
-    crank_torque_high: Value = quantity("N.m", f"crank torque, peak of a turn, {100 * HIGH:g} % quantile")
-    crank_torque_high_from: Value = quantity("N.m", "interval of that quantile, from")
-    crank_torque_high_to: Value = quantity("N.m", "interval of that quantile, to")
-    crank_torque_rms: Value = quantity("N.m", "crank torque, RMS")
-    rocker_torque_median: Value = quantity("N.m", "rocker torque, peak of a turn, median")
-    rocker_torque_high: Value = quantity("N.m", f"rocker torque, peak of a turn, {100 * HIGH:g} % quantile")
-    rocker_torque_high_from: Value = quantity("N.m", "interval of that quantile, from")
-    rocker_torque_high_to: Value = quantity("N.m", "interval of that quantile, to")
-    snatch_median: Value = quantity("1", "force at A2, peak of a turn over that at rest, median")
-    snatch_high: Value = quantity(
-        "1", f"force at A2, peak of a turn over that at rest, {100 * HIGH:g} % quantile"
-    )
-    snatch_high_from: Value = quantity("1", "interval of that quantile, from")
-    snatch_high_to: Value = quantity("1", "interval of that quantile, to")
-    independent_turns: Value = quantity(
-        "1", "number of independent turns for which all turns count, least of the three peaks"
-    )
-    snatch_spread: Value = quantity("1", "largest over least of the starts' medians of it")
-    slack_time: Value = quantity("1", "share of the time in which a rod is slack", kind="percent")
-    slack_rods: Value = quantity("1", "share of the rods that are slack, mean over time", kind="percent")
-    fold_largest: Value = quantity("rad", "largest angle between neighbouring rods")
-    two_bar_crank_torque: Value = quantity("N.m", "crank torque of two bars, peak")
-    two_bar_crank_torque_rms: Value = quantity("N.m", "crank torque of two bars, RMS")
-    two_bar_rocker_torque: Value = quantity("N.m", "rocker torque of two bars, peak")
-    two_bar_snatch: Value = quantity("1", "force at A2 of two bars, peak, over theirs at rest")
-    two_bar_slack_time: Value = quantity(
-        "1", "share of the time in which a bar is pushed, by its mean axial pull as a rod's", kind="percent"
-    )
-    energy_residual: Value = quantity("1", "largest energy residual of an organ over the energy moved")
 
 
 @dataclass(frozen=True)
@@ -100,94 +64,41 @@ class Turns:
     """by side, mean axial pull in each rod [N], shape (starts, turns, points, rods)"""
 
 
-@dataclass(frozen=True)
-class Band:
-    """Speeds to avoid [rad/s], and why."""
+class ChainAnalysis(Analysis):
+    """The chains of a study at constant speed."""
 
-    low: float
-    high: float
-    why: str
+    name = "chain"
+    needs_runs, at_end = True, True
 
-    def __str__(self) -> str:
-        """The range in words; a single speed in a study without a sweep."""
-        ends = [self.low, self.high] if self.high > self.low else [self.low]
-        return " to ".join(number(end, "rad/s", "speed", 4, full=False, beside=False) for end in ends)
+    @staticmethod
+    def applies(config: Config, drive: Drive) -> bool:
+        """Where the organs are chains."""
+        return config.table("chain") is not None
+
+    @staticmethod
+    def find(study: StudyRecord, work: Work) -> ChainResult | None:
+        """The numbers at the speed of the study and over the sweep. None without native code, as an FMU in Python
+        would take hours."""
+        if study.fmus["machine"].backend != "native":
+            study.note(
+                "chains left out",
+                "chains at constant speed and the sweep are left out: they need native code, that is a C compiler.",
+            )
+            return None
+        assert work.rig.files is not None
+        config, file = study.config, work.rig.files["machine"]
+        result, failure = study_chain(
+            study.drive, config.table("chain"), config.feed, config.run.crank_speed, file, work.report
+        )
+        study.failure = study.failure or failure
+        return result
 
 
-@dataclass(frozen=True)
-class ChainResult:
-    """The study's own speed, the sweep in rising order, and its conclusions."""
-
-    own: SpeedNumbers
-    sweep: tuple[SpeedNumbers, ...]
-    avoid: tuple[Band, ...]
-    critical: tuple[tuple[int, int, float], ...]
-    """(mode, order, crank speed [rad/s]): at this speed `order` times the crank speed is a natural
-    frequency"""
-    slack_by_rod: Mapping[str, Any]
-    """by side: share of the time in which each rod is slack, from A1 on, at the study's own speed"""
-    starts: int
-    turns: int
-    rods: tuple[int, int]
-    failures: Mapping[float, str]
-    """by crank speed [rad/s], the reason why the speed is missing in the sweep"""
-
-    @property
-    def resonance(self) -> float | None:
-        """Crank speed that equals the lowest natural frequency of an organ [rad/s]; None without weight."""
-        return next((speed for mode, order, speed in self.critical if mode == order == 1), None)
-
-    @property
-    def distance(self) -> float | None:
-        """Distance of the study's speed from the resonance, relative to it: negative below."""
-        return None if self.resonance is None else float(self.own.speed / self.resonance - 1.0)
-
-    def within_sweep(self, apart: float = 0.0) -> list[tuple[int, int, float]]:
-        """The critical speeds within the sweep, low orders first. A speed is left out if its distance to an
-        earlier one is less than the share `apart` of the width of the sweep."""
-        low, high = self.sweep[0].speed, self.sweep[-1].speed
-        speeds: list[tuple[int, int, float]] = []
-        for each in sorted(self.critical, key=lambda speed: (speed[1], speed[0])):
-            clear = all(abs(each[2] - other[2]) >= apart * (high - low) for other in speeds)
-            if low <= each[2] <= high and clear:
-                speeds.append(each)
-        return speeds
-
-    def rod_name(self, k: int) -> str:
-        """The name of rod `k`, counted from 0 at A1."""
-        wall, _ = self.rods
-        return f"wall {k + 1}" if k < wall else f"web {k - wall + 1}"
-
-    def as_dict(self) -> dict[str, Any]:
-        """Ready for JSON, each number with its unit."""
-
-        def pure(value: float | None, kind: str = "") -> dict[str, Any]:
-            return entry(value, "1", kind)
-
-        return {
-            "rods_of_wall": pure(self.rods[0]),
-            "rods_of_web": pure(self.rods[1]),
-            "starts": pure(self.starts),
-            "turns": pure(self.turns),
-            "quantile": pure(HIGH, "percent"),
-            "confidence": pure(CONFIDENCE, "percent"),
-            "own_speed": entries(self.own),
-            "resonance": entry(self.resonance, "rad/s", "speed"),
-            "distance_to_resonance": pure(self.distance, "percent"),
-            "sweep": [entries(numbers) for numbers in self.sweep],
-            "avoid": [
-                {"from": entry(b.low, "rad/s", "speed"), "to": entry(b.high, "rad/s", "speed"), "why": b.why}
-                for b in self.avoid
-            ],
-            "critical_speeds": [
-                {"mode": pure(mode), "order": pure(order), "speed": entry(speed, "rad/s", "speed")}
-                for mode, order, speed in self.critical
-            ],
-            "slack_by_rod": {
-                side: [{"rod": self.rod_name(k), **pure(share, "percent")} for k, share in enumerate(shares)]
-                for side, shares in self.slack_by_rod.items()
-            },
-        }
+def rods_of(drive: Drive) -> tuple[int, int]:
+    """Numbers of rods in wall and web of an organ of a drive with chains."""
+    machine = drive.simulated_machine
+    assert isinstance(machine, ChainedUnit)
+    return machine.rods
 
 
 def run_turns(
@@ -220,12 +131,11 @@ def run_turns(
     InterruptedRunError, RunError
         where the run was stopped, or a run fails.
     """
-    model, p = drive.load_model()
-    rods = [f"{side}.pull_{k + 1}" for side in SIDES for k in range(sum(drive.rods))]
+    rods = [f"{side}.pull_{k + 1}" for side in SIDES for k in range(sum(rods_of(drive)))]
     names = [*outputs, *rods]
     ratio = drive.driven_machine.p.ratio
     step = 2.0 * math.pi / crank_speed / points
-    parameters = model.parameter_layout.by_name(p) | Layout(Feed).by_name(feed)
+    parameters = drive.simulated_machine.by_name | Layout(Feed).by_name(feed)
     finished = [0]
 
     def one(start: int, stop: Callable[[], bool]) -> Any:
@@ -263,29 +173,32 @@ def run_turns(
     )
 
 
-def duty(fmu: Fmu, drive: Drive, crank_speed: float, feed: Feed) -> Cycle:
-    """The machine with chains over all turns of all starts, of shape (turns, points), for sizing; `cycle`
-    gives the single turn of two bars."""
-    chain = drive.chain
-    sample = run_turns(
-        fmu, drive, crank_speed, feed, ("tau", "J"), starts=int(chain.starts), turns=int(chain.turns)
-    )
-    tau, J = (sample.values[name].reshape(-1, POINTS) for name in ("tau", "J"))
-    return Cycle(sample.angle, tau * drive.driven_machine.p.ratio, SimpleNamespace(J=J, tau=tau))
+def turns_of_starts(
+    config: Config, feeds: Iterable[Feed], folder: Path, backend: Backend | None
+) -> list[Cycle]:
+    """The machine with chains over all turns of all starts, of shape (turns, points), with each of the `feeds`. The
+    FMU is written to `folder`."""
+    drive, chain, outputs = Drive(Motor, None, config.machine), config.table("chain"), ("tau", "J")
+    starts, turns, speed = int(chain.starts), int(chain.turns), config.run.crank_speed
+    cycles = []
+    with closing(Fmu(export_machine(drive, folder, backend))) as fmu:
+        for feed in feeds:
+            sample = run_turns(fmu, drive, speed, feed, outputs, starts=starts, turns=turns)
+            tau, J = (sample.values[name].reshape(-1, POINTS) for name in outputs)
+            cycles.append(Cycle(sample.angle, tau * drive.ratio, SimpleNamespace(J=J, tau=tau)))
+    return cycles
 
 
 def numbers_at(
     fmu: Fmu,
     drive: Drive,
-    config: Config,
+    chain: ChainOrgans,
+    feed: Feed,
     crank_speed: float,
     progress: Progress = lambda share: None,
     is_stopped: Callable[[], bool] | None = None,
 ) -> tuple[SpeedNumbers, dict[str, Any]]:
-    """The numbers at one speed with the study's feed, and by side the share of the time in which each rod is
-    slack."""
-    chain, feed = config.chain, config.feed
-    assert chain is not None
+    """The numbers at one speed with this feed, and by side the share of the time in which each rod is slack."""
     forces = [f"{side}.rocker_joint.{x}" for side in SIDES for x in ("fx", "fy")]
     others = [f"{side}.{name}" for side in SIDES for name in ("fold_largest", "energy_residual")]
     outputs = ("tau", "power", "rocker.tau", *others, *forces)
@@ -311,7 +224,7 @@ def numbers_at(
     for side in SIDES:
         bars = getattr(two.outputs, side).rocker_joint
         size = np.hypot(*(values[f"{side}.rocker_joint.{x}"] for x in ("fx", "fy")))
-        rest, two_bar_rest = rest_forces(drive.chain_unit, side, feed, sum(drive.rods))
+        rest, two_bar_rest = rest_forces(drive.chain_unit, side, feed, sum(rods_of(drive)))
         snatch.append(peaks(size) / rest)
         two_bar_snatch.append(np.max(np.hypot(bars.fx, bars.fy)) / two_bar_rest)
     snatches = np.maximum(*snatch)
@@ -365,28 +278,27 @@ def rest_forces(machine: ChainUnitMachine, side: str, feed: Any, rods: int) -> t
 
 
 def study_chain(
-    config: Config, drive: Drive, file: Path, report: Report
+    drive: Drive, chain: ChainOrgans, feed: Feed, own: float, file: Path, report: Report
 ) -> tuple[ChainResult, RunError | None]:
-    """The numbers of a study whose organs are chains, at its own speed and over the sweep, by the FMU `file`
-    of the machine; and the error that ended the sweep early, or None. A speed of the sweep whose run fails is
-    left out and stands in `failures`.
+    """The numbers of chains at the crank speed `own` of a study [rad/s] and over the sweep, by the FMU `file` of the
+    machine; and the error that ended the sweep early, or None. A speed of the sweep whose run fails is left out and
+    stands in `failures`.
 
     Raises
     ------
     RunError
         where the study's own speed fails or is interrupted.
     """
-    chain, own = config.chain, config.run.crank_speed
-    assert chain is not None
-    modes = drive.chain_unit.chain_modes(config.feed.left, config.feed.right)
+    modes = drive.chain_unit.chain_modes(feed.left, feed.right)
     critical = []
     if modes is not None:
         for mode, frequency in enumerate(modes.frequency[:4], 1):
-            critical += [(mode, order, float(frequency) / order) for order in (1, 2)]
+            critical += [CriticalSpeed(mode, order, float(frequency) / order) for order in (1, 2)]
     speeds = np.linspace(chain.sweep_lowest, chain.sweep_highest, int(chain.sweep_points)).tolist()
     if speeds:
         # the resonance itself is added to the grid
-        speeds += [w for _, _, w in critical[:1] if chain.sweep_lowest < w < chain.sweep_highest]
+        lowest = [each.speed for each in critical[:1]]
+        speeds += [w for w in lowest if chain.sweep_lowest < w < chain.sweep_highest]
     spacing = (chain.sweep_highest - chain.sweep_lowest) / max(1, len(speeds) - 2)
     others = sorted({w for w in speeds if abs(w - own) > 1e-9 * own})
     failures: dict[float, str] = {}
@@ -398,7 +310,7 @@ def study_chain(
                 report(f"chains at {w:.3g} rad/s", k + share, float(len(others) + 1))
 
             report_share(0.0)
-            return numbers_at(fmu, drive, config, w, report_share, is_stopped)
+            return numbers_at(fmu, drive, chain, feed, w, report_share, is_stopped)
 
         # the study's own speed comes first, so that an early end loses only the sweep
         mine, by_rod = at(0, own)
@@ -412,23 +324,29 @@ def study_chain(
             except RunError as error:
                 failures[w] = str(error)
     rows.sort(key=lambda n: float(n.speed))
+    walls, webs = rods_of(drive)
+    names = [f"{part} {k + 1}" for part, count in (("wall", walls), ("web", webs)) for k in range(count)]
     result = ChainResult(
         own=mine,
         sweep=tuple(rows),
-        avoid=tuple(bands(rows, _rocker_at_rest(config, drive), 0.5 * spacing)),
+        avoid=tuple(bands(rows, _rocker_at_rest(drive, feed), 0.5 * spacing)),
         critical=tuple(critical),
-        slack_by_rod=by_rod,
+        slack_by_rod={
+            side: [RodSlack(name, float(share)) for name, share in zip(names, shares, strict=True)]
+            for side, shares in by_rod.items()
+        },
         starts=int(chain.starts),
         turns=int(chain.turns),
-        rods=drive.rods,
+        walls=walls,
+        webs=webs,
         failures=failures,
     )
     return result, interruption
 
 
-def _rocker_at_rest(config: Config, drive: Drive) -> float:
+def _rocker_at_rest(drive: Drive, feed: Feed) -> float:
     """Largest rocker torque of two bars in a very slow turn [N.m]."""
-    slowly = cycle(drive.machine, 1e-6, config.feed)
+    slowly = cycle(drive.machine, 1e-6, feed)
     return peak(slowly.outputs.rocker.tau)
 
 

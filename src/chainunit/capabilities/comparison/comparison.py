@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -12,14 +11,14 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from .. import __version__
-from ..core.errors import InputError, printable
-from ..core.quantities import variables
-from ..reading.text import entry
-from .line.shaft import ShaftAnswers
-from .measures import Answers
-from .registry import registered
-from .sections import CHOICES, SECTIONS
+from ... import __version__
+from ...core.errors import InputError, printable
+from ...core.quantities import variables
+from ...reading.text import entry
+from ...study.line.shaft import ShaftAnswers
+from ...study.measures import Answers
+from ...study.registry import registered
+from ...study.sections import all_choices, all_sections
 
 FILE = "result.json"
 _ROUNDING = 1e-12
@@ -85,7 +84,7 @@ def compare(a: StoredResult, b: StoredResult) -> dict[str, Any]:
     """The comparison, ready for JSON.
 
     - ``verdict``: by result, those on its model and its motor
-    - ``warnings``: by result, the warnings that it has alone, whatever the numbers in them are
+    - ``warnings``: by result, the warnings of a kind and of runs of which the other has none
     - ``given``: by the name in a study file, the given values that differ, those of `a` and of `b`
     - ``runs``: by run, each measure of both: the values, the difference b - a, and its share of a's, of
       values that are not negative and no shares themselves
@@ -167,13 +166,12 @@ def _warnings_alone(mine: StoredResult, theirs: StoredResult) -> list[str]:
 
 
 def _warnings(result: StoredResult) -> Iterator[tuple[Any, str]]:
-    """The warnings of a result, each with its subject: kind, runs and first words, without its numbers."""
+    """The warnings of a result, each with its subject: its kind and its runs."""
     warnings = result.data.get("warnings")
     for each in warnings if isinstance(warnings, list) else []:
         text = _mapping(each).get("text")
         if isinstance(text, str):
-            words = re.sub(r"[-\d.]+", "", text.partition(":")[0])
-            yield (str(each.get("kind")), str(each.get("runs")), words), printable(text, 2000)
+            yield (str(each.get("kind")), str(each.get("runs"))), printable(text, 2000)
 
 
 def _head(result: StoredResult) -> dict[str, str]:
@@ -207,11 +205,11 @@ def _is_number(node: Any) -> bool:
 
 def _given_values(data: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
     """The given values of a result, by their names in a study file: entries, texts, switches and lists."""
-    for name in CHOICES:
+    for name in all_choices():
         yield from _leaves(data.get(name), name)
     for table in ("system", "machine", "feed", "motor", "event"):
         yield from _leaves(data.get(table), table)
-    for table, section in SECTIONS.items():
+    for table, section in all_sections().items():
         node = _mapping(data.get(table))
         if section.apart:
             yield from _leaves(node.get("asked"), table)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
-from ..study.comparison import StoredResult, compare
-from ..study.measures import MEASURES
-from . import blocks as b
-from .lines import Aside, Line, Name, capital, line
-from .task import Task
+from ...report import blocks as b
+from ...report.lines import Aside, Line, Name, capital, line
+from ...report.task import Task
+from ...study.measures import MEASURES
+from .comparison import compare, read_result
 
 _SIDES = ("a", "b")
 _FOLLOWS = {"tuned": "tuned", "catalogue": "of the catalogue", "sizing": "by sizing"}
@@ -17,7 +18,7 @@ _FOLLOWS = {"tuned": "tuned", "catalogue": "of the catalogue", "sizing": "by siz
 
 
 def comparison_report(result: Mapping[str, Any]) -> b.Report:
-    """The report on a comparison, see `chainunit.study.comparison.compare`."""
+    """The report on a comparison, see `compare`."""
     s = b.Source(result)
     return b.Report(
         "Two studies side by side",
@@ -153,6 +154,6 @@ def _row(s: b.Source, run: str, name: str, is_short: bool) -> b.TableRow:
     return b.TableRow((title, *numbers), form="both" if is_short else "long")
 
 
-TASK: Task[tuple[StoredResult, StoredResult], Mapping[str, Any]] = Task(
-    "compare", lambda results, folder, progress: compare(*results), comparison_report
+TASK: Task[tuple[Path, Path], Mapping[str, Any]] = Task(
+    "compare", lambda paths, folder, progress: compare(*map(read_result, paths)), comparison_report
 )

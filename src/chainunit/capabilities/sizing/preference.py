@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
-from ..reading.text import number
+from ...reading.text import number
 from .candidate import TOLERANCES, Candidate, Criterion, Standing
 
 ALIKE = 0.05
@@ -38,7 +38,7 @@ def rank(candidates: list[Candidate], larger: float) -> None:
     """Order the candidates by rank and set their reasons. First come those that fit, by the order of preference,
     then those whose start alone is too hard for the gear, by the same order, then the others, by their largest
     utilisation; among those that do not start at all a larger motor comes first. For `larger` see
-    `chainunit.study.sizing_table`."""
+    `chainunit.capabilities.sizing.table`."""
     for c in candidates:
         _judge(c)
     ranking, behind = _ranking([c for c in candidates if c.fits], larger)
@@ -89,7 +89,7 @@ def _steps(larger: float) -> Sequence[tuple[Criterion, Callable[[list[Candidate]
         (Criterion.LARGER, partial(_powerful, most=larger)),
         (Criterion.FIELD, partial(_least, value=lambda c: float(c.weakened))),
         (Criterion.GEAR, partial(_least, value=lambda c: float(c.unit is None))),
-        (Criterion.START, partial(_least, value=lambda c: c.start_class or 0)),
+        (Criterion.START, partial(_least, value=lambda c: c.trial.start_class or 0)),
         (Criterion.FLYWHEEL, partial(_least, value=lambda c: float(c.drive.flywheel > 0.0))),
         # the better number of poles may cost one step of power
         (Criterion.POWER, partial(_powerful, most=STEP)),
@@ -158,9 +158,9 @@ def _judge(c: Candidate) -> None:
 
 def _unstarted(c: Candidate) -> str:
     """The reason of a candidate that does not bring the machine up to speed."""
-    if c.stall_angle is None:
+    if c.trial.stall_angle is None:
         return "it does not bring the machine up to speed"
-    reason = f"without a flywheel it stalls at {number(c.stall_angle, 'rad')} of the crank"
+    reason = f"without a flywheel it stalls at {number(c.trial.stall_angle, 'rad')} of the crank"
     if c.bound:
         reason += f", and no flywheel that sizing.inertia_ratio = {c.bound:g} permits carries it through"
     elif c.heaviest:
@@ -183,7 +183,7 @@ def _chosen(best: Candidate, ranking: Sequence[Candidate]) -> str:
     rival = max((c for c in smaller if c.power == least), key=lambda c: [*Criterion].index(c.criterion))
     name = f"{rival.motor.designation}, the smallest that fits,"
     if rival.criterion is Criterion.FIELD:
-        return f"runs at {number(best.frequency, 'Hz')}, where {name} {_weakened(rival)}"
+        return f"runs at {number(best.trial.frequency, 'Hz')}, where {name} {_weakened(rival)}"
     if rival.criterion is Criterion.GEAR:
         return f"takes one gear unit, where {name} takes two"
     if rival.criterion is Criterion.START:
@@ -214,7 +214,9 @@ def _behind(c: Candidate, best: Candidate) -> str:
 
 def _weakened(c: Candidate) -> str:
     rated = number(c.motor.nameplate.frequency, "Hz")
-    return f"runs at {number(c.frequency, 'Hz')} in field weakening, with less torque than at its {rated}"
+    return (
+        f"runs at {number(c.trial.frequency, 'Hz')} in field weakening, with less torque than at its {rated}"
+    )
 
 
 def _margin(c: Candidate) -> str:
@@ -226,4 +228,4 @@ def _mass(c: Candidate) -> str:
 
 
 def _class(c: Candidate) -> str:
-    return f"class {c.start_class}" if c.start_class else "no class"
+    return f"class {c.trial.start_class}" if c.trial.start_class else "no class"

@@ -1,6 +1,6 @@
 """The duty of any drive of a machine: turns at constant speed, and the inertia that evens the speed.
 
-The turns are computed by inverse dynamics; chains are run by their FMU."""
+The turns are computed by inverse dynamics, or by the capability whose model the machine has in its runs."""
 
 from __future__ import annotations
 
@@ -12,19 +12,16 @@ from typing import Any
 
 import numpy as np
 
-from ..core.quantities import Value, declaration, quantity
-from ..drives.motor import Motor
-from ..fmu.backends import Backend
-from ..machines.chain_unit import SIDES, SideName
-from ..reading.text import entries
-from ..system.instance import Fmu
-from .chain import HIGH
-from .chain import duty as chain_duty
-from .config import Config
-from .cycle import Cycle, cycle, energy_swing, needed_inertia
-from .drive import Drive
-from .drive_fmus import export_machine
-from .one_sided import all_on_one
+from ...core.quantities import Value, declaration, quantity
+from ...fmu.backends import Backend
+from ...machines.chain_unit import SIDES, SideName
+from ...reading.text import entries
+from ...study.config import Config
+from ...study.cycle import Cycle, cycle, energy_swing, needed_inertia
+from ...study.one_sided import all_on_one
+from ...study.quantiles import HIGH
+from ...study.registry import registered
+from .table import Sizing, plan_of
 
 
 def rms(*parts: tuple[float, Any]) -> float:
@@ -55,8 +52,8 @@ class CycleNumbers:
 class Duty:
     """The duty of any drive, at constant speed of the crank: the turn with the feed of normal running and,
     for a machine with two sides, the turns with all feed on one side. `heavier` is the side with the larger
-    RMS torque of two bars; the sides differ, as the rocker swings farther to one of them. With chains each is
-    many turns."""
+    RMS torque of two bars; the sides differ, as the rocker swings farther to one of them. Each is many turns of a
+    machine that never repeats one."""
 
     normal: Cycle
     one_sided: Mapping[SideName, Cycle]
@@ -71,7 +68,7 @@ class Duty:
 
 
 def duty_of(config: Config, folder: Path, backend: Backend | None) -> Duty:
-    """The duty of a study with `sizing`; chains are run by an FMU that is written to `folder`."""
+    """The duty of a study with [sizing]; an FMU of a machine that has to be run for it is written to `folder`."""
     feed, w = config.feed, config.run.crank_speed
     loads = {side: all_on_one(side, feed) for side in SIDES if side in config.machine.model.sides}
     normal = cycle(config.machine, w, feed)
@@ -79,32 +76,33 @@ def duty_of(config: Config, folder: Path, backend: Backend | None) -> Duty:
     sizes = [(rms((1.0, turn.crank_torque)), side) for side, turn in one_sided.items()]
     # if both sides are alike it is the left one
     heavier = min(sizes, key=lambda each: -each[0])[1] if sizes else None
-    if config.chain is not None:
-        drive = Drive(Motor, None, config.machine, chain=config.chain)
-        fmu = Fmu(export_machine(drive, folder, backend))
-        try:
-            normal = chain_duty(fmu, drive, w, feed)
-            one_sided = {side: chain_duty(fmu, drive, w, case) for side, case in loads.items()}
-        finally:
-            fmu.close()
-    return Duty(normal, one_sided, heavier, cycle_numbers(config, normal, one_sided, heavier))
+    for part in registered():
+        if turns := part.turns(config, (feed, *loads.values()), folder, backend):
+            normal, *others = turns
+            one_sided = dict(zip(loads, others, strict=True))
+    demands, ratio = plan_of(config).demands, config.machine.ratio
+    return Duty(normal, one_sided, heavier, cycle_numbers(demands, w, ratio, normal, one_sided, heavier))
 
 
 def _peak(cycle: Cycle) -> float:
-    """Largest crank torque of a cycle; for the many turns of chains the quantile of their peaks, as no single
-    peak is a prediction."""
+    """Largest crank torque of a cycle; of many turns the quantile of their peaks, as no single peak is a
+    prediction."""
     peaks = np.max(np.abs(np.atleast_2d(cycle.crank_torque)), axis=1)
     return float(np.quantile(peaks, HIGH))
 
 
 def cycle_numbers(
-    config: Config, normal: Cycle, one_sided: Mapping[SideName, Cycle], heavier: SideName | None
+    demands: Sizing,
+    crank_speed: float,
+    ratio: float,
+    normal: Cycle,
+    one_sided: Mapping[SideName, Cycle],
+    heavier: SideName | None,
 ) -> CycleNumbers:
-    """The numbers of a duty. With all feed on one side the RMS torque is that of the heavier side, and the
-    peak the larger of both sides."""
-    assert config.sizing is not None
-    w, share = config.run.crank_speed, config.sizing.one_sided_share
-    inertia = normal.outputs.J * config.machine.ratio**2
+    """The numbers of a duty at that speed of the crank [rad/s], with the `ratio` of the gear. With all feed on one
+    side the RMS torque is that of the heavier side, and the peak the larger of both sides."""
+    w, share = crank_speed, demands.one_sided_share
+    inertia = normal.outputs.J * ratio**2
     mean = float(np.mean(normal.crank_torque))
     cases = [(1.0, normal.crank_torque)]
     if heavier is not None:
@@ -121,6 +119,6 @@ def cycle_numbers(
         inertia_wanted=needed_inertia(
             float(np.quantile([energy_swing(turn) for turn in np.atleast_2d(normal.crank_torque)], HIGH)),
             w,
-            config.sizing.fluctuation,
+            demands.fluctuation,
         ),
     )

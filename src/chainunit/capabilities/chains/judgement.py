@@ -1,0 +1,155 @@
+"""The verdict on organs as chains, and the remarks on them.
+
+Chains are a good model as long as their energy balance is kept, no rod folds through its stop, and the peaks do not
+depend on the start.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from ...study.events import Jam
+from ...study.measures import Answers
+from ...study.quantiles import HIGH, runs_needed
+from ...study.record import StudyRecord
+from ...study.verdict import RESIDUAL, SETTLING, START, STEADY, TOPICS, Reason, Topic, Verdict, balance_faults
+from .analysis import rods_of
+from .result import ChainResult
+from .table import ChainOrgans
+
+CONSTANT = "constant"
+"""Name of the runs of chains at constant speed among those that are judged."""
+_TOPICS: Mapping[str, Topic] = {
+    **TOPICS,
+    "folded through": Topic(
+        "rods fold through their stop",
+        "Rods that fold through their stop",
+        "raise chain.fold_stiffness, or assume that the machine breaks",
+    ),
+    "folded": Topic(
+        "rods meet the stop between them, whose stiffness is assumed",
+        "Rods that fold and meet the stop between them",
+    ),
+    "slack": Topic(
+        "rods go slack and snatch: a single peak is no prediction",
+        "Share of the time with a slack rod; no single peak of a snatching chain is a prediction",
+    ),
+    "starts": Topic(
+        "the starts differ so much that they do not determine the quantile of peaks",
+        "Turns that count as independent, too few for the quantile, as the starts differ",
+        "raise chain.starts",
+    ),
+}
+"""By kind of fault, its words."""
+
+
+def verdict_on(study: StudyRecord, speed: float, actual: float, residuals: Mapping[str, float]) -> Verdict:
+    """The verdict on the chains of a study; arguments are those of `chains`."""
+    runs: dict[str, Answers | None] = {**study.answers, START: study.start, SETTLING: study.settling}
+    folds = {name: a.fold_largest for name, a in runs.items() if a is not None}
+    slack = {name: a.slack_time for name, a in runs.items() if a is not None}
+    residuals, turns = dict(residuals), math.inf
+    found: ChainResult | None = study.findings.get("chain")
+    if found is not None:
+        own = found.own
+        folds[CONSTANT], slack[CONSTANT] = own.fold_largest, own.slack_time
+        residuals[CONSTANT], turns = own.energy_residual, own.independent_turns
+    limit, least_turns = study.config.table("chain").fold_limit, runs_needed(HIGH)
+    return chains(speed, residuals, folds, limit, slack, turns, least_turns, actual=actual)
+
+
+def chains(
+    speed: float,
+    residuals: Mapping[str, float],
+    folds: Mapping[str, float],
+    fold_limit: float,
+    slack: Mapping[str, float],
+    independent: float,
+    least_turns: float,
+    *,
+    actual: float | None = None,
+) -> Verdict:
+    """The verdict on organs as chains.
+
+    Parameters
+    ----------
+    speed : crank speed at which the model is judged [rad/s]
+    residuals, folds, slack : by run, the energy residual over the energy moved, the largest angle between two rods
+        [rad], the share of the time with a slack rod
+    fold_limit : angle at which two rods meet the stop between them [rad]
+    independent, least_turns : turns at constant speed that count as independent, and the number that the quantile
+        needs
+    actual : crank speed in the runs, if that is another [rad/s]
+    """
+    reasons: list[Reason] = []
+    for run, fold in folds.items():
+        if fold > math.pi:
+            reasons.append(
+                Reason("folded through", "fold_largest", fold, math.pi, "rad", run, grave=run == STEADY)
+            )
+        elif fold > fold_limit:
+            reasons.append(Reason("folded", "fold_largest", fold, fold_limit, "rad", run))
+    for run, share in slack.items():
+        if share > 0.0:
+            reasons.append(Reason("slack", "slack_time", share, 0.0, "1", run, "percent"))
+    if independent < least_turns:
+        reasons.append(Reason("starts", "independent_turns", independent, least_turns, "1"))
+    titles = {CONSTANT: "chains at constant speed"}
+    reasons += balance_faults(residuals)
+    return Verdict("organs", "chains", speed, tuple(reasons), actual, topics=_TOPICS, titles=titles)
+
+
+def remark_on(study: StudyRecord) -> None:
+    """The remarks on chains."""
+    chain: ChainOrgans = study.config.table("chain")
+    result: ChainResult | None = study.findings.get("chain")
+    walls, webs = rods_of(study.drive)
+    warn, note = study.warn, study.note
+    note(
+        "chains",
+        f"The organs are chains of {walls} + {webs} rods; their damping (eta {chain.eta:g} N m2 s, ends "
+        f"{chain.end_damping:g} N m s), which has to be larger for a heavier organ, and their folding are assumed.",
+    )
+    if walls + webs < 4:
+        few = f"{walls + webs} rods have {walls + webs - 2} natural frequencies; 8 rods show a chain well."
+        note("few rods", f"chains: {few}")
+    _on_folding(study)
+    if result is None:
+        return
+    speed = result.own.speed
+    for band in result.avoid:
+        if band.low <= speed <= band.high:
+            text = "chains: the crank speed lies in a range to avoid, {band}: {why}."
+            warn("speed to avoid", text, band=str(band), why=band.why, speed=(speed, "rad/s", "speed"))
+    for missing, why in result.failures.items():
+        text = "chains: {speed} is missing in the sweep: {why}"
+        warn("speed missing", text, why=str(why), speed=(missing, "rad/s", "speed"))
+    residual = max(n.energy_residual for n in result.sweep)
+    if not residual < RESIDUAL:
+        text = (
+            "chains: the energy residual reaches {residual} of the energy moved; lower chain.fold_stiffness."
+        )
+        warn("energy of chains", text, residual=(residual, "1"))
+
+
+FELT = 1.1
+"""The drive hardly feels a lump whose peak torque is below this multiple of the peak in steady running."""
+
+
+def _on_folding(study: StudyRecord) -> None:
+    """Warn of lumps on the stroke on which the web folds: the drive feels a lump only on the other stroke."""
+    steady = study.answers.get(STEADY)
+    for run, event in study.config.events.items():
+        answers = study.answers.get(run)
+        if not isinstance(event, Jam) or steady is None or answers is None:
+            continue
+        if answers.crank_torque_peak < FELT * steady.crank_torque_peak:
+            study.warn(
+                "lump not felt",
+                "{run}: the drive hardly feels the lump, as the web folds before it on this stroke; on the other "
+                "stroke the web is pulled: try crank_angle = {angle}.",
+                run,
+                run=study.title_of(run),
+                angle=f'"{math.degrees((event.p.crank_angle + math.pi) % (2.0 * math.pi)):.4g} deg"',
+            )

@@ -1,0 +1,1 @@
+"""Comparison: two results of studies side by side."""

@@ -1,0 +1,28 @@
+"""The command that compares two results."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ...report.command_options import OutputFolder
+from ...report.console import carry_out
+
+
+def compare(
+    first: Annotated[Path, typer.Argument(help="Folder of a study, or its result.json.")],
+    second: Annotated[Path, typer.Argument(help="Folder of the other study, or its result.json.")],
+    output: OutputFolder = Path("comparison"),
+) -> None:
+    """Show two results side by side: the given values that differ, and every measure of each run of both.
+
+    Writes report.html, comparison.json and comparison.md into the output folder.
+    """
+    from .page import TASK
+
+    carry_out(TASK, (first, second), output)
+
+
+COMMAND = compare

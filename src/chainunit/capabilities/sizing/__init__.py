@@ -1,0 +1,114 @@
+"""Sizing: the motor of the catalogue that a machine needs, its gear, its flywheel, its protection."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from ...fmu.backends import Backend
+from ...report.blocks import Block, Source
+from ...report.capability import Capability, Contents
+from ...study.analysis import Analysis
+from ...study.conditions import given, has_entries, is_one_of
+from ...study.config import Config
+from ...study.file_reading import FileReading
+from ...study.file_section import FileSection
+from ...study.proposal import DriveProposal
+from ...study.record import StudyRecord
+from ...study.rules import BESIDE_MOTOR, Rule, has_sides
+from ...work.progress import Report
+from .table import SIZING_KEYS, Sizing, SizingPlan
+
+
+class SizingCapability(Capability):
+    """The capability, with the table [sizing]."""
+
+    name = "sizing"
+    motor_table = "sizing"
+    tables = {  # noqa: RUF012
+        "sizing": FileSection(
+            Sizing,
+            # a rule for servo drives: time, current and heat of its start limit the inertia of an induction motor
+            default=Sizing(inertia_ratio=math.inf),
+            optional=True,
+            keys=SIZING_KEYS,
+            before="gear",
+            title="Demands on the motor",
+            apart=True,
+            follows={"inertia_ratio": "none"},
+            order=(("poles_least", ">=", "poles_most"), ("ambient", ">", "temperature")),
+        )
+    }
+
+    def rules(self) -> Iterable[Rule]:
+        """Keys of another motor, and those whose values it chooses."""
+        is_sized = given("sizing")
+        yield Rule("sizing.one_sided_share", ~has_sides(), "the {name} has no sides; leave it out")
+        yield Rule("sizing", given("system.motor"), BESIDE_MOTOR)
+        another = "is of the DC motor, and [sizing] picks another; leave out one of the two"
+        yield Rule("motor", is_sized, another, has_entries("motor"))
+        yield Rule("feed_forward", is_sized, another, is_one_of("feed_forward", True))
+        yield Rule("run.winding_temperature", is_sized, "is sizing.temperature with [sizing]; leave it out")
+        yield Rule("machine.ratio", is_sized, "[sizing] finds it; to have it kept, give gear.ratio")
+
+    def plan(self, reading: FileReading) -> SizingPlan | None:
+        """The plan of the table."""
+        if "sizing" not in reading.data:
+            return None
+        form = reading.form.sizing
+        return SizingPlan(reading.values["sizing"], form.gear_kind, form.ratio_series, form.ratios)
+
+    def unused_values(self, config: Config) -> Iterable[str]:
+        """A machine without sides has no one-sided feed."""
+        return () if config.machine.model.sides else ("sizing.one_sided_share",)
+
+    def drive(
+        self, config: Config, folder: Path, report: Report, backend: Backend | None
+    ) -> DriveProposal | None:
+        """The best of the motors that it tries."""
+        if config.plans[self.name] is None:
+            return None
+        from .search import size
+
+        return size(config, folder, report, backend).proposal(config)
+
+    def permitted_temperature(self, config: Config) -> tuple[str, float] | None:
+        """That of its table."""
+        plan: SizingPlan | None = config.plans[self.name]
+        return None if plan is None else ("sizing.temperature", float(plan.demands.temperature))
+
+    def additions(self, study: StudyRecord) -> Mapping[str, Mapping[str, Any]]:
+        """The findings with the gear to order and the protection."""
+        from .result import additions
+
+        found = study.findings.get(self.name)
+        return {} if found is None else {self.name: found.as_dict() | additions(study, found)}
+
+    def analyses(self) -> Iterable[type[Analysis]]:
+        """The protection of the drive."""
+        from .findings import ProtectionAnalysis
+
+        return (ProtectionAnalysis,)
+
+    def contents(self) -> Mapping[str, Contents]:
+        """Candidates and choice."""
+        from . import page
+
+        return {self.name: Contents("The drive", page.blocks, leads=True)}
+
+    def head(self, s: Source, study: StudyRecord) -> Iterator[Block]:
+        """The drive, and the share that it takes of its limits."""
+        from . import page
+
+        return page.answer(s)
+
+    def judgements(self, s: Source, study: StudyRecord) -> Iterator[Block]:
+        """The alarm where no motor fits."""
+        from . import page
+
+        return page.judgements(s)
+
+
+CAPABILITY = SizingCapability()

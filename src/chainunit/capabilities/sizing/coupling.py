@@ -1,0 +1,79 @@
+"""The recommended setting of the safety coupling of a sized drive, and its effect in the overloads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import xarray as xr
+
+from ...study.coupling import hardest_start, pull_out
+from ...study.event import Role
+from ...study.event_torques import from_event_on, peaks_in_events, running_peak
+from ...study.judgement import wrong_runs
+from ...study.record import StudyRecord
+from ...study.sections import Coupling
+from ...study.torques import at_gear, gear_torque
+from ...study.verdict import STEADY
+from .protection import CouplingEffect, Setting, goal
+
+
+def recommended_setting(study: StudyRecord) -> Setting | None:
+    """The recommended safety coupling of a sized drive, judged by the events of the study. None where no motor fits,
+    where the file gives a coupling, as that one cuts off the peaks from which the setting follows, or where the study
+    ended before steady running."""
+    if study.insufficient or study.config.coupling or STEADY not in study.answers:
+        return None
+    events, wrong = study.config.events, wrong_runs(study)
+    normal = [n for n in wrong if n not in events or events[n].from_rest or events[n].role is Role.DUTY]
+    shocks = peaks_in_events(study, Role.SHOCK)
+    setting = Setting(
+        running=running_peak(study).torque,
+        start=hardest_start(study).torque,
+        motor=pull_out(study),
+        gear=study.config.gear.torque_limit,
+        overloads={} if normal else {n: peak for n, peak in shocks.items() if n not in wrong},
+        disturbances={n: x for n, x in peaks_in_events(study, Role.DISTURBANCE).items() if n not in wrong},
+        wrong=normal or [n for n in wrong if n in shocks],
+    )
+    if setting.obstacle is not None:
+        return setting
+    tried = effects(study, setting.least)
+    return replace(setting, effects={n: tried[n] for n in setting.opens})
+
+
+def effects(
+    study: StudyRecord,
+    setting: float,
+    runs: Mapping[str, xr.Dataset] | None = None,
+    release: float | None = None,
+) -> dict[str, CouplingEffect]:
+    """The effect of a coupling with this setting [N m at the crank] in each shock that opens it, by name; it passes
+    torque for the `release` time [s], by default the declared one. `runs` are other runs of the shocks without a
+    coupling, from their begin on; by default those of the study."""
+    drive, release = study.drive, Coupling().release_time if release is None else release
+    if runs is None:
+        names = peaks_in_events(study, Role.SHOCK)
+        runs = {name: from_event_on(study, name) for name in names}
+    found = {}
+    for name, run in runs.items():
+        time, torque = run["time"].values, np.abs(run["motor.tau"].values) * drive.ratio
+        passed = np.flatnonzero(torque > setting)
+        if not passed.size:
+            continue
+        k = int(passed[0])
+        before = slice(max(k - 1, 0), k + 1)
+        trip = float(np.interp(setting, torque[before], time[before]))
+        end = trip + release
+        # up to the opening the run is the same as without the coupling
+        until = run.sel(time=slice(None, end))
+        rows = until.sizes["time"]
+        last = run.isel(time=slice(rows - 1, rows + 1)).interp(time=[min(end, float(time[-1]))])
+        without = at_gear(drive, run)
+        wanted = goal(without, study.config.gear.torque_limit)
+        above = int(np.argmax(np.abs(gear_torque(drive, run)) > wanted))
+        in_time = max(float(time[max(above - 1, 0)]) - trip, 0.0)
+        with_coupling = max(at_gear(drive, until), at_gear(drive, last))
+        found[name] = CouplingEffect(without, with_coupling, wanted, in_time)
+    return found

@@ -1,0 +1,214 @@
+"""The sentences on the safety coupling of a sized drive, and on the ways to another."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from ...core.quantities import variables
+from ...reading.text import number
+from ...study.coupling import hardest_start
+from ...study.event_torques import running_peak, running_words
+from ...study.record import StudyRecord
+from ...study.sections import Coupling
+from .protection import MARGIN, Alternative, CouplingEffect, Obstacle, Setting, Way, WayNumbers, spares
+
+
+def _torque(value: float) -> str:
+    return number(value, "N.m")
+
+
+def _at_both(study: StudyRecord, value: float) -> str:
+    """A torque at the crank, and at the motor's shaft, on which the coupling sits."""
+    return f"{_torque(value)} at the crank, {_torque(value / study.drive.ratio)} at the motor's shaft"
+
+
+def _list_of(study: StudyRecord, peaks: Mapping[str, float]) -> str:
+    """A list of runs with their peaks on the coupling [N m], in words."""
+    return ", ".join(f"{study.title_of(name)} ({_torque(peak)})" for name, peak in peaks.items())
+
+
+_OBSTACLES = {
+    Obstacle.START: "No safety coupling protects this drive as it starts now: {start} puts {start_torque} on it, so "
+    "that it has to open above {least}, and {bound}. For running alone {least_in_running} would do.",
+    Obstacle.MOTOR: "No safety coupling protects this drive: it has to open above {above}, and the motor gives at "
+    "most {motor} at the crank.",
+    Obstacle.GEAR: "No safety coupling protects this drive: it has to open above {above}, and the gear may carry "
+    "{gear}.",
+    Obstacle.OVERLOADS: "No safety coupling is recommended: it has to open above {above}, and {bound}.",
+    Obstacle.RELEASE: "No safety coupling is recommended: one that opens at {setting}, opens too late. The largest "
+    "torques until no torque passes it, {release} after its trip: {effects}. That saves nothing.",
+    Obstacle.ENERGY: "No safety coupling is recommended: the energy balance is not kept in {wrong}, so that no "
+    "setting follows from its numbers.",
+}
+"""By obstacle, the sentence on it."""
+
+
+_REASONS = {
+    Obstacle.START: "a start puts {start} on it",
+    Obstacle.MOTOR: "the motor gives {motor} at most",
+    Obstacle.GEAR: "the gear may carry {gear}",
+    Obstacle.OVERLOADS: "no overload of this study would open it",
+    Obstacle.RELEASE: "it opens too late",
+    Obstacle.ENERGY: "the energy balance of its runs is not kept",
+}
+"""By obstacle, a few words on it."""
+
+
+def why_none(setting: Setting) -> str:
+    """A few words on the reason why no coupling is recommended; empty where one is."""
+    if setting.obstacle is None:
+        return ""
+    return _REASONS[setting.obstacle].format(
+        start=_torque(setting.start), motor=_torque(setting.motor), gear=_torque(setting.gear)
+    )
+
+
+def coupling_sentence(study: StudyRecord, setting: Setting, alternatives: Sequence[Alternative] = ()) -> str:
+    """A sentence on the recommended safety coupling of a sized drive and its effect in the overloads, or on
+    the reason why no coupling protects the drive."""
+    caveat = f" ({study.verdict.caveat})" if study.verdict and study.verdict.caveat else ""
+    hardest, running = hardest_start(study), running_peak(study)
+    start = hardest.named(study)
+    of = f"that {start}" if setting.start > setting.running else f"that {running_words(study, running.run)}"
+    above = f"{_torque(setting.least)}, {MARGIN:g} times the {_torque(setting.normal)} {of} puts on it"
+    if setting.obstacle is not None:
+        return _OBSTACLES[setting.obstacle].format(
+            start=start,
+            setting=_at_both(study, setting.least),
+            release=number(Coupling().release_time, "s"),
+            effects=_effects(study, setting.effects),
+            wrong=", ".join(map(study.title_of, setting.wrong)),
+            start_torque=_torque(hardest.torque),
+            least=_torque(setting.least),
+            least_in_running=_torque(setting.least_in_running),
+            above=above,
+            motor=_torque(setting.motor),
+            gear=_torque(setting.gear),
+            bound=_bound(setting),
+        )
+    shut = {name: peak for name, peak in setting.overloads.items() if name not in setting.opens}
+    text = (
+        f"Recommended safety coupling{caveat}: {_at_both(study, setting.least)}; this is {MARGIN:g} times the "
+        f"{_torque(setting.normal)} {of} puts on it, and {'above' if setting.stalls else 'below'} the "
+        f"{_torque(setting.motor)} that the motor gives at the crank. It opens where "
+        f"{_effects(study, setting.effects)}"
+    )
+    text += f"; it stays shut where {_list_of(study, shut)}." if shut else "."
+    text += _too_late(study, setting, alternatives)
+    if setting.wrong:
+        names = ", ".join(map(study.title_of, setting.wrong))
+        text += f" Left out, as the energy balance is not kept: {names}."
+    if setting.stalls:
+        text += (
+            " A load that rises slowly stalls the motor and does not open it: the relay has to trip there."
+        )
+    if setting.nuisances:
+        nuisances = _list_of(study, setting.nuisances)
+        text += f" A nuisance trip, which protects nothing: it opens, too, where {nuisances}."
+    if setting.start_decides:
+        text += f" For running alone {_torque(setting.least_in_running)} would do."
+    return text
+
+
+def _effects(study: StudyRecord, effects: Mapping[str, CouplingEffect]) -> str:
+    """A list of overloads with the effects of a coupling in them, in words."""
+    return ", ".join(
+        f"{study.title_of(name)} ({_torque(effect.with_coupling)} at the output of the gear in place of "
+        f"{_torque(effect.without)})"
+        for name, effect in effects.items()
+    )
+
+
+def _bound(setting: Setting) -> str:
+    """The reason why a coupling of the least setting protects nothing, in words."""
+    if setting.obstacle is Obstacle.START and setting.least >= setting.gear:
+        return f"the gear may carry {_torque(setting.gear)}"
+    if not setting.overloads:
+        return "this study has no jam, lump or block that could open it"
+    most = _torque(max(setting.overloads.values()))
+    return f"the jams, lumps and blocks of this study put {most} on it at most"
+
+
+def _too_late(study: StudyRecord, setting: Setting, alternatives: Sequence[Alternative]) -> str:
+    """A sentence on the overloads in which the gear carries more than it may, though the coupling opens, and on the
+    cures; empty where there are none."""
+    if not setting.passed:
+        return ""
+    over = ", ".join(
+        f"{study.title_of(name)} (by {_torque(effect.with_coupling - setting.gear)}, "
+        f"{number(effect.with_coupling / setting.gear - 1.0, '1', 'percent')})"
+        for name, effect in setting.passed.items()
+    )
+    cures = []
+    for each in alternatives:
+        if each.way is Way.RELEASE:
+            declared = number(Coupling().release_time, "s")
+            cures.append(f"a release time of {number(each.numbers.release_time, 's')} in place of {declared}")
+    cures.append(f"a gear that may carry {_torque(max(e.with_coupling for e in setting.passed.values()))}")
+    cures.append("a device at the machine, nearer to the overload")
+    return (
+        f" It opens too late to keep below the {_torque(setting.gear)} that the gear may carry where {over}; the "
+        f"cure is {', or '.join(cures)}."
+    )
+
+
+_WAYS = {
+    Way.RELEASE: "With a release time of {release_time}: {set}.",
+    Way.GEAR: "With a gear that may carry {gear}: {set}.",
+    Way.SOFT_STARTER: 'With a soft starter (start = "soft"; starter.soft_start: voltage = "{voltage}", '
+    'time = "{ramp}") a start puts at most {start} on it and takes {start_time}: {set}.',
+    Way.INVERTER: 'With an inverter (start = "inverter"; run.ramp = "{ramp}", starter.inverter.boost = "{boost}") a '
+    "start puts at most {start} on it, running {running}: {set}.",
+    Way.SLIP_CLUTCH: "With a slip clutch, set to {setting}, the motor starts on line, and the clutch slips for "
+    "{slip_time} in each start, which makes {slip_energy} of heat. It slips, too, where {opens}: a switch has to "
+    "stop the motor then, as the slip makes {slip_power} of heat.",
+    Way.HIGHER: "With the start direct on line and a higher setting: {set}.",
+    Way.BEFORE_FLYWHEEL: "Between motor and flywheel in place of behind the flywheel: a start puts {start} on it, "
+    "running {running}: {set}. There it does not protect the machine from the energy of the flywheel.",
+}
+"""By way, its sentence; the values in quotes are those of a study file."""
+
+
+_FAILURES = {
+    Way.SOFT_STARTER: "No soft starter that was tried brings the crank to its speed from every angle within the "
+    "locked-rotor time of the motor.",
+    Way.INVERTER: "An inverter does not bring the crank to its speed from every angle with any ramp and boost "
+    "(starter.inverter.boost) that were tried.",
+    Way.SLIP_CLUTCH: "A slip clutch that running alone permits slips on in the start and does not bring the machine "
+    "to its speed.",
+}
+"""By way, the sentence on one with which the machine does not start."""
+
+
+def way_words(study: StudyRecord, each: Alternative, setting: Setting) -> str:
+    """The sentence on a way to a safety coupling that a start does not open, beside the one of that `setting`."""
+    if each.numbers.start is None:
+        return _FAILURES[each.way]
+    numbers = {
+        v.name: number(value, v.unit, v.kind, full=v.name not in ("voltage", "ramp", "boost"))
+        for v in variables(WayNumbers)
+        if (value := getattr(each.numbers, v.name)) is not None
+    }
+    if each.numbers.setting is not None:
+        numbers["setting"] = _at_both(study, each.numbers.setting)
+    return _WAYS[each.way].format(
+        **numbers, opens=_list_of(study, each.opens), set=_set(study, each, setting)
+    )
+
+
+def _set(study: StudyRecord, each: Alternative, setting: Setting) -> str:
+    """The setting of a way and what it protects, in words."""
+    gear = study.config.gear.torque_limit
+    if each.numbers.setting is None:
+        return f"no setting is left below the {_torque(gear)} that the gear may carry"
+    text = f"set to {_at_both(study, each.numbers.setting)}, it opens "
+    if not each.opens:
+        return text + "in no overload of this study and protects nothing"
+    text += f"where {_effects(study, each.effects) if each.effects else _list_of(study, each.opens)}"
+    if each.effects and not spares(each.effects, gear):
+        text += ", too late to save anything"
+    if shut := [name for name in setting.overloads if name not in each.opens]:
+        text += f", but stays shut where {', '.join(map(study.title_of, shut))}"
+    if each.numbers.rocker is not None:
+        text += f"; the rocker sees up to {_torque(each.numbers.rocker)}"
+    return text

@@ -1,0 +1,154 @@
+"""The findings of sizing: the chosen drive, the candidates behind it, and the protection of the drive."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from ...reading.text import entries
+from ...study.analysis import Analysis, Findings, Work
+from ...study.catalogue_drive import gear_with
+from ...study.config import Config
+from ...study.coupling import remark_on_rams
+from ...study.drive import Drive
+from ...study.proposal import DriveProposal
+from ...study.record import StudyRecord
+from .alternatives import alternatives
+from .candidate import Candidate, Standing
+from .coupling import recommended_setting
+from .duty import Duty
+from .preference import ORDER, poles_rank
+from .protection import Alternative, Obstacle, Setting
+from .table import SizingPlan
+
+INSUFFICIENT = "No motor of the catalogue fits; all runs are with the nearest, which is insufficient."
+"""The sentence on a study for which no motor fits."""
+
+
+@dataclass
+class SizingFindings(Findings):
+    """Cycle, candidates in the order of their rank, the chosen candidate, and its protection."""
+
+    plan: SizingPlan
+    duty: Duty
+    candidates: list[Candidate]
+    notes: list[str]
+    motors: int
+    """number of motors of the catalogue with a permitted number of poles; `candidates` are those that were
+    tried"""
+    weak: int = 0
+    """number of motors that were left out, as their rated power does not give the mean power of the cycle with the
+    margin"""
+    setting: Setting | None = None
+    """the recommended safety coupling, see `chainunit.capabilities.sizing.coupling.recommended_setting`"""
+    alternatives: tuple[Alternative, ...] = ()
+    """ways to a coupling that a start does not open, where the start is more than running"""
+
+    @property
+    def chosen_candidate(self) -> Candidate | None:
+        """The candidate that was chosen, if one fits."""
+        return self.candidates[0] if self.candidates[0].verdict is Standing.CHOSEN else None
+
+    @property
+    def best(self) -> Candidate:
+        """The candidate that the study goes on with: the chosen one, or the nearest where none fits."""
+        return self.candidates[0]
+
+    @property
+    def answer(self) -> str:
+        """The result of sizing, in a sentence; with the words of `rank`."""
+        count = f"{len(self.candidates)} of {self.motors} were tried"
+        if self.weak:
+            count += f", {self.weak} {'is' if self.weak == 1 else 'are'} too weak by the nameplate"
+        best = f"{self.best.motor.designation}: {self.best.reason}"
+        return (
+            f"{best} ({count})"
+            if self.chosen_candidate
+            else f"no motor of the catalogue fits ({count}); {best}"
+        )
+
+    @property
+    def trade(self) -> tuple[Candidate, Candidate] | None:
+        """The smallest motor that fits with a flywheel, and the next larger one that fits without; None where
+        the candidates do not have both."""
+        fitting = [c for c in self.candidates if c.fits]
+        fitting.sort(key=lambda c: (not c.keeps_margin, c.power, poles_rank(c.motor.nameplate.poles)))
+        with_one = next((c for c in fitting if c.drive.flywheel), None)
+        if with_one is None:
+            return None
+        bare = (c for c in fitting if not c.drive.flywheel and c.power >= with_one.power)
+        without = next(bare, None)
+        return None if without is None else (with_one, without)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Ready for JSON, each number with its unit."""
+        best = self.best
+        return {
+            "asked": entries(self.plan.demands, with_titles=True) | self.plan.words,
+            **self.duty.as_dict(),
+            "flywheel": entries(best.flywheel_numbers(), with_titles=True),
+            "tried": {"value": len(self.candidates), "unit": "1"},
+            "motors": {"value": self.motors, "unit": "1"},
+            "weak": {"value": self.weak, "unit": "1"},
+            "candidates": [c.as_dict() for c in self.candidates],
+            "order": [words.format(larger=f"{self.plan.demands.larger:g}") for words in ORDER.values()],
+            "trade": None if self.trade is None else [self.candidates.index(c) for c in self.trade],
+            "chosen": self.candidates.index(self.chosen_candidate) if self.chosen_candidate else None,
+            "nearest": None if self.chosen_candidate else self.candidates.index(best),
+            "notes": self.notes,
+        }
+
+    def proposal(self, config: Config) -> DriveProposal:
+        """The drive of a study by these findings."""
+        best, trial, fits = self.best, self.best.trial, self.chosen_candidate is not None
+        return DriveProposal(
+            "sizing",
+            self,
+            best.drive,
+            best.motor,
+            gear_with(config, best.drive.ratio, self.plan.offer),
+            "Which motor, gear and flywheel does {noun} need? Its crank turns at {=run.crank_speed:4}.",
+            self.answer,
+            insufficient="" if fits else INSUFFICIENT,
+            keys={"ambient.T": "sizing.ambient"},
+            start_class=trial.start_class or 0,
+            duty=trial.duty if fits else None,
+            inverter_current=trial.inverter_current,
+        )
+
+    def remark(self, study: StudyRecord) -> None:
+        """Add the notes on the choice, and one on each ram of a linkage at the recommended coupling."""
+        for text in self.notes:
+            study.note("sizing", "{text}", text=text)
+        if study.insufficient:
+            study.warn("insufficient motor", "{answer}. All runs are with it.", answer=self.answer)
+        if study.statics.torsion is not None:
+            rigid = "Sizing took the shafts as rigid and the driveline as massless; the runs include it."
+            study.note("sized without line", rigid)
+        # a study that ended early has a recommendation, too
+        self.setting = setting = self.setting or recommended_setting(study)
+        if setting is not None and setting.obstacle in (None, Obstacle.RELEASE):
+            # this is the setting that the answer names, recommended or not
+            remark_on_rams(study, setting.least)
+        elif setting is not None:
+            remark_on_rams(study, setting.least_in_running, "set for running alone ")
+
+
+class ProtectionAnalysis(Analysis):
+    """The safety coupling of a sized drive, and the ways to another; it completes the findings of sizing."""
+
+    name = "protection"
+    needs_runs = True
+
+    @staticmethod
+    def applies(config: Config, drive: Drive) -> bool:
+        """Whether the study asks for sizing."""
+        return config.plans["sizing"] is not None
+
+    @staticmethod
+    def find(study: StudyRecord, work: Work) -> None:
+        """Judge the coupling by the runs of the study, and try each way."""
+        sizing: SizingFindings = study.findings["sizing"]
+        sizing.setting = recommended_setting(study)
+        if sizing.setting is not None:
+            sizing.alternatives = alternatives(study, sizing.setting, work.rig, work.report)

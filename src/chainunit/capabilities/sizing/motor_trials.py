@@ -1,0 +1,207 @@
+"""Trials of candidates: each gets its ratio, the least boost of an inverter, and the least flywheel that it needs.
+
+The hand formulas for flywheels are here; all else is read from the runs.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from ...core.errors import InterruptedRunError, RunError
+from ...drives.catalogue import CatalogueMotor
+from ...drives.gear_ratios import gear_unit, next_ratio, ratio_on_offer
+from ...study.catalogue_drive import catalogue_drive, with_wheel
+from ...study.config import Config
+from ...study.limits import SPEED_DEVIATION
+from .candidate import Candidate, TrialResult
+from .duty import CycleNumbers, Duty
+from .inverter import least_boost, misses_by_a_hair
+from .table import SizingPlan, plan_of
+from .trial import try_motor
+
+_EVENED = ("speed", "rms_torque", "peak_torque", "temperature")
+"""Checks that a flywheel improves: it evens the speed, and with it the torque of a varying load."""
+_WORSE_WITH_INERTIA = ("start", "inertia")
+"""Checks that a flywheel makes worse."""
+_SMALL = 0.1
+"""Inertia of a flywheel, relative to all other inertia, below which it hardly evens the speed."""
+_TOLERANCE = SPEED_DEVIATION - 0.005
+"""Relative deviation of the crank speed up to which a ratio of a series is taken; the rest of the permitted
+deviation is for the slip in the run."""
+
+
+@dataclass(frozen=True)
+class MotorTrials:
+    """Trials of motors for the `duty` of a study, by the FMU `files`, or without them on the compiled system."""
+
+    config: Config
+    duty: Duty
+    files: Mapping[str, Path] | None = None
+
+    @property
+    def plan(self) -> SizingPlan:
+        """The demands on the motor, and the gears on offer."""
+        return plan_of(self.config)
+
+    @property
+    def has_given_ratio(self) -> bool:
+        """Whether the file gives the ratio of the gear."""
+        return "gear.ratio" in self.config.given
+
+    @property
+    def has_given_boost(self) -> bool:
+        """Whether the file gives the boost of the inverter."""
+        return "starter.inverter.boost" in self.config.given
+
+    @property
+    def is_made(self) -> bool:
+        """Whether the ratios are those of gears that there are: the file gives one, or a list of them."""
+        return self.has_given_ratio or self.plan.offer.is_made
+
+    def candidate(self, motor: CatalogueMotor, chosen: float | None = None) -> Candidate:
+        """A candidate without a flywheel, with the `chosen` ratio, or that which the file gives, or the ratio on
+        offer that is nearest to the one at which the crank has its speed."""
+        plan, series, torque = self.plan, "", self.duty.normal.crank_torque
+        with_ratio = partial(
+            catalogue_drive, self.config, motor, torque, plan.demands.ambient, offer=plan.offer
+        )
+        drive = with_ratio(gear_ratio=chosen)
+        if chosen is not None:
+            series = "own list" if plan.ratios else "R80"
+        elif not self.has_given_ratio:
+            ratio, series = ratio_on_offer(drive.ratio, plan.ratio_series, plan.ratios, _TOLERANCE)
+            drive = with_ratio(gear_ratio=ratio)
+        unit = gear_unit(plan.gear_kind, drive.ratio, is_given=self.is_made)
+        return Candidate(motor, drive, margin=plan.demands.margin, unit=unit, series=series)
+
+    def judged(self, c: Candidate, *, worst_start: bool = False) -> Candidate:
+        """The same candidate with the results of its runs; with `worst_start` its start is that from the worst crank
+        angle."""
+        c.worst_start = worst_start
+        try:
+            trial = try_motor(self.config, c.motor, c.drive, self.duty, self.files, worst_start=worst_start)
+            c.trial = trial.result()
+        except InterruptedRunError:
+            raise
+        except RunError as error:
+            c.trial, c.reason = TrialResult(), f"its run failed: {error}"
+        return c
+
+    def with_least_boost(self, c: Candidate, *, worst_start: bool = False) -> Candidate:
+        """The judged candidate, with an inverter with the least boost with which it starts."""
+        return least_boost(c, partial(self.judged, worst_start=worst_start), self.has_given_boost)
+
+    def best_of(self, motor: CatalogueMotor) -> Candidate:
+        """The candidate with the least flywheel, and with an inverter with the least boost. Where it then misses its
+        limits by a hair, it gets the ratio above, as an inverter keeps the speed of the crank with either ratio."""
+        bare, is_given = self.candidate(motor), self.has_given_boost
+        candidate = least_boost(bare, self.with_flywheel, is_given)
+        if not bare.drive.follows or self.has_given_ratio or not misses_by_a_hair(candidate):
+            return candidate
+        above = next_ratio(bare.drive.ratio, self.plan.ratios)
+        if above is None:
+            return candidate
+        other = least_boost(self.candidate(motor, above), self.with_flywheel, is_given)
+        return other if other.keeps_margin else candidate
+
+    def with_flywheel(self, bare: Candidate) -> Candidate:
+        """The candidate with the least flywheel, to about a tenth, that keeps the permitted fluctuation and the
+        limits of torque and temperature. It has no flywheel where none is needed, or where it exceeds a limit
+        that no flywheel improves. If such a flywheel exceeds another limit, it is the flywheel that comes nearest
+        to all limits. A motor that stalls in the peak of the cycle may run with a flywheel, which carries it through.
+
+        The largest flywheel that is tried is that of the hand formulas for speed and torque. It is on the safe
+        side for the speed, as the formula leaves out that a motor's torque falls with speed, which evens the
+        speed, too. None is tried where this flywheel is a small part of the other inertia."""
+        numbers = self.duty.numbers
+        there = bare.drive.rotor_inertia + numbers.inertia_mean / bare.drive.ratio**2
+        trials: list[Candidate] = []
+
+        def trial_with(flywheel: float) -> Candidate:
+            candidate = dataclasses.replace(bare, drive=with_wheel(self.config, bare.drive, flywheel))
+            trials.append(self.judged(candidate))
+            return candidate
+
+        def heavy_enough(candidate: Candidate) -> bool:
+            if candidate.checks and not candidate.starts:
+                # it stalls for want of inertia, unless it starts with less
+                return any(c.starts for c in trials if c.drive.flywheel < candidate.drive.flywheel)
+            return too_heavy(candidate) or is_even(candidate)
+
+        first = trial_with(0.0)
+        mean = numbers.torque_mean / bare.drive.ratio
+        if heavy_enough(first) or mean > bare.motor.nameplate.torque:
+            return first
+        inertia = numbers.inertia_wanted / bare.drive.ratio**2 / (1.0 - bare.margin)
+        whole = max(inertia, torque_evening_inertia(first, numbers, self.config.run.crank_speed)) - there
+        if whole < _SMALL * there:
+            return first
+        below = 0.0
+        for share in (0.03, 0.1, 0.3, 1.0):
+            if heavy_enough(trial_with(share * whole)):
+                break
+            below = share
+        else:
+            return _nearest(trials)
+        for _ in range(3):
+            middle = 0.5 * (below + share)
+            if heavy_enough(trial_with(middle * whole)):
+                share = middle
+            else:
+                below = middle
+        solutions = [c for c in trials if is_even(c) and not too_heavy(c)]
+        return min(solutions, key=lambda c: c.drive.flywheel) if solutions else _nearest(trials)
+
+
+def _nearest(trials: list[Candidate]) -> Candidate:
+    """The trial that comes nearest to all limits; where none starts, the one without a flywheel."""
+    best = min(trials, key=lambda c: c.violation)
+    best.heaviest = max(c.drive.flywheel for c in trials)
+    best.bound = next((c.checks["inertia"].limit for c in trials if c.exceeds("inertia")), None)
+    return best
+
+
+def torque_evening_inertia(c: Candidate, numbers: CycleNumbers, crank_speed: float) -> float:
+    """Inertia on the motor's shaft [kg m2] that brings the RMS and peak torque of a candidate down to their
+    limits, by hand; 0 where it exceeds neither limit, or where the mean torque alone exceeds one.
+
+    A motor whose torque falls by D [N m s/rad] with speed gives 1/sqrt(1 + (n w J/D)^2) of the n-th harmonic
+    of the load, with the crank speed w [rad/s]. The factor of the first harmonic is taken for all, which is
+    on the safe side."""
+    plate, ratio = c.motor.nameplate, c.drive.ratio
+    mean, rms = numbers.torque_mean / ratio, numbers.torque_rms / ratio
+    peak = max(numbers.torque_peak, numbers.torque_peak_one_sided or 0.0) / ratio
+    limits = {
+        name: (1.0 - c.margin) * c.checks[name].limit
+        for name in ("rms_torque", "peak_torque")
+        if c.exceeds(name)
+    }
+    # the parts of load and limit above the mean
+    beyond = []
+    if "rms_torque" in limits:
+        beyond.append((rms**2 - mean**2, limits["rms_torque"] ** 2 - mean**2))
+    if "peak_torque" in limits:
+        beyond.append(((peak - mean) ** 2, max(0.0, limits["peak_torque"] - mean) ** 2))
+    square = max((load / bound for load, bound in beyond if bound > 0.0), default=0.0)
+    slope = plate.torque / (plate.synchronous - plate.speed)
+    return float(slope / crank_speed * math.sqrt(max(0.0, square - 1.0)))
+
+
+def is_even(c: Candidate) -> bool:
+    """Whether the candidate keeps every limit that a flywheel improves, with the margin."""
+    return not any(map(c.exceeds, _EVENED))
+
+
+def too_heavy(c: Candidate) -> bool:
+    """Whether the candidate exceeds a limit that a flywheel makes worse, or its run failed."""
+    # a winding that is too hot from running alone permits no starts, too
+    return (
+        not c.checks
+        or any(map(c.exceeds, _WORSE_WITH_INERTIA))
+        or (c.exceeds("starts") and not c.exceeds("temperature"))
+    )

@@ -1,0 +1,257 @@
+"""Sizing of the drive: which motor of the catalogue, behind which gear, with which flywheel.
+
+First the cycle is computed by inverse dynamics. Then every candidate is simulated: a start
+under load, steady running, and steady running with all feed on one side. Each check is a utilisation, value
+over limit.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from ...core.errors import InputError
+from ...core.native.compilers import compiler
+from ...drives.catalogue import CatalogueMotor, catalogue
+from ...drives.gear_ratios import UNITS, nearest
+from ...fmu.backends import Backend
+from ...reading.text import number
+from ...study.config import Config
+from ...study.drive_fmus import export_drive
+from ...study.limits import SPEED_DEVIATION
+from ...study.quantiles import HIGH
+from ...study.relay import HEAVIEST, LIGHT, class_words
+from ...study.sections import SOFTER
+from ...work.progress import Report
+from .candidate import Candidate
+from .duty import Duty, duty_of
+from .findings import SizingFindings
+from .inverter import inverter_needs
+from .motor_trials import MotorTrials
+from .preference import choice, poles_rank, rank
+from .table import plan_of
+
+_WORSE_WITH_POWER = ("gear_start",)
+"""Checks that a larger motor makes worse."""
+
+
+def size(config: Config, folder: Path, report: Report, backend: Backend | None = None) -> SizingFindings:
+    """Choose a motor of the catalogue for the study. At least `sizing.candidates` motors are tried, from
+    small to large, and then more until one fits with the margin, and none that follows could be preferred to
+    it, or the catalogue ends.
+
+    Parameters
+    ----------
+    config : a study with [sizing]
+    folder : where the FMUs are written
+    report, backend : see `chainunit.study.run.run_study`
+
+    Raises
+    ------
+    InputError
+        for a catalogue that cannot be read, or that has no motor with the requested numbers of poles.
+    """
+    limits = plan_of(config).demands
+    motors = [
+        m for m in catalogue(config.catalogue) if limits.poles_least <= m.nameplate.poles <= limits.poles_most
+    ]
+    motors.sort(key=lambda m: (m.nameplate.power, poles_rank(m.nameplate.poles)))
+    if not motors:
+        raise InputError(
+            f"sizing.poles_least = {limits.poles_least:g}, sizing.poles_most = {limits.poles_most:g}: the catalogue "
+            "has no motor with so many poles"
+        )
+    if config.start != "inverter" and "gear.ratio" not in config.given:
+        check_ratios(plan_of(config).ratios, config.run.crank_speed, motors)
+    report("the machine at constant speed", 0.0, 1.0)
+    duty = duty_of(config, folder, backend)
+    numbers = duty.numbers
+    notes = [
+        "Catalogue data are typical; iron losses are not in the motor model.",
+        "The gear's losses act as viscous drag on the motor shaft, with the mean power that its efficiency costs.",
+    ]
+    if config.machine.in_place:
+        notes.append(
+            f"Peaks of the cycle and the flywheel are those of single turns, {100 * HIGH:g} % quantile over all "
+            "turns of all starts of the chains."
+        )
+    # a flywheel evens the torque of a cycle, but gives no mean power
+    power = numbers.power_mean / (1.0 - limits.margin)
+    strong = [m for m in motors if m.nameplate.power >= power]
+    if not strong:
+        notes.append(
+            "No motor of the catalogue gives the mean power of the cycle with the margin, "
+            f"{number(power, 'W')}: the largest were tried."
+        )
+        strong = [m for m in motors if m.nameplate.power == motors[-1].nameplate.power]
+    candidates = _search(_trials(config, strong[0], duty, folder, report, backend), strong, report)
+    notes += [
+        f"{c.motor.designation} would be preferred, but for its start: {c.reason}."
+        for c in candidates[1:]
+        if c.remedy
+    ]
+    notes += _needs(candidates[0], MotorTrials(config, duty))
+    return SizingFindings(plan_of(config), duty, candidates, notes, len(motors), len(motors) - len(strong))
+
+
+def check_ratios(ratios: Sequence[float], crank_speed: float, motors: Sequence[CatalogueMotor]) -> None:
+    """Refuse `sizing.ratios` with which none of the `motors`, the smallest first, keeps the speed of the crank
+    [rad/s] on the line, at any slip up to the rated one. An inverter keeps the speed with any ratio.
+
+    Raises
+    ------
+    InputError
+        with the ratios that are needed.
+    """
+    if not ratios:
+        return
+    w = crank_speed
+    needed: dict[float, float] = {}
+    for plate in (motor.nameplate for motor in motors):
+        least, most = plate.speed / w, plate.synchronous / w
+        if any((1.0 - SPEED_DEVIATION) * least <= x <= (1.0 + SPEED_DEVIATION) * most for x in ratios):
+            return
+        needed.setdefault(plate.poles, least)
+    wanted = sorted((ratio, poles) for poles, ratio in needed.items())
+    near, _ = min(wanted, key=lambda each: abs(math.log(each[0] / nearest(each[0], ratios))))
+    words = " or ".join(f"{number(ratio, '1', digits=2)} ({poles:g} poles)" for ratio, poles in wanted)
+    raise InputError(
+        f"sizing.ratios: no ratio on offer brings the crank to {number(w, 'rad/s', 'speed')} with a motor of the "
+        f"catalogue: about {words} is needed, the nearest on offer is {nearest(near, ratios):g}; add such a ratio, "
+        "change run.crank_speed, or take an inverter (start)",
+        "sizing.ratios",
+    )
+
+
+def _trials(
+    config: Config, motor: CatalogueMotor, duty: Duty, folder: Path, report: Report, backend: Backend | None
+) -> MotorTrials:
+    """The trials of motors such as this one: on the compiled system where there is a compiler."""
+    trials = MotorTrials(config, duty)
+    drive = trials.candidate(motor).drive
+    if compiler() is not None and backend != "python" and not drive.outsiders:
+        return trials
+    files, _ = export_drive(drive, folder, backend, lambda what: report(what, 0.0, 1.0))
+    return dataclasses.replace(trials, files=files)
+
+
+def _search(trials: MotorTrials, motors: list[CatalogueMotor], report: Report) -> list[Candidate]:
+    """The candidates that `size` tries of the `motors`, in the order of their rank. The start of the best one is that
+    from the worst crank angle; a candidate that fails in it makes room for the next."""
+    demands = trials.plan.demands
+    candidates: list[Candidate] = []
+    rest = iter(motors)
+    following = next(rest, None)
+
+    def is_over() -> bool:
+        if following is None:
+            return True
+        return len(candidates) >= demands.candidates and _is_settled(candidates, following, demands.larger)
+
+    while not candidates or not is_over():
+        while following is not None and not is_over():
+            report(f"simulating {following.designation}", float(len(candidates)), float(len(motors)))
+            candidates.append(trials.best_of(following))
+            following = next(rest, None)
+        _from_all_angles(trials, candidates)
+    if candidates[0].fits and candidates[0].drive.flywheel:
+        report("a larger motor without a flywheel", 0.0, 1.0)
+        if (larger := _without_flywheel(trials, motors, candidates)) is not None:
+            candidates.append(larger)
+            _from_all_angles(trials, candidates)
+    hard = [c for c in candidates if c.breaks_gear]
+    best, _ = choice([candidates[0], *hard], demands.larger) if hard else (candidates[0], {})
+    if best.breaks_gear:
+        report("a softer start", 0.0, 1.0)
+        best.remedy = _remedy(trials, best)
+        rank(candidates, demands.larger)
+    return candidates
+
+
+def _remedy(trials: MotorTrials, c: Candidate) -> str:
+    """What makes a candidate fit whose start alone is too hard for the gear: on the line it is tried with a soft
+    starter."""
+    start = trials.config.start
+    if start != "direct":
+        return SOFTER[start]
+    softly = dataclasses.replace(trials, config=dataclasses.replace(trials.config, start="soft"))
+    soft = softly.candidate(c.motor, c.drive.ratio)
+    soft.drive = dataclasses.replace(soft.drive, flywheel=c.drive.flywheel)
+    if not softly.judged(soft, worst_start=True).fits:
+        return SOFTER["direct"]
+    check = soft.checks["gear_start"]
+    return f'with start = "soft" it fits, and puts {number(check.value, check.unit)} on the gear in a start'
+
+
+def _from_all_angles(trials: MotorTrials, candidates: list[Candidate]) -> None:
+    """Rank the candidates, with the start of the best one from all crank angles."""
+    larger = trials.plan.demands.larger
+    rank(candidates, larger)
+    while candidates[0].fits and not candidates[0].worst_start:
+        candidates[0] = trials.with_least_boost(candidates[0], worst_start=True)
+        rank(candidates, larger)
+
+
+def _needs(best: Candidate, trials: MotorTrials) -> Iterator[str]:
+    """What has to be ordered beside the usual parts: a relay for a heavy start or the settings of the inverter, a
+    second gear unit."""
+    relay_class = best.trial.start_class or 0
+    if relay_class > LIGHT:
+        relay = f"{'of ' if relay_class <= HEAVIEST else ''}{class_words(relay_class)}"
+        yield f"The start takes an overload relay {relay}; one of class {LIGHT} may trip in it."
+    if best.drive.follows:
+        yield from inverter_needs(best, trials.config.starter.overload, trials.has_given_boost)
+    if best.unit is None:
+        largest = UNITS[trials.plan.gear_kind][-1]
+        end = (
+            f"even of makers with large ratios ends at about {largest.made:g}"
+            if trials.is_made
+            else (f"ends at about {largest.largest:g}")
+        )
+        yield f"A ratio of {best.drive.ratio:g} takes two gear units: a {largest.title} {end}."
+
+
+def _is_settled(candidates: list[Candidate], following: CatalogueMotor, larger: float) -> bool:
+    """Whether a candidate keeps the margin, and neither the `following` motor nor a larger one could be
+    preferred to the best."""
+    keeping = [c for c in candidates if c.keeps_margin]
+    if not keeping:
+        return False
+    best, _ = choice(keeping, larger)
+    is_light = best.unit is not None and (best.trial.start_class or 0) <= LIGHT and not best.drive.flywheel
+    if (
+        is_light
+        and not best.weakened
+        and poles_rank(best.motor.nameplate.poles) <= poles_rank(following.nameplate.poles)
+    ):
+        return best.power < following.nameplate.power
+    return following.nameplate.power > larger * min(c.power for c in keeping)
+
+
+def _without_flywheel(
+    trials: MotorTrials, motors: list[CatalogueMotor], candidates: list[Candidate]
+) -> Candidate | None:
+    """The next larger motor that fits without a flywheel, of the best candidate's number of poles; None where
+    the candidates have one, or the `motors` none."""
+    best = candidates[0]
+    if any(c.keeps_margin and not c.drive.flywheel and c.power >= best.power for c in candidates):
+        return None
+    tried = {c.motor.designation for c in candidates}
+    poles = best.motor.nameplate.poles
+    rest = [
+        m
+        for m in motors
+        if m.nameplate.poles == poles and m.nameplate.power > best.power and m.designation not in tried
+    ]
+    # a larger motor runs more evenly, but puts more on the gear in its start: the largest may not fit
+    least = None
+    while rest:
+        middle = len(rest) // 2
+        candidate = trials.with_least_boost(trials.candidate(rest[middle]))
+        if candidate.keeps_margin:
+            least = candidate
+        too_weak = any(candidate.exceeds(name) for name in candidate.checks if name not in _WORSE_WITH_POWER)
+        rest = rest[middle + 1 :] if too_weak else rest[:middle]
+    return least

@@ -1,0 +1,39 @@
+"""A proposed drive: the motor of a catalogue that a capability chooses for a study, with its gear."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..drives.catalogue import CatalogueMotor
+from ..drives.gearing import Transmission
+from .drive import Drive
+from .torques import DutyPeak
+
+
+@dataclass(frozen=True)
+class DriveProposal:
+    """The drive that a capability chose: the best one that fits, or the nearest where none does."""
+
+    name: str
+    """name of the findings of the choice, and origin of the values that follow from it"""
+    findings: Any
+    """the `Findings` of the choice; their remarks come before those on the runs"""
+    drive: Drive
+    motor: CatalogueMotor
+    gear: Transmission
+    question: str
+    """the question that it answers about the machine {noun}"""
+    answer: str
+    """the choice and its reason, in words"""
+    insufficient: str = ""
+    """the sentence on a study in which no drive fits, so that all is run with the nearest; empty where one fits"""
+    keys: Mapping[str, str] = field(default_factory=dict)
+    """by parameter of the motor, the key of the study file that gives it"""
+    start_class: int = 0
+    """trip class of the relay that holds in each start; 0 for an inverter"""
+    duty: DutyPeak | None = None
+    """the largest torque at the crank in normal duty beside that of the study; None for a drive that does not fit"""
+    inverter_current: float | None = None
+    """least rated current of the inverter to be ordered [A]"""
