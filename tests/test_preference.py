@@ -29,6 +29,7 @@ from chainunit.drives.gear_ratios import (
     typical_efficiency,
 )
 from chainunit.drives.gearing import START_FACTOR, ordered_torque
+from chainunit.reading.results import as_data
 from chainunit.reading.text import number
 from chainunit.study.catalogue_drive import gear_with
 from chainunit.study.choice import Choice, as_chosen
@@ -428,8 +429,8 @@ def test_the_heavy_mill_gets_the_motor_without_a_flywheel(tmp_path, monkeypatch)
     # the smaller one fits, too, and the result has the trade
     assert small.fits and small.drive.flywheel > 50.0 * small.motor.nameplate.J
     assert small.checks["start"].value > 5.0 and small.criterion in (Criterion.START, Criterion.FLYWHEEL)
-    assert result.trade == (small, best) and result.as_dict()["trade"] == [1, 0]
-    numbers = result.as_dict()["candidates"][1]["flywheel"]
+    assert result.trade == (small, best) and as_data(result)["trade"] == [1, 0]
+    numbers = as_data(result)["candidates"][1]["flywheel"]
     mass, diameter = numbers["mass"]["value"], numbers["diameter"]["value"]
     assert mass * diameter**2 / 8.0 == pytest.approx(numbers["J"]["value"])
     check_order(config, result, "heavy_mill", tmp_path, monkeypatch, *motors)
@@ -632,7 +633,7 @@ def test_a_motor_that_stalls_without_a_flywheel_is_told_so(tmp_path, monkeypatch
     rank(alone := [bare], 2.0)
     assert "without a flywheel it stalls at 2" in alone[0].reason and "deg" in alone[0].reason
     assert c.reason.endswith("and no flywheel that sizing.inertia_ratio = 2 permits carries it through")
-    assert "at most 2 times (sizing.larger)" in result.as_dict()["order"][1]
+    assert "at most 2 times (sizing.larger)" in as_data(result)["order"][1]
     assert "hot" not in alone[0].reason and bare.checks["starts"].value is None
     # the ram meets the workpiece 10 mm above its lower dead centre, on the way down
     turn = result.duty.normal

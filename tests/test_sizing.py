@@ -29,6 +29,7 @@ from chainunit.drives.induction_motor import InductionMotor, breakdown, steady
 from chainunit.drives.motor import T_RATED
 from chainunit.fmu.backends import export
 from chainunit.machines.chain_unit import Feed, SideLoads
+from chainunit.reading.results import as_data
 from chainunit.study.config import parse
 from chainunit.study.cycle import cycle, energy_swing, needed_inertia
 from chainunit.study.drive import Drive
@@ -327,7 +328,7 @@ def test_without_a_fit_the_whole_catalogue_is_tried_and_the_nearest_is_named(tmp
     assert [c.verdict for c in outcome.candidates] == [Standing.INSUFFICIENT] + 3 * [Standing.REJECTED]
     assert outcome.best is outcome.candidates[0] and "torque of the gear" in outcome.answer
     assert "4 of 4 were tried" in outcome.answer
-    result = outcome.as_dict()
+    result = as_data(outcome)
     assert (result["chosen"], result["nearest"]) == (None, 0)
     assert result["tried"]["value"] == result["motors"]["value"] == 4
 
@@ -343,7 +344,7 @@ def test_motors_that_are_too_weak_by_the_nameplate_are_counted(tmp_path, monkeyp
     result = sizing.size(one_candidate("[gear]\ntorque_limit = 150\n"), tmp_path, lambda *said: None)
     assert (len(result.candidates), result.motors, result.weak) == (3, 5, 2)
     assert "3 of 5 were tried, 2 are too weak by the nameplate" in result.answer
-    assert result.as_dict()["weak"]["value"] == 2
+    assert as_data(result)["weak"]["value"] == 2
 
 
 def test_the_remedy_of_the_rejected_example_works(tmp_path):
@@ -374,7 +375,7 @@ def test_a_limit_of_the_inertia_ratio_is_for_who_asks_for_it(tmp_path, monkeypat
         return sizing.size(one_candidate(more, fluctuation=0.5), tmp_path, lambda *said: None)
 
     assert "inertia" not in found("").best.checks
-    assert found("").as_dict()["asked"]["inertia_ratio"]["value"] is None
+    assert as_data(found(""))["asked"]["inertia_ratio"]["value"] is None
     asked = found("inertia_ratio = 5\n").best
     assert asked.checks["inertia"].limit == 5.0
     # nor for an inverter: the limit is a rule for servo drives

@@ -6,14 +6,13 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
 
 from ...core.quantities import Value, declaration, quantity
 from ...drives.catalogue import CatalogueMotor
 from ...drives.disc import Disc, steel_disc
 from ...drives.gear_ratios import GearUnit
-from ...reading.results import as_data
-from ...reading.text import entries, number
+from ...reading.results import derived, part, result
+from ...reading.text import number
 from ...study.drive import Drive
 from ...study.limits import Check
 from ...study.torques import DutyPeak
@@ -108,7 +107,7 @@ class TrialResult:
     """crank angle at which the load stalls the motor [rad]; None for a motor that starts"""
 
 
-@dataclass
+@result(frozen=False)
 class Candidate:
     """A motor behind a gear, with the results of its runs."""
 
@@ -119,23 +118,25 @@ class Candidate:
     """share of each limit that should remain free"""
     unit: GearUnit | None = None
     """the gear unit of the ratio; None where one unit does not suffice"""
-    series: str = ""
-    """source of the ratio, such as a series of preferred numbers; empty for an exact or a given one"""
+    series: str = part(
+        "source of the ratio, such as a series of preferred numbers; empty for an exact or a given one",
+        default="",
+    )
     heaviest: float = 0.0
     """the heaviest flywheel that was tried with the motor [kg m2]"""
     bound: float | None = None
     """the value of `sizing.inertia_ratio`, where it ended the trials of flywheels"""
     worst_start: bool = False
     """whether time, class and heat of its start are those of the worst crank angle, not of the angle 0 alone"""
-    verdict: Standing | None = None
-    """None until the candidate is judged or ranked"""
-    criterion: Criterion | None = None
-    """the criterion by which a candidate that fits stands behind the chosen one"""
-    reason: str = ""
+    verdict: Standing | None = part("its standing; None until it is judged or ranked", default=None)
+    criterion: Criterion | None = part(
+        "the criterion by which a candidate that fits stands behind the chosen one", default=None
+    )
+    reason: str = part("the reason of its standing", default="")
     remedy: str = ""
     """what makes a candidate fit that only fails in the torque of the gear in its start, in words"""
 
-    @property
+    @derived()
     def checks(self) -> Mapping[str, Check]:
         """The values of its runs beside their limits, by name; empty where a run failed."""
         return self.trial.checks
@@ -218,6 +219,7 @@ class Candidate:
         mass, diameter = number(self.disc.mass, "kg"), number(self.disc.diameter, "m")
         return f"{number(self.drive.flywheel, 'kg.m2')} (steel disc of {mass}, {diameter} in diameter)"
 
+    @derived(name="flywheel", titled=True)
     def flywheel_numbers(self) -> Flywheel:
         """The flywheel of the candidate."""
         disc = self.disc
@@ -230,9 +232,10 @@ class Candidate:
             fluctuation=self.trial.fluctuation,
         )
 
-    def as_dict(self) -> dict[str, Any]:
-        """Ready for JSON, each number with its unit."""
-        numbers = DriveNumbers(
+    @derived(titled=True)
+    def numbers(self) -> DriveNumbers:
+        """Numbers of the drive."""
+        return DriveNumbers(
             start_class=self.trial.start_class,
             inverter_current=self.trial.inverter_current,
             frequency=self.trial.frequency,
@@ -240,15 +243,18 @@ class Candidate:
             mass=self.mass,
             price=self.motor.nameplate.price or None,
         )
-        return {
-            "motor": self.motor.designation,
-            "ratio": {"value": self.drive.ratio, "unit": "1"},
-            "gear": self.unit.title if self.unit else "two gear units",
-            "series": self.series,
-            "flywheel": entries(self.flywheel_numbers(), with_titles=True),
-            "numbers": entries(numbers, with_titles=True),
-            "verdict": self.verdict,
-            "criterion": self.criterion,
-            "reason": self.reason,
-            "checks": as_data(self.checks),
-        }
+
+    @derived(name="motor")
+    def designation(self) -> str:
+        """Designation of the motor."""
+        return self.motor.designation
+
+    @derived("1")
+    def ratio(self) -> float:
+        """Ratio of the gear."""
+        return self.drive.ratio
+
+    @derived()
+    def gear(self) -> str:
+        """The gear."""
+        return self.unit.title if self.unit else "two gear units"

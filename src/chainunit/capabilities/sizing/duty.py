@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ import numpy as np
 from ...core.quantities import Value, declaration, quantity
 from ...fmu.backends import Backend
 from ...machines.chain_unit import SIDES, SideName
-from ...reading.text import entries
+from ...reading.results import derived, part, result
 from ...study.config import Config
 from ...study.cycle import Cycle, cycle, energy_swing, needed_inertia
 from ...study.one_sided import all_on_one
@@ -48,7 +47,7 @@ class CycleNumbers:
     )
 
 
-@dataclass(frozen=True)
+@result
 class Duty:
     """The duty of any drive, at constant speed of the crank: the turn with the feed of normal running and,
     for a machine with two sides, the turns with all feed on one side. `heavier` is the side with the larger
@@ -58,13 +57,13 @@ class Duty:
     normal: Cycle
     one_sided: Mapping[SideName, Cycle]
     heavier: SideName | None
-    numbers: CycleNumbers
+    numbers: CycleNumbers = part("the torque over a turn", name="cycle", titled=True)
 
-    def as_dict(self) -> dict[str, Any]:
-        """Ready for JSON."""
+    @derived(name="one_sided", optional=True)
+    def larger(self) -> dict[str, SideName | None] | None:
+        """The sides with the larger RMS torque and with the larger peak torque."""
         peaks = [(_peak(turn), side) for side, turn in self.one_sided.items()]
-        sides = {"one_sided": {"larger_rms": self.heavier, "larger_peak": max(peaks)[1]}} if peaks else {}
-        return {"cycle": entries(self.numbers, with_titles=True), **sides}
+        return {"larger_rms": self.heavier, "larger_peak": max(peaks)[1]} if peaks else None
 
 
 def duty_of(config: Config, folder: Path, backend: Backend | None) -> Duty:

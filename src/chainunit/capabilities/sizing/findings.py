@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Any
 
-from ...reading.text import entries
+from ...reading.results import GIVEN, derived, part, result
 from ...study.analysis import Analysis, Findings, Work
 from ...study.catalogue_drive import gear_with
 from ...study.config import Config
@@ -14,31 +14,40 @@ from ...study.drive import Drive
 from ...study.proposal import DriveProposal
 from ...study.record import StudyRecord
 from .alternatives import alternatives
-from .candidate import Candidate, Standing
+from .candidate import Candidate, Flywheel, Standing
 from .coupling import recommended_setting
 from .duty import Duty
 from .preference import ORDER, poles_rank
 from .protection import Alternative, Obstacle, Setting
-from .table import SizingPlan
+from .table import Sizing, SizingPlan
 
 INSUFFICIENT = "No motor of the catalogue fits; all runs are with the nearest, which is insufficient."
 """The sentence on a study for which no motor fits."""
 
 
-@dataclass
+@result
+class Asked:
+    """The demands on the drive."""
+
+    demands: Sizing = part(inline=True, titled=True)
+    words: Mapping[str, Any] = part("kinds and series of gears", unit=GIVEN, inline=True)
+
+
+@result(frozen=False)
 class SizingFindings(Findings):
     """Cycle, candidates in the order of their rank, the chosen candidate, and its protection."""
 
     plan: SizingPlan
-    duty: Duty
-    candidates: list[Candidate]
-    notes: list[str]
-    motors: int
-    """number of motors of the catalogue with a permitted number of poles; `candidates` are those that were
-    tried"""
-    weak: int = 0
-    """number of motors that were left out, as their rated power does not give the mean power of the cycle with the
-    margin"""
+    duty: Duty = part(inline=True)
+    candidates: list[Candidate] = part("the motors that were tried, by their rank")
+    notes: list[str] = part("notes on the choice")
+    motors: int = part("number of motors of the catalogue with a permitted number of poles", unit="1")
+    weak: int = part(
+        "number of motors that were left out, as their rated power does not give the mean power of the cycle with "
+        "the margin",
+        unit="1",
+        default=0,
+    )
     setting: Setting | None = None
     """the recommended safety coupling, see `chainunit.capabilities.sizing.coupling.recommended_setting`"""
     alternatives: tuple[Alternative, ...] = ()
@@ -80,23 +89,40 @@ class SizingFindings(Findings):
         without = next(bare, None)
         return None if without is None else (with_one, without)
 
-    def as_dict(self) -> dict[str, Any]:
-        """Ready for JSON, each number with its unit."""
-        best = self.best
-        return {
-            "asked": entries(self.plan.demands, with_titles=True) | self.plan.words,
-            **self.duty.as_dict(),
-            "flywheel": entries(best.flywheel_numbers(), with_titles=True),
-            "tried": {"value": len(self.candidates), "unit": "1"},
-            "motors": {"value": self.motors, "unit": "1"},
-            "weak": {"value": self.weak, "unit": "1"},
-            "candidates": [c.as_dict() for c in self.candidates],
-            "order": [words.format(larger=f"{self.plan.demands.larger:g}") for words in ORDER.values()],
-            "trade": None if self.trade is None else [self.candidates.index(c) for c in self.trade],
-            "chosen": self.candidates.index(self.chosen_candidate) if self.chosen_candidate else None,
-            "nearest": None if self.chosen_candidate else self.candidates.index(best),
-            "notes": self.notes,
-        }
+    @derived()
+    def asked(self) -> Asked:
+        """The demands."""
+        return Asked(self.plan.demands, self.plan.words)
+
+    @derived(titled=True)
+    def flywheel(self) -> Flywheel:
+        """The flywheel of the drive."""
+        return self.best.flywheel_numbers
+
+    @derived("1")
+    def tried(self) -> int:
+        """Number of motors that were tried."""
+        return len(self.candidates)
+
+    @derived()
+    def order(self) -> list[str]:
+        """The order of preference among candidates that fit."""
+        return [words.format(larger=f"{self.plan.demands.larger:g}") for words in ORDER.values()]
+
+    @derived(name="trade")
+    def traded(self) -> list[int] | None:
+        """Places of the smallest motor that fits with a flywheel, and of the next larger one that fits without."""
+        return None if self.trade is None else [self.candidates.index(c) for c in self.trade]
+
+    @derived()
+    def chosen(self) -> int | None:
+        """Place of the chosen candidate."""
+        return self.candidates.index(self.chosen_candidate) if self.chosen_candidate else None
+
+    @derived()
+    def nearest(self) -> int | None:
+        """Place of the nearest candidate, where none fits."""
+        return None if self.chosen_candidate else self.candidates.index(self.best)
 
     def proposal(self, config: Config) -> DriveProposal:
         """The drive of a study by these findings."""
