@@ -75,8 +75,8 @@ def duty_of(config: Config, folder: Path, backend: Backend | None) -> Duty:
     sizes = [(rms((1.0, turn.crank_torque)), side) for side, turn in one_sided.items()]
     # if both sides are alike it is the left one
     heavier = min(sizes, key=lambda each: -each[0])[1] if sizes else None
-    for part in registered():
-        if turns := part.turns(config, (feed, *loads.values()), folder, backend):
+    for capability in registered():
+        if turns := capability.turns(config, (feed, *loads.values()), folder, backend):
             normal, *others = turns
             one_sided = dict(zip(loads, others, strict=True))
     demands, ratio = plan_of(config).demands, config.machine.ratio
