@@ -324,12 +324,12 @@ def test_a_drive_whose_start_is_harder_than_its_shocks_has_no_coupling(on_line):
     block = float(np.max(np.abs(crank_torque(on_line.drive, on_line.runs["blocked"]))))
     assert gear["overload"]["value"] == pytest.approx(block, rel=1e-3)
     quick = dataclasses.replace(on_line.config.gear, start_factor=1.0)
-    given = on_line.config.given | {"gear.start_factor"}
+    given = on_line.config.file.given | {"gear.start_factor"}
     light = dataclasses.replace(on_line.findings["starts"].worst, gear_torque=1.0)
     gentle = dataclasses.replace(on_line.findings["starts"], starts=(light,))
     own = dataclasses.replace(
         on_line,
-        config=dataclasses.replace(on_line.config, gear=quick, given=given),
+        config=dataclasses.replace(on_line.config, gear=quick).with_file(given=given),
         findings=on_line.findings | {"starts": gentle},
     )
     ordered = as_dict(own)["sizing"]["gear"]
@@ -393,7 +393,7 @@ def test_an_inverter_as_a_way_is_tried_with_more_boost(on_line, monkeypatch):
     rig = Rig(on_line.config, on_line.drive, None)
     found = coupling_alternatives._inverter(on_line, rig, sizing_of(on_line).setting)
     assert tried == [({0.05}, 5), ({0.10}, 5), ({0.15}, 5)] and found.numbers.boost == 0.15
-    given = dataclasses.replace(on_line.config, given=on_line.config.given | {"starter.inverter.boost"})
+    given = on_line.config.with_file(given=on_line.config.file.given | {"starter.inverter.boost"})
     tried.clear()
     none = coupling_alternatives._inverter(
         dataclasses.replace(on_line, config=given), rig, sizing_of(on_line).setting

@@ -180,7 +180,7 @@ def test_a_run_that_is_stopped_keeps_what_it_has(tmp_path):
 def test_the_same_keys_and_checks_as_in_a_file():
     study = Study(**TABLES)
     assert study.machine.p.r == 0.16 and study.config.run.crank_speed == pytest.approx(2.0 * np.pi)
-    assert study.config.given == Study.from_text(FILE).config.given
+    assert study.config.file.given == Study.from_text(FILE).config.file.given
     with pytest.raises(InputError) as caught:
         Study(machin={}, run={"crank_speed": "30 kg"})
     assert {fault.key for fault in caught.value.faults} == {"run.crank_speed", "machin"}
@@ -204,7 +204,7 @@ def test_a_text_and_a_file_tell_the_line(tmp_path):
         Study.from_file(tmp_path / "mine.toml")
     with pytest.raises(InputError, match=r"other.toml: cannot be read"):
         Study.from_file(str(tmp_path / "other.toml"))
-    assert Study.from_file().config.is_packaged and not Study().config.is_packaged
+    assert Study.from_file().config.file.is_packaged and not Study().config.file.is_packaged
 
 
 OWN_MOTOR = """[[motor]]
@@ -227,12 +227,12 @@ def test_what_a_run_refuses_names_file_and_line(tmp_path):
     (tmp_path / "own.toml").write_text(OWN_MOTOR)
     study = Study.from_file(tmp_path / "mine.toml")
     # beside the study file, as for the command
-    assert study.config.catalogue == tmp_path / "own.toml"
+    assert study.config.file.catalogue == tmp_path / "own.toml"
     variant = study.with_values({"sizing.temperature": 400.0})
     (tmp_path / "own.toml").unlink()
     with pytest.raises(InputError, match=r"mine.toml:1: catalogue = .*own.toml: cannot be read"):
         study.run()
-    assert variant.config.catalogue == tmp_path / "own.toml"
+    assert variant.config.file.catalogue == tmp_path / "own.toml"
     with pytest.raises(InputError, match=r"^catalogue = .*own.toml: cannot be read"):
         variant.run(tmp_path / "out")
     assert not (tmp_path / "out").exists()
@@ -244,14 +244,17 @@ def test_other_values_make_another_study():
     assert (study.machine.p.r, other.machine.p.r) == (0.16, 0.17)
     assert study.config.events["jam_left"].p.force == 1000.0
     assert other.config.events["jam_left"].p.force == 3000.0
-    assert other.config.source == 'tables in Python with machine.r = "170 mm", event.jam_left.force = "3 kN"'
+    assert (
+        other.config.file.source
+        == 'tables in Python with machine.r = "170 mm", event.jam_left.force = "3 kN"'
+    )
     again = other.with_values({"machine.r": np.float64(0.165), "motor.rotor.J": 0.01})
     assert again.machine.p.r == 0.165 and again.config.events["jam_left"].p.force == 3000.0
-    assert again.config.source.count("machine.r") == 1 and "motor.rotor.J = 0.01" in repr(again)
+    assert again.config.file.source.count("machine.r") == 1 and "motor.rotor.J = 0.01" in repr(again)
     assert list(study.with_values({"event": []}).config.events) == []
     right = study.with_values({"event.jam_left": {"type": "jam", "side": "right"}})
     assert list(right.config.events) == ["jam_right"] and list(study.config.events) == ["jam_left"]
-    assert study.with_values({}).config.source == "tables in Python"
+    assert study.with_values({}).config.file.source == "tables in Python"
     with pytest.raises(InputError, match=r'^event.jam_lef.force: no such event; was "jam_left" meant'):
         study.with_values({"event.jam_lef.force": 1.0})
     with pytest.raises(InputError, match=r"^start = .*: must be "):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import dataclasses
 import warnings
 from collections.abc import Mapping
 from functools import cached_property
@@ -91,7 +90,7 @@ class Study:
             with a line of text for each fault, which begins with the file and its line number.
         """
         config = study_files.load(None if path is None else Path(path))
-        return cls.__new__(cls)._take(config, config.source)
+        return cls.__new__(cls)._take(config, config.file.source)
 
     @classmethod
     def from_text(cls, text: str) -> Self:
@@ -121,9 +120,9 @@ class Study:
         the source."""
         self._source, self._changes = source, dict(changes or {})
         if self._changes:
-            config = dataclasses.replace(config, source=f"{source} with {self._changed}")
+            config = config.with_file(source=f"{source} with {self._changed}")
         self.config = config
-        for value in config.unusual:
+        for value in config.file.unusual:
             warnings.warn(value.sentence, RemarkWarning, stacklevel=3)
         return self
 
@@ -141,7 +140,7 @@ class Study:
         InputError
             as the class.
         """
-        tables = copy.deepcopy(dict(self.config.tables))
+        tables = copy.deepcopy(dict(self.config.file.tables))
         for name, value in values.items():
             if not isinstance(name, str):
                 raise InputError(f'{shown(name)}: must be the name of a key, such as "machine.r"')
@@ -210,10 +209,11 @@ class Study:
         config = self.config
         with shown_in(config.units):
             speed = number(config.run.crank_speed, "rad/s", "speed")
-        motor = "a motor that sizing chooses" if config.chooses_motor else config.choices["system.motor"]
+        motor = "a motor that sizing chooses" if config.chooses_motor else config.file.choices["system.motor"]
         changes = f" with {self._changed}" if self._changes else ""
+        machine = config.file.choices["system.machine"]
         return (
-            f"<Study {config.title or self._source!r}{changes}: {config.choices['system.machine']} with {motor}, "
+            f"<Study {config.title or self._source!r}{changes}: {machine} with {motor}, "
             f"crank at {speed}; events: {', '.join(config.events) or 'none'}>"
         )
 

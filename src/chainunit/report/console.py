@@ -121,6 +121,6 @@ def study_file(file: Path | None) -> Any:
     from ..study import config as configuration
 
     loaded = configuration.load(file)
-    for value in loaded.unusual:
+    for value in loaded.file.unusual:
         show_remark(value.sentence)
     return loaded

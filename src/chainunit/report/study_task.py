@@ -19,7 +19,7 @@ from .task import Task, Writer
 
 
 def _accept(config: Config, *, scheduler: str | None = None, **options: Any) -> None:
-    with config.of_file():
+    with config.file.refusals():
         check_files(config)
     if scheduler is not None:
         for part in registered():
@@ -30,7 +30,7 @@ def _compute(config: Config, folder: Path, progress: Progress, **options: Any) -
     """Run a study; options and errors are those of `run_study`. A refusal begins with the name of the study file, if
     there is one."""
     progress("the machine at constant speed", 0.0, 1.0)
-    with config.of_file():
+    with config.file.refusals():
         return run_study(config, folder, progress, **options)
 
 

@@ -63,7 +63,7 @@ def catalogue_drive(
     model, p = motor.model()
     synchronous, rated_speed, rated_torque = plate.synchronous, plate.speed, plate.torque
     follows = config.start == "inverter"
-    if gear_ratio is None and "gear.ratio" in config.given:
+    if gear_ratio is None and "gear.ratio" in config.file.given:
         gear_ratio = config.gear.ratio
     ratio = rated_speed / w if gear_ratio is None else gear_ratio
     speed, drag = rated_speed, config.gear.d
@@ -93,7 +93,7 @@ def catalogue_drive(
 def gear_with(config: Config, ratio: float, offer: GearOffer = HELICAL) -> Transmission:
     """The gear of a study with that ratio; its efficiency is the typical one of its kind and stages, unless the file
     gives one."""
-    gear, given = config.gear, config.given
+    gear, given = config.gear, config.file.given
     if "gear.efficiency" in given:
         return dataclasses.replace(gear, ratio=ratio)
     is_made = "gear.ratio" in given or offer.is_made
@@ -105,7 +105,7 @@ def with_starter(p: Any, plate: Nameplate, config: Config) -> Any:
     rated slip of the motor, unless the file gives its compensation."""
     control = dataclasses.asdict(config.starter.inverter)
     follows = config.start == "inverter"
-    if follows and SLIP not in config.given:
+    if follows and SLIP not in config.file.given:
         slip_hz = (plate.synchronous - plate.speed) * plate.poles / (4.0 * math.pi)
         control["slip"] = slip_hz / plate.torque
     soft = config.starter.soft_start if config.start == "soft" else p.soft_start
@@ -116,7 +116,7 @@ def with_wheel(config: Config, drive: Drive, flywheel: float) -> Drive:
     """The drive with that flywheel [kg m2]. Slip compensation raises the frequency in each peak of the load, where a
     flywheel has to slow down to give its energy: with a flywheel there is none, unless the file gives it."""
     drive = dataclasses.replace(drive, flywheel=flywheel)
-    if not flywheel or config.start != "inverter" or not config.of_catalogue or SLIP in config.given:
+    if not flywheel or config.start != "inverter" or not config.of_catalogue or SLIP in config.file.given:
         return drive
     inverter = dataclasses.replace(drive.parameters.inverter, slip=0.0)
     return dataclasses.replace(drive, parameters=dataclasses.replace(drive.parameters, inverter=inverter))

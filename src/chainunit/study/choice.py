@@ -89,7 +89,7 @@ def check_files(config: Config) -> None:
     """
     if config.chooses_motor:
         with refusal_prefix("catalogue = ", "catalogue"):
-            check_own(config.catalogue)
+            check_own(config.file.catalogue)
     if config.foreign is not None:
         _with_foreign(config)
 
@@ -144,7 +144,7 @@ def with_line(config: Config, drive: Drive) -> Drive:
 def tune(config: Config, drive: Drive) -> Drive:
     """The drive with controller gains that are tuned to its inertia, unless the config gives them."""
     both = cycle(drive.machine, config.run.crank_speed, config.feed)
-    given_gains = {name.removeprefix("motor.") for name in config.given if name.startswith("motor.")}
+    given_gains = {name.removeprefix("motor.") for name in config.file.given if name.startswith("motor.")}
     inertia = drive.rotor_inertia + float(np.mean(both.outputs.J))
     parameters, tuning = drive.motor.tune(drive.parameters, inertia, given_gains)
     return replace(drive, parameters=parameters, tuning=tuning)

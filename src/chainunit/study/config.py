@@ -53,6 +53,40 @@ from .sections import (
 
 
 @dataclasses.dataclass(frozen=True)
+class FileContents:
+    """The contents of a study file, as they stand in it, and where each value comes from."""
+
+    source: str
+    """name of the file, or words for tables from Python"""
+    given: frozenset[str] = frozenset()
+    """names of all values that the file sets, such as "machine.crank.m"; see `of_example`"""
+    of_example: frozenset[str] = frozenset()
+    """names of all values that the file leaves out and the example sets; all others have their declared start
+    values"""
+    choices: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    """by name, all values that are no quantities, such as "start" or "driveline.place", given or not"""
+    catalogue: Path | None = None
+    """the catalogue of own motors that it names"""
+    unusual: tuple[UnusualValue, ...] = ()
+    """values whose unit is likely mistaken"""
+    tables: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    """the tables and keys as the file has them"""
+    lines: Mapping[str, int] = dataclasses.field(default_factory=dict)
+    """the line of each key in the file"""
+    is_packaged: bool = False
+    """whether it is the packaged example"""
+
+    def refusals(self) -> AbstractContextManager[None]:
+        """A context in which an InputError begins with the name of the study file and the line of its key; with
+        tables from Python the error stays as it is."""
+        return in_file(self.source, lambda: self.lines) if self.lines else nullcontext()
+
+    def gives(self, section: str) -> bool:
+        """Whether the file sets anything in that table."""
+        return any(name.startswith(f"{section}.") for name in self.given)
+
+
+@dataclasses.dataclass(frozen=True)
 class Config:
     """A study, checked: machine, motor, loads, runs and events by the names of their runs."""
 
@@ -77,39 +111,22 @@ class Config:
     starter: Starter
     simulation: str
     """one of `SIMULATIONS`"""
-    catalogue: Path | None
     foreign: ForeignMotor | None
     """the motor, if it is a foreign FMU; `motor` then has no meaning"""
-    source: str
-    given: frozenset[str]
-    """names of all values that the file sets, such as "machine.crank.m"; see `of_example`"""
-    of_example: frozenset[str] = frozenset()
-    """names of all values that the file leaves out and the example sets; all others have their declared start
-    values"""
-    choices: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-    """by name, all values that are no quantities, such as "start" or "driveline.place", given or not"""
-    is_packaged: bool = False
-    """whether the file is the packaged example"""
-    unusual: tuple[UnusualValue, ...] = ()
-    """values that look like a slip of the unit"""
+    file: FileContents
     units: Units = dataclasses.field(default_factory=lambda: DEFAULT_UNITS)
     """units in which the report shows numbers"""
     labels: Mapping[str, str] = dataclasses.field(default_factory=dict)
     """project, author, date and revision, as far as the file gives them"""
-    tables: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-    """the tables and keys as the file has them"""
-    lines: Mapping[str, int] = dataclasses.field(default_factory=dict)
-    """the line of each key in the file"""
     values: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     """by table of a part of the line or of a capability, the values of its declared quantities; None for an optional
     table that the file does not have"""
     plans: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     """by part of the line and capability, the plan that its tables state, or None"""
 
-    def of_file(self) -> AbstractContextManager[None]:
-        """A context in which an InputError begins with the name of the study file and the line of its key; with
-        tables from Python the error stays as it is."""
-        return in_file(self.source, lambda: self.lines) if self.lines else nullcontext()
+    def with_file(self, **changes: Any) -> Config:
+        """The study with other facts on its file, by the names of `FileContents`."""
+        return dataclasses.replace(self, file=dataclasses.replace(self.file, **changes))
 
     @property
     def turn(self) -> float:
@@ -157,10 +174,6 @@ class Config:
         have."""
         return getattr(self, name) if name in _OWN_TABLES else self.values[name]
 
-    def gives(self, section: str) -> bool:
-        """Whether the file sets anything in that table."""
-        return any(name.startswith(f"{section}.") for name in self.given)
-
     def one_sided(self, side: SideName) -> Event:
         """The event of all feed on that side: that of the study, if it has one, else that of the example."""
         of_study = (
@@ -179,7 +192,8 @@ def load(file: Path | None = None) -> Config:
     InputError
         with a line for each fault: the file, the key, its value and the allowed range.
     """
-    return dataclasses.replace(read(file, example, parse), is_packaged=file is None)
+    config = read(file, example, parse)
+    return config.with_file(is_packaged=file is None)
 
 
 def parse(text: str, source: str = "config") -> Config:
@@ -190,7 +204,7 @@ def parse(text: str, source: str = "config") -> Config:
     InputError
         see `load`.
     """
-    return dataclasses.replace(of_tables(toml(text), source), lines=lines_of(text))
+    return of_tables(toml(text), source).with_file(lines=lines_of(text))
 
 
 def of_tables(data: Mapping[str, Any], source: str) -> Config:
@@ -258,9 +272,16 @@ def _of_values(data: Mapping[str, Any], parts: Parts, source: str) -> Config:
             kinds = {f"event.{name}": event.Parameters for name, event in events.items()}
             tables = dict(zip(events, data["event"], strict=True))
             unusual += tuple(unusual_values(kinds, {"event": tables}))
-        config = _config(data, form, parts, events, source, unusual)
         given, names = frozenset(_names(data, events)), frozenset(_names(whole, events))
-        return dataclasses.replace(config, given=given, of_example=names - given - {"title"}, tables=data)
+        contents = FileContents(
+            source,
+            given,
+            of_example=names - given - {"title"},
+            choices=_choices(form, parts),
+            unusual=unusual,
+            tables=data,
+        )
+        return _config(form, parts, events, contents)
 
 
 def _with_hints(fault: InputError, unusual: Iterable[UnusualValue]) -> InputError:
@@ -281,16 +302,10 @@ _OWN_TABLES = ("feed", "run", "coupling", "gear", "starter")
 """Tables whose values are fields of a `Config`."""
 
 
-def _config(
-    data: Mapping[str, Any],
-    checked: Any,
-    parts: Parts,
-    events: Mapping[str, Event],
-    source: str,
-    unusual: tuple[UnusualValue, ...],
-) -> Config:
+def _config(checked: Any, parts: Parts, events: Mapping[str, Event], contents: FileContents) -> Config:
     """The study of a file each of whose values is allowed."""
     sections, faults = parts.sections, Faults()
+    data, source = contents.tables, contents.source
     tables, values = _read_sections(sections, checked, faults)
     faults.add(check_order(values))
     of_study: dict[str, Any] = {
@@ -331,14 +346,10 @@ def _config(
         empty_start=checked.empty_start,
         start=checked.start,
         simulation=checked.simulation,
-        catalogue=own_motors,
         foreign=ForeignMotor(beside(parts.file, source), given_values(checked.system.motor_names))
         if parts.file
         else None,
-        source=source,
-        given=frozenset(),
-        choices=_choices(checked, parts),
-        unusual=unusual,
+        file=dataclasses.replace(contents, catalogue=own_motors),
         units=chosen_units(checked.report.units),
         labels=checked.report.labels,
         values={name: x for name, x in of_study.items() if name not in _OWN_TABLES},

@@ -86,15 +86,17 @@ def given_sections(study: StudyRecord) -> list[GivenSection]:
 
 def _of_study(config: Config) -> dict[str, Any]:
     # a key that a file of this kind may not have is not used either
-    refused = {rule.key for rule in all_rules() if rule.refused is None and rule.on.holds(config.tables)}
+    refused = {rule.key for rule in all_rules() if rule.refused is None and rule.on.holds(config.file.tables)}
     used = all_choices().keys() - refused
-    return {name: x for name, x in config.choices.items() if name in used and x != ""}
+    return {name: x for name, x in config.file.choices.items() if name in used and x != ""}
 
 
 def _system(config: Config) -> dict[str, Any]:
     """Names of machine and motor, and the names of our variables in their FMUs."""
     own = {
-        name.removeprefix("system."): x for name, x in config.choices.items() if name.startswith("system.")
+        name.removeprefix("system."): x
+        for name, x in config.file.choices.items()
+        if name.startswith("system.")
     }
     return {name: x for name, x in own.items() if x and (name != "motor" or not config.chooses_motor)}
 
@@ -108,10 +110,12 @@ def _tables(study: StudyRecord) -> Iterator[GivenSection]:
         if values is None or not section.is_used(config) or is_idle:
             continue
         prefix = f"{name}."
-        keys = {full.removeprefix(prefix): x for full, x in config.choices.items() if full.startswith(prefix)}
+        keys = {
+            full.removeprefix(prefix): x for full, x in config.file.choices.items() if full.startswith(prefix)
+        }
         events = [key for key in section.random_events if keys.pop(key, None) is not None]
         # without its own ratio the gear has that of the machine, which follows from the motor's speed
-        follows = frozenset({"ratio"} if name == "gear" and "gear.ratio" not in config.given else ())
+        follows = frozenset({"ratio"} if name == "gear" and "gear.ratio" not in config.file.given else ())
         choices = {key: x for key, x in keys.items() if x}
         yield GivenSection(name, section.title, values, choices, unused_names=follows)
         for key in events:

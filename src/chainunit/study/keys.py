@@ -258,7 +258,7 @@ def _of_entry(entry: TableList) -> Iterator[Key]:
 def _of_fields(fields: Mapping[str, Any], config: Config | None = None) -> Iterator[Key]:
     """Keys that are no quantities, from their pydantic fields."""
     for name, (annotation, field) in fields.items():
-        yield _of_field(name, annotation, field, config.choices.get(name) if config else field.default)
+        yield _of_field(name, annotation, field, config.file.choices.get(name) if config else field.default)
 
 
 def _of_field(name: str, annotation: Any, field: FieldInfo, value: Any) -> Key:

@@ -20,10 +20,10 @@ def origin_of(study: StudyRecord, name: str) -> str:
     if name == SLIP and config.start == "inverter" and _of(config, name) == "declared":
         return "catalogue"
     if section == "motor" and (tuning := study.drive.tuning) and parameter in tuning.parameters:
-        return "file" if name in config.given else "tuned"
-    if section == "machine" and parameter in LENGTHS and config.gives("ratios"):
+        return "file" if name in config.file.given else "tuned"
+    if section == "machine" and parameter in LENGTHS and config.file.gives("ratios"):
         return "file"
-    if section == "machine" and parameter in LENGTHS and "ratios.rho" in config.of_example:
+    if section == "machine" and parameter in LENGTHS and "ratios.rho" in config.file.of_example:
         return "example"
     if config.of_catalogue and (name == "machine.ratio" or section == "motor"):
         name_in_file = _name_in_file(study, parameter)
@@ -35,9 +35,9 @@ def origin_of(study: StudyRecord, name: str) -> str:
 
 def _of(config: Config, name: str) -> str:
     """The origin of a value that only the study file or the example can give."""
-    if name in config.given:
+    if name in config.file.given:
         return "file"
-    return "example" if name in config.of_example else "declared"
+    return "example" if name in config.file.of_example else "declared"
 
 
 def _name_in_file(study: StudyRecord, parameter: str) -> str:
@@ -50,7 +50,7 @@ def _name_in_file(study: StudyRecord, parameter: str) -> str:
     group = parameter.partition(".")[0]
     if parameter == "inverter.on":
         return "start"
-    if parameter == "inverter.slip" and config.start == "inverter" and SLIP not in config.given:
+    if parameter == "inverter.slip" and config.start == "inverter" and SLIP not in config.file.given:
         return ""
     if group in ("soft_start", "inverter"):
         return f"starter.{parameter}"

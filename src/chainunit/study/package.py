@@ -166,7 +166,7 @@ def _running(config: Config) -> float:
 def left_out(config: Config) -> str:
     """A sentence on the parts of a study that its exported system does not have; empty where there are none."""
     names = ["the safety coupling"] if config.coupling is not None else []
-    if config.gives("event"):
+    if config.file.gives("event"):
         names.append(f"the events {', '.join(config.events)}")
     if config.empty_start:
         names.append("the feed that comes once the machine runs")

@@ -25,9 +25,9 @@ def conclude(study: StudyRecord) -> None:
     """Judge the model, and add every remark to the study."""
     config, note = study.config, study.note
     own = "Values that the study file does not name are the declared start values, which are assumed."
-    if config.is_packaged:
+    if config.file.is_packaged:
         own = "Masses, pins, feed and drive are assumed; the papers print none."
-    elif config.of_example:
+    elif config.file.of_example:
         own = (
             "Values that the study file does not name are those of the packaged example, whose masses and drive "
             "are assumed."
@@ -86,16 +86,16 @@ _RATING = ("limit.i", "limit.v", "armature.k")
 def _left_out(study: StudyRecord) -> Iterator[str]:
     """Values that decide the result, but that the file leaves out, so that the packaged values are used."""
     config, coupling = study.config, study.config.coupling
-    if config.is_packaged:
+    if config.file.is_packaged:
         return
-    if coupling is not None and "coupling.trip_torque" not in config.given:
+    if coupling is not None and "coupling.trip_torque" not in config.file.given:
         yield f"coupling.trip_torque ({number(coupling.trip_torque, 'N.m', full=False)})"
-    if config.plate is not None and "system.motor" in config.of_example:
+    if config.plate is not None and "system.motor" in config.file.of_example:
         yield f"the motor ({config.plate.designation})"
     elif study.proposal is None and config.foreign is None:
         values = study.drive.motor.parameter_layout.by_name(study.drive.parameters)
         units = {v.name: v.unit for v in study.drive.motor.parameter_layout.variables}
-        names = [name for name in _RATING if f"motor.{name}" in config.of_example]
+        names = [name for name in _RATING if f"motor.{name}" in config.file.of_example]
         if names:
             sizes = (f"{name} = {number(values[name], units[name], full=False)}" for name in names)
             yield f"the rating of the motor ({', '.join(sizes)})"
@@ -307,7 +307,7 @@ def _happenings(study: StudyRecord, name: str) -> Iterator[tuple[str, str, dict[
     if largest is not None and answers.current_peak > 0.999 * largest:
         yield "current limit", "", {}
     peak = peaks_in_events(study).get(name, 0.0)
-    if "gear.torque_limit" in config.given and peak > config.gear.torque_limit:
+    if "gear.torque_limit" in config.file.given and peak > config.gear.torque_limit:
         yield "gear passed", number(peak, "N.m"), {"torque": (peak, "N.m")}
     if answers.stall_time is not None:
         late = answers.stall_time > 10.0 * config.run.step
@@ -331,7 +331,7 @@ def _on_inverter(study: StudyRecord) -> None:
     rated_current = study.drive.rated_current
     if rated_current is None or study.config.start != "inverter":
         return
-    if SLIP not in study.config.given:
+    if SLIP not in study.config.file.given:
         slip = study.drive.parameters.inverter.slip
         without = (
             "The inverter does not compensate the slip of the motor (starter.inverter.slip): it would raise "

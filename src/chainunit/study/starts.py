@@ -119,6 +119,6 @@ class StartAnalysis(Analysis):
             return None
         work.report("starts from other crank angles", 1.0, 1.0)
         starts = starts_from_all(work.rig, longest_start(config, study.start.start_time))
-        limit = config.gear.start_limit if "gear.torque_limit" in config.given else math.inf
+        limit = config.gear.start_limit if "gear.torque_limit" in config.file.given else math.inf
         running = running_peak(study, at_gear)
         return StartFindings(tuple(starts), running.torque, limit, running.run)

@@ -23,7 +23,7 @@ def changed_tables(config: Config, values: Mapping[str, float], title: str, fold
     """The tables of a study with other `values` by full name ("machine.crank.m"), as a file in `folder` has them:
     names of other files are relative to it. `title` follows that of the study. Where one length of a chain unit
     changes, all are given one by one."""
-    tables = copy.deepcopy(dict(config.tables))
+    tables = copy.deepcopy(dict(config.file.tables))
     written = dict(values)
     lengths = [f"machine.{name}" for name in LENGTHS]
     if config.machine.model.sides and written.keys() & set(lengths):
@@ -41,10 +41,10 @@ def changed_tables(config: Config, values: Mapping[str, float], title: str, fold
     for table, key in (("", "catalogue"), ("system", "machine"), ("system", "motor"), ("machine", "linkage")):
         inner = tables.get(table, {}) if table else tables
         if isinstance(inner.get(key), str) and inner[key].lower().endswith((".toml", ".fmu", ".csv")):
-            inner[key] = _from(folder, Path(config.source).parent / inner[key])
+            inner[key] = _from(folder, Path(config.file.source).parent / inner[key])
     for file in (file for part in registered() for file in part.files(tables)):
         if file.name in file.table:
-            file.table[file.name] = _from(folder, Path(config.source).parent / file.table[file.name])
+            file.table[file.name] = _from(folder, Path(config.file.source).parent / file.table[file.name])
     return tables
 
 

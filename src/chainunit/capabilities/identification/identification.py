@@ -349,7 +349,7 @@ def remarks(machine: IdentifiedMachine) -> Iterator[str]:
             )
     has_motor = bool(columns & set(OF_TERMINALS))
     if has_motor and config.motor is not None and config.motor_type.follows(config.motor):
-        tuned = [f"motor.{name}" for name in CONTROL if f"motor.{name}" not in config.given]
+        tuned = [f"motor.{name}" for name in CONTROL if f"motor.{name}" not in config.file.given]
         if tuned:
             names = ", ".join(tuned)
             yield f"{names}: not in the file, and tuned as for a new drive; give those of the real converter"

@@ -48,7 +48,7 @@ def _as_dict(machine: IdentifiedMachine) -> dict[str, Any]:
     return {
         "chainunit": __version__,
         "title": config.title,
-        "source": config.source,
+        "source": config.file.source,
         "report": dict(config.labels),
         "is_described": machine.is_described,
         "status": "complete" if machine.is_described else "the model does not describe the recordings",

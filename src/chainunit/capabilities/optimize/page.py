@@ -73,7 +73,7 @@ class OptimizedStudy(NamedTuple):
 
     def as_file(self) -> tuple[Path, dict[str, Any]]:
         """The study file with the best machine, beside that of the study: its name, and its tables."""
-        source = Path(self.config.source).parent / FILE
+        source = Path(self.config.file.source).parent / FILE
         return source, best_tables(self.best, self.config, source.parent)
 
 
@@ -81,12 +81,12 @@ def _compute(
     config: Config, folder: Path | None, progress: Progress, *, backend: Backend | None = None
 ) -> OptimizedStudy:
     """Search for the best machine of a study. A refusal begins with the name of the study file, if there is one."""
-    with config.of_file():
+    with config.file.refusals():
         return OptimizedStudy(config, find_best(wishes_of(config), progress, backend))
 
 
 def _accept(config: Config, **options: Any) -> None:
-    with config.of_file():
+    with config.file.refusals():
         wishes_of(config)
 
 

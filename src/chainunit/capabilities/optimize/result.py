@@ -199,7 +199,7 @@ def units_of(best: Best, config: Config) -> Units:
         for x in (best.today[name], best.found[name], limit and limit.low, limit and limit.high)
         if q.unit == "W" and x
     ]
-    named = config.tables.get("report", {}).get("units", {})
+    named = config.file.tables.get("report", {}).get("units", {})
     if "power" in named or not any(x < _SMALL for x in powers):
         return config.units
     return {**config.units, "power": ("W",)}

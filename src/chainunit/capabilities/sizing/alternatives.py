@@ -228,7 +228,7 @@ def _inverter(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative:
             fed = dataclasses.replace(rig, config=own, drive=with_wheel(own, drive, drive.flywheel))
             yield fed, 1.5 * ramp + 1.0, {"ramp": ramp, "boost": boost}
 
-    for boost in boosts(config.starter.inverter.boost, "starter.inverter.boost" in config.given):
+    for boost in boosts(config.starter.inverter.boost, "starter.inverter.boost" in config.file.given):
         best = _gentlest(rigs(boost), study, setting.running, math.inf)
         if best is not None:
             break

@@ -51,12 +51,12 @@ class MotorTrials:
     @property
     def has_given_ratio(self) -> bool:
         """Whether the file gives the ratio of the gear."""
-        return "gear.ratio" in self.config.given
+        return "gear.ratio" in self.config.file.given
 
     @property
     def has_given_boost(self) -> bool:
         """Whether the file gives the boost of the inverter."""
-        return "starter.inverter.boost" in self.config.given
+        return "starter.inverter.boost" in self.config.file.given
 
     @property
     def is_made(self) -> bool:

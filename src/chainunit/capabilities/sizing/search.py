@@ -55,7 +55,9 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
     """
     limits = plan_of(config).demands
     motors = [
-        m for m in catalogue(config.catalogue) if limits.poles_least <= m.nameplate.poles <= limits.poles_most
+        m
+        for m in catalogue(config.file.catalogue)
+        if limits.poles_least <= m.nameplate.poles <= limits.poles_most
     ]
     motors.sort(key=lambda m: (m.nameplate.power, poles_rank(m.nameplate.poles)))
     if not motors:
@@ -63,7 +65,7 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
             f"sizing.poles_least = {limits.poles_least:g}, sizing.poles_most = {limits.poles_most:g}: the catalogue "
             "has no motor with so many poles"
         )
-    if config.start != "inverter" and "gear.ratio" not in config.given:
+    if config.start != "inverter" and "gear.ratio" not in config.file.given:
         check_ratios(plan_of(config).ratios, config.run.crank_speed, motors)
     report("the machine at constant speed", 0.0, 1.0)
     duty = duty_of(config, folder, backend)

@@ -291,7 +291,7 @@ class Trial:
             inertia = float(np.max(load_inertia(self.drive, self.steady)))
             ratio = (inertia + p.rotor.J - plate.J) / plate.J
             checks["inertia"] = Check("inertia ratio", ratio, demands.inertia_ratio, "1")
-        if "gear.torque_limit" in self.config.given:
+        if "gear.torque_limit" in self.config.file.given:
             gear = self.config.gear
             checks["gear"] = Check("torque of the gear", self.duty.torque, gear.torque_limit, "N.m")
             hardest = max([at_gear(self.drive, self.start), *(s.gear_torque for s in self.starts)])

@@ -49,7 +49,7 @@ class TorsionAnalysis(Analysis):
         assert modes is not None
         turn = study.statics.normal
         speed = float(config.run.crank_speed * drive.driven_machine.ratio)
-        has_table = config.gives("torsion")
+        has_table = config.file.gives("torsion")
         if not has_table and speed < SLOW * modes.k_least:
             study.note(
                 "torsion left out",

@@ -30,7 +30,7 @@ def _as_dict(watched: WatchedRecording) -> dict[str, Any]:
     return {
         "chainunit": __version__,
         "title": config.title,
-        "source": config.source,
+        "source": config.file.source,
         "report": dict(config.labels),
         "file": str(plan.file),
         "columns": list(recording.columns),
