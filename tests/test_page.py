@@ -653,9 +653,9 @@ def test_a_run_that_stopped_early_has_a_page(study, tmp_path):
 
 def test_the_head_names_project_author_date_and_revision(study):
     text = '[report]\nproject = "Mill 3"\nauthor = "A. <b>"\ndate = 2026-11-22\nrevision = "B"\n'
-    labels = config.parse(text).labels
+    labels = config.parse(text).file.labels
     assert labels == {"project": "Mill 3", "author": "A. <b>", "date": "2026-11-22", "revision": "B"}
-    named = dataclasses.replace(study, config=dataclasses.replace(study.config, labels=labels))
+    named = dataclasses.replace(study, config=study.config.with_file(labels=labels))
     page = html.render(study_report.report(named))
     head = re.search(r'<p class="from">.*?</p>', page)[0]
     plain = re.sub(r"<[^>]*>", "", head)

@@ -73,6 +73,8 @@ class FileContents:
     """the tables and keys as the file has them"""
     lines: Mapping[str, int] = dataclasses.field(default_factory=dict)
     """the line of each key in the file"""
+    labels: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    """project, author, date and revision, as far as the file gives them"""
     is_packaged: bool = False
     """whether it is the packaged example"""
 
@@ -116,8 +118,6 @@ class Config:
     file: FileContents
     units: Units = dataclasses.field(default_factory=lambda: DEFAULT_UNITS)
     """units in which the report shows numbers"""
-    labels: Mapping[str, str] = dataclasses.field(default_factory=dict)
-    """project, author, date and revision, as far as the file gives them"""
     values: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     """by table of a part of the line or of a capability, the values of its declared quantities; None for an optional
     table that the file does not have"""
@@ -280,6 +280,7 @@ def _of_values(data: Mapping[str, Any], parts: Parts, source: str) -> Config:
             choices=_choices(form, parts),
             unusual=unusual,
             tables=data,
+            labels=form.report.labels,
         )
         return _config(form, parts, events, contents)
 
@@ -351,7 +352,6 @@ def _config(checked: Any, parts: Parts, events: Mapping[str, Event], contents: F
         else None,
         file=dataclasses.replace(contents, catalogue=own_motors),
         units=chosen_units(checked.report.units),
-        labels=checked.report.labels,
         values={name: x for name, x in of_study.items() if name not in _OWN_TABLES},
         plans=plans,
         **{name: of_study[name] for name in _OWN_TABLES},

@@ -21,4 +21,4 @@ class Heading:
     @classmethod
     def of(cls, config: Config) -> Heading:
         """The heading of a result of this study."""
-        return cls(__version__, config.title, config.file.source, config.labels)
+        return cls(__version__, config.title, config.file.source, config.file.labels)

@@ -147,7 +147,7 @@ def whole_system(
     system = study_system(config, drive)
     machine = system.components["machine"]
     name = machine.model.name if isinstance(machine, ModelComponent) else machine.title
-    labels = {key: printable(config.labels.get(key, ""), 1000) for key in ("author", "revision")}
+    labels = {key: printable(config.file.labels.get(key, ""), 1000) for key in ("author", "revision")}
     part = compiled(
         system,
         f"{name}System",

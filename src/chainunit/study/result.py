@@ -56,7 +56,7 @@ def _as_dict(study: StudyRecord) -> dict[str, Any]:
         "chainunit": __version__,
         "title": config.title,
         "source": config.file.source,
-        "report": dict(config.labels),
+        "report": dict(config.file.labels),
         "status": f"failed: {study.failure}" if study.failure else "complete",
         "failure": str(study.failure) if study.failure else None,
         "verdict": {"model": _on_model(study), "motor": motor_verdict(study)},

@@ -49,7 +49,7 @@ def _as_dict(machine: IdentifiedMachine) -> dict[str, Any]:
         "chainunit": __version__,
         "title": config.title,
         "source": config.file.source,
-        "report": dict(config.labels),
+        "report": dict(config.file.labels),
         "is_described": machine.is_described,
         "status": "complete" if machine.is_described else "the model does not describe the recordings",
         "sought": entry(float(len(estimates)), "1"),

@@ -31,7 +31,7 @@ def _as_dict(watched: WatchedRecording) -> dict[str, Any]:
         "chainunit": __version__,
         "title": config.title,
         "source": config.file.source,
-        "report": dict(config.labels),
+        "report": dict(config.file.labels),
         "file": str(plan.file),
         "columns": list(recording.columns),
         "duration": entry(float(recording.time[-1] - recording.time[0]), "s"),
