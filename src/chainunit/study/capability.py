@@ -74,15 +74,6 @@ class StudyCapability:
         """The rules of its keys that do not go together with others."""
         return ()
 
-    def check_values(self, data: Mapping[str, Any]) -> None:
-        """Refuse single values of its tables that their forms cannot refuse.
-
-        Raises
-        ------
-        InputError
-            with a line for each fault.
-        """
-
     def plan(self, reading: FileReading) -> Any:
         """The plan that its tables state; None where the file asks for nothing.
 
