@@ -171,11 +171,6 @@ class StudyCapability:
         """By name, the words on the numbers of its results, for a comparison of two."""
         return {}
 
-    def additions(self, study: StudyRecord) -> Mapping[str, Mapping[str, Any]]:
-        """By name, parts of the result that follow from the whole study, ready for JSON; they stand in place of those
-        of findings of the same name."""
-        return {}
-
     def take_estimates(self, config: Config, estimates: Estimates, tables: dict[str, Any]) -> None:
         """Write into its `tables` of the study file with estimated numbers what follows from their errors."""
 
