@@ -14,7 +14,7 @@ from typing import Any, Literal, TypeAlias
 from ..core.quantities import Layout
 from ..reading.text import DEFAULT_UNITS, Units
 from .figure import Figure
-from .lines import Aside, Line, Number, Piece, Words, line, pieces
+from .lines import Aside, Line, Number, Piece, Words, capital, line, pieces
 from .motion import Animation
 
 Form = Literal["both", "short", "long"]
@@ -286,6 +286,13 @@ class Source:
     def words(self, path: str) -> Words:
         """The words at `path`."""
         return Words(str(at(self.result, path)), path)
+
+    def source_line(self) -> Line:
+        """Project, author, date and revision, where the file gives them; the study file, and the version."""
+        labels = [
+            self.line(f"{capital(name)}: {{report.{name}}} · ") for name in self.result.get("report", ())
+        ]
+        return line(*labels, self.line("Study file: {source} · chainunit {chainunit}"))
 
     def lines(self, path: str) -> list[Words]:
         """The sentences of the list at `path`; an item that is a mapping has its sentence at the key ``text``."""

@@ -19,7 +19,7 @@ from . import blocks as b
 from .analyses import analysis_sections
 from .capability import Contents, capabilities
 from .drawing import drawing
-from .lines import Line, capital, join, line, spoken
+from .lines import Line, join, line, spoken
 from .study_motion import motion
 
 DRAWING, QUESTION = "machine.svg", "question"
@@ -42,7 +42,7 @@ def report(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Rep
             s.result,
             (),
             wording.of_machine(tuple(sections), study.turning),
-            source=_head(s),
+            source=s.source_line(),
             failure=s.words("failure") if study.failure is not None else (),
             units=study.config.units,
         )
@@ -68,12 +68,6 @@ def summary(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Re
             failure=s.words("failure") if study.failure is not None else (),
             units=study.config.units,
         )
-
-
-def _head(s: b.Source) -> Line:
-    """Project, author, date and revision, where the file gives them; the study file, and the version."""
-    entries = [s.line(f"{capital(name)}: {{report.{name}}} · ") for name in s.result.get("report", ())]
-    return line(*entries, s.line("Study file: {source} · chainunit {chainunit}"))
 
 
 def _motion(study: StudyRecord) -> list[b.Block]:

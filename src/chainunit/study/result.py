@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from .. import __version__
 from ..core.quantities import variables
 from ..drives.catalogue import CatalogueMotor
 from ..reading.results import as_data
 from ..reading.text import entries, entry, shown_in, turning
 from .given import given_sections
+from .heading import Heading
 from .judgement import motor_verdict
 from .line.shaft import driveline_of
 from .line.shaft_runs import shaft_findings
@@ -52,10 +52,7 @@ def as_dict(study: StudyRecord) -> dict[str, Any]:
 def _as_dict(study: StudyRecord) -> dict[str, Any]:
     config = study.config
     return {
-        "chainunit": __version__,
-        "title": config.title,
-        "source": config.file.source,
-        "report": dict(config.file.labels),
+        **as_data(Heading.of(config)),
         "status": f"failed: {study.failure}" if study.failure else "complete",
         "failure": str(study.failure) if study.failure else None,
         "verdict": {"model": _on_model(study), "motor": motor_verdict(study)},

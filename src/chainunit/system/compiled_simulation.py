@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,14 +10,13 @@ import xarray as xr
 
 from ..batch.transients import Transients, signal_table
 from ..core.engines import MATH
-from ..core.errors import InputError, InterruptedRunError
+from ..core.errors import InputError, InterruptedRunError, RunError
 from ..core.quantities import Variable
-from ..work.progress import Progress
 from .compiled import compiled, input_starts
 from .graph import System
 from .rows import selected
 from .signals import at_time
-from .simulation import Simulation
+from .simulation import RunOptions, Simulation
 
 TOLERANCE = 1e-9
 """Relative tolerance of the integrator: a run agrees with the monolithic solution to some 1e-7 of the peaks, where a
@@ -108,34 +106,21 @@ class CompiledSimulation(Simulation):
     def close(self) -> None:
         """See `Simulation`; nothing is left to free."""
 
-    def run(
-        self,
-        stop: float,
-        step: float,
-        progress: Progress | None = None,
-        *,
-        guards: Mapping[str, float] | None = None,
-        every: int = 1,
-        names: Iterable[str] | None = None,
-        file: Path | None = None,
-    ) -> xr.Dataset:
-        """See `FmuSimulation.run`; all rows are in memory, without a `file`.
+    def _run(self, options: RunOptions) -> tuple[xr.Dataset, RunError | None]:
+        """All rows are in memory, without a `file`.
 
         Raises
         ------
         InputError
-            as `FmuSimulation.run`, and for a `file`.
+            as `Simulation.run`, and for a `file`.
         InterruptedRunError
             after Ctrl-C; the time is then that before the run.
-        RunError
-            where the states leave all bounds; the attribute ``partial`` of the error holds the rows before.
         """
-        self._check_run(stop, step, every)
-        if file is not None:
+        if options.file is not None:
             raise InputError("a compiled system keeps its rows in memory: leave the file out")
         system = self._system
         self._checked(self.signals)
-        kept, guards = selected(names, [*system.outputs, *self.signals]), dict(guards or {})
+        kept, guards = selected(options.names, [*system.outputs, *self.signals]), options.guards
         needed = {*kept, *guards}
         outputs = [name for name in system.outputs if name in needed]
         driven = {full: signal for full, signal in self.signals.items() if hasattr(signal, "changes")}
@@ -147,25 +132,21 @@ class CompiledSimulation(Simulation):
                 system.inputs | {full: float(x) for full, x in self.signals.items() if full not in driven},
                 self._states,
                 begin=self.time,
-                step=step,
-                stop=[stop],
+                step=options.step,
+                stop=[options.stop],
                 signals=signal_table(list(driven), [driven], {}, changes),
                 limits=np.reshape(list(guards.values()), (len(guards), 1)),
-                longest=max(LONGEST * step, float(system.model.internal_step(MATH, system.p))),
+                longest=max(LONGEST * options.step, float(system.model.internal_step(MATH, system.p))),
             )
         except KeyboardInterrupt:
             raise InterruptedRunError(f"interrupted at t = {self.time:g} s") from None
         n = int(result.count[0])
         self.time, self._states = result.end(0), result.states[:, 0]
         rows = dict(zip(outputs, result.rows[:, 0, :n], strict=True))
-        run = self._dataset(result.times[0, :n], rows, kept, every)
+        run = self._dataset(result.times[0, :n], rows, kept, options.every)
         failure = result.failure(0)
-        if failure is not None:
-            failure.partial = run.isel(time=slice(None, -1))
-            raise failure
-        if progress:
-            progress(self.time)
-        return run
+        # the last row is that of the failure
+        return run if failure is None else run.isel(time=slice(None, -1)), failure
 
     def _dataset(self, times: Any, outputs: Mapping[str, Any], kept: Sequence[str], every: int) -> xr.Dataset:
         chosen = np.unique([*range(0, len(times), every), len(times) - 1])

@@ -10,6 +10,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any, ClassVar, Self
@@ -28,6 +29,19 @@ from .signals import Profile, at_time
 
 Watch = tuple[Instance, Any, list[float]]
 """An instance, the handle of its guarded outputs, and their limits."""
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """The arguments of `Simulation.run`."""
+
+    stop: float
+    step: float
+    progress: Progress | None
+    guards: Mapping[str, float]
+    every: int
+    names: Iterable[str] | None
+    file: Path | None
 
 
 class Simulation(ABC):
@@ -50,7 +64,6 @@ class Simulation(ABC):
     def close(self) -> None:
         """Free all that the system holds."""
 
-    @abstractmethod
     def run(
         self,
         stop: float,
@@ -62,15 +75,53 @@ class Simulation(ABC):
         names: Iterable[str] | None = None,
         file: Path | None = None,
     ) -> xr.Dataset:
-        """Simulate to the time `stop` [s]; see `FmuSimulation.run`."""
+        """Simulate to the time `stop` [s] with the communication step `step` [s].
 
-    def _check_run(self, stop: float, step: float, every: int) -> None:
+        Parameters
+        ----------
+        stop, step : [s]
+        progress : is called with the simulated time now and then
+        guards : limits by full name of an output: where the absolute value passes the limit at the end of a step, the
+            run ends with that row; in Model Exchange it ends with a row at the instant of the passage
+        every : keep one of so many rows, besides the first and the last
+        names : full names of the outputs and of the inputs with signals to keep; all by default
+        file : a NetCDF file to which the rows are written in blocks during the run; the memory then does not grow
+            with the number of rows
+
+        Returns
+        -------
+        every output and every input with a signal, or those in `names`, over the dimension ``time``, with units and
+        descriptions. With a `file` the Dataset reads from it lazily; close it at the end. A further call continues
+        the run.
+
+        Raises
+        ------
+        InputError
+            for a run that does not go forward, where `every` is no whole number >= 1, and for a name that cannot be
+            guarded or kept.
+        RunError
+            where an FMU fails or the states leave all bounds; the attribute ``partial`` of the error holds the
+            Dataset up to the failure.
+        WriteError
+            where the `file` cannot be written.
+        """
         if not (0.0 < step < math.inf) or not self.time < stop < math.inf:
             raise InputError(
                 f"a run from t = {self.time:g} to {stop:g} s in steps of {step:g} s: must go forward"
             )
         if not every >= 1 or every % 1:
             raise InputError(f"every = {every:g}: must be a whole number >= 1")
+        run, failure = self._run(RunOptions(stop, step, progress, guards or {}, every, names, file))
+        if failure is not None:
+            failure.partial = run
+            raise failure
+        if progress:
+            progress(self.time)
+        return run
+
+    @abstractmethod
+    def _run(self, options: RunOptions) -> tuple[xr.Dataset, RunError | None]:
+        """The rows of a run, and the error that ended it early."""
 
     @abstractmethod
     def save(self) -> float:
@@ -251,51 +302,11 @@ class FmuSimulation(Simulation):
     def _steps(self, times: Any) -> Iterator[None]:
         """Go from the first of the `times` to each of the others in turn, with all values consistent there."""
 
-    def run(
-        self,
-        stop: float,
-        step: float,
-        progress: Progress | None = None,
-        *,
-        guards: Mapping[str, float] | None = None,
-        every: int = 1,
-        names: Iterable[str] | None = None,
-        file: Path | None = None,
-    ) -> xr.Dataset:
-        """Simulate to the time `stop` [s] with the communication step `step` [s].
-
-        Parameters
-        ----------
-        stop, step : [s]
-        progress : is called with the simulated time now and then
-        guards : limits by full name of an output: where the absolute value passes the limit at the end of a step, the
-            run ends with that row; in Model Exchange it ends with a row at the instant of the passage
-        every : keep one of so many rows, besides the first and the last
-        names : full names of the outputs and of the inputs with signals to keep; all by default
-        file : a NetCDF file to which the rows are written in blocks during the run; the memory then does not grow
-            with the number of rows
-
-        Returns
-        -------
-        every output and every input with a signal, or those in `names`, over the dimension ``time``, with units and
-        descriptions. With a `file` the Dataset reads from it lazily; close it at the end. A further call continues
-        the run.
-
-        Raises
-        ------
-        InputError
-            for a run that does not go forward, where `every` is no whole number >= 1, and for a name that cannot be
-            guarded or kept.
-        RunError
-            where an FMU fails; the attribute ``partial`` of the error holds the Dataset up to the failure.
-        WriteError
-            where the `file` cannot be written.
-        """
-        start = self.time
-        self._check_run(stop, step, every)
-        n = max(1, math.ceil((stop - start) / step - 1e-9))
-        recorders, watches = self._recorders(names), self._watches(guards or {})
-        room = n // every + 2 if file is None else rows.BLOCK
+    def _run(self, options: RunOptions) -> tuple[xr.Dataset, RunError | None]:
+        start, file = self.time, options.file
+        n = max(1, math.ceil((options.stop - start) / options.step - 1e-9))
+        recorders, watches = self._recorders(options.names), self._watches(options.guards)
+        room = n // options.every + 2 if file is None else rows.BLOCK
         failure: RunError | None = None
         try:
             with (
@@ -305,7 +316,7 @@ class FmuSimulation(Simulation):
             ):
                 complaints = _Complaints(self._journal)
                 try:
-                    self._record(table, stop, step, n, every, watches, progress, stopped, complaints)
+                    self._record(table, options, n, watches, stopped, complaints)
                 except RunError as error:
                     failure = complaints.explain(error)
         except KeyboardInterrupt:
@@ -313,34 +324,26 @@ class FmuSimulation(Simulation):
             if self.time == start:
                 raise
             failure = self._interruption()
-        run = table.dataset() if file is None else xr.open_dataset(file, decode_times=False)
-        if failure is not None:
-            failure.partial = run
-            raise failure
-        if progress:
-            progress(self.time)
-        return run
+        return table.dataset() if file is None else xr.open_dataset(file, decode_times=False), failure
 
     def _record(
         self,
         table: rows.Rows,
-        stop: float,
-        step: float,
+        options: RunOptions,
         n: int,
-        every: int,
         watches: Sequence[Watch],
-        progress: Progress | None,
         stopped: Callable[[], bool],
         complaints: _Complaints,
     ) -> None:
         """Take `n` steps, or fewer where a guard or an interrupt ends the run."""
-        start, often, done = self.time, max(1, n // 200), 0
+        start, stop, progress = self.time, options.stop, options.progress
+        often, done = max(1, n // 200), 0
         self._begin(stop)
         table.add(start)
         complaints.step()
         for first in range(0, n, rows.BLOCK):
             # the last step is shorter where the end is no multiple of the step
-            times = np.minimum(start + step * np.arange(first, min(first + rows.BLOCK, n) + 1), stop)
+            times = np.minimum(start + options.step * np.arange(first, min(first + rows.BLOCK, n) + 1), stop)
             for _ in self._steps(times):
                 done += 1
                 is_beyond = beyond(watches)
@@ -348,7 +351,7 @@ class FmuSimulation(Simulation):
                     self._meet(watches)
                 is_interrupted = stopped()
                 ends = is_beyond or is_interrupted or done == n
-                if ends or done % every == 0:
+                if ends or done % options.every == 0:
                     table.add(self.time)
                 if progress and done % often == 0:
                     progress(self.time)

@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from ... import __version__
 from ...core.messages import unit_behind
+from ...reading.results import as_data
 from ...reading.text import array_entry, difference_entry, entry, shown_in
 from ...recordings.fit import fitted_entries
 from ...recordings.measurands import MEASURANDS
 from ...recordings.residuals import EXCESS_NOISE, ResidualTest
 from ...study.capability import Estimates
+from ...study.heading import Heading
 from ...study.registry import registered
 from ...study.study_file import changed_tables
 from .identification import FittedNumber, IdentifiedMachine, remarks, system_name
@@ -46,10 +47,7 @@ def _as_dict(machine: IdentifiedMachine) -> dict[str, Any]:
     estimates, start = machine.estimates, machine.information_at_start
     determined = sum(each.is_determined for each in estimates.values())
     return {
-        "chainunit": __version__,
-        "title": config.title,
-        "source": config.file.source,
-        "report": dict(config.file.labels),
+        **as_data(Heading.of(config)),
         "is_described": machine.is_described,
         "status": "complete" if machine.is_described else "the model does not describe the recordings",
         "sought": entry(float(len(estimates)), "1"),

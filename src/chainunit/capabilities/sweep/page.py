@@ -10,7 +10,7 @@ from ...core.errors import InputError, shown
 from ...reading.results import as_data
 from ...reading.text import shown_in
 from ...report import blocks as b
-from ...report.lines import Line, Name, Number, capital, join, line
+from ...report.lines import Line, Name, Number, join, line
 from ...report.task import Task
 from ...study.config import Config
 from ...work.progress import Report as Progress
@@ -35,14 +35,13 @@ def report(findings: SweepFindings) -> b.Report:
             b.Section("spread", _spread_heading(summary), tuple(_spread(s, summary))),
             b.Section("basis", "Basis of the numbers", tuple(_basis(s, summary))),
         )
-        entries = [s.line(f"{capital(name)}: {{report.{name}}} · ") for name in s.result["report"]]
         return b.Report(
             findings.config.title,
             "Sweep",
             s.result,
             tuple(_opening(s)),
             sections,
-            source=line(*entries, s.line("Study file: {source} · chainunit {chainunit}")),
+            source=s.source_line(),
             units=findings.config.units,
             opening_title="The sweep",
         )

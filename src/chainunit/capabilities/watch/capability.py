@@ -87,7 +87,8 @@ class WatchCapability(Capability):
     def faults(self, config: Config) -> Iterator[InputError]:
         """The refusal of an observer of a feed that is zero."""
         plans: WatchPlans = config.plans[self.name]
-        tables = [name for name in ("observer", "watch") if getattr(plans, name) is not None]
+        asked = {"observer": plans.observer, "watch": plans.watch}
+        tables = [name for name, plan in asked.items() if plan is not None]
         if tables and config.machine.model.sides:
             feed = config.feed
             if not feed.left.material_mass + feed.right.material_mass > 0.0:

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from ... import __version__
 from ...machines.load_observer import LoadObserver
+from ...reading.results import as_data
 from ...reading.text import array_entry, entry, shown_in
 from ...recordings.fit import fitted_entries
+from ...study.heading import Heading
 from .watch import GAP, OUTPUTS, Alarm, WatchedRecording, file_name
 
 ROWS = 1500
@@ -28,10 +29,7 @@ def _as_dict(watched: WatchedRecording) -> dict[str, Any]:
     config, plan, recording = watched.config, watched.plan, watched.recording
     p = watched.parameters
     return {
-        "chainunit": __version__,
-        "title": config.title,
-        "source": config.file.source,
-        "report": dict(config.file.labels),
+        **as_data(Heading.of(config)),
         "file": str(plan.file),
         "columns": list(recording.columns),
         "duration": entry(float(recording.time[-1] - recording.time[0]), "s"),
