@@ -327,7 +327,8 @@ def test_a_run_that_is_killed_while_it_replaces_a_file_leaves_its_own(moment, tm
     kill = "os.kill(os.getpid(), signal.SIGKILL)"
     renames = "real(part, file);" if moment == "after" else ""
     code = (
-        "import os, signal; from pathlib import Path\nfrom chainunit.core.files import ResultKind, claim, atomic_file\n"
+        "import os, signal; from pathlib import Path\n"
+        "from chainunit.core.files import ResultKind, claim, atomic_file\n"
         "real = Path.replace\n"
         "def replace(part, file):\n"
         f"    {renames} {kill}\n"
