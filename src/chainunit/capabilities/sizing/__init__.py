@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ...fmu.backends import Backend
+from ...reading.results import as_data
 from ...report.blocks import Block, Source
 from ...report.capability import Capability, Contents
 from ...study.analysis import Analysis
@@ -84,7 +85,7 @@ class SizingCapability(Capability):
         from .result import additions
 
         found = study.findings.get(self.name)
-        return {} if found is None else {self.name: found.as_dict() | additions(study, found)}
+        return {} if found is None else {self.name: as_data(found) | additions(study, found)}
 
     def analyses(self) -> Iterable[type[Analysis]]:
         """The protection of the drive."""
