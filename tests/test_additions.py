@@ -15,6 +15,7 @@ import pytest
 import xarray as xr
 
 import chainunit
+from chainunit.reading.text import number
 
 pytestmark = pytest.mark.second
 
@@ -95,6 +96,20 @@ type = "jam"
 side = "left"
 """
 
+LIFE = """
+title = "A bearing at the rocker's pin"
+event = []
+
+[run]
+settle_turns = 2
+
+[pin_life]
+pin = "C rocker pivot"
+C = "2 kN"
+p = 3.3333
+wanted = "20000 h"
+"""
+
 
 class House:
     """A copy of the package, and the files of it that are changed or new."""
@@ -105,8 +120,19 @@ class House:
         shutil.copytree(Path(chainunit.__file__).parent, self.package)
         shutil.copytree(Path(__file__).parents[1] / "fmu", folder / "fmu")
 
+    @property
+    def content(self) -> dict[str, bytes]:
+        files = (
+            path for path in self.package.rglob("*") if path.is_file() and "__pycache__" not in path.parts
+        )
+        return {path.relative_to(self.package).as_posix(): path.read_bytes() for path in files}
+
     def add(self, name: str, file: Path) -> None:
         shutil.copy(file, self.package / name)
+        self.touched.append(name)
+
+    def add_folder(self, name: str, folder: Path) -> None:
+        shutil.copytree(folder, self.package / name, ignore=shutil.ignore_patterns("__pycache__"))
         self.touched.append(name)
 
     def insert(self, name: str, before: str, text: str) -> None:
@@ -117,8 +143,11 @@ class House:
         self.touched.append(name)
 
     def run(self, *command: str, status: int = 0) -> str:
+        return self.python("from chainunit.app.cli import main; main()", *command, status=status)
+
+    def python(self, code: str, *arguments: str, status: int = 0) -> str:
         env = os.environ | {"PYTHONPATH": str(self.package.parent)}
-        call = [sys.executable, "-c", "from chainunit.app.cli import main; main()", *command]
+        call = [sys.executable, "-c", code, *arguments]
         process = subprocess.run(call, cwd=self.folder, env=env, capture_output=True, text=True)
         assert process.returncode == status, process.stderr
         return process.stderr if status else process.stdout
@@ -247,3 +276,65 @@ def test_a_part_of_the_line_is_a_file_and_a_line(house):
     (house.folder / "wrong.toml").write_text("[planetary]\nratio = 1\n[sizing]\n", "utf-8")
     refusal = house.run("study", "wrong.toml", status=2)
     assert "planetary.ratio = 1: must be > 1" in refusal and "sizing does not know its stiffness" in refusal
+
+
+def test_a_capability_is_a_folder_and_a_line(house):
+    """The rating life of a pin by a given load rating has its table, its number on the page, its warning, its command
+    and its method of `Study`."""
+
+    def capability():
+        house.add_folder("capabilities/pin_life", HERE / "pin_life")
+        house.insert("capabilities/__init__.py", '    "comparison",\n', '    "pin_life",\n')
+
+    before = house.content
+    assert files_of(house, capability) == 2
+    changed = {name for name, text in house.content.items() if before.get(name) != text}
+    outside = {name for name in changed if not name.startswith("capabilities/pin_life/")}
+    assert outside == {"capabilities/__init__.py"} and set(before) <= set(house.content)
+    (house.folder / "life.toml").write_text(LIFE, "utf-8")
+    keys = house.run("keys", "pin_life")
+    assert all(f"│ {key} " in keys for key in ("pin", "C", "p", "wanted"))
+    assert "[pin_life]" in house.run("study", "--example", "full")
+    house.run("schema")
+    schema = json.loads((house.folder / "chainunit.schema.json").read_text("utf-8"))
+    assert set(schema["properties"]["pin_life"]["properties"]) == {"pin", "C", "p", "wanted"}
+    house.run("study", "life.toml", "-o", "life")
+    result = json.loads((house.folder / "life" / "result.json").read_text("utf-8"))
+    assert result["status"] == "complete"
+
+    # the rocker swings about C by its angle, which the run has
+    with xr.open_dataset(house.folder / "life" / "result.nc", group="start_up") as run:
+        angle = run["machine.phi0"].values / result["machine"]["ratio"]["value"]
+        run = run.sel(time=angle >= angle[-1] - 2.0 * np.pi * result["run"]["turns"]["value"])
+        force = np.hypot(run["machine.pivot.fx"].values, run["machine.pivot.fy"].values)
+        swing, time = np.abs(np.diff(run["machine.rocker.psi"].values)), np.ptp(run["time"].values)
+    p, middle = 3.3333, 0.5 * (force[1:] + force[:-1])
+    load = (np.sum(middle**p * swing) / np.sum(swing)) ** (1.0 / p)
+    hours = (2000.0 / load) ** p * 1e6 / (np.sum(swing) / (2.0 * np.pi) / time) / 3600.0
+    found = result["pin_life"]
+    assert found["load"]["value"] == pytest.approx(load, rel=1e-3)
+    assert found["life"]["value"] / 3600.0 == pytest.approx(hours, rel=4e-3)
+    assert found["life"]["value"] < found["wanted"]["value"] == 7.2e7
+    said = next(warning for warning in result["warnings"] if warning["kind"] == "pin life")
+    page, text = ((house.folder / "life" / name).read_text("utf-8") for name in ("report.html", "result.md"))
+    shown = number(found["life"]["value"], "s", "hours")
+    for written in (page, text):
+        assert "Rating life of a pin" in written and shown in written and said["text"] in written
+
+    # the same by the command, whose exit status says that the life is too short, and from Python
+    house.run("pin-life", "life.toml", "-o", "alone", status=1)
+    alone = json.loads((house.folder / "alone" / "pin_life.json").read_text("utf-8"))["pin_life"]
+    assert alone == found
+    assert shown in (house.folder / "alone" / "pin_life.md").read_text("utf-8")
+    code = "from chainunit import Study; r = Study.from_file('life.toml').pin_life();"
+    code += " print(r); print(r.found.numbers.life)"
+    *said, life = house.python(code).splitlines()
+    assert float(life) == pytest.approx(found["life"]["value"], rel=1e-9)
+    assert shown in " ".join(said)
+    (house.folder / "other.toml").write_text(LIFE.replace("C rocker pivot", "C rocker pivo"), "utf-8")
+    assert 'pin_life.pin = "C rocker pivo": is no turning pin' in house.run("study", "other.toml", status=2)
+    (house.folder / "bare.toml").write_text("event = []\n", "utf-8")
+    foreign = '[system]\nmachine = "life/fmu/ChamberForces.fmu"\n[pin_life]\npin = "C"\nC = 1\n'
+    (house.folder / "foreign.toml").write_text(foreign, "utf-8")
+    assert "pin_life: needs the bearings of the machine" in house.run("study", "foreign.toml", status=2)
+    assert "has no table [pin_life]" in house.run("pin-life", "bare.toml", status=2)

@@ -17,7 +17,7 @@ from command import chainunit
 
 from chainunit.core import ledger, temporary_folders
 from chainunit.core.errors import InputError, WriteError
-from chainunit.core.files import LOCK, atomic_file, claim, clear, folder
+from chainunit.core.files import LOCK, ResultKind, atomic_file, claim, clear, folder
 
 SHORT = """
 event = []
@@ -265,8 +265,11 @@ def test_a_folder_that_was_there_or_holds_a_file_stays(tmp_path):
     assert sorted(p.name for p in tmp_path.rglob("*")) == ["fmu", "full", "old", "result"]
 
 
-def write(folder, text, *names, command="compare"):
-    with claim(folder, command, *names) as place:
+KIND = ResultKind("a comparison", "comparison.json")
+
+
+def write(folder, text, *names):
+    with claim(folder, *names, kind=KIND) as place:
         for name in names:
             with atomic_file(place / name) as part:
                 part.write_text(text)
@@ -291,7 +294,7 @@ def test_a_file_that_no_run_wrote_is_never_overwritten(tmp_path):
         write(out, "third", "comparison.json", "notes.md")
     assert [str(fault).split(":")[0] for fault in refusal.value.faults] == [str(mine), str(out / "notes.md")]
     mine.unlink()
-    with claim(out, "compare") as place, pytest.raises(WriteError, match=r"notes\.md: stays as it is"):
+    with claim(out, kind=KIND) as place, pytest.raises(WriteError, match=r"notes\.md: stays as it is"):
         clear(place, "notes.md")
         with atomic_file(place / "notes.md") as part:
             part.write_text("third")
@@ -306,7 +309,7 @@ def test_the_list_of_files_is_that_of_sha256sum_and_goes_with_them(tmp_path):
     # a process that was killed leaves the part of a line
     with (tmp_path / "out" / ledger.NAME).open("a") as out:
         out.write("0123")
-    with claim(tmp_path / "out", "compare", "a.png", "b.csv") as place:
+    with claim(tmp_path / "out", "a.png", "b.csv", kind=KIND) as place:
         clear(place, "a.png", "b.csv")
     assert names(tmp_path / "out") == []
     (tmp_path / "out" / ledger.NAME).write_text("a list of my own\n")
@@ -324,11 +327,13 @@ def test_a_run_that_is_killed_while_it_replaces_a_file_leaves_its_own(moment, tm
     kill = "os.kill(os.getpid(), signal.SIGKILL)"
     renames = "real(part, file);" if moment == "after" else ""
     code = (
-        "import os, signal; from pathlib import Path; from chainunit.core.files import claim, atomic_file\n"
+        "import os, signal; from pathlib import Path\n"
+        "from chainunit.core.files import ResultKind, claim, atomic_file\n"
         "real = Path.replace\n"
         "def replace(part, file):\n"
         f"    {renames} {kill}\n"
-        f"with claim(Path({str(out)!r}), 'compare', 'a.txt') as place, atomic_file(place / 'a.txt') as part:\n"
+        f"with claim(Path({str(out)!r}), 'a.txt', kind=ResultKind({KIND.words!r}, {KIND.file!r})) as place, "
+        "atomic_file(place / 'a.txt') as part:\n"
         "    part.write_text('second'); Path.replace = replace\n"
     )
     killed = python(code, tmp_path)

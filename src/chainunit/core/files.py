@@ -10,7 +10,7 @@ import re
 import secrets
 import stat
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
@@ -22,27 +22,27 @@ LOCK = ".chainunit-lock"
 """Name of the file that stands in a folder while a process writes there."""
 
 
-class _Kind(NamedTuple):
+class ResultKind(NamedTuple):
     """A kind of result: its words, the file that has its numbers, and a key that only this kind has there; without a
     key the name of the file tells the kind."""
 
     words: str
-    file: str
+    file: str = "result.json"
     key: str = ""
 
+    def is_in(self, folder: Path) -> bool:
+        """Whether a folder has a result of this kind."""
+        if not (folder / self.file).is_file():
+            return False
+        if not self.key:
+            return True
+        try:
+            result = json.loads((folder / self.file).read_bytes())
+        except (OSError, ValueError, RecursionError):
+            return False
+        return isinstance(result, dict) and self.key in result
 
-RESULTS: Mapping[str, _Kind] = {
-    "study": _Kind("a study", "result.json", "answers"),
-    "sweep": _Kind("a sweep", "result.json", "best_by"),
-    "optimize": _Kind("a search for the best machine", "result.json", "objectives"),
-    "identify": _Kind("an identification", "result.json", "proposals"),
-    "watch": _Kind("a watched recording", "result.json", "learned"),
-    "compare": _Kind("a comparison", "comparison.json"),
-    "linkage": _Kind("a linkage", "linkage.json"),
-    "reproduce": _Kind("the papers", "reproduction.json"),
-    "two-bar-error": _Kind("the two-bar error", "two_bar_error.json"),
-}
-"""The kinds of results by their commands. All have a file report.html, and the numbers as text, too."""
+
 PAGE = "report.html"
 written: list[Path] = []
 """The results that this process wrote by `atomic_file`, in order."""
@@ -188,33 +188,13 @@ def folder(path: Path) -> Path:
     return path
 
 
-def refuse_other_result(path: Path, command: str) -> None:
-    """Refuse a folder with a result that `command` would overwrite, as another command of `RESULTS` made it.
-
-    Raises
-    ------
-    InputError
-        which names the kind of the result.
-    """
-    for other, kind in RESULTS.items():
-        file = path / kind.file
-        if other == command or not file.is_file():
-            continue
-        if kind.key:
-            try:
-                result = json.loads(file.read_bytes())
-            except (OSError, ValueError, RecursionError):
-                continue
-            if not isinstance(result, dict) or kind.key not in result:
-                continue
-        raise InputError(f"{path}: has the result of {kind.words}, which would be lost; name another folder")
-
-
 @contextmanager
-def claim(path: Path, command: str = "", *names: str) -> Iterator[Path]:
-    """The `folder` at `path`, for this process alone as long as the context lasts; for a `command` of `RESULTS` it
-    must not have the result of another one, nor files that no earlier run wrote and that the command would write: the
-    numbers and the page, and of the further `names`.
+def claim(
+    path: Path, *names: str, kind: ResultKind | None = None, others: Iterable[ResultKind] = ()
+) -> Iterator[Path]:
+    """The `folder` at `path`, for this process alone as long as the context lasts; for a result of that `kind` it
+    must not have one of the `others`, nor files that no earlier run wrote and that would be written: the numbers, the
+    same as text, and the page, and of the further `names`.
 
     A lock of the operating system on a file guards the folder. The file is removed at the end. The lock ends
     with the process, even if the process is killed. A file system without locks gives no protection. A folder
@@ -223,11 +203,11 @@ def claim(path: Path, command: str = "", *names: str) -> Iterator[Path]:
     Raises
     ------
     InputError
-        where another process writes there, and with a line for each file that would be lost; see also
-        `refuse_other_result` and `folder`.
+        where another process writes there, for a result of another kind, and with a line for each file that would be
+        lost; see also `folder`.
     """
-    if command:
-        refuse_other_result(path, command)
+    if other := next((other for other in others if other.is_in(path)), None):
+        raise InputError(f"{path}: has the result of {other.words}, which would be lost; name another folder")
     ours, left_empty = not path.exists(), False
     lock = folder(path) / LOCK
     while True:
@@ -247,7 +227,7 @@ def claim(path: Path, command: str = "", *names: str) -> Iterator[Path]:
             raise
         os.close(handle)
     try:
-        with _listed(path, command, names) if command else contextlib.nullcontext():
+        with _listed(path, kind.file, names) if kind else contextlib.nullcontext():
             yield path
     except BaseException:
         left_empty = ours
@@ -266,12 +246,12 @@ def claim(path: Path, command: str = "", *names: str) -> Iterator[Path]:
 
 
 @contextmanager
-def _listed(path: Path, command: str, names: Sequence[str]) -> Iterator[None]:
-    """Keep the list of the files of a claimed folder."""
+def _listed(path: Path, numbers: str, names: Sequence[str]) -> Iterator[None]:
+    """Keep the list of the files of a claimed folder; `numbers` is the name of the file of the numbers."""
     ledger = Ledger(path)
     _ledgers.append(ledger)
     try:
-        numbers, faults = RESULTS[command].file, Faults()
+        faults = Faults()
         for file in dict.fromkeys(
             path / name for name in (PAGE, numbers, numbers.replace(".json", ".md"), *names)
         ):

@@ -10,6 +10,7 @@ Kinds, beside the unit (see `quantities.quantity`):
 ``speed``        the speed of a shaft, in rad/s and rev/min
 ``frequency``    an angular frequency, in rad/s and Hz
 ``energy``       the energy of long operation, in kWh
+``hours``        the time of long operation, in h
 ``assumed``      a value that is known to one digit
 ``millimetres``  a length in mm
 """
@@ -49,6 +50,7 @@ DEFAULT_UNITS: Units = MappingProxyType(
         "power": ("kW",),
         "points": ("% points",),
         "energy": ("kWh",),
+        "hours": ("h",),
         "millimetres": ("mm",),
     }
 )
@@ -61,6 +63,7 @@ _SCALES: dict[str, dict[str, tuple[float, float]]] = {
     "power": {"W": (1.0, 0.0), "kW": (1e-3, 0.0)},
     "points": {"% points": (100.0, 0.0)},
     "energy": {"J": (1.0, 0.0), "kWh": (1.0 / 3.6e6, 0.0)},
+    "hours": {"h": (1.0 / 3600.0, 0.0)},
     "torque": {"N.m": (1.0, 0.0), "kN.m": (1e-3, 0.0)},
     "force": {"N": (1.0, 0.0), "kN": (1e-3, 0.0)},
     "millimetres": {"mm": (1e3, 0.0)},

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol, Self
+from typing import Any, ClassVar, Protocol, Self
 
+from ..core.files import ResultKind
 from ..study.capability import StudyCapability
 from ..study.config import Config
 from ..study.record import StudyRecord
@@ -43,6 +44,9 @@ class AnyStudy(Protocol):
 class Capability(StudyCapability):
     """A capability with what it shows: the base of the one that each folder of `chainunit.capabilities` has by the
     name ``CAPABILITY``."""
+
+    results: ClassVar[Mapping[str, ResultKind]] = {}
+    """by command, the kind of result that it leaves in a folder"""
 
     def contents(self) -> Mapping[str, Contents]:
         """The sections of a study's report on its findings, by name: that of the analysis."""

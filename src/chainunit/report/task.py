@@ -6,14 +6,15 @@ it: they claim the folder, clear it, compute, report and write.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from ..core.errors import RunError, WriteError
-from ..core.files import RESULTS, claim, clear, write_all
+from ..core.files import ResultKind, claim, clear, write_all
+from ..study.registry import capabilities
 from ..work.progress import Report as Progress
 from . import files
 from .blocks import Report
@@ -26,6 +27,19 @@ Writer = Callable[[], list[Path]]
 """A function that writes files, and returns them."""
 
 
+_OF_BASE = {
+    "study": ResultKind("a study", key="answers"),
+    "linkage": ResultKind("a linkage", "linkage.json"),
+    "reproduce": ResultKind("the papers", "reproduction.json"),
+    "two-bar-error": ResultKind("the two-bar error", "two_bar_error.json"),
+}
+
+
+def result_kinds() -> Mapping[str, ResultKind]:
+    """The kinds of results that commands leave in a folder, by command: of the base and of the capabilities."""
+    return _OF_BASE | {name: kind for part in capabilities() for name, kind in part.results.items()}
+
+
 def no_check(question: Any, **options: Any) -> None:
     """Accept a question that was checked before."""
 
@@ -35,7 +49,7 @@ class Task(Generic[Question, Outcome]):
     """A command with a report in a folder."""
 
     name: str
-    """name of the command; the folder is claimed for it, see `chainunit.core.files.claim`"""
+    """name of the command, one of `result_kinds`; the folder is claimed for it"""
     compute: Callable[..., Outcome]
     """gets the question, the folder (None without one), the function for the progress, and options by their names"""
     report: Callable[[Outcome], Report]
@@ -65,12 +79,14 @@ class Task(Generic[Question, Outcome]):
 
     @property
     def _stem(self) -> str:
-        return RESULTS[self.name].file.removesuffix(".json")
+        return result_kinds()[self.name].file.removesuffix(".json")
 
     def claimed(self, question: Question, folder: Path) -> AbstractContextManager[Path]:
         """The folder, for this process alone. Errors are those of `chainunit.core.files.claim`."""
         names = [name for name in self.files if "*" not in name]
-        return claim(folder, self.name, *names, *self.replaced(question))
+        kinds = dict(result_kinds())
+        kind = kinds.pop(self.name)
+        return claim(folder, *names, *self.replaced(question), kind=kind, others=kinds.values())
 
     def clear(self, folder: Path) -> None:
         """Remove the files of an earlier result from a folder, see `chainunit.core.files.clear`."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from ...core.files import ResultKind
 from ...report.capability import Capability
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
@@ -17,6 +18,7 @@ class OptimizeCapability(Capability):
     """The capability, with the table [optimize]."""
 
     name = "optimize"
+    results = {"optimize": ResultKind("a search for the best machine", key="objectives")}  # noqa: RUF012
     tables = {  # noqa: RUF012
         "optimize": FileSection(
             Optimize,

@@ -1,0 +1,68 @@
+"""The task of ``chainunit pin-life``: start-up and steady running of a study, and the life of its pin."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from chainunit.core.errors import InputError
+from chainunit.reading.text import shown_in
+from chainunit.report import blocks as b
+from chainunit.report import study_task
+from chainunit.report.task import Task
+from chainunit.study.config import Config
+from chainunit.study.record import StudyRecord
+from chainunit.study.result import as_dict
+from chainunit.work.progress import Report as Progress
+
+from . import page
+
+_HEAD = ("chainunit", "title", "source", "status", "pin_life")
+
+
+def _report(study: StudyRecord) -> b.Report:
+    result = as_dict(study)
+    result = {name: result[name] for name in _HEAD if name in result} | {
+        "warnings": [each for each in result["warnings"] if each["kind"] == "pin life"],
+        "notes": [],
+    }
+    s = b.Source(result)
+    with shown_in(study.config.units):
+        found = page.blocks(s, study) if "pin_life" in study.findings else ()
+        return b.Report(
+            study.config.title,
+            "Rating life of a pin",
+            result,
+            (*found, *s.conclusions()),
+            (),
+            source=s.line("Study file: {source} · chainunit {chainunit}"),
+            units=study.config.units,
+            opening_title="The answer",
+        )
+
+
+def _accept(config: Config, **options: Any) -> None:
+    if config.plans["pin_life"] is None:
+        raise InputError(f"{config.file.source}: has no table [pin_life], which names the pin and its rating")
+
+
+def _compute(config: Config, folder: Path, progress: Progress, **options: Any) -> StudyRecord:
+    """Start-up and steady running, without the events of the study."""
+    return study_task.TASK.compute(replace(config, events={}), folder, progress, **options)
+
+
+def _shortfall(study: StudyRecord) -> str | None:
+    return "" if "pin_life" in study.findings and study.findings["pin_life"].is_short else None
+
+
+TASK: Task[Config, StudyRecord] = Task(
+    "pin-life",
+    _compute,
+    _report,
+    accept=_accept,
+    replaced=study_task.TASK.replaced,
+    kept=study_task.TASK.kept,
+    failure=study_task.TASK.failure,
+    shortfall=_shortfall,
+)
