@@ -16,7 +16,7 @@ from ..reading.lists import Entry, leaves
 from ..reading.tables import instance
 from ..study.conditions import given
 from ..study.entry_values import filled_text
-from ..study.rules import MACHINE_FMU, MOTOR_FMU, Rule, other_models
+from ..study.rules import MACHINE_FMU, MOTOR_FMU, Rule, motor_is_chosen, other_models
 from .measurands import MEASURANDS
 from .recording import Recording, read_signal
 
@@ -73,7 +73,7 @@ def recording_rules(table: str) -> Iterator[Rule]:
     for condition, words in (
         (MACHINE_FMU, "machine is an FMU"),
         (MOTOR_FMU, "motor is an FMU"),
-        (given("sizing"), "motor is not known before it is chosen"),
+        (motor_is_chosen(), "motor is not known before it is chosen"),
         (given("driveline"), "driveline stands between motor and machine"),
         *((other.on, other.words) for other in other_models()),
     ):
