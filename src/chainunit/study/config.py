@@ -155,8 +155,8 @@ class Config:
         """Permitted temperature of the winding if the steady turns go on for ever [K], after its name in the
         study file."""
         for part in registered():
-            if (own := part.permitted_temperature(self)) is not None:
-                return own[0], own[1]
+            if (permitted := part.permitted_temperature(self)) is not None:
+                return permitted[0], permitted[1]
         return "run.winding_temperature", float(self.run.winding_temperature)
 
     @property

@@ -33,9 +33,9 @@ def check_values(data: Mapping[str, Any], source: str) -> tuple[Parts | None, li
     with faults.collected():
         parts = parts_of(data, source)
     known = parts or Parts(MACHINES["ChamberForces"], MOTORS["DcMotor"])
-    own = data if parts else {name: x for name, x in data.items() if name not in _OF_MACHINE}
+    readable = data if parts else {name: x for name, x in data.items() if name not in _OF_MACHINE}
     with faults.collected():
-        read_table(known.form, own)
+        read_table(known.form, readable)
     with faults.collected():
         if isinstance(data.get("event", []), list):
             read_events(data.get("event", []), known.machine if parts else None)

@@ -52,10 +52,10 @@ class GivenSection:
     @property
     def data(self) -> dict[str, Any]:
         """The values as a result has them."""
-        own = {} if self.values is None else as_data(self.values)
-        own = {name: x for name, x in own.items() if name not in self.unused_names}
-        ranges = {name: {**own[name], "value": list(ends)} for name, ends in self.ranges.items()}
-        return own | ranges | {key: _choice(value) for key, value in self.choices.items()}
+        values = {} if self.values is None else as_data(self.values)
+        values = {name: x for name, x in values.items() if name not in self.unused_names}
+        ranges = {name: {**values[name], "value": list(ends)} for name, ends in self.ranges.items()}
+        return values | ranges | {key: _choice(value) for key, value in self.choices.items()}
 
 
 def _choice(value: Any) -> Any:
@@ -93,12 +93,12 @@ def _of_study(config: Config) -> dict[str, Any]:
 
 def _system(config: Config) -> dict[str, Any]:
     """Names of machine and motor, and the names of our variables in their FMUs."""
-    own = {
+    choices = {
         name.removeprefix("system."): x
         for name, x in config.file.choices.items()
         if name.startswith("system.")
     }
-    return {name: x for name, x in own.items() if x and (name != "motor" or not config.chooses_motor)}
+    return {name: x for name, x in choices.items() if x and (name != "motor" or not config.chooses_motor)}
 
 
 def _tables(study: StudyRecord) -> Iterator[GivenSection]:

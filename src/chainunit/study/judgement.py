@@ -30,8 +30,8 @@ def model_verdict(study: StudyRecord) -> Verdict:
     if not study.drive.machine.model.sides:
         return verdict.rigid_links(speed, residuals, actual=mean)
     for part in registered():
-        if (own := part.model_verdict(study, speed, mean, residuals)) is not None:
-            return own
+        if (judged := part.model_verdict(study, speed, mean, residuals)) is not None:
+            return judged
     empty = {name for name in study.overloads if config.events[name].empties}
     always = 0.0 in (config.feed.left.material_mass, config.feed.right.material_mass)
     slack_speed, resonance = slack_and_mode(study.drive.chain_unit, config.feed)

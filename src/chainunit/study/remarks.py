@@ -24,22 +24,22 @@ from .window import CLOSED, DRIFT, STORED
 def conclude(study: StudyRecord) -> None:
     """Judge the model, and add every remark to the study."""
     config, note = study.config, study.note
-    own = "Values that the study file does not name are the declared start values, which are assumed."
+    assumed = "Values that the study file does not name are the declared start values, which are assumed."
     if config.file.is_packaged:
-        own = "Masses, pins, feed and drive are assumed; the papers print none."
+        assumed = "Masses, pins, feed and drive are assumed; the papers print none."
     elif config.file.of_example:
-        own = (
+        assumed = (
             "Values that the study file does not name are those of the packaged example, whose masses and drive "
             "are assumed."
         )
     elif study.drive.foreign_machine:
-        own = (
+        assumed = (
             "The machine is an FMU, {description}. Values that the study file does not "
             "name are the start values of this FMU, which alone computes the turn at constant speed. Its bearings "
             "and its motion behind an open coupling are not known."
         )
     machine = study.drive.foreign_machine
-    note("assumed", own, description=machine.model.description if machine else "")
+    note("assumed", assumed, description=machine.model.description if machine else "")
     if any(value for name, value in study.drive.machine.by_name.items() if name.endswith("friction")):
         note(
             "smoothed friction",

@@ -126,8 +126,8 @@ def all_rules() -> tuple[Rule, ...]:
 @cache
 def _with_motors(names: tuple[str, ...]) -> tuple[Rule, ...]:
     """The rules for the registered motors of these names."""
-    own = (rule for part in registered() for rule in part.rules())
-    return (*_of_parts(), *_of_sides(), *_of_motors(), *own)
+    of_registered = (rule for part in registered() for rule in part.rules())
+    return (*_of_parts(), *_of_sides(), *_of_motors(), *of_registered)
 
 
 BESIDE_MOTOR = "given beside system.motor = {motor}, which is the motor; leave out one of the two"

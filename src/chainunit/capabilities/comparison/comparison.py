@@ -128,20 +128,20 @@ def compare(a: StoredResult, b: StoredResult) -> dict[str, Any]:
 
 
 def _alone(
-    mine: StoredResult, own: Mapping[str, _Group], theirs: StoredResult, others: Mapping[str, _Group]
+    mine: StoredResult, groups: Mapping[str, _Group], theirs: StoredResult, others: Mapping[str, _Group]
 ) -> dict[str, list[str]]:
     """The runs, events and measures that one result has and the other has not."""
-    missing = [name for name in own if name not in others]
+    missing = [name for name in groups if name not in others]
     # the further numbers of a run go with the run
     whole = {name.removeprefix("answers.") for name in missing if name.startswith("answers.")}
     runs = [name for name in missing if name.startswith("answers.") or name.split(".")[-1] not in whole]
     events = _mapping(theirs.data.get("event"))
     return {
-        "runs": [own[name].title for name in runs],
+        "runs": [groups[name].title for name in runs],
         "events": [name for name in _mapping(mine.data.get("event")) if name not in events],
         "measures": [
             f"{group.title}: {words}"
-            for name, group in own.items()
+            for name, group in groups.items()
             if name in others
             for measure, (words, _) in group.numbers.items()
             if measure not in others[name].numbers

@@ -143,8 +143,8 @@ def _runs(s: b.Source) -> Iterator[b.Block]:
 
 def _is_short(run: str, name: str) -> bool:
     """Whether a measure that differs is shown where there is little room, too."""
-    own = MEASURES.get(name)
-    return not run.startswith("pins.") and (own is None or not own.minor)
+    measure = MEASURES.get(name)
+    return not run.startswith("pins.") and (measure is None or not measure.minor)
 
 
 def _row(s: b.Source, run: str, name: str, is_short: bool) -> b.TableRow:

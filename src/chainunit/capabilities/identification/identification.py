@@ -156,10 +156,10 @@ class IdentifiedMachine:
         return float(np.mean(sums)), float(np.std(sums))
 
 
-def _bound_of(own: Unknown, x: float) -> str:
+def _bound_of(unknown: Unknown, x: float) -> str:
     """The bound at which a fitted value lies, "lower" or "upper"; empty between them."""
-    near = AT_BOUND * own.prior_deviation
-    return "lower" if x <= own.low + near else "upper" if x >= own.high - near else ""
+    near = AT_BOUND * unknown.prior_deviation
+    return "lower" if x <= unknown.low + near else "upper" if x >= unknown.high - near else ""
 
 
 def system_name(name: str) -> str:

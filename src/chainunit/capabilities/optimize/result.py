@@ -184,8 +184,8 @@ def best_machine(best: Best, config: Config) -> BestMachine:
 def best_tables(best: Best, config: Config, folder: Path) -> dict[str, Any]:
     """The tables of the study file with the best machine, as a file in `folder` has them."""
     assert best.machine is not None
-    own = best.machine.by_name
-    values = {f"machine.{name}": own[name] for name in best.wishes.names}
+    by_name = best.machine.by_name
+    values = {f"machine.{name}": by_name[name] for name in best.wishes.names}
     return changed_tables(config, values, "the best machine", folder)
 
 
@@ -222,9 +222,9 @@ def _parameters(best: Best) -> Iterator[tuple[str, FreeParameter]]:
         for name, today, value in zip(wishes.names, wishes.today, x, strict=True)
     } | {name: (by_name[name], by_name[name], *bounds) for name, bounds in best.idle.items()}
     variables = {v.name: v for v in wishes.machine.model.parameter_layout.variables}
-    for name, own in numbers.items():
+    for name, entries in numbers.items():
         v = variables[name]
-        today, value, low, high = map(float, own)
+        today, value, low, high = map(float, entries)
         yield name, FreeParameter(today, value, low, high, v.unit, v.kind, v.description)
 
 
@@ -254,16 +254,18 @@ def _organs(best: Best) -> list[SpeedLimit]:
 
 
 def _conflict(best: Best) -> WhyNone | None:
-    own = best.conflict
-    if own is None:
+    conflict = best.conflict
+    if conflict is None:
         return None
-    bounds = [f"{name}.{side}" for name, side in own.bounds]
-    return WhyNone(own.names, tuple(own.alone), own.together, bounds, list(conflict_sentences(best)))
+    bounds = [f"{name}.{side}" for name, side in conflict.bounds]
+    return WhyNone(
+        conflict.names, tuple(conflict.alone), conflict.together, bounds, list(conflict_sentences(best))
+    )
 
 
-def _neighbours(best: Best, own: Neighbours) -> NeighbourCheck:
+def _neighbours(best: Best, neighbours: Neighbours) -> NeighbourCheck:
     held = [q.name for q in best.wishes.objectives[1:]]
-    return NeighbourCheck(neighbours_sentence(best), held, STEPS, own)
+    return NeighbourCheck(neighbours_sentence(best), held, STEPS, neighbours)
 
 
 def _front(best: Best) -> list[FrontMachine]:

@@ -112,9 +112,11 @@ def limit_words(limit: TurnLimit) -> str:
 def conflict_sentences(best: Best) -> Iterator[str]:
     """Why no machine meets the limits: which of them conflict, and how near the nearest machine comes."""
     assert best.conflict is not None
-    wishes, own = best.wishes, best.conflict
+    wishes, conflict = best.wishes, best.conflict
     limits = {limit.name: limit for limit in wishes.limits}
-    alone, together = ([_wish_words(best, name) for name in names] for names in (own.alone, own.together))
+    alone, together = (
+        [_wish_words(best, name) for name in names] for names in (conflict.alone, conflict.together)
+    )
     if alone:
         each = " Each of these limits is impossible alone." if len(alone) > 1 else ""
         yield f"No machine within the bounds has {'; none has '.join(alone)}.{each}"
@@ -124,26 +126,26 @@ def conflict_sentences(best: Best) -> Iterator[str]:
             f"{begin} has {' and '.join(filter(None, (', '.join(together[:-1]), together[-1])))} together; without "
             "any one of them the others can be met."
         )
-    several = len(own.names) > len(own.together) and len(own.names) > 1
+    several = len(conflict.names) > len(conflict.together) and len(conflict.names) > 1
     reached = [
         f"{name} = {number(value, limits[name].quantity.unit, limits[name].quantity.kind)}"
         for name, value in (
-            own.alone if several else {n: best.found.get(n, math.nan) for n in own.names}
+            conflict.alone if several else {n: best.found.get(n, math.nan) for n in conflict.names}
         ).items()
         if name in limits and not math.isnan(value)
     ]
     if reached and several:
         which = "machines that come nearest to each of these limits alone have"
-        if len(own.alone) == 1:
+        if len(conflict.alone) == 1:
             which = "machine that comes nearest to the first of these limits alone has"
         yield f"The {which} {', '.join(reached)}."
     elif reached:
         yield f"The machine that comes nearest has {', '.join(reached)}."
-    if own.bounds:
+    if conflict.bounds:
         units = {v.name: v.unit for v in wishes.machine.model.parameter_layout.variables}
         words = (
             f"{name}.{side} = {number(wishes.free[name][side == 'max'], units[name], full=False)}"
-            for name, side in own.bounds
+            for name, side in conflict.bounds
         )
         yield f"The bounds that hold {'the nearest to all of them' if several else 'it'}: {', '.join(words)}."
 
@@ -170,10 +172,10 @@ def starts_sentence(best: Best) -> str:
 
 def neighbours_sentence(best: Best) -> str:
     """How the machines around the best one compare with it."""
-    own = best.neighbours
-    assert own is not None
+    neighbours = best.neighbours
+    assert neighbours is not None
     held = " and ".join(f"have no more {q.name}" for q in best.wishes.objectives[1:])
     conditions = " and ".join(filter(None, ("meet all limits" if best.is_limited else "", held))) or "turn"
     first = f" in {best.wishes.objectives[0].name}" if held else ""
-    better = f"{own.better} of these {'is' if own.better == 1 else 'are'} better{first}"
-    return f"Of {own.number} machines around it {own.feasible} {conditions}, and {better}."
+    better = f"{neighbours.better} of these {'is' if neighbours.better == 1 else 'are'} better{first}"
+    return f"Of {neighbours.number} machines around it {neighbours.feasible} {conditions}, and {better}."

@@ -17,9 +17,9 @@ _RELIEVED = ("rms_torque", "peak_torque", "temperature")
 """Checks that a larger ratio improves: the motor turns faster and gives less torque."""
 
 
-def boosts(own: float, is_given: bool) -> list[float]:
-    """The boosts to try, the `own` one first; it alone where the file gives it."""
-    return [own, *(boost for boost in BOOSTS if boost > own and not is_given)]
+def boosts(first: float, is_given: bool) -> list[float]:
+    """The boosts to try, beginning with `first`; it alone where the file gives it."""
+    return [first, *(boost for boost in BOOSTS if boost > first and not is_given)]
 
 
 def _with_boost(c: Candidate, boost: float) -> Candidate:
