@@ -18,7 +18,7 @@ from typing import Any
 from ..core.planar import ZERO, Link, Motion, Vec2
 from .body import Bar, Load
 from .driver import Driver, SolvedDriver
-from .group import GuideForce, Joint, PlacedLinkage, Slide, Third
+from .group import GuideForce, Joint, PlacedLinkage, Slide, Solution, Third
 
 
 @dataclass
@@ -78,17 +78,8 @@ class SolvedCylinder(SolvedDriver):
 
     __slots__ = ("_data", "_e", "_per_det", "_r", "_way")
 
-    def __init__(
-        self,
-        data: Cylinder,
-        arms: tuple[Vec2, Vec2],
-        way: Any,
-        links: tuple[Link, ...],
-        pins: tuple[Motion, ...],
-        margin: Any,
-        slides: tuple[Slide, ...],
-    ) -> None:
-        super().__init__(links, pins, margin, slides)
+    def __init__(self, data: Cylinder, arms: tuple[Vec2, Vec2], way: Any, *common: *Solution) -> None:
+        super().__init__(*common)
         self._data, (self._e, self._r), self._way = data, arms, way
         self._per_det = 1.0 / self._r.cross(self._e)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar, NamedTuple, Protocol, Self
+from typing import Any, ClassVar, NamedTuple, Protocol, Self, TypeAlias
 
 from ..core.planar import ZERO, Link, Motion, Vec2
 from .body import Bar, Load
@@ -51,6 +51,10 @@ class Slide(NamedTuple):
     s: Any
     s1: Any
     s2: Any
+
+
+Solution: TypeAlias = tuple[tuple[Link, ...], tuple[Motion, ...], Any, tuple[Slide, ...]]
+"""Links, pins, margin and slides of a `SolvedGroup`."""
 
 
 class GuideForce(Vec2):

@@ -18,7 +18,7 @@ from typing import Any
 
 from ..core.planar import Link, Motion, Vec2, coriolis, coriolis_third, rod_rates
 from .body import Bar, Load
-from .group import Group, GuideForce, PlacedLinkage, Rail, Slide, SolvedGroup, Third
+from .group import Group, GuideForce, PlacedLinkage, Rail, Slide, Solution, SolvedGroup, Third
 
 
 @dataclass
@@ -76,16 +76,8 @@ class SolvedRRP(SolvedGroup):
 
     __slots__ = ("_per_along", "_per_square", "_rail")
 
-    def __init__(
-        self,
-        rail: Link,
-        per: tuple[Any, Any],
-        links: tuple[Link, ...],
-        pins: tuple[Motion, ...],
-        margin: Any,
-        slides: tuple[Slide, ...],
-    ) -> None:
-        super().__init__(links, pins, margin, slides)
+    def __init__(self, rail: Link, per: tuple[Any, Any], *common: *Solution) -> None:
+        super().__init__(*common)
         self._rail, (self._per_along, self._per_square) = rail, per
 
     @classmethod
@@ -198,16 +190,8 @@ class SolvedRPR(SolvedGroup):
 
     __slots__ = ("_offset", "_per_way")
 
-    def __init__(
-        self,
-        offset: Any,
-        per_way: Any,
-        links: tuple[Link, ...],
-        pins: tuple[Motion, ...],
-        margin: Any,
-        slides: tuple[Slide, ...],
-    ) -> None:
-        super().__init__(links, pins, margin, slides)
+    def __init__(self, offset: Any, per_way: Any, *common: *Solution) -> None:
+        super().__init__(*common)
         self._offset, self._per_way = offset, per_way
 
     @classmethod

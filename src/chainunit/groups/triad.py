@@ -32,7 +32,7 @@ from typing import Any, ClassVar, NamedTuple
 from ..core.model import Requirement
 from ..core.planar import Link, Motion, Vec2
 from .body import Bar, Load, Mass
-from .group import Group, Joint, PlacedLinkage, Rail, Slide, SolvedGroup, Third
+from .group import Group, Joint, PlacedLinkage, Rail, Solution, SolvedGroup, Third
 from .legs import Leg, LegAt, PlacedLeg, RodLeg, rods_at
 
 LEGS = 3
@@ -274,15 +274,8 @@ class SolvedTriad(SolvedGroup):
 
     __slots__ = ("_rows",)
 
-    def __init__(
-        self,
-        rows: _Rows,
-        links: tuple[Link, ...],
-        pins: tuple[Motion, ...],
-        margin: Any,
-        slides: tuple[Slide, ...],
-    ) -> None:
-        super().__init__(links, pins, margin, slides)
+    def __init__(self, rows: _Rows, *common: *Solution) -> None:
+        super().__init__(*common)
         self._rows = rows
 
     @property

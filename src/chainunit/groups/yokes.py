@@ -9,7 +9,7 @@ from typing import Any
 
 from ..core.planar import Link, Motion, Vec2, coriolis, coriolis_third
 from .body import Bar, Load
-from .group import Group, GuideForce, PlacedLinkage, Rail, Slide, SolvedGroup, Third
+from .group import Group, GuideForce, PlacedLinkage, Rail, Slide, Solution, SolvedGroup, Third
 
 
 @dataclass
@@ -66,15 +66,8 @@ class SolvedPRP(SolvedGroup):
 
     __slots__ = ("_rails",)
 
-    def __init__(
-        self,
-        rails: tuple[Link, Link, Any],
-        links: tuple[Link, ...],
-        pins: tuple[Motion, ...],
-        margin: Any,
-        slides: tuple[Slide, ...],
-    ) -> None:
-        super().__init__(links, pins, margin, slides)
+    def __init__(self, rails: tuple[Link, Link, Any], *common: *Solution) -> None:
+        super().__init__(*common)
         self._rails = rails
 
     @classmethod
@@ -182,16 +175,8 @@ class SolvedRPP(SolvedGroup):
 
     __slots__ = ("_per", "_rail")
 
-    def __init__(
-        self,
-        rail: Link,
-        per: Any,
-        links: tuple[Link, ...],
-        pins: tuple[Motion, ...],
-        margin: Any,
-        slides: tuple[Slide, ...],
-    ) -> None:
-        super().__init__(links, pins, margin, slides)
+    def __init__(self, rail: Link, per: Any, *common: *Solution) -> None:
+        super().__init__(*common)
         self._rail, self._per = rail, per
 
     @classmethod
