@@ -206,8 +206,6 @@ NOT_OF_A_FILE = (
 )
 
 
-
-
 @pytest.mark.parametrize(
     "text", [ALL, KNIFE, "[run]\ncrank_speed = 2", 'organ = "chain"\n[chain]\nrods = 12']
 )

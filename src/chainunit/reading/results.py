@@ -194,7 +194,10 @@ def _table(x: Any, titled: bool) -> dict[str, Any]:
 
 def _number(x: Any, unit: str, kind: str) -> dict[str, Any]:
     is_array = isinstance(x, list | tuple) or bool(getattr(x, "ndim", 0))
-    return array_entry(x, unit, kind) if is_array else entry(x, unit, kind)
+    if is_array:
+        return array_entry(x, unit, kind)
+    # a count stays one
+    return entry(x, unit, kind) | ({"value": x} if type(x) is int else {})
 
 
 def documented(of: type, prefix: str = "") -> Iterator[tuple[str, str, str]]:

@@ -147,7 +147,7 @@ def _results(contents: Mapping[str, type | None]) -> dict[str, type]:
 
 def _parts(of: type) -> Table:
     """A row for each part of a result."""
-    rows = (TableRow((name, unit or "-", words)) for name, unit, words in documented(of))
+    rows = (TableRow((name or "(the number)", unit or "-", words)) for name, unit, words in documented(of))
     return Table(tuple(rows), heads("name", "unit", "meaning"), numeric=False)
 
 
