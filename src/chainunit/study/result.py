@@ -163,7 +163,7 @@ def _parts(study: StudyRecord) -> dict[str, Any]:
     more = {name: x for part in registered() for name, x in part.additions(study).items()}
     parts: dict[str, Any] = as_data({name: x for name, x in study.findings.items() if name not in more})
     parts |= more
-    if study.statics.torsion is not None:
+    if study.statics.modes is not None:
         parts |= _driveline(study)
     return parts
 
@@ -176,7 +176,7 @@ def _driveline(study: StudyRecord) -> dict[str, Any]:
         "driveline": {
             "damping_ratio": entry(study.config.plans["driveline"].damping_ratio, "1"),
             **entries(driveline_of(study.drive)),
-            **entries(study.statics.torsion),
+            **entries(study.statics.modes),
         },
         "shaft": as_data(shaft),
         "torque_cycles": {

@@ -26,7 +26,7 @@ from .graph import FmuComponent, System, direct_inputs, order
 from .instance import Fmu, Instance, Kind
 from .signals import Profile, at_time
 
-Watch = tuple[Instance, Any, list[float]]
+Guarded = tuple[Instance, Any, list[float]]
 """An instance, the handle of its guarded outputs, and their limits."""
 
 
@@ -294,7 +294,7 @@ class FmuSimulation(Simulation):
         start = self.time
         self._check_run(stop, step, every)
         n = max(1, math.ceil((stop - start) / step - 1e-9))
-        recorders, watches = self._recorders(names), self._watches(guards or {})
+        recorders, guarded = self._recorders(names), self._guarded(guards or {})
         room = n // every + 2 if file is None else rows.BLOCK
         failure: RunError | None = None
         try:
@@ -305,7 +305,7 @@ class FmuSimulation(Simulation):
             ):
                 complaints = _Complaints(self._journal)
                 try:
-                    self._record(table, stop, step, n, every, watches, progress, stopped, complaints)
+                    self._record(table, stop, step, n, every, guarded, progress, stopped, complaints)
                 except RunError as error:
                     failure = complaints.explain(error)
         except KeyboardInterrupt:
@@ -328,7 +328,7 @@ class FmuSimulation(Simulation):
         step: float,
         n: int,
         every: int,
-        watches: Sequence[Watch],
+        guarded: Sequence[Guarded],
         progress: Progress | None,
         stopped: Callable[[], bool],
         complaints: _Complaints,
@@ -343,9 +343,9 @@ class FmuSimulation(Simulation):
             times = np.minimum(start + step * np.arange(first, min(first + rows.BLOCK, n) + 1), stop)
             for _ in self._steps(times):
                 done += 1
-                is_beyond = beyond(watches)
+                is_beyond = beyond(guarded)
                 if is_beyond:
-                    self._meet(watches)
+                    self._meet(guarded)
                 is_interrupted = stopped()
                 ends = is_beyond or is_interrupted or done == n
                 if ends or done % every == 0:
@@ -359,7 +359,7 @@ class FmuSimulation(Simulation):
                 complaints.step()
 
     @abstractmethod
-    def _meet(self, watches: Sequence[Watch]) -> None:
+    def _meet(self, guarded: Sequence[Guarded]) -> None:
         """Go back from a row beyond a guard to the instant of the passage, if the simulation can."""
 
     def _interruption(self) -> InterruptedRunError:
@@ -373,7 +373,7 @@ class FmuSimulation(Simulation):
             there += [*(f"{name}.{v}" for v in fmu.outputs()), *inputs]
         return self._handles(rows.selected(names, there))
 
-    def _watches(self, guards: Mapping[str, float]) -> list[Watch]:
+    def _guarded(self, guards: Mapping[str, float]) -> list[Guarded]:
         """Handles and limits of the guards, by instance."""
         for full in guards:
             self.system.connector(full, "output")
@@ -422,11 +422,11 @@ class FmuSimulation(Simulation):
         self.time = self._saved_at
 
 
-def beyond(watches: Sequence[Watch]) -> bool:
+def beyond(guarded: Sequence[Guarded]) -> bool:
     """Whether the absolute value of a guarded output is above its limit."""
     return any(
         abs(value) > limit
-        for instance, handle, limits in watches
+        for instance, handle, limits in guarded
         for value, limit in zip(instance.read(handle), limits, strict=True)
     )
 
