@@ -117,14 +117,17 @@ def test_verdicts_and_warnings_of_one_alone_come_first(folder):
 
 
 def test_warnings_are_compared_by_their_kinds_and_runs(folder, tmp_path):
-    """No sentence is read: the same kind in the same runs is the same warning, whatever its words."""
+    """No sentence is read: the same kind in the same runs is the same warning, whatever its words. One in the same
+    words is the same under any kind: an earlier version named it otherwise."""
     speed, far, hot = (
         ("Speed 3.1 rad/s, too high: 1", "model speed"),
         ("Not so far: 2", "far"),
         ("Hot", "hot"),
     )
     results = []
-    for name, warnings in (("a", [speed, far]), ("b", [("Far off: 3", "far"), ("Hot", "model speed"), hot])):
+    a = [speed, far, ("Pushed: 4", "model")]
+    b = [("Far off: 3", "far"), ("Hot", "model speed"), hot, ("Pushed: 4", "model pushed")]
+    for name, warnings in (("a", a), ("b", b)):
         data = numbers(folder, name)
         data["warnings"] = [
             {"kind": kind, "text": text, "runs": [name] if kind == "model speed" else []}

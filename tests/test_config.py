@@ -59,7 +59,7 @@ def test_the_full_example_has_every_event():
     own = {name for name, of in TYPES.items() if of.__module__ == Jam.__module__}
     assert {event.kind for event in full.events.values()} == own - {"cut", "overload"}
     assert (
-        not full.unusual
+        not full.file.unusual
         and full.plate
         and full.table("driveline")
         and full.coupling

@@ -40,13 +40,20 @@ RESULTS = ("BestResult", "IdentificationResult", "SweepResult", "WatchResult")
 
 def test_public_names():
     assert {"Study", "ChainUnitMachine", "ChamberForces", "SideLoads", "InputError"} <= set(chainunit.__all__)
-    for name in (*chainunit.__all__, *RESULTS):
+    assert set(RESULTS) <= set(chainunit.__all__)
+    for name in chainunit.__all__:
         assert getattr(chainunit, name) is getattr(chainunit, name) and name in dir(chainunit)
     assert chainunit.__version__ == metadata.version("chainunit")
     with pytest.raises(AttributeError, match="module 'chainunit' has no attribute 'Chainunit'"):
         chainunit.Chainunit  # noqa: B018
     with pytest.raises(ImportError):
         from chainunit import nothing  # noqa: F401
+
+
+def test_completion_shows_the_public_names_alone_before_they_are_used():
+    code = "import chainunit; print([name for name in dir(chainunit) if name[0] != '_'])"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == str([name for name in chainunit.__all__ if name != "__version__"])
 
 
 def test_the_package_runs_as_a_module_and_names_all_models():

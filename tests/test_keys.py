@@ -138,7 +138,7 @@ def test_a_key_at_its_value_changes_nothing(table, key):
         assert _values(one) == pytest.approx(_values(other), rel=1e-11) and one.name == other.name
     for part in ("simulation",):
         assert getattr(values, part) == getattr(left_out, part)
-    assert values.choices["driveline.place"] == left_out.choices["driveline.place"]
+    assert values.file.choices["driveline.place"] == left_out.file.choices["driveline.place"]
     # a damping ratio stands in place of both dampings, which are none in a file without it
     apart = {"optimize"} | ({"driveline"} if key.name == "damping_ratio" else set())
     for part in set(values.plans) - apart:

@@ -101,7 +101,7 @@ def test_internal_integrator_against_an_error_controlled_solver():
 
 def test_declared_gains_are_the_tuned_ones_of_the_packaged_drive():
     config = load()
-    drive, tuning = tune_motor(config, Drive(DcMotor, config.motor, config.machine))
+    drive = tune_motor(config, Drive(DcMotor, config.motor, config.machine))
     tuned = drive.parameters
     declarations = DcMotor.Parameters()
     for name in ("kp", "ki"):
@@ -111,7 +111,7 @@ def test_declared_gains_are_the_tuned_ones_of_the_packaged_drive():
         assert getattr(declarations.current_control, name) == pytest.approx(
             getattr(tuned.current_control, name), rel=1e-3
         )
-    assert tuning.phase_margin > 60.0
+    assert drive.tuning.phase_margin > 60.0
 
 
 def test_tuning_scales_with_inertia_and_refuses_a_loop_without_margin():

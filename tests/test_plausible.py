@@ -95,7 +95,7 @@ def test_at_the_bounds_every_number_is_finite(seed):
 
 
 def test_the_example_and_random_machines_give_no_remark():
-    assert config.load().unusual == ()
+    assert config.load().file.unusual == ()
     rng = np.random.default_rng(5)
     for _ in range(20):
         names = ChamberForces.parameter_layout.by_name(random_machine(rng).p)
@@ -129,24 +129,24 @@ def test_the_example_and_random_machines_give_no_remark():
     ],
 )
 def test_a_slip_of_the_unit_is_named_with_what_was_meant(text, name, meant):
-    (slip,) = config.parse(text).unusual
+    (slip,) = config.parse(text).file.unusual
     assert (slip.variable.name, slip.meant) == (name, meant)
     assert str(slip).startswith(f"{name} = ") and (f'was "{meant}" meant?' in str(slip)) == bool(meant)
     if meant and name.startswith("event."):
         key = name.rsplit(".", 1)[1]
         line = next(line for line in text.splitlines() if line.startswith(key))
-        assert config.parse(text.replace(line, f'{key} = "{meant}"')).unusual == ()
+        assert config.parse(text.replace(line, f'{key} = "{meant}"')).file.unusual == ()
     elif meant:
         section, *keys = name.split(".")
         inner = f'"{meant}"'
         for key in reversed(keys[1:]):
             inner = f"{{ {key} = {inner} }}"
-        assert config.parse(f"[{section}]\n{keys[0]} = {inner}").unusual == ()
+        assert config.parse(f"[{section}]\n{keys[0]} = {inner}").file.unusual == ()
 
 
 def test_a_machine_in_millimetres_is_told_for_each_length():
     text = "[machine]\n" + "\n".join(f"{name} = {x}" for name, x in MM.items())
-    assert {slip.variable.name: slip.meant for slip in config.parse(text).unusual} == {
+    assert {slip.variable.name: slip.meant for slip in config.parse(text).file.unusual} == {
         f"machine.{name}": f"{x:g} mm" for name, x in MM.items()
     }
 
@@ -175,7 +175,7 @@ def test_the_remark_stands_on_terminal_page_and_in_json():
     drive = Drive(DcMotor, values.motor, values.machine)
     study = StudyRecord(values, drive, statics(values, drive))
     result = as_dict(study)
-    message = str(values.unusual[0])
+    message = str(values.file.unusual[0])
     assert result["slips"] == [
         {
             "name": "machine.pin.diameter",
@@ -192,12 +192,12 @@ def test_the_remark_stands_on_terminal_page_and_in_json():
 
 
 def test_a_gear_ratio_that_no_drive_has_is_remarked():
-    (values,) = map(str, config.parse("[machine]\nratio = 5000").unusual)
+    (values,) = map(str, config.parse("[machine]\nratio = 5000").file.unusual)
     assert values.startswith("machine.ratio = 5000: is unusual") and "usual: 1 to 500" in values
 
 
 def test_the_usual_speed_is_that_of_the_machine():
     fast = '[system]\nmachine = "Accelerator"\n[run]\ncrank_speed = {}'
-    assert config.parse(fast.format(150)).unusual == ()
-    (slip,) = config.parse(fast.format('"90 rev/min"')).unusual
+    assert config.parse(fast.format(150)).file.unusual == ()
+    (slip,) = config.parse(fast.format('"90 rev/min"')).file.unusual
     assert slip.variable.name == "run.crank_speed" and "usual: 10 to 1000 rad/s" in str(slip)

@@ -16,7 +16,7 @@ from chainunit.study.verdict import (
     RESIDUAL,
     ROCKER_GOOD,
     ROCKER_GOOD_EMPTY,
-    outsider,
+    foreign_machine,
     rigid_links,
     two_bars,
 )
@@ -166,7 +166,7 @@ def test_a_shorter_step_is_no_advice_for_a_crank_that_stalls():
 
 
 def test_of_a_machine_that_is_not_known_only_the_energy_balance_is_judged():
-    kept, lost = (outsider(3.0, {"steady": share}) for share in (1e-6, 1.0))
+    kept, lost = (foreign_machine(3.0, {"steady": share}) for share in (1e-6, 1.0))
     assert (kept.holds, kept.caveat) == ("true", None) and as_data(kept)["model"] is None
     assert kept.text == (
         "The machine is an FMU whose own model is not known; its energy balance holds: the crank at 3.00 rad/s."

@@ -7,24 +7,16 @@ alone, for scripts; ``ChamberForces`` is its model, which becomes an FMU.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-__all__ = [
-    "EMPTY",
-    "ChainUnitMachine",
-    "ChamberForces",
-    "GeometryError",
-    "InputError",
-    "RunError",
-    "SideLoads",
-    "Study",
-    "StudyResult",
-    "__version__",
-]
-
 if TYPE_CHECKING:
-    from .app.studies import Study, StudyResult
-    from .core.errors import GeometryError, InputError, RunError
-    from .machines.api import EMPTY, ChainUnitMachine
-    from .machines.chain_unit import ChamberForces, SideLoads
+    from .app.studies import Study as Study
+    from .app.studies import StudyResult as StudyResult
+    from .core.errors import GeometryError as GeometryError
+    from .core.errors import InputError as InputError
+    from .core.errors import RunError as RunError
+    from .machines.api import EMPTY as EMPTY
+    from .machines.api import ChainUnitMachine as ChainUnitMachine
+    from .machines.chain_unit import ChamberForces as ChamberForces
+    from .machines.chain_unit import SideLoads as SideLoads
 
     __version__: str
 
@@ -48,18 +40,21 @@ else:
     def __getattr__(name):
         if name == "__version__":
             value = import_module("importlib.metadata").version(__name__)
+        elif name == "__all__":
+            value = sorted([*_HOMES, *_results_of_capabilities(), "__version__"])
         elif name in _HOMES:
             value = getattr(import_module(_HOMES[name], __name__), name)
-        elif name.endswith("Result") and (result := _result_of_capability(name)):
-            value = result
+        elif name.endswith("Result") and name in (results := _results_of_capabilities()):
+            value = results[name]
         else:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         return globals().setdefault(name, value)
 
-    def _result_of_capability(name):
-        """The class of this name of the result of a method of `Study` that a capability brings; None without one."""
+    def _results_of_capabilities():
+        """The classes of the results of the methods of `Study` that capabilities bring, by their names."""
         modules = import_module(".capabilities", __name__).modules("study_method")
-        return next((module.RESULT for module in modules if module.RESULT.__name__ == name), None)
+        return {module.RESULT.__name__: module.RESULT for module in modules}
 
     def __dir__():
-        return sorted({*globals(), *__all__})
+        shown = {name for name in globals() if name.startswith("__")}
+        return sorted({*shown, *import_module(__name__).__all__})

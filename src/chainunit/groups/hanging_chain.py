@@ -194,7 +194,7 @@ def hang(xp: Any, rods: Rods, reach: tuple[Any, Any], z: Sequence[Any]) -> list[
 
 
 def _gradient(b: Sequence[Any], l: Sequence[Any], H: Any, v: Any, reach: tuple[Any, Any], xp: Any) -> Any:
-    """The function whose minimum is the hanging position, see `machines.hanging`, with its derivatives by H and v:
+    """The function whose minimum is the hanging position, see `hang`, with its derivatives by H and v:
     the horizontal force H > 0, and the weight v between A1 and the point of horizontal pull, both in parts
     of the whole weight."""
     value, by_h, by_v = v * reach[1] - H * reach[0], -reach[0], reach[1]

@@ -292,11 +292,6 @@ class Source:
         items = enumerate(at(self.result, path))
         return [self.words(f"{path}.{i}.text" if isinstance(x, Mapping) else f"{path}.{i}") for i, x in items]
 
-    def conclusions(self) -> Iterator[Text | Judgement]:
-        """The warnings of the result as judgements, then its notes."""
-        yield from (Judgement("warning", each) for each in self.lines("warnings"))
-        yield from (Text(each, "note") for each in self.lines("notes"))
-
     def rows(self, declaration: type, path: str, only: str = "", **more: Any) -> tuple[TableRow, ...]:
         """A row (description, number) for each declared quantity that the result has at `path`, or for `only` one."""
         entries = at(self.result, path)

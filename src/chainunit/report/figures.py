@@ -131,7 +131,9 @@ def _histogram(s: b.Source, study: StudyRecord) -> fig.Figure:
     return load_figures.load_histogram(study.drive, study.steady)
 
 
-@PICTURES.declare(lambda study: _is_steady(study) and not study.drive.outsider, "force_over_stroke.png")
+@PICTURES.declare(
+    lambda study: _is_steady(study) and not study.drive.foreign_machine, "force_over_stroke.png"
+)
 def _stroke(s: b.Source, study: StudyRecord) -> Iterator[fig.Figure]:
     names = [name for name in run_names.motor_runs(study) if run_names.event_time(study, name) is not None]
     parts = {"steady": study.steady} | {

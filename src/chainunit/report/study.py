@@ -78,7 +78,7 @@ def _head(s: b.Source) -> Line:
 
 def _motion(study: StudyRecord) -> list[b.Block]:
     # the links of a foreign FMU are unknown
-    return [motion(study)] if study.runs and not study.drive.outsider else []
+    return [motion(study)] if study.runs and not study.drive.foreign_machine else []
 
 
 # -- the question
@@ -115,7 +115,7 @@ def _question(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         *s.rows(type(feed), "feed", as_given=True),
     ]
     yield b.Table(tuple(rows), title="In short", form="long")
-    if not study.drive.outsider:
+    if not study.drive.foreign_machine:
         alt, model = f"The {noun}: its pins, links and dimensions", study.drive.machine.model
         yield b.Drawing(
             drawing(study.drive.machine), alt, DRAWING, _DRAWING_CAPTION.format(model.angle_counts)

@@ -11,8 +11,9 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
+from ..reading.results import as_data
 from ..work.progress import Report
 
 if TYPE_CHECKING:
@@ -33,6 +34,11 @@ class Findings(ABC):
     def store(self) -> Path | None:
         """The store of its runs, a folder beside the files of the study, if it has one."""
         return None
+
+    def data(self, study: StudyRecord) -> dict[str, Any]:
+        """Its part of result.json: its declared parts."""
+        data: dict[str, Any] = as_data(self)
+        return data
 
     @abstractmethod
     def remark(self, study: StudyRecord) -> None:

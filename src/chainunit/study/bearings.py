@@ -17,7 +17,7 @@ from .window import mean, whole_turns
 def pin_loads(drive: Drive, run: xr.Dataset) -> dict[str, dict[str, float | None]]:
     """Peak, RMS and equivalent load (mean of ISO 281 over the angle that the pin turns) of the reaction of every pin
     and guide [N]; a guide, which does not turn, has no equivalent load. Empty for a machine that is a foreign FMU."""
-    if drive.outsider:
+    if drive.foreign_machine:
         return {}
     table: dict[str, dict[str, float | None]] = {}
     turns = whole_turns(drive, run)

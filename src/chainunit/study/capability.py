@@ -74,15 +74,6 @@ class StudyCapability:
         """The rules of its keys that do not go together with others."""
         return ()
 
-    def check_values(self, data: Mapping[str, Any]) -> None:
-        """Refuse single values of its tables that their forms cannot refuse.
-
-        Raises
-        ------
-        InputError
-            with a line for each fault.
-        """
-
     def plan(self, reading: FileReading) -> Any:
         """The plan that its tables state; None where the file asks for nothing.
 
@@ -178,11 +169,6 @@ class StudyCapability:
 
     def words(self) -> Mapping[str, str]:
         """By name, the words on the numbers of its results, for a comparison of two."""
-        return {}
-
-    def additions(self, study: StudyRecord) -> Mapping[str, Mapping[str, Any]]:
-        """By name, parts of the result that follow from the whole study, ready for JSON; they stand in place of those
-        of findings of the same name."""
         return {}
 
     def take_estimates(self, config: Config, estimates: Estimates, tables: dict[str, Any]) -> None:

@@ -290,9 +290,9 @@ def _with_hints(fault: InputError, unusual: Iterable[UnusualValue]) -> InputErro
     slip of the unit."""
     table = fault.key.partition(".")[0]
     hints = [
-        f'was {slip.variable.name} = "{slip.meant}" meant?'
-        for slip in unusual
-        if slip.meant and slip.variable.name.startswith(f"{table}.")
+        f'was {value.variable.name} = "{value.meant}" meant?'
+        for value in unusual
+        if value.meant and value.variable.name.startswith(f"{table}.")
     ]
     return InputError("; ".join([str(fault), *hints]), fault.key) if hints else fault
 

@@ -133,14 +133,14 @@ class Drive:
         raise AbsentError("machine", f"{self.machine.model.name}: has no organs")
 
     @property
-    def outsider(self) -> ForeignMachine | None:
+    def foreign_machine(self) -> ForeignMachine | None:
         """The machine as the shaft behind the driveline drives it, if it is a foreign FMU; else None."""
         return self.driven_machine if isinstance(self.driven_machine, ForeignMachine) else None
 
     @property
-    def outsiders(self) -> list[str]:
+    def foreign_titles(self) -> list[str]:
         """Titles of the foreign FMUs."""
-        parts = self.outsider and self.outsider.component, self.foreign
+        parts = self.foreign_machine and self.foreign_machine.component, self.foreign
         return [part.title for part in parts if part]
 
     @cached_property
@@ -152,10 +152,10 @@ class Drive:
     def graph(self) -> System:
         """The system of the models, each before the part that drives it. With feed-forward it also has the
         second machine, `model`, that the control uses; and it has the `observer`, if the drive has one."""
-        outsider = self.outsider
+        machine = self.foreign_machine
         system = in_line(
             {
-                "machine": outsider.component if outsider else _component(self.simulated_machine),
+                "machine": machine.component if machine else _component(self.simulated_machine),
                 **{part.name: part.component for part in reversed(self.whole_line.parts)},
                 "motor": self.foreign or ModelComponent(self.motor, self.fmu_parameters),
             }
@@ -175,11 +175,11 @@ class Drive:
     def whole_line(self) -> Line:
         """The line with the gear before a foreign machine that has none. Behind other parts its ratio may be 1: the
         twin with a rigid shaft puts that of the driveline there."""
-        outsider = self.outsider
-        if outsider is None or outsider.model.has_gear() or not (self.line or outsider.needs_gear):
+        machine = self.foreign_machine
+        if machine is None or machine.model.has_gear() or not (self.line or machine.needs_gear):
             return self.line
-        gear = Gear.Parameters(ratio=outsider.ratio)
-        return self.line.behind(PlacedPart("gear", Gear, gear, outsider.ratio))
+        gear = Gear.Parameters(ratio=machine.ratio)
+        return self.line.behind(PlacedPart("gear", Gear, gear, machine.ratio))
 
     @cached_property
     def motor_bond(self) -> Bond:

@@ -55,7 +55,7 @@ def coasting_parameters(drive: Drive) -> dict[str, float]:
 def export_coasting(drive: Drive, folder: Path, backend: Backend | None = None) -> Path | None:
     """Write the FMU of the machine that turns without its motor, with the inertia on its shaft. None for a machine
     that is a foreign FMU, as there is no such model of it."""
-    if drive.outsider:
+    if drive.foreign_machine:
         return None
     model = coasting_model(drive)
     file = folder / f"{model.name}.fmu"

@@ -15,7 +15,7 @@ from ..models import MACHINES
 from ..reading.tables import read_table
 from ..reading.text import chosen_units
 from .checks import lower_limits
-from .event_table import read_events
+from .event_table import read_events, read_random_event
 from .parts import Parts, beside, is_designation, named_table, parts_of
 from .registry import registered
 from .rules import refusals
@@ -39,9 +39,12 @@ def check_values(data: Mapping[str, Any], source: str) -> tuple[Parts | None, li
     with faults.collected():
         if isinstance(data.get("event", []), list):
             read_events(data.get("event", []), known.machine if parts else None)
-    for part in registered():
-        with faults.collected():
-            part.check_values(data)
+    for table, section in all_sections().items():
+        for key in section.random_events:
+            with faults.collected():
+                event = named_table(data, table).get(key)
+                if isinstance(event, Mapping):
+                    read_random_event(event, f"{table}.{key}")
     with faults.collected():
         _check_catalogue(data, source)
     with faults.collected():

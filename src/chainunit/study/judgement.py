@@ -25,8 +25,8 @@ def model_verdict(study: StudyRecord) -> Verdict:
     steady = answers.get(STEADY)
     mean = steady.speed_mean if steady else config.run.crank_speed
     speed, residuals = max(config.run.crank_speed, mean), _residuals(study)
-    if study.drive.outsider:
-        return verdict.outsider(speed, residuals, actual=mean)
+    if study.drive.foreign_machine:
+        return verdict.foreign_machine(speed, residuals, actual=mean)
     if not study.drive.machine.model.sides:
         return verdict.rigid_links(speed, residuals, actual=mean)
     for part in registered():

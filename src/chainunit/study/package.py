@@ -34,11 +34,11 @@ def study_system(config: Config, drive: Drive) -> System:
     """Machine, line and motor of a study, from rest. The speed reference is the crank speed at the motor
     from the start on; feed and processing forces are those of normal running. With feed-forward, the system
     has the second machine that the control uses."""
-    start = drive.loads(config.feed) if drive.outsider else {}
+    start = drive.loads(config.feed) if drive.foreign_machine else {}
     if "w_ref" in drive.graph.components["motor"].connectors:
         start["motor.w_ref"] = config.run.crank_speed * drive.ratio
     for name, machine in (("machine", drive.driven_machine), ("model", drive.machine)):
-        if name in drive.graph.components and not drive.outsider:
+        if name in drive.graph.components and not drive.foreign_machine:
             # a connected input needs no start value, but an FMU that runs alone needs one
             values = _machine(config, machine.model, machine)
             start |= {f"{name}.{variable}": x for variable, x in values.items()}
@@ -192,7 +192,7 @@ def with_rods(number: int, start: Mapping[str, float]) -> type[Model]:
 
 def _is_of(model: type[Model], drive: Drive) -> bool:
     """Whether the model is the machine of the drive, its direct model, or its model with chains."""
-    if drive.outsider:
+    if drive.foreign_machine:
         return False
     own = drive.driven_machine.model
     chains = bool(own.sides) and issubclass(model, ChainedModel)

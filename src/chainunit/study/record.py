@@ -160,7 +160,7 @@ class StudyRecord:
     def turning(self) -> str:
         """The noun for the part of the machine that the motor turns: "crank", or another word for a machine
         without one."""
-        return "crank" if self.drive.outsider else self.drive.machine.model.turning
+        return "crank" if self.drive.foreign_machine else self.drive.machine.model.turning
 
     @property
     def reaches(self) -> bool:

@@ -32,14 +32,14 @@ def conclude(study: StudyRecord) -> None:
             "Values that the study file does not name are those of the packaged example, whose masses and drive "
             "are assumed."
         )
-    elif study.drive.outsider:
+    elif study.drive.foreign_machine:
         own = (
             "The machine is an FMU, {description}. Values that the study file does not "
             "name are the start values of this FMU, which alone computes the turn at constant speed. Its bearings "
             "and its motion behind an open coupling are not known."
         )
-    outsider = study.drive.outsider
-    note("assumed", own, description=outsider.model.description if outsider else "")
+    machine = study.drive.foreign_machine
+    note("assumed", own, description=machine.model.description if machine else "")
     if any(value for name, value in study.drive.machine.by_name.items() if name.endswith("friction")):
         note(
             "smoothed friction",

@@ -16,7 +16,6 @@ from .line.shaft_runs import shaft_findings
 from .measures import measures_of
 from .origins import origin_of
 from .record import StudyRecord
-from .registry import registered
 from .window import Phase
 
 
@@ -160,9 +159,7 @@ def _spread(study: StudyRecord, name: str) -> dict[str, Any]:
 
 def _parts(study: StudyRecord) -> dict[str, Any]:
     """The parts of the result that only some studies have."""
-    more = {name: x for part in registered() for name, x in part.additions(study).items()}
-    parts: dict[str, Any] = as_data({name: x for name, x in study.findings.items() if name not in more})
-    parts |= more
+    parts = {name: found.data(study) for name, found in study.findings.items()}
     if study.statics.modes is not None:
         parts |= _driveline(study)
     return parts

@@ -74,8 +74,8 @@ def run_study(
         choice = choose(config, folder / "fmu", report, backend)
         config = as_chosen(config, choice)
         drive = with_parts_beside(config, choice.drive)
-        if check and drive.outsiders:
-            titles = " and ".join(drive.outsiders)
+        if check and drive.foreign_titles:
+            titles = " and ".join(drive.foreign_titles)
             raise InputError(f"--check: the equations of {titles} are not known; leave --check out")
         study = StudyRecord(config, drive, statics(config, drive), choice.proposal)
         if choice.proposal is not None:

@@ -383,7 +383,7 @@ def rigid_links(speed: float, residuals: Mapping[str, float], *, actual: float |
     return Verdict("machine", "rigid links", speed, tuple(balance_faults(residuals)), actual)
 
 
-def outsider(speed: float, residuals: Mapping[str, float], *, actual: float | None = None) -> Verdict:
+def foreign_machine(speed: float, residuals: Mapping[str, float], *, actual: float | None = None) -> Verdict:
     """The verdict on a machine that is a foreign FMU: only on its energy balance.
 
     Parameters

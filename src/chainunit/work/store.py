@@ -190,7 +190,7 @@ class BatchStore:
             part.write_bytes(content)
 
     def _remove_leftovers(self) -> None:
-        """Remove the temporary files of a process that was killed while it wrote; see `files.whole`."""
+        """Remove the temporary files of a process that was killed while it wrote; see `atomic_file`."""
         for part in self.path.rglob("*.part"):
             if re.search(r"\.[0-9a-f]{16}\.part$", part.name):
                 part.unlink(missing_ok=True)

@@ -160,9 +160,10 @@ def _verdicts(result: StoredResult) -> dict[str, dict[str, str]]:
 
 
 def _warnings_alone(mine: StoredResult, theirs: StoredResult) -> list[str]:
-    """The warnings that one result has and the other has not."""
-    others = {subject for subject, _ in _warnings(theirs)}
-    return [text for subject, text in _warnings(mine) if subject not in others]
+    """The warnings that one result has and the other has not. A kind may have had another name in an earlier version,
+    so that a warning in the same words is the same, too."""
+    others = {x for known in _warnings(theirs) for x in known}
+    return [text for subject, text in _warnings(mine) if subject not in others and text not in others]
 
 
 def _warnings(result: StoredResult) -> Iterator[tuple[Any, str]]:

@@ -73,7 +73,7 @@ def _as_dict(machine: IdentifiedMachine) -> dict[str, Any]:
             }
             for each in start.proposals
         ],
-        "residuals": [_check(machine, each) for each in machine.residual_tests],
+        "residuals": [_check(each) for each in machine.residual_tests],
         "sensors": {
             unknown.name: each
             for unknown, each in fitted_entries(machine.problem, best)
@@ -163,7 +163,7 @@ def _unseen_change(machine: IdentifiedMachine, each: Combination) -> dict[str, A
     return {"text": words, "terms": dict(each.terms)}
 
 
-def _check(machine: IdentifiedMachine, each: ResidualTest) -> dict[str, Any]:
+def _check(each: ResidualTest) -> dict[str, Any]:
     unit = MEASURANDS[each.column].unit
     return {
         "run": each.run,

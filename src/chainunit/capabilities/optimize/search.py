@@ -47,7 +47,6 @@ class Answer:
     x: Any
     value: float
     feasible: bool
-    program: AngleProgram
     point: Solution
     sensitivities: dict[tuple[str, str], float] = field(default_factory=dict)
     at_bounds: dict[tuple[str, str], float] = field(default_factory=dict)
@@ -363,9 +362,7 @@ class Search:
         for name, factor, span in zip(self.wishes.names, point.bounds, self.space.span, strict=False):
             at_bounds[name, "max" if factor > 0.0 else "min"] = -float(factor) * scale / float(span)
         if objective is None:
-            return Answer(
-                x, sum(misses.values()), point.converged, program, point, at_bounds=at_bounds, misses=misses
-            )
+            return Answer(x, sum(misses.values()), point.converged, point, at_bounds=at_bounds, misses=misses)
         feasible = point.converged and float(np.max(program.violation(point.z), initial=0.0)) < _MET
         value = self.value(objective, x) if np.all(np.isfinite(x)) and self.turns(x) else math.nan
         sensitivities: dict[tuple[str, str], float] = {}
@@ -375,7 +372,7 @@ class Search:
                 sign = -1.0 if row.side == "max" else 1.0
                 key = row.owner, row.side
                 sensitivities[key] = sensitivities.get(key, 0.0) + sign * float(factor) * row.per_unit * scale
-        return Answer(x, value, bool(feasible), program, point, sensitivities, at_bounds)
+        return Answer(x, value, bool(feasible), point, sensitivities, at_bounds)
 
 
 def _is_helper(row: Row, rows: Sequence[Row]) -> bool:

@@ -18,7 +18,6 @@ from ...study.config import Config
 from ...study.event_table import RandomEvent, read_random_event
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
-from ...study.parts import named_table
 from ...study.record import StudyRecord
 from ...study.rig import Rig
 from ...study.rules import MACHINE_FMU, NEEDS_MODEL, Rule, has_sides
@@ -57,12 +56,6 @@ class RandomOverloads(Capability):
         yield Rule("monte_carlo.runs", MACHINE_FMU, NEEDS_MODEL, some)
         words = "draws jams of two sides, and the machine is {machine}; give the event in monte_carlo.event"
         yield Rule("monte_carlo.runs", ~(has_sides() | MACHINE_FMU | given(_EVENT)), words, some)
-
-    def check_values(self, data: Mapping[str, Any]) -> None:
-        """Refuse a wrong event."""
-        event = named_table(data, "monte_carlo").get("event")
-        if isinstance(event, Mapping):
-            read_random_event(event, _EVENT)
 
     def plan(self, reading: FileReading) -> RandomPlan:
         """The plan, also of a file without the table."""

@@ -37,7 +37,7 @@ _METHODS: dict[str, str] = {
     "cs": "by co-simulation of the FMUs",
     "me": "by Model Exchange of the FMUs",
 }
-"""The ways in which random overloads are run, see `study.monte_carlo.RandomTask.method`."""
+"""The ways in which random overloads are run, see `.runs.RandomTask.method`."""
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:

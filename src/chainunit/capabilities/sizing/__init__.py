@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
 from ...fmu.backends import Backend
 from ...report.blocks import Block, Source
@@ -78,13 +77,6 @@ class SizingCapability(Capability):
         """That of its table."""
         plan: SizingPlan | None = config.plans[self.name]
         return None if plan is None else ("sizing.temperature", float(plan.demands.temperature))
-
-    def additions(self, study: StudyRecord) -> Mapping[str, Mapping[str, Any]]:
-        """The findings with the gear to order and the protection."""
-        from .result import additions
-
-        found = study.findings.get(self.name)
-        return {} if found is None else {self.name: found.as_dict() | additions(study, found)}
 
     def analyses(self) -> Iterable[type[Analysis]]:
         """The protection of the drive."""

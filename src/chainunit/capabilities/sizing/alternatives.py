@@ -317,7 +317,7 @@ def _slip_clutch(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative 
     """A slip clutch with the setting that running alone allows, in a start from the angle from which the direct start
     takes longest: there the load is largest. It slips in the overloads as well."""
     capacity = setting.least_in_running
-    if rig.drive.outsiders or capacity >= setting.gear:
+    if rig.drive.foreign_titles or capacity >= setting.gear:
         return None
     slowest = max(study.findings[StartAnalysis.name].starts, key=lambda start: start.start_time or 0.0)
     run = slip_run(rig, slowest, capacity)

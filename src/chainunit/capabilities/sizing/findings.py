@@ -19,6 +19,7 @@ from .coupling import recommended_setting
 from .duty import Duty
 from .preference import ORDER, poles_rank
 from .protection import Alternative, Obstacle, Setting
+from .result import gear_data, protection_data
 from .table import Sizing, SizingPlan
 
 INSUFFICIENT = "No motor of the catalogue fits; all runs are with the nearest, which is insufficient."
@@ -141,6 +142,14 @@ class SizingFindings(Findings):
             duty=trial.duty if fits else None,
             inverter_current=trial.inverter_current,
         )
+
+    def data(self, study: StudyRecord) -> dict[str, Any]:
+        """Its declared parts, with the gear to order and the protection."""
+        rated = self.best.motor.nameplate.rated_current
+        return super().data(study) | {
+            "gear": gear_data(study, self.setting, self.plan.demands.margin),
+            "protection": protection_data(study, self.setting, self.alternatives, rated),
+        }
 
     def remark(self, study: StudyRecord) -> None:
         """Add the notes on the choice, and one on each ram of a linkage at the recommended coupling."""

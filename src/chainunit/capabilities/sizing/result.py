@@ -2,27 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ...reading.text import entries, entry, number
 from ...study.record import StudyRecord
 from ...study.relay import class_words
 from .coupling_words import coupling_sentence, way_words, why_none
-from .findings import SizingFindings
 from .gear_order import gear_order
-from .protection import CouplingEffect, Obstacle
+from .protection import Alternative, CouplingEffect, Obstacle, Setting
 
 
-def additions(study: StudyRecord, found: SizingFindings) -> dict[str, Any]:
-    """The gear to order and the protection of the drive that was chosen, ready for JSON."""
-    return {"gear": _gear(study, found), "protection": _protection(study, found)}
-
-
-def _gear(study: StudyRecord, found: SizingFindings) -> dict[str, Any]:
-    """The gear to order, and the load that decides; empty where there is no drive to order."""
-    margin = found.plan.demands.margin
-    order = gear_order(study, found.setting, margin)
+def gear_data(study: StudyRecord, setting: Setting | None, margin: float) -> dict[str, Any]:
+    """The gear to order with this share as `margin`, and the load that decides, ready for JSON; empty where there is
+    no drive to order."""
+    order = gear_order(study, setting, margin)
     if order is None:
         return {}
     decides = order.decides
@@ -48,11 +42,14 @@ def _gear(study: StudyRecord, found: SizingFindings) -> dict[str, Any]:
 _UNTRIED = "not judged: this study has no overload; add [[event]]"
 
 
-def _protection(study: StudyRecord, found: SizingFindings) -> dict[str, Any]:
-    """Settings of the protection of the drive; empty where the motor is insufficient."""
+def protection_data(
+    study: StudyRecord, setting: Setting | None, alternatives: Sequence[Alternative], rated: float
+) -> dict[str, Any]:
+    """Settings of the protection of the drive, whose motor has the `rated` current [A], ready for JSON; empty where
+    the motor is insufficient."""
     if study.insufficient:
         return {}
-    relay, setting = _relay(study, found.best.motor.nameplate.rated_current), found.setting
+    relay = _relay(study, rated)
     if setting is None:
         return relay
 
@@ -66,7 +63,7 @@ def _protection(study: StudyRecord, found: SizingFindings) -> dict[str, Any]:
             "safety coupling, trip torque at the motor's shaft",
         ),
         **relay,
-        "coupling": coupling_sentence(study, setting, found.alternatives),
+        "coupling": coupling_sentence(study, setting, alternatives),
         "obstacle": setting.obstacle,
         "why_none": why_none(setting)
         if setting.overloads or setting.obstacle is not Obstacle.OVERLOADS
@@ -99,7 +96,7 @@ def _protection(study: StudyRecord, found: SizingFindings) -> dict[str, Any]:
                 "opens": {name: entry(peak, "N.m") for name, peak in each.opens.items()},
                 "effects": _effects(study, each.effects),
             }
-            for each in found.alternatives
+            for each in alternatives
         ],
     }
 

@@ -133,7 +133,7 @@ def _trials(
     """The trials of motors such as this one: on the compiled system where there is a compiler."""
     trials = MotorTrials(config, duty)
     drive = trials.candidate(motor).drive
-    if compiler() is not None and backend != "python" and not drive.outsiders:
+    if compiler() is not None and backend != "python" and not drive.foreign_titles:
         return trials
     files, _ = export_drive(drive, folder, backend, lambda what: report(what, 0.0, 1.0))
     return dataclasses.replace(trials, files=files)

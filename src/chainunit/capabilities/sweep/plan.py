@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -134,9 +134,3 @@ def _hypercube(seed: int, size: int, points: int) -> Any:
     from scipy.stats import qmc
 
     return qmc.LatinHypercube(size, rng=np.random.default_rng(seed)).random(points)
-
-
-def plan_values(plan: SweepPlan, numbers: Any) -> Mapping[str, Any]:
-    """The values of the parameters at points of any numbers, by name."""
-    parts = [plan.values(int(n), int(n) + 1) for n in numbers]
-    return {each.name: np.concatenate([part[each.name] for part in parts]) for each in plan.parameters}

@@ -1,7 +1,7 @@
 """A line with a cardan shaft in rotation: natural frequency, resonance and stability.
 
 The mechanics are in `drives.cardan` and `drives.torsion`. This module makes the grids of speeds and bends.
-The analysis as a part of a study is in `torsion_findings`.
+The analysis as a part of a study is in `chainunit.capabilities.torsion.analysis`.
 """
 
 from __future__ import annotations

@@ -16,8 +16,6 @@ from ...mechanism.machine import Mechanism
 
 PLACES = 720
 """Places over the span at which a group is looked at."""
-Wanted = tuple[str, float, float, float]
-"""A link, its length, and the least and largest length with which its group closes all the way [m]."""
 
 
 def open_group(links: Sequence[str], where: str, hint: str = "") -> InputError:
