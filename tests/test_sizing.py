@@ -149,12 +149,12 @@ def test_the_heat_of_a_start_does_not_depend_on_how_long_the_machine_idles(windo
 class Wheeled:
     """Stands for the drive of a candidate: the inertia on the motor's shaft."""
 
-    flywheel: float = 0.0
+    added_inertia: float = 0.0
     ratio = 10.0
 
     @property
     def rotor_inertia(self):
-        return 0.25 + self.flywheel
+        return 0.25 + self.added_inertia
 
 
 def wheel_of(monkeypatch, wanted, inertia, sizes):
