@@ -322,7 +322,7 @@ def test_a_capability_is_a_folder_and_a_line(house):
         assert "Rating life of a pin" in written and shown in written and said["text"] in written
 
     # the same by the command, whose exit status says that the life is too short, and from Python
-    house.run("pin-life", "life.toml", "-o", "alone", status=1)
+    assert "Traceback" not in house.run("pin-life", "life.toml", "-o", "alone", status=1)
     alone = json.loads((house.folder / "alone" / "pin_life.json").read_text("utf-8"))["pin_life"]
     assert alone == found
     assert shown in (house.folder / "alone" / "pin_life.md").read_text("utf-8")

@@ -48,7 +48,7 @@ def sized(tmp_path_factory):
 def test_a_flywheel_makes_a_small_motor_fit_a_load_that_comes_and_goes(sized):
     study, _ = sized
     best = study.findings["sizing"].best
-    assert study.findings["sizing"].chosen_candidate is best and best.drive.flywheel > 0.0
+    assert study.findings["sizing"].chosen_candidate is best and best.drive.added_inertia > 0.0
     steady, ratio = study.answers["steady"], study.drive.ratio
     plate = best.motor.nameplate
     # without it the RMS torque of the turn alone asks for more than the motor has

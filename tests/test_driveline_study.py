@@ -27,8 +27,8 @@ from chainunit.capabilities.torsion.table import TorsionTable
 from chainunit.core.engines import MATH, numpy_
 from chainunit.core.quantities import Layout
 from chainunit.drives import shafts, torsion
-from chainunit.drives.cardan import Cardan, Twist, frozen_frequency, two_joints
-from chainunit.drives.torsion import rigid, settling_time, simulate, steady, with_damping_ratio
+from chainunit.drives.cardan import Cardan, Twist, frozen_frequency, two_joints, with_damping_ratio
+from chainunit.drives.torsion import rigid, settling_time, simulate, steady
 from chainunit.reading.results import as_data
 from chainunit.reading.text import number
 from chainunit.report import blocks, figure

@@ -1082,4 +1082,4 @@ def test_an_interrupted_sweep_keeps_what_it_has(undamped):
 
     result, ended = study_chain(drive, study.table("chain"), study.feed, 8.0, fmu.archive, report)
     assert isinstance(ended, InterruptedRunError) and "interrupted at" in str(ended)
-    assert [round(n.speed, 3) for n in result.sweep] == [1.0, 8.0] and result.own.speed == 8.0
+    assert [round(n.speed, 3) for n in result.speeds] == [1.0, 8.0] and result.own.speed == 8.0

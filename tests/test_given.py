@@ -18,7 +18,7 @@ from chainunit.core.quantities import Layout
 from chainunit.report import blocks
 from chainunit.report.study import report
 from chainunit.study import remarks
-from chainunit.study.catalogue_drive import with_wheel
+from chainunit.study.catalogue_drive import with_inertia
 from chainunit.study.choice import as_chosen, choose
 from chainunit.study.config import load, parse
 from chainunit.study.given import given_sections
@@ -100,8 +100,8 @@ def test_the_slip_compensation_that_is_used_is_shown(tmp_path):
         assert result["starter"]["inverter.slip"]["value"] == drive.parameters.inverter.slip
         assert origin_of(study, "starter.inverter.slip") == ("file" if given else "catalogue")
         # a flywheel that a comparison adds has the setting of a drive with one
-        wheel = with_wheel(config, drive, 0.1)
-        assert wheel.flywheel == 0.1 and wheel.parameters.inverter.slip == (used if given else 0.0)
+        wheel = with_inertia(config, drive, 0.1)
+        assert wheel.added_inertia == 0.1 and wheel.parameters.inverter.slip == (used if given else 0.0)
         (note,) = [remark.text for remark in study.remarks if remark.kind == "slip compensation"] or [""]
         assert ("rated slip" in note) == (not given and used > 0.0)
         assert ("flywheel has to slow down" in note) == (not given and used == 0.0)

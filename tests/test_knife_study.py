@@ -91,7 +91,7 @@ def rig(done):
 
 def at_speed(rig, flywheel, **changes):
     """The rig with that flywheel, at its speed from the start on."""
-    drive = dataclasses.replace(rig.drive, flywheel=flywheel)
+    drive = dataclasses.replace(rig.drive, added_inertia=flywheel)
     speed = rig.config.run.crank_speed * drive.ratio
     return dataclasses.replace(
         rig,

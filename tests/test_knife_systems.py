@@ -161,8 +161,8 @@ def test_a_cardan_line_on_the_crank(tmp_path):
     motor = study.drive.fmu_parameters.rotor.J * study.drive.ratio**2
     c = line.c2 * line.c3 / (line.c2 + line.c3)
     for J, k in (
-        (turn.inertia_largest, study.statics.torsion.k_least),
-        (turn.inertia_least, study.statics.torsion.k_largest),
+        (turn.inertia_largest, study.statics.modes.k_least),
+        (turn.inertia_least, study.statics.modes.k_largest),
     ):
         assert k == pytest.approx(math.sqrt(c * (1.0 / motor + 1.0 / (line.J4 + J))), rel=0.03)
     assert sections(study) >= COMMON | {"flywheels", "shaft"}

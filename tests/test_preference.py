@@ -184,7 +184,7 @@ def made(name, power=2200.0, poles=4.0, flywheel=0.0, used=0.5, **more):
     motor = dataclasses.replace(
         motor, designation=name, nameplate=dataclasses.replace(motor.nameplate, **plate)
     )
-    drive = SimpleNamespace(flywheel=flywheel, ratio=50.0, follows=False)
+    drive = SimpleNamespace(added_inertia=flywheel, ratio=50.0, follows=False)
     checks = {"temperature": Check("heat", used, 1.0, "1"), "crank_speed": Check("speed", 0.95, 1.0, "1")}
     measured = {name: more.pop(name) for name in ("start_class", "frequency") if name in more}
     trial = TrialResult(checks, **({"start_class": 10} | measured))
@@ -406,7 +406,7 @@ def check_order(config, first, name, tmp_path, monkeypatch, *motors):
         again = result.chosen_candidate
         assert again is not None and again.keeps_margin
         assert (again.motor, again.drive.ratio) == (best.motor, best.drive.ratio)
-        assert again.drive.flywheel == best.drive.flywheel == 0.0
+        assert again.drive.added_inertia == best.drive.added_inertia == 0.0
         used = again.sizes["gear_start"]
         assert used == pytest.approx(start / START_FACTOR / torque, rel=1e-3)
     assert used > 0.95
@@ -419,7 +419,7 @@ def test_the_heavy_mill_gets_the_motor_without_a_flywheel(tmp_path, monkeypatch)
     config, result = sized("heavy_mill", tmp_path, monkeypatch, *motors, candidates=2.0)
     best, small = result.candidates
     assert result.chosen_candidate is best and best.motor.designation == "IE3 4-pole 0.75 kW, 80M"
-    assert best.drive.flywheel == 0.0 and best.checks["start"].value < 0.2
+    assert best.drive.added_inertia == 0.0 and best.checks["start"].value < 0.2
     assert (best.drive.ratio, best.series) == (100.0, "R20")
     assert best.use <= 0.9
     # its start is that from the worst angle, which takes longer than that from 0 deg
@@ -427,7 +427,7 @@ def test_the_heavy_mill_gets_the_motor_without_a_flywheel(tmp_path, monkeypatch)
     slowest = max(start.start_time for start in starts)
     assert best.worst_start and best.checks["start"].value == pytest.approx(slowest, rel=0.02)
     # the smaller one fits, too, and the result has the trade
-    assert small.fits and small.drive.flywheel > 50.0 * small.motor.nameplate.J
+    assert small.fits and small.drive.added_inertia > 50.0 * small.motor.nameplate.J
     assert small.checks["start"].value > 5.0 and small.criterion in (Criterion.START, Criterion.FLYWHEEL)
     assert result.trade == (small, best) and as_data(result)["trade"] == [1, 0]
     numbers = as_data(result)["candidates"][1]["flywheel"]
@@ -607,7 +607,7 @@ def test_a_motor_that_stalls_in_the_peak_runs_with_a_flywheel(tmp_path, monkeypa
     result = pressed(tmp_path, monkeypatch, "", *motors)
     best = result.chosen_candidate
     assert best is not None and best.motor.designation == motors[0] and best.keeps_margin and result.weak == 0
-    assert best.drive.flywheel > 20.0 * best.motor.nameplate.J and best.reason.startswith(
+    assert best.drive.added_inertia > 20.0 * best.motor.nameplate.J and best.reason.startswith(
         "the smallest that fits"
     )
     # the drive runs as its checks say, with its gear and its flywheel, in a run of its own
@@ -628,7 +628,7 @@ def test_a_motor_that_stalls_without_a_flywheel_is_told_so(tmp_path, monkeypatch
     result = pressed(tmp_path, monkeypatch, "inertia_ratio = 2\n", "IE3 4-pole 0.55 kW, 80M")
     (c,) = result.candidates
     assert result.chosen_candidate is None
-    bare = dataclasses.replace(c, drive=dataclasses.replace(c.drive, flywheel=0.0))
+    bare = dataclasses.replace(c, drive=dataclasses.replace(c.drive, added_inertia=0.0))
     MotorTrials(parse(PRESS, str(EXAMPLES / "linkages" / "press.toml")), result.duty).judged(bare)
     rank(alone := [bare], 2.0)
     assert "without a flywheel it stalls at 2" in alone[0].reason and "deg" in alone[0].reason
@@ -675,7 +675,7 @@ def test_the_next_motor_without_a_flywheel_gets_its_boost(monkeypatch):
     """A larger motor that starts with a boost of 10 % alone counted as one that does not start."""
     config, small = proposed("[sizing]\nlarger = 1\n", start="inverter")
     small.trial = TrialResult({"start": Check("time to start", 1.0, 2.0, "s")})
-    small.drive = dataclasses.replace(small.drive, flywheel=0.5)
+    small.drive = dataclasses.replace(small.drive, added_inertia=0.5)
     motors = [m for m in catalogue() if m.nameplate.poles == small.motor.nameplate.poles][:6]
 
     def judged(self, c, **options):

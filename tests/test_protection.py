@@ -463,7 +463,7 @@ def test_the_sentence_on_a_coupling_names_both_shafts_and_its_effect(on_line):
 
 def test_a_coupling_before_the_flywheel_carries_each_start_and_one_sided_feed(on_line):
     """Its torque in starts from eight angles and with all feed on either side, against single runs by hand."""
-    drive = dataclasses.replace(on_line.drive, flywheel=2.0 * on_line.drive.parameters.rotor.J)
+    drive = dataclasses.replace(on_line.drive, added_inertia=2.0 * on_line.drive.parameters.rotor.J)
     study = dataclasses.replace(on_line, config=dataclasses.replace(on_line.config, events={}))
     rig = Rig(study.config, drive, None)
     way = _before_flywheel(study, rig, sizing_of(on_line).setting)
@@ -526,7 +526,7 @@ def test_the_torque_through_a_coupling_by_hand(on_line):
     w, a, gap = (run[f"motor.{name}"].values for name in ("w", "a", "air_gap_tau"))
     p = drive.fmu_parameters.rotor
     assert run["motor.tau"].values == pytest.approx(gap - p.d * w - p.J * a, rel=1e-9, abs=1e-9)
-    heavier = dataclasses.replace(drive, flywheel=0.4 * p.J, gear_inertia=0.1 * p.J)
+    heavier = dataclasses.replace(drive, added_inertia=0.4 * p.J, gear_inertia=0.1 * p.J)
     behind = run.assign({"motor.tau": run["motor.tau"] - 0.5 * p.J * run["motor.a"]})
     bare = drive.parameters.rotor
     by_hand = float(np.max(np.abs(gap - bare.d * w - bare.J * a))) * drive.ratio

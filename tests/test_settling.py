@@ -59,7 +59,7 @@ def mill():
     config = parse(MILL)
     bars = cycle(config.machine, config.run.crank_speed, config.feed)
     drive = catalogue_drive(config, config.plate, bars.crank_torque)
-    drive = replace(drive, flywheel=config.values["flywheel"].J)
+    drive = replace(drive, added_inertia=config.values["flywheel"].J)
     rig = Rig(config, drive, None)
     with rig.from_rest() as simulation:
         start = start_up(rig, simulation, config.stop, lambda time: None, {})

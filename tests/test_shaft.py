@@ -22,7 +22,7 @@ from chainunit.study import config
 from chainunit.study.choice import choose
 from chainunit.study.cycle import cycle
 from chainunit.study.drive_fmus import coasting_parameters
-from chainunit.study.line.shaft import RIGID, Cycles, driveline_of, rainflow, shaft_answers, torsion
+from chainunit.study.line.shaft import RIGID, Cycles, driveline_of, line_modes, rainflow, shaft_answers
 from chainunit.study.line.shaft_runs import ShaftFindings, shaft_findings
 from chainunit.study.package import export_study, start_of
 from chainunit.study.readings import crank_torque
@@ -122,7 +122,7 @@ def test_before_or_behind_the_gear(tmp_path):
         np.testing.assert_allclose(
             crank_torque(crank.drive, a), crank_torque(motor.drive, b), rtol=1e-7, atol=1e-6
         )
-    assert crank.statics.torsion.k_largest == pytest.approx(motor.statics.torsion.k_largest, rel=1e-12)
+    assert crank.statics.modes.k_largest == pytest.approx(motor.statics.modes.k_largest, rel=1e-12)
     assert crank.answers["jam_left"].speed_least == pytest.approx(
         motor.answers["jam_left"].speed_least, rel=1e-9
     )
@@ -131,7 +131,7 @@ def test_before_or_behind_the_gear(tmp_path):
 def test_the_frequency_is_that_of_rotor_gear_shafts_and_machine(study):
     """The eigenproblem in the angles of rotor (behind the gear) and driven shaft, the straight cardan condensed."""
     drive = study.drive
-    line, rotor, result = driveline_of(drive), drive.fmu_parameters.rotor.J, torsion(drive, [2e-3, 9e-3])
+    line, rotor, result = driveline_of(drive), drive.fmu_parameters.rotor.J, line_modes(drive, [2e-3, 9e-3])
     for J, expected in zip((2e-3, 9e-3), (result.k_largest, result.k_least), strict=True):
         c = 1.0 / (1.0 / line.c2 + 1.0 / line.c3)
         # twist = phi_motor/ratio - phi_driven; both inertias where they turn

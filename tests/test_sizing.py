@@ -149,12 +149,12 @@ def test_the_heat_of_a_start_does_not_depend_on_how_long_the_machine_idles(windo
 class Wheeled:
     """Stands for the drive of a candidate: the inertia on the motor's shaft."""
 
-    flywheel: float = 0.0
+    added_inertia: float = 0.0
     ratio = 10.0
 
     @property
     def rotor_inertia(self):
-        return 0.25 + self.flywheel
+        return 0.25 + self.added_inertia
 
 
 def wheel_of(monkeypatch, wanted, inertia, sizes):
@@ -163,8 +163,8 @@ def wheel_of(monkeypatch, wanted, inertia, sizes):
     trials = []
 
     def judged(self, candidate):
-        trials.append(candidate.drive.flywheel)
-        used = sizes(candidate.drive.flywheel)
+        trials.append(candidate.drive.added_inertia)
+        used = sizes(candidate.drive.added_inertia)
         candidate.trial = TrialResult({name: Check(name, share, 1.0, "1") for name, share in used.items()})
         return candidate
 
@@ -204,12 +204,12 @@ def test_the_flywheels_tried_go_as_far_as_the_hand_formula_with_the_machine(monk
     best, trials = wheel_of(monkeypatch, 200.0, 75.0, lambda J: {"speed": 1.5})
     assert trials == [0.0, *(pytest.approx(share) for share in (0.03, 0.1, 0.3, 1.0))]
     best, _ = wheel_of(monkeypatch, 200.0, 75.0, lambda J: {"rms_torque": 1.5 - J})
-    assert best.drive.flywheel == pytest.approx(0.5, abs=0.1) and best.fits
+    assert best.drive.added_inertia == pytest.approx(0.5, abs=0.1) and best.fits
 
 
 def test_no_flywheel_is_tried_that_is_small_beside_what_is_there(monkeypatch):
     best, trials = wheel_of(monkeypatch, 105.0, 75.0, lambda J: {"rms_torque": 1.2})
-    assert trials == [best.drive.flywheel] == [0.0]
+    assert trials == [best.drive.added_inertia] == [0.0]
 
 
 def test_of_flywheels_that_are_too_heavy_the_nearest_is_kept(monkeypatch):
@@ -217,9 +217,9 @@ def test_of_flywheels_that_are_too_heavy_the_nearest_is_kept(monkeypatch):
     best, trials = wheel_of(
         monkeypatch, 200.0, 75.0, lambda J: {"speed": 3.0 - J, "inertia": 0.5 + 1000.0 * J}
     )
-    assert len(trials) == 5 and best.drive.flywheel == 0.0
+    assert len(trials) == 5 and best.drive.added_inertia == 0.0
     best, trials = wheel_of(monkeypatch, 200.0, 75.0, lambda J: {"speed": 3.0 - J, "inertia": 0.5 + 3.0 * J})
-    assert best.violation == pytest.approx(2.7) and best.drive.flywheel == max(trials)
+    assert best.violation == pytest.approx(2.7) and best.drive.added_inertia == max(trials)
 
 
 def test_a_check_is_what_is_used_of_what_is_permitted():
@@ -251,9 +251,9 @@ def test_the_smallest_that_fits_is_chosen_and_the_others_are_told_why(sized):
         fits = all(u is not None and u <= 1.0 for u in used)
         assert fits == c.fits == (c.verdict is not Standing.REJECTED)
         if c.verdict is Standing.FITS and c.power < choice.power:
-            assert c.criterion is Criterion.FLYWHEEL and c.drive.flywheel > 0.0
+            assert c.criterion is Criterion.FLYWHEEL and c.drive.added_inertia > 0.0
     assert {c.verdict for c in sized.candidates} >= {Standing.CHOSEN, Standing.FITS}
-    assert choice.keeps_margin and choice.drive.flywheel == 0.0
+    assert choice.keeps_margin and choice.drive.added_inertia == 0.0
 
 
 def test_peaks_are_of_both_sides(sized, tmp_path):
@@ -484,18 +484,18 @@ def test_above_the_corner_an_inverter_has_less_torque(tmp_path, monkeypatch):
     rated = c.motor.nameplate.torque
     assert c.checks["rms_torque"].limit == pytest.approx(0.5 * rated, rel=0.1)
     # all feed on the right asks more than it has left, all on the left does not: a flywheel evens that
-    assert c.verdict is Standing.CHOSEN and c.drive.flywheel > 0.0 and c.sizes["peak_torque"] <= 0.9
+    assert c.verdict is Standing.CHOSEN and c.drive.added_inertia > 0.0 and c.sizes["peak_torque"] <= 0.9
     # it is the least, to the last of three halvings of the widest step of the search, from 0.3 to 1
     step = 0.7 / 8.0 / 0.3
     lighter = dataclasses.replace(
-        c, drive=dataclasses.replace(c.drive, flywheel=(1.0 - step) * c.drive.flywheel)
+        c, drive=dataclasses.replace(c.drive, added_inertia=(1.0 - step) * c.drive.added_inertia)
     )
     MotorTrials(config, outcome.duty).judged(lighter)
     assert lighter.sizes["peak_torque"] > 0.9
     monkeypatch.setattr(motor_trials, "torque_evening_inertia", lambda *of: 0.0)
     (light,) = sizing.size(config, tmp_path, lambda *said: None).candidates
     assert light.verdict is Standing.INSUFFICIENT and "peak torque" in light.reason
-    assert light.drive.flywheel < 0.1 * c.drive.flywheel
+    assert light.drive.added_inertia < 0.1 * c.drive.added_inertia
 
 
 def test_the_peak_torque_is_that_of_the_feed_that_moves_too(tmp_path, monkeypatch):

@@ -1,7 +1,7 @@
 """Forces in a chain unit, as Python and as FMUs.
 
 ``Study`` runs a machine with its motor, as the command ``chainunit study`` does; ``ChainUnitMachine`` is the machine
-alone, for scripts and sweeps; ``ChamberForces`` is its model, which becomes an FMU.
+alone, for scripts; ``ChamberForces`` is its model, which becomes an FMU.
 """
 
 from importlib import import_module

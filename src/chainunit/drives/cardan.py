@@ -9,9 +9,11 @@ right only for this yoke. `i23` is d phi3/d phi2: it varies twice a turn, its me
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import Any, NamedTuple
 
+from ..core.engines import MATH, Dual, dual, slope, value
 from ..core.errors import InputError
 from ..core.quantities import Layout, Value, declaration, quantity, violations
 
@@ -109,6 +111,19 @@ def frozen_frequency(xp: Any, p: Cardan, i: Any) -> Any:
     return xp.sqrt(p.c2 * (i * i + p.J1 / p.J4) / (p.J1 * (i * i + p.c2 / p.c3)))
 
 
+def largest_frequency(xp: Any, p: Cardan) -> Any:
+    """An upper bound of the natural frequency over the turn [rad/s], from the bounds of i23 by the bends."""
+    least = xp.cos(p.alpha1) * xp.cos(p.alpha2)
+    return xp.maximum(frozen_frequency(xp, p, least), frozen_frequency(xp, p, 1.0 / least))
+
+
+def with_damping_ratio(p: Cardan, ratio: float) -> Cardan:
+    """The line with damping of both shafts in proportion to their stiffness, so that the torsional vibration at i23 =
+    1 has the damping `ratio`. The shape of the vibration stays the same, and 2 ratio k = (d/c) k^2."""
+    k = float(frozen_frequency(MATH, p, 1.0))
+    return dataclasses.replace(p, d2=2.0 * ratio * p.c2 / k, d3=2.0 * ratio * p.c3 / k)
+
+
 class FrequencyBand(NamedTuple):
     """The frozen-angle frequency over a turn [rad/s], and its limits at extreme ratios."""
 
@@ -150,10 +165,6 @@ def frequency_band(p: Cardan, points: int = 3600) -> FrequencyBand:
 def sensitivity(p: Cardan, i: float = 1.0) -> dict[str, float]:
     """Relative change of the natural frequency per relative change of J1, J4, c2, c3 at the ratio `i`, exactly, by
     dual numbers."""
-    import dataclasses
-
-    from ..core.engines import MATH, Dual, dual, slope, value
-
     shares = {}
     for name in ("J1", "J4", "c2", "c3"):
         size = getattr(p, name)

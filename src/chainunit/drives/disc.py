@@ -1,4 +1,4 @@
-"""A flywheel as a disc of steel: the dimensions by which people name it."""
+"""An inertia as a disc of steel, by whose dimensions people name it."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ from ..core.integrators import rk4
 from ..core.quantities import quantity
 from ..reading.results import derived, part, result
 from ..work.progress import Progress
-from .cardan import Cardan, Twist, frozen_frequency, middle_angle, two_joints
+from .cardan import Cardan, Twist, frozen_frequency, largest_frequency, middle_angle, two_joints
 
 HALF_TURN = np.array([math.pi, 0.0, math.pi, 0.0])
 STEPS_PER_PERIOD = 32
@@ -64,13 +64,6 @@ def _pick(p: Cardan, places: Any) -> Cardan:
     return dataclasses.replace(p, **{f.name: getattr(p, f.name)[places] for f in dataclasses.fields(p)})
 
 
-def largest_frequency(p: Cardan) -> Any:
-    """An upper bound of the natural frequency over the turn [rad/s], from the bounds of i23 by the bends."""
-    xp = numpy_()
-    least = np.cos(p.alpha1) * np.cos(p.alpha2)
-    return np.maximum(frozen_frequency(xp, p, least), frozen_frequency(xp, p, 1.0 / least))
-
-
 def half_turn_steps(p: Cardan, speed: Any) -> Any:
     """Number of steps of a half turn that resolves the vibration and the ratio, with the shape of `speed`.
 
@@ -78,7 +71,7 @@ def half_turn_steps(p: Cardan, speed: Any) -> Any:
     """
     steep = np.maximum(np.tan(0.5 * np.maximum(p.alpha1, p.alpha2)), 0.05)
     harmonics = 1.0 + 0.5 * math.log(1e-4) / np.log(steep)
-    periods = largest_frequency(p) / (2.0 * np.asarray(speed))
+    periods = largest_frequency(numpy_(), p) / (2.0 * np.asarray(speed))
     return np.ceil(np.maximum(STEPS_PER_HARMONIC * harmonics, STEPS_PER_PERIOD * periods)).astype(int)
 
 
@@ -340,13 +333,6 @@ def _free(p: Cardan, x: Any, drive: Any, load: Any, monodromy: Any) -> Any:
     matrix = np.moveaxis(monodromy * scale[None] / scale[:, None], 2, 0)
     rest = np.linalg.eigvals((np.swapaxes(rotation, 1, 2) @ matrix @ rotation)[:, 1:, 1:])
     return np.max(np.abs(rest), axis=1)
-
-
-def with_damping_ratio(p: Cardan, ratio: float) -> Cardan:
-    """The line with damping of both shafts in proportion to their stiffness, so that the torsional vibration at i23 =
-    1 has the damping `ratio`. The shape of the vibration stays the same, and 2 ratio k = (d/c) k^2."""
-    k = float(frozen_frequency(numpy_(), p, 1.0))
-    return dataclasses.replace(p, d2=2.0 * ratio * p.c2 / k, d3=2.0 * ratio * p.c3 / k)
 
 
 @result

@@ -176,8 +176,8 @@ class ChainUnitMachine(Machine):
         """Loads of the organs at a rocker angle `psi` [rad], with speed `w` and acceleration `a` of the rocker,
         independent of the drive: for the papers' statics at +-12 degrees, beyond this drive's swing.
 
-        For an array of angles, the loads of a side and of the rocker are NaN where that side cannot be assembled: a
-        sweep may pass the limit.
+        For an array of angles, the loads of a side and of the rocker are NaN where that side cannot be assembled: the
+        array may pass the limit.
 
         Raises
         ------

@@ -1,5 +1,5 @@
-"""The reader of lists of tables, and of tables by name: the parameters of a sweep, the events of a study, the joints
-of a linkage. The faults of all entries come at once, each with its full key."""
+"""The reader of lists of tables, and of tables by name: the events of a study, the joints of a linkage. The faults
+of all entries come at once, each with its full key."""
 
 from __future__ import annotations
 

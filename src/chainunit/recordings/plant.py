@@ -203,7 +203,7 @@ def free(drive: Drive) -> Drive:
         drive,
         motor=FreeRotor,
         parameters=rotor,
-        flywheel=0.0,
+        added_inertia=0.0,
         gear_inertia=0.0,
         gear_friction=0.0,
         feed_forward=False,

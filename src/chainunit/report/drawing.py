@@ -334,8 +334,8 @@ def _swing(canvas: _Canvas, at: Mapping[str, Point], link: DrawnLink, name: str)
     angle = math.atan2(end[0] - x, end[1] - y)
     canvas.add("line", x1=x, y1=y, x2=x, y2=y + r + 14, stroke="#999999", stroke_dasharray="2 3")
     tip = (x + r * math.sin(angle), y + r * math.cos(angle))
-    sweep = 0 if angle > 0 else 1
-    canvas.add("path", d=f"M {x:.1f} {y + r:.1f} A {r:.1f} {r:.1f} 0 0 {sweep} {tip[0]:.1f} {tip[1]:.1f}",
+    clockwise = 0 if angle > 0 else 1
+    canvas.add("path", d=f"M {x:.1f} {y + r:.1f} A {r:.1f} {r:.1f} 0 0 {clockwise} {tip[0]:.1f} {tip[1]:.1f}",
                fill="none", stroke="#c1440e", stroke_width=1.5)  # fmt: skip
     side = -1.0 if angle > 0 else 1.0
     canvas.label(name, [(x + 10 * side, y + r)], [], fill="#c1440e", font_style="italic")

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from ..core.quantities import Layout
-from ..study.line.shaft import CLASSES, RIGID, ShaftAnswers, Torsion
+from ..study.analysis import is_examined
+from ..study.line.shaft import CLASSES, RIGID, LineModes, ShaftAnswers
 from ..study.line.shaft_runs import shaft_findings
 from ..study.record import StudyRecord
 from ..study.verdict import START, STEADY
@@ -26,8 +27,8 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     if not shaft_findings(study).answers:
         return
     yield _shaft(s, study)
-    if "torsion" not in s.result:
-        yield b.Table(s.rows(Torsion, "driveline"), title="The driveline's torsion")
+    if not is_examined("driveline", study.findings):
+        yield b.Table(s.rows(LineModes, "driveline"), title="The driveline's torsion")
     yield from PICTURES.figures(s, study)
 
 

@@ -8,6 +8,7 @@ An analysis of the base stands in `chainunit.study.analyses`, with its section o
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -26,6 +27,9 @@ class Findings(ABC):
     """What an analysis found: a declared result (`chainunit.reading.results`), whose data are the part of result.json
     under the name of the analysis."""
 
+    examines: ClassVar[str] = ""
+    """name of the part of the line of which it says more than the base of a study"""
+
     @property
     def store(self) -> Path | None:
         """The store of its runs, a folder beside the files of the study, if it has one."""
@@ -39,6 +43,11 @@ class Findings(ABC):
     @abstractmethod
     def remark(self, study: StudyRecord) -> None:
         """Add to the study the remarks that the reader needs beside the numbers."""
+
+
+def is_examined(part: str, findings: Mapping[str, Findings]) -> bool:
+    """Whether one of the findings of a study examines that part of the line."""
+    return any(each.examines == part for each in findings.values())
 
 
 @dataclass(frozen=True)

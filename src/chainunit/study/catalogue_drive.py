@@ -112,11 +112,12 @@ def with_starter(p: Any, plate: Nameplate, config: Config) -> Any:
     return dataclasses.replace(p, soft_start=soft, inverter=Inverter(on=float(follows), **control))
 
 
-def with_wheel(config: Config, drive: Drive, flywheel: float) -> Drive:
-    """The drive with that flywheel [kg m2]. Slip compensation raises the frequency in each peak of the load, where a
-    flywheel has to slow down to give its energy: with a flywheel there is none, unless the file gives it."""
-    drive = dataclasses.replace(drive, flywheel=flywheel)
-    if not flywheel or config.start != "inverter" or not config.of_catalogue or SLIP in config.file.given:
+def with_inertia(config: Config, drive: Drive, added: float) -> Drive:
+    """The drive with that inertia added to the motor's shaft [kg m2]. Slip compensation raises the frequency in each
+    peak of the load, where the inertia has to slow down to give its energy: with an added one there is none, unless
+    the file gives it."""
+    drive = dataclasses.replace(drive, added_inertia=added)
+    if not added or config.start != "inverter" or not config.of_catalogue or SLIP in config.file.given:
         return drive
     inverter = dataclasses.replace(drive.parameters.inverter, slip=0.0)
     return dataclasses.replace(drive, parameters=dataclasses.replace(drive.parameters, inverter=inverter))

@@ -15,7 +15,7 @@ from ..drives.motor import Motor
 from ..fmu.backends import Backend
 from ..system import foreign_component
 from ..work.progress import Report
-from .catalogue_drive import catalogue_drive, gear_with, with_wheel
+from .catalogue_drive import catalogue_drive, gear_with, with_inertia
 from .config import Config
 from .cycle import cycle
 from .drive import Drive
@@ -51,8 +51,8 @@ def _drive_of_file(config: Config) -> Drive:
     else:
         motor, p = config.motor_type, config.motor
         drive = Drive(motor, p, config.machine, motor.follows(p))
-    flywheel = sum(part.shaft_inertia(config) for part in registered())
-    return with_wheel(config, replace(drive, feed_forward=config.feed_forward), flywheel)
+    added = sum(part.shaft_inertia(config) for part in registered())
+    return with_inertia(config, replace(drive, feed_forward=config.feed_forward), added)
 
 
 def as_chosen(config: Config, choice: Choice) -> Config:

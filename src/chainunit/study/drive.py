@@ -61,8 +61,8 @@ class Drive:
 
     line: Line = field(default_factory=Line)
 
-    flywheel: float = 0.0
-    """inertia of a flywheel on the motor's shaft [kg m2]"""
+    added_inertia: float = 0.0
+    """inertia that is added to the motor's shaft [kg m2]"""
 
     gear_inertia: float = 0.0
     gear_friction: float = 0.0
@@ -91,17 +91,17 @@ class Drive:
 
     @cached_property
     def fmu_parameters(self) -> Any:
-        """Parameters of the motor's FMU: those of the motor, with gear and flywheel added to the rotor."""
+        """Parameters of the motor's FMU: those of the motor, with gear and added inertia in the rotor."""
         p = self.parameters
-        if not (self.flywheel or self.gear_inertia or self.gear_friction):
+        if not (self.added_inertia or self.gear_inertia or self.gear_friction):
             return p
-        J = p.rotor.J + self.gear_inertia + self.flywheel
+        J = p.rotor.J + self.gear_inertia + self.added_inertia
         return replace(p, rotor=replace(p.rotor, J=J, d=p.rotor.d + self.gear_friction))
 
     @property
     def rotor_inertia(self) -> float:
-        """Inertia that turns with the rotor, at the motor's shaft [kg m2]: of rotor, gear and flywheel, and of the
-        parts of the line."""
+        """Inertia that turns with the rotor, at the motor's shaft [kg m2]: of rotor and gear, the added one, and of
+        the parts of the line."""
         self.needs_own("the inertia of its rotor")
         return float(self.fmu_parameters.rotor.J + self.line.at_motor(0.0))
 

@@ -119,7 +119,7 @@ def _lists() -> tuple[str, ...]:
 
 
 def _table(key: str) -> str:
-    """The table of a key; the lists of a sweep and of a search, and each of their parameters and limits, count as
+    """The table of a key; a list whose faults say nothing of the rest of its table, and each of its entries, count as
     tables by themselves."""
     names = key.split(".")
     return ".".join(names[:3]) if ".".join(names[:2]) in _lists() else names[0]

@@ -107,7 +107,7 @@ class KeyTable:
 
 @cache
 def entry_tables() -> dict[str, TableList]:
-    """The declarations of the lists of tables in a table, by name: ``sweep.parameter``."""
+    """The declarations of the lists of tables in a table, by the names of table and key."""
     return {
         f"{table}.{key}": entry
         for table, section in all_sections().items()

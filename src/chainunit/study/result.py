@@ -157,7 +157,7 @@ def _spread(study: StudyRecord, name: str) -> dict[str, Any]:
 def _parts(study: StudyRecord) -> dict[str, Any]:
     """The parts of the result that only some studies have."""
     parts = {name: found.data(study) for name, found in study.findings.items()}
-    if study.statics.torsion is not None:
+    if study.statics.modes is not None:
         parts |= _driveline(study)
     return parts
 
@@ -170,7 +170,7 @@ def _driveline(study: StudyRecord) -> dict[str, Any]:
         "driveline": {
             "damping_ratio": entry(study.config.plans["driveline"].damping_ratio, "1"),
             **entries(driveline_of(study.drive)),
-            **entries(study.statics.torsion),
+            **entries(study.statics.modes),
         },
         "shaft": as_data(shaft),
         "torque_cycles": {

@@ -1,4 +1,4 @@
-"""Results without co-simulation: turns at constant speed, the speed loop, the line's torsion."""
+"""Results without co-simulation: turns at constant speed, the speed loop, the modes of the line."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..drives.speed_control import Loop
 from .config import Config
 from .cycle import Cycle, cycle, no_feed
 from .drive import Drive
-from .line.shaft import Torsion, torsion
+from .line.shaft import LineModes, line_modes
 from .one_sided import one_sided_feeds
 
 
@@ -24,8 +24,8 @@ class DriveStatics:
     """turns at constant speed, by load case"""
     loops: dict[str, Loop] = field(default_factory=dict)
     """the linearised speed loop of a controlled motor, by the inertia that is used (mean, least, largest)"""
-    torsion: Torsion | None = None
-    """torsion of the driveline, if there is one"""
+    modes: LineModes | None = None
+    """the modes of the driveline, if there is one"""
 
     @property
     def normal(self) -> Cycle:
@@ -52,7 +52,7 @@ def statics(config: Config, drive: Drive) -> DriveStatics:
     return DriveStatics(
         cycles=cycles,
         loops={} if drive.foreign else _loops(drive, normal.J),
-        torsion=None if drive.line.part("driveline") is None else _torsion(config, drive, normal.J),
+        modes=None if drive.line.part("driveline") is None else _modes(config, drive, normal.J),
     )
 
 
@@ -73,9 +73,9 @@ def _loops(drive: Drive, inertia: Any) -> dict[str, Loop]:
     return {name: loop for name, loop in loops.items() if loop is not None}
 
 
-def _torsion(config: Config, drive: Drive, inertia: Any) -> Torsion:
+def _modes(config: Config, drive: Drive, inertia: Any) -> LineModes:
     """The natural frequencies of the line; a communication step that is too long for them is refused."""
-    line = torsion(drive, inertia)
+    line = line_modes(drive, inertia)
     if config.run.step > line.step_longest:
         raise InputError(
             f"run.step = {config.run.step:g} s: the driveline swings at {line.k_largest:.4g} rad/s; must be <= "

@@ -1,4 +1,4 @@
-"""Energy that flywheel and moving masses hold: what they take up over a turn, and what they lend to a cut."""
+"""Energy that the moving masses hold: what they take up over a turn, and what they lend to a cut."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def energy_behind(drive: Drive, run: xr.Dataset) -> Any:
 
 
 def energy_held(drive: Drive, run: xr.Dataset) -> Any:
-    """Energy of all moving masses [J], shape (time,): that of the machine, see `energy_behind`, and that of rotor and
-    flywheel, where the motor is no foreign FMU."""
+    """Energy of all moving masses [J], shape (time,): that of the machine, see `energy_behind`, and that of the
+    motor's shaft, where the motor is no foreign FMU."""
     try:
         drive.needs_own("the inertia of its rotor")
     except AbsentError:
@@ -48,8 +48,8 @@ def cutting_power(run: xr.Dataset) -> Any:
 
 
 def stored_shares(turns: xr.Dataset, held: Any) -> tuple[float | None, float | None]:
-    """Energy that rotor, flywheel and machine give to a cut, of the energy `held` by them [J], shape (time,), over
-    the work of the cut: from the begin of the cut to its end, and from the begin to their least energy. None
+    """Energy that the motor's shaft and the machine give to a cut, of the energy `held` by them [J], shape (time,),
+    over the work of the cut: from the begin of the cut to its end, and from the begin to their least energy. None
     where nothing is cut. The rest of the work comes from the motor through the air gap, less friction.
     Towards the end of a cut, where the blade slows down, the motor may already restore their energy. `turns`
     are whole, periodic turns.

@@ -18,8 +18,8 @@ PeakOf = Callable[[Drive, xr.Dataset], float]
 
 
 def on_coupling(drive: Drive, run: xr.Dataset) -> float:
-    """Peak torque in a run on a coupling that sits on the motor shaft behind rotor and flywheel, at the crank [N m]:
-    the torque of the motor less the one that accelerates the inertia on its side."""
+    """Peak torque in a run on a coupling that sits on the motor shaft behind rotor and added inertia, at the crank
+    [N m]: the torque of the motor less the one that accelerates the inertia on its side."""
     return peak(run["motor.tau"].values) * drive.ratio
 
 

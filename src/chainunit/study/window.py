@@ -157,7 +157,7 @@ class Window:
     @cached_property
     def taken_up(self) -> tuple[float, float]:
         """Mean power [W] that the moving masses take up over the steady turns: those of the machine, and all of them
-        with rotor and flywheel. 0 for a run that does not repeat its turns, and where the crank makes none."""
+        with the motor's shaft. 0 for a run that does not repeat its turns, and where the crank makes none."""
         if self.phase is not Phase.STEADY or not has_turn(self.drive, self.run):
             return 0.0, 0.0
         time = self.turns["time"].values
@@ -232,7 +232,7 @@ def drift(drive: Drive, turns: xr.Dataset) -> float:
 
 
 def closes(gap: float, drifts: float, energy: float) -> bool:
-    """Whether turns close, by their `end_gap`, `drift` and `energy_gap`. A heavy flywheel that still speeds up hardly
+    """Whether turns close, by their `end_gap`, `drift` and `energy_gap`. A heavy drive that still speeds up hardly
     changes its speed in a turn, but may take more power for that than the machine. So the change has to be
     small beside the ripple, and the energy that it takes small beside the energy that passes the shaft."""
     return gap <= CLOSED and abs(drifts) <= DRIFT and abs(energy) <= STORED

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from .instance import Instance
-from .simulation import FmuSimulation, Watch
+from .simulation import FmuSimulation, Guarded
 
 _Table = list[tuple[Instance, Any, Any]]
 """For each instance a handle and the values of its signals, shape (n, signals)."""
@@ -29,7 +29,7 @@ class CoSimulation(FmuSimulation):
         _apply(self._signal_values(np.array([self.time])), 0)
         self._transfer()
 
-    def _meet(self, watches: Sequence[Watch]) -> None:
+    def _meet(self, guarded: Sequence[Guarded]) -> None:
         """Do nothing: a co-simulation cannot go back into a step."""
 
     def _steps(self, times: Any) -> Iterator[None]:

@@ -21,7 +21,7 @@ from ..core.errors import InputError, RunError
 from .graph import System
 from .instance import DiscardError, ExchangeInstance
 from .signals import at_time, corners
-from .simulation import FmuSimulation, Watch, beyond
+from .simulation import FmuSimulation, Guarded, beyond
 
 METHODS = ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA")
 """Solvers of scipy. The explicit ones suit motors, shafts and chains; Radau and BDF suit stiff systems."""
@@ -228,22 +228,22 @@ class ModelExchange(FmuSimulation):
             self._row, self.time = self.time, after
             yield
 
-    def _meet(self, watches: Sequence[Watch]) -> None:
+    def _meet(self, guarded: Sequence[Guarded]) -> None:
         """See `Simulation`: go back by bisection in the dense output since the last row, to just after the
         instant."""
         row, now = self._row, self.time
         pieces = ((max(begin, row), min(end, now), dense) for begin, end, dense in self._pieces)
-        low, high, dense = next(piece for piece in pieces if self._at(*piece[1:], watches))
+        low, high, dense = next(piece for piece in pieces if self._at(*piece[1:], guarded))
         for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
-            low, high = (low, middle) if self._at(middle, dense, watches) else (middle, high)
-        self._at(high, dense, watches)
+            low, high = (low, middle) if self._at(middle, dense, guarded) else (middle, high)
+        self._at(high, dense, guarded)
         self.time = high
 
-    def _at(self, t: float, dense: Any, watches: Sequence[Watch]) -> bool:
+    def _at(self, t: float, dense: Any, guarded: Sequence[Guarded]) -> bool:
         """Set the values at an instant in a step of the solver; whether a guard is passed there."""
         self._put(t, dense(t))
-        return beyond(watches)
+        return beyond(guarded)
 
     # -- branching
 

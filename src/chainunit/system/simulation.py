@@ -27,7 +27,7 @@ from .graph import FmuComponent, System, direct_inputs, order
 from .instance import Fmu, Instance, Kind
 from .signals import Profile, at_time
 
-Watch = tuple[Instance, Any, list[float]]
+Guarded = tuple[Instance, Any, list[float]]
 """An instance, the handle of its guarded outputs, and their limits."""
 
 
@@ -305,7 +305,7 @@ class FmuSimulation(Simulation):
     def _run(self, options: RunOptions) -> tuple[xr.Dataset, RunError | None]:
         start, file = self.time, options.file
         n = max(1, math.ceil((options.stop - start) / options.step - 1e-9))
-        recorders, watches = self._recorders(options.names), self._watches(options.guards)
+        recorders, guarded = self._recorders(options.names), self._guarded(options.guards)
         room = n // options.every + 2 if file is None else rows.BLOCK
         failure: RunError | None = None
         try:
@@ -316,7 +316,7 @@ class FmuSimulation(Simulation):
             ):
                 complaints = _Complaints(self._journal)
                 try:
-                    self._record(table, options, n, watches, stopped, complaints)
+                    self._record(table, options, n, guarded, stopped, complaints)
                 except RunError as error:
                     failure = complaints.explain(error)
         except KeyboardInterrupt:
@@ -331,7 +331,7 @@ class FmuSimulation(Simulation):
         table: rows.Rows,
         options: RunOptions,
         n: int,
-        watches: Sequence[Watch],
+        guarded: Sequence[Guarded],
         stopped: Callable[[], bool],
         complaints: _Complaints,
     ) -> None:
@@ -346,9 +346,9 @@ class FmuSimulation(Simulation):
             times = np.minimum(start + options.step * np.arange(first, min(first + rows.BLOCK, n) + 1), stop)
             for _ in self._steps(times):
                 done += 1
-                is_beyond = beyond(watches)
+                is_beyond = beyond(guarded)
                 if is_beyond:
-                    self._meet(watches)
+                    self._meet(guarded)
                 is_interrupted = stopped()
                 ends = is_beyond or is_interrupted or done == n
                 if ends or done % options.every == 0:
@@ -362,7 +362,7 @@ class FmuSimulation(Simulation):
                 complaints.step()
 
     @abstractmethod
-    def _meet(self, watches: Sequence[Watch]) -> None:
+    def _meet(self, guarded: Sequence[Guarded]) -> None:
         """Go back from a row beyond a guard to the instant of the passage, if the simulation can."""
 
     def _interruption(self) -> InterruptedRunError:
@@ -376,7 +376,7 @@ class FmuSimulation(Simulation):
             there += [*(f"{name}.{v}" for v in fmu.outputs()), *inputs]
         return self._handles(rows.selected(names, there))
 
-    def _watches(self, guards: Mapping[str, float]) -> list[Watch]:
+    def _guarded(self, guards: Mapping[str, float]) -> list[Guarded]:
         """Handles and limits of the guards, by instance."""
         for full in guards:
             self.system.connector(full, "output")
@@ -425,11 +425,11 @@ class FmuSimulation(Simulation):
         self.time = self._saved_at
 
 
-def beyond(watches: Sequence[Watch]) -> bool:
+def beyond(guarded: Sequence[Guarded]) -> bool:
     """Whether the absolute value of a guarded output is above its limit."""
     return any(
         abs(value) > limit
-        for instance, handle, limits in watches
+        for instance, handle, limits in guarded
         for value, limit in zip(instance.read(handle), limits, strict=True)
     )
 

@@ -25,7 +25,6 @@ def _report(study: StudyRecord) -> b.Report:
     result = as_dict(study)
     result = {name: result[name] for name in _HEAD if name in result} | {
         "warnings": [each for each in result["warnings"] if each["kind"] == "pin life"],
-        "notes": [],
     }
     s = b.Source(result)
     with shown_in(study.config.units):
@@ -34,7 +33,7 @@ def _report(study: StudyRecord) -> b.Report:
             study.config.title,
             "Rating life of a pin",
             result,
-            (*found, *s.conclusions()),
+            (*found, *(b.Judgement("warning", each) for each in s.lines("warnings"))),
             (),
             source=s.line("Study file: {source} · chainunit {chainunit}"),
             units=study.config.units,

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -19,30 +17,12 @@ from ...study.analysis import Analysis
 from ...study.conditions import is_one_of
 from ...study.config import Config
 from ...study.cycle import Cycle
-from ...study.file_reading import FileReading
-from ...study.file_section import FileSection
-from ...study.organ_limits import slack_and_mode
 from ...study.record import StudyRecord
 from ...study.rules import OF_CHAIN_UNIT, OtherModel, Rule, has_sides
 from ...study.verdict import Verdict
-from .table import ChainOrgans
+from .table import CHAIN, ChainOrgans
 
 _CHAINS = is_one_of("organ", "chain")
-_BEYOND = 1.2
-"""Highest speed of a sweep, over the lowest natural frequency."""
-
-
-def _completed(chain: ChainOrgans, reading: FileReading) -> ChainOrgans | None:
-    """The table of a study with chains, with the speed up to which its sweep shows them: twice the speed of normal
-    running, or a fifth beyond the lowest natural frequency of an organ where that is higher. None with two bars."""
-    if reading.form.organ != "chain" or not isinstance(reading.machine, ChainUnitMachine):
-        return None
-    if "sweep_highest" in reading.given["chain"]:
-        return chain
-    _, mode = slack_and_mode(reading.machine, reading.values["feed"])
-    beyond = _BEYOND * mode if math.isfinite(mode) else 0.0
-    highest = max(2.0 * reading.values["run"].crank_speed, beyond, chain.sweep_lowest)
-    return replace(chain, sweep_highest=highest)
 
 
 class ChainsCapability(Capability):
@@ -58,17 +38,7 @@ class ChainsCapability(Capability):
             ),
         )
     }
-    tables = {  # noqa: RUF012
-        "chain": FileSection(
-            ChainOrgans,
-            title="Chains",
-            follows={
-                "sweep_highest": "twice run.crank_speed, or 1.2 times the lowest mode of an organ if that is more"
-            },
-            order=(("sweep_lowest", ">", "sweep_highest"),),
-            completed=_completed,
-        )
-    }
+    tables = {"chain": CHAIN}  # noqa: RUF012
     other_model = OtherModel(
         _CHAINS,
         "organs are chains",

@@ -77,12 +77,12 @@ class ChainAnalysis(Analysis):
 
     @staticmethod
     def find(study: StudyRecord, work: Work) -> ChainResult | None:
-        """The numbers at the speed of the study and over the sweep. None without native code, as an FMU in Python
+        """The numbers at the speed of the study and over the speeds. None without native code, as an FMU in Python
         would take hours."""
         if study.fmus["machine"].backend != "native":
             study.note(
                 "chains left out",
-                "chains at constant speed and the sweep are left out: they need native code, that is a C compiler.",
+                "chains at constant speed are left out: they need native code, that is a C compiler.",
             )
             return None
         assert work.rig.files is not None
@@ -280,8 +280,8 @@ def rest_forces(machine: ChainUnitMachine, side: str, feed: Any, rods: int) -> t
 def study_chain(
     drive: Drive, chain: ChainOrgans, feed: Feed, own: float, file: Path, report: Report
 ) -> tuple[ChainResult, RunError | None]:
-    """The numbers of chains at the crank speed `own` of a study [rad/s] and over the sweep, by the FMU `file` of the
-    machine; and the error that ended the sweep early, or None. A speed of the sweep whose run fails is left out and
+    """The numbers of chains at the crank speed `own` of a study [rad/s] and over the range of speeds, by the FMU
+    `file` of the machine; and the error that ended the runs early, or None. A speed whose run fails is left out and
     stands in `failures`.
 
     Raises
@@ -294,12 +294,12 @@ def study_chain(
     if modes is not None:
         for mode, frequency in enumerate(modes.frequency[:4], 1):
             critical += [CriticalSpeed(mode, order, float(frequency) / order) for order in (1, 2)]
-    speeds = np.linspace(chain.sweep_lowest, chain.sweep_highest, int(chain.sweep_points)).tolist()
+    speeds, (low, high) = chain.speeds, chain.ends
     if speeds:
         # the resonance itself is added to the grid
         lowest = [each.speed for each in critical[:1]]
-        speeds += [w for w in lowest if chain.sweep_lowest < w < chain.sweep_highest]
-    spacing = (chain.sweep_highest - chain.sweep_lowest) / max(1, len(speeds) - 2)
+        speeds += [w for w in lowest if low < w < high]
+    spacing = (high - low) / max(1, len(speeds) - 2)
     others = sorted({w for w in speeds if abs(w - own) > 1e-9 * own})
     failures: dict[float, str] = {}
     interruption: RunError | None = None
@@ -312,7 +312,7 @@ def study_chain(
             report_share(0.0)
             return numbers_at(fmu, drive, chain, feed, w, report_share, is_stopped)
 
-        # the study's own speed comes first, so that an early end loses only the sweep
+        # the study's own speed comes first, so that an early end loses only the others
         mine, by_rod = at(0, own)
         rows = [mine]
         for k, w in enumerate(others, 1):
@@ -328,7 +328,7 @@ def study_chain(
     names = [f"{part} {k + 1}" for part, count in (("wall", walls), ("web", webs)) for k in range(count)]
     result = ChainResult(
         own=mine,
-        sweep=tuple(rows),
+        speeds=tuple(rows),
         avoid=tuple(bands(rows, _rocker_at_rest(drive, feed), 0.5 * spacing)),
         critical=tuple(critical),
         slack_by_rod={
@@ -351,7 +351,7 @@ def _rocker_at_rest(drive: Drive, feed: Feed) -> float:
 
 
 def bands(rows: Sequence[SpeedNumbers], at_rest: float, reach: float = math.inf) -> list[Band]:
-    """Speeds to avoid, from the rows of a sweep in rising order. Neighbours with the same reason are one
+    """Speeds to avoid, from rows in rising order. Neighbours with the same reason are one
     band. The band begins halfway to the last good speed below and ends halfway to the next good speed above,
     but no farther than `reach` [rad/s] from a speed that was run. `at_rest` is the rocker torque of two bars
     at rest [N.m]."""

@@ -123,9 +123,9 @@ def remark_on(study: StudyRecord) -> None:
             text = "chains: the crank speed lies in a range to avoid, {band}: {why}."
             warn("speed to avoid", text, band=str(band), why=band.why, speed=(speed, "rad/s", "speed"))
     for missing, why in result.failures.items():
-        text = "chains: {speed} is missing in the sweep: {why}"
+        text = "chains: the speed {speed} is missing: {why}"
         warn("speed missing", text, why=str(why), speed=(missing, "rad/s", "speed"))
-    residual = max(n.energy_residual for n in result.sweep)
+    residual = max(n.energy_residual for n in result.speeds)
     if not residual < RESIDUAL:
         text = (
             "chains: the energy residual reaches {residual} of the energy moved; lower chain.fold_stiffness."

@@ -159,17 +159,17 @@ def _critical(s: b.Source, chain: Mapping[str, Any], study: StudyRecord) -> Iter
     found: ChainResult = study.findings["chain"]
     inside = [
         s.line(f"{{{path}.{places[each.mode][each.order]}.speed}} (mode {each.mode}, order {each.order})")
-        for each in sorted(found.within_sweep(), key=lambda each: each.speed)
+        for each in sorted(found.within_speeds(), key=lambda each: each.speed)
     ]
     if inside:
         yield b.Text(line("Critical speeds within the sweep: ", join(inside), f". {_ORDERS}"), form="short")
 
 
-@PICTURES.declare(lambda study: len(study.findings["chain"].sweep) > 1, "chain_sweep.png")
+@PICTURES.declare(lambda study: len(study.findings["chain"].speeds) > 1, "chain_sweep.png")
 def _over_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
     """Torques of chains and two bars, and the share of the time with a slack rod, over the crank speed."""
     result: ChainResult = study.findings["chain"]
-    rows = result.sweep
+    rows = result.speeds
     speed = np.array([n.speed for n in rows])
     x = fig.Axis("crank speed", "rad/s", "speed", low=float(speed[0]), high=float(speed[-1]))
     # the least distance of 5 % keeps labels apart on a narrow screen, too
@@ -180,11 +180,11 @@ def _over_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
             look="thin",
             upright=True,
         )
-        for each in result.within_sweep(0.05)
+        for each in result.within_speeds(0.05)
     ]
     marks: list[fig.Item] = [
         *(fig.Shade(band.low, band.high, "to avoid") for band in result.avoid),
-        *(fig.Mark(each.speed, look="thin") for each in result.within_sweep()),
+        *(fig.Mark(each.speed, look="thin") for each in result.within_speeds()),
         fig.Mark(result.own.speed, "the study's speed", look=2),
     ]
 

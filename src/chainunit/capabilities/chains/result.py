@@ -61,7 +61,7 @@ class Band:
     why: str = part("the reason")
 
     def __str__(self) -> str:
-        """The range in words; a single speed in a study without a sweep."""
+        """The range in words; a single speed in a study at one speed."""
         ends = [self.low, self.high] if self.high > self.low else [self.low]
         return " to ".join(number(end, "rad/s", "speed", 4, full=False, beside=False) for end in ends)
 
@@ -85,21 +85,21 @@ class RodSlack:
 
 @result
 class ChainResult(Findings):
-    """The study's own speed, the sweep in rising order, and its conclusions."""
+    """The study's own speed, all speeds in rising order, and its conclusions."""
 
     walls: int = part("number of rods of the wall", unit="1", name="rods_of_wall")
     webs: int = part("number of rods of the web", unit="1", name="rods_of_web")
     starts: int = part("starts at each speed", unit="1")
     turns: int = part("turns that are evaluated of each start", unit="1")
     own: SpeedNumbers = part("at the study's own speed", name="own_speed")
-    sweep: tuple[SpeedNumbers, ...] = part("over the speeds of the sweep")
+    speeds: tuple[SpeedNumbers, ...] = part("over the speeds of the sweep", name="sweep")
     avoid: tuple[Band, ...] = part("the speeds to avoid")
     critical: tuple[CriticalSpeed, ...] = part("the critical speeds", name="critical_speeds")
     slack_by_rod: Mapping[str, list[RodSlack]] = part(
         "by side, the rods from A1 on, at the study's own speed"
     )
     failures: Mapping[float, str]
-    """by crank speed [rad/s], the reason why the speed is missing in the sweep"""
+    """by crank speed [rad/s], the reason why the speed is missing"""
 
     @derived("1", "percent")
     def quantile(self) -> float:
@@ -121,10 +121,10 @@ class ChainResult(Findings):
         """Distance of the study's speed from the resonance, relative to it: negative below."""
         return None if self.resonance is None else float(self.own.speed / self.resonance - 1.0)
 
-    def within_sweep(self, apart: float = 0.0) -> list[CriticalSpeed]:
-        """The critical speeds within the sweep, low orders first. A speed is left out if its distance to an
-        earlier one is less than the share `apart` of the width of the sweep."""
-        low, high = self.sweep[0].speed, self.sweep[-1].speed
+    def within_speeds(self, apart: float = 0.0) -> list[CriticalSpeed]:
+        """The critical speeds within the range that was run, low orders first. A speed is left out if its distance
+        to an earlier one is less than the share `apart` of the width of the range."""
+        low, high = self.speeds[0].speed, self.speeds[-1].speed
         speeds: list[CriticalSpeed] = []
         for each in sorted(self.critical, key=lambda speed: (speed.order, speed.mode)):
             clear = all(abs(each.speed - other.speed) >= apart * (high - low) for other in speeds)

@@ -1,9 +1,21 @@
-"""The table [chain] of a study file: declarations only."""
+"""The table [chain] of a study file, with the range of speeds that follows from the rest of the file."""
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
+import numpy as np
+
 from ...core.quantities import Value, declaration, quantity
+from ...machines.api import ChainUnitMachine
 from ...machines.chain_organs import LEAST, MOST, USUAL, OrganLaw
+from ...study.file_reading import FileReading
+from ...study.file_section import FileSection
+from ...study.organ_limits import slack_and_mode
+
+_BEYOND = 1.2
+"""Highest speed of the range, over the lowest natural frequency."""
 
 
 @declaration
@@ -43,3 +55,38 @@ class ChainOrgans(OrganLaw):
         max=10_000,
         type="Integer",
     )
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Lowest and highest speed of the range [rad/s]."""
+        return float(self.sweep_lowest), float(self.sweep_highest)
+
+    @property
+    def speeds(self) -> list[float]:
+        """The speeds at even distances [rad/s]."""
+        speeds: list[float] = np.linspace(*self.ends, int(self.sweep_points)).tolist()
+        return speeds
+
+
+def _completed(chain: ChainOrgans, reading: FileReading) -> ChainOrgans | None:
+    """The table of a study with chains, with the highest of the speeds: twice the speed of normal running, or a fifth
+    beyond the lowest natural frequency of an organ where that is higher. None with two bars."""
+    if reading.form.organ != "chain" or not isinstance(reading.machine, ChainUnitMachine):
+        return None
+    if "sweep_highest" in reading.given["chain"]:
+        return chain
+    _, mode = slack_and_mode(reading.machine, reading.values["feed"])
+    beyond = _BEYOND * mode if math.isfinite(mode) else 0.0
+    highest = max(2.0 * reading.values["run"].crank_speed, beyond, chain.sweep_lowest)
+    return replace(chain, sweep_highest=highest)
+
+
+CHAIN = FileSection(
+    ChainOrgans,
+    title="Chains",
+    follows={
+        "sweep_highest": "twice run.crank_speed, or 1.2 times the lowest mode of an organ if that is more"
+    },
+    order=(("sweep_lowest", ">", "sweep_highest"),),
+    completed=_completed,
+)

@@ -15,7 +15,7 @@ from ...core.quantities import Layout
 from ...reading.results import derived, part, result
 from ...reading.text import number
 from ...study.analysis import Analysis, Findings, Work
-from ...study.catalogue_drive import with_wheel
+from ...study.catalogue_drive import with_inertia
 from ...study.choice import tune
 from ...study.config import Config
 from ...study.cycle import needed_inertia
@@ -136,7 +136,7 @@ class FlywheelAnalysis(Analysis):
             permitted_fluctuation=table.fluctuation,
             swing=turn.energy_swing,
             speed=config.run.crank_speed * drive.ratio,
-            bare=drive.rotor_inertia - drive.flywheel + turn.inertia_mean / drive.ratio**2,
+            bare=drive.rotor_inertia - drive.added_inertia + turn.inertia_mean / drive.ratio**2,
             mean_torque=turn.torque_mean / drive.ratio,
         )
         study.findings[FlywheelAnalysis.name] = findings
@@ -166,7 +166,7 @@ def _own(study: StudyRecord, findings: FlywheelFindings) -> Wheel:
 def _run(study: StudyRecord, rig: Rig, findings: FlywheelFindings, flywheel: float) -> Wheel:
     """The start-up and steady running of the study with another flywheel [kg m2], without its safety coupling."""
     config = study.config
-    turned = with_wheel(config, replace(study.drive, observer=None), flywheel)
+    turned = with_inertia(config, replace(study.drive, observer=None), flywheel)
     drive = tune(config, turned)
     findings.is_retuned = findings.is_retuned or drive.parameters != turned.parameters
     sides = drive.machine.loaded_sides(config.feed)

@@ -53,7 +53,7 @@ def around(search: Search, x: Any) -> Any:
 def neighbours(
     search: Search, x: Any, objective: CycleQuantity, limits: Sequence[TurnLimit], value: float
 ) -> Neighbours:
-    """A sweep of the machines `around` x."""
+    """The quantities of the machines `around` x, and whether these meet the limits."""
     points = around(search, x)
     quantities = list({q.name: q for q in (objective, *(limit.quantity for limit in limits))}.values())
     machine = search.wishes.machine.replace(dict(zip(search.wishes.names, map(float, x), strict=True)))

@@ -14,7 +14,7 @@ from ...core.errors import InterruptedRunError, RunError
 from ...drives.induction_motor import SoftStart
 from ...drives.slip_clutch import SlipClutch
 from ...study.arrays import peak
-from ...study.catalogue_drive import with_starter, with_wheel
+from ...study.catalogue_drive import with_inertia, with_starter
 from ...study.cycle import cycle
 from ...study.drive import Drive
 from ...study.event import Event, Role
@@ -225,7 +225,7 @@ def _inverter(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative:
             own = dataclasses.replace(config, start="inverter", run=run, starter=starter)
             p = with_starter(rig.drive.parameters, plate, own)
             drive = dataclasses.replace(rig.drive, parameters=p, follows=True, observer=None, observed={})
-            fed = dataclasses.replace(rig, config=own, drive=with_wheel(own, drive, drive.flywheel))
+            fed = dataclasses.replace(rig, config=own, drive=with_inertia(own, drive, drive.added_inertia))
             yield fed, 1.5 * ramp + 1.0, {"ramp": ramp, "boost": boost}
 
     for boost in boosts(config.starter.inverter.boost, "starter.inverter.boost" in config.file.given):
@@ -278,8 +278,9 @@ def _runs(study: StudyRecord, rig: Rig, of: PeakOf) -> tuple[float, dict[str, xr
 
 def slip_run(rig: Rig, start: StartNumbers, setting: float) -> xr.Dataset | None:
     """A start direct on line from the crank angle of `start`, the same start without a clutch, with a slip clutch of
-    the `setting` [N m at the crank] behind rotor and flywheel, until the clutch sticks and the machine has its speed;
-    None where it slips on for three times as long as the start takes. The variables of the clutch are ``clutch.*``.
+    the `setting` [N m at the crank] behind rotor and added inertia, until the clutch sticks and the machine has its
+    speed; None where it slips on for three times as long as the start takes. The variables of the clutch are
+    ``clutch.*``.
 
     The clutch may slip again near the breakdown torque of the motor: the attribute `slip_time` [s] is the sum of all
     times in which it slips."""
@@ -359,16 +360,16 @@ def _rocker_until(study: StudyRecord, setting: Setting) -> float | None:
 
 
 def on_motor_side(drive: Drive, run: xr.Dataset) -> float:
-    """Peak torque in a run on a coupling between rotor and flywheel, at the crank [N m]: that behind the flywheel,
-    and the torque that accelerates flywheel and gear."""
-    inertia = drive.flywheel + drive.gear_inertia
+    """Peak torque in a run on a coupling between rotor and added inertia, at the crank [N m]: that behind the
+    inertia, and the torque that accelerates it and the gear."""
+    inertia = drive.added_inertia + drive.gear_inertia
     torque = run["motor.tau"].values + inertia * run["motor.a"].values
     return peak(torque + drive.gear_friction * run["motor.w"].values) * drive.ratio
 
 
 def _before_flywheel(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative | None:
-    """The coupling between motor and flywheel, where the drive has a flywheel; else None."""
-    if not rig.drive.flywheel or study.start is None:
+    """The coupling between motor and added inertia, where the drive has one; else None."""
+    if not rig.drive.added_inertia or study.start is None:
         return None
     events = _loaded_starts(study)
     starts = starts_from_all(rig, longest_start(study.config, study.start.start_time), events, on_motor_side)

@@ -203,7 +203,7 @@ class Candidate:
     @property
     def disc(self) -> Disc | None:
         """The flywheel as a disc of steel; None without one."""
-        return steel_disc(self.drive.flywheel) if self.drive.flywheel else None
+        return steel_disc(self.drive.added_inertia) if self.drive.added_inertia else None
 
     @property
     def mass(self) -> float | None:
@@ -217,14 +217,14 @@ class Candidate:
         """The flywheel, and its disc, in words."""
         assert self.disc is not None
         mass, diameter = number(self.disc.mass, "kg"), number(self.disc.diameter, "m")
-        return f"{number(self.drive.flywheel, 'kg.m2')} (steel disc of {mass}, {diameter} in diameter)"
+        return f"{number(self.drive.added_inertia, 'kg.m2')} (steel disc of {mass}, {diameter} in diameter)"
 
     @derived(name="flywheel", titled=True)
     def flywheel_numbers(self) -> Flywheel:
         """The flywheel of the candidate."""
         disc = self.disc
         return Flywheel(
-            J=self.drive.flywheel,
+            J=self.drive.added_inertia,
             mass=disc and disc.mass,
             diameter=disc and disc.diameter,
             width=disc and disc.width,

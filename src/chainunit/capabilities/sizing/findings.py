@@ -83,10 +83,10 @@ class SizingFindings(Findings):
         the candidates do not have both."""
         fitting = [c for c in self.candidates if c.fits]
         fitting.sort(key=lambda c: (not c.keeps_margin, c.power, poles_rank(c.motor.nameplate.poles)))
-        with_one = next((c for c in fitting if c.drive.flywheel), None)
+        with_one = next((c for c in fitting if c.drive.added_inertia), None)
         if with_one is None:
             return None
-        bare = (c for c in fitting if not c.drive.flywheel and c.power >= with_one.power)
+        bare = (c for c in fitting if not c.drive.added_inertia and c.power >= with_one.power)
         without = next(bare, None)
         return None if without is None else (with_one, without)
 
@@ -157,7 +157,7 @@ class SizingFindings(Findings):
             study.note("sizing", "{text}", text=text)
         if study.insufficient:
             study.warn("insufficient motor", "{answer}. All runs are with it.", answer=self.answer)
-        if study.statics.torsion is not None:
+        if study.statics.modes is not None:
             rigid = "Sizing took the shafts as rigid and the driveline as massless; the runs include it."
             study.note("sized without line", rigid)
         # a study that ended early has a recommendation, too

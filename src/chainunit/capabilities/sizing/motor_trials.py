@@ -15,7 +15,7 @@ from pathlib import Path
 from ...core.errors import InterruptedRunError, RunError
 from ...drives.catalogue import CatalogueMotor
 from ...drives.gear_ratios import gear_unit, next_ratio, ratio_on_offer
-from ...study.catalogue_drive import catalogue_drive, with_wheel
+from ...study.catalogue_drive import catalogue_drive, with_inertia
 from ...study.config import Config
 from ...study.limits import SPEED_DEVIATION
 from .candidate import Candidate, TrialResult
@@ -123,14 +123,14 @@ class MotorTrials:
         trials: list[Candidate] = []
 
         def trial_with(flywheel: float) -> Candidate:
-            candidate = dataclasses.replace(bare, drive=with_wheel(self.config, bare.drive, flywheel))
+            candidate = dataclasses.replace(bare, drive=with_inertia(self.config, bare.drive, flywheel))
             trials.append(self.judged(candidate))
             return candidate
 
         def heavy_enough(candidate: Candidate) -> bool:
             if candidate.checks and not candidate.starts:
                 # it stalls for want of inertia, unless it starts with less
-                return any(c.starts for c in trials if c.drive.flywheel < candidate.drive.flywheel)
+                return any(c.starts for c in trials if c.drive.added_inertia < candidate.drive.added_inertia)
             return too_heavy(candidate) or is_even(candidate)
 
         first = trial_with(0.0)
@@ -155,13 +155,13 @@ class MotorTrials:
             else:
                 below = middle
         solutions = [c for c in trials if is_even(c) and not too_heavy(c)]
-        return min(solutions, key=lambda c: c.drive.flywheel) if solutions else _nearest(trials)
+        return min(solutions, key=lambda c: c.drive.added_inertia) if solutions else _nearest(trials)
 
 
 def _nearest(trials: list[Candidate]) -> Candidate:
     """The trial that comes nearest to all limits; where none starts, the one without a flywheel."""
     best = min(trials, key=lambda c: c.violation)
-    best.heaviest = max(c.drive.flywheel for c in trials)
+    best.heaviest = max(c.drive.added_inertia for c in trials)
     best.bound = next((c.checks["inertia"].limit for c in trials if c.exceeds("inertia")), None)
     return best
 

@@ -90,7 +90,7 @@ def _steps(larger: float) -> Sequence[tuple[Criterion, Callable[[list[Candidate]
         (Criterion.FIELD, partial(_least, value=lambda c: float(c.weakened))),
         (Criterion.GEAR, partial(_least, value=lambda c: float(c.unit is None))),
         (Criterion.START, partial(_least, value=lambda c: c.trial.start_class or 0)),
-        (Criterion.FLYWHEEL, partial(_least, value=lambda c: float(c.drive.flywheel > 0.0))),
+        (Criterion.FLYWHEEL, partial(_least, value=lambda c: float(c.drive.added_inertia > 0.0))),
         # the better number of poles may cost one step of power
         (Criterion.POWER, partial(_powerful, most=STEP)),
         (Criterion.POLES, partial(_least, value=lambda c: poles_rank(c.motor.nameplate.poles))),
@@ -119,7 +119,7 @@ def _cheaper(left: list[Candidate]) -> list[Candidate]:
     """Those with the lowest cost, to a twentieth: the prices, where each motor has one and no drive a flywheel, else
     the masses, where each is known."""
     costs: list[float | None] = [c.motor.nameplate.price or None for c in left]
-    if None in costs or any(c.drive.flywheel for c in left):
+    if None in costs or any(c.drive.added_inertia for c in left):
         costs = [c.mass for c in left]
     known = [cost for cost in costs if cost is not None]
     if len(known) < len(left):
@@ -196,7 +196,7 @@ def _chosen(best: Candidate, ranking: Sequence[Candidate]) -> str:
 def _behind(c: Candidate, best: Candidate) -> str:
     """The reason why a candidate that fits comes after the best one."""
     if c.criterion is Criterion.COST:
-        is_priced = c.motor.nameplate.price and not c.drive.flywheel
+        is_priced = c.motor.nameplate.price and not c.drive.added_inertia
         return "dearer than the chosen one" if is_priced else f"heavier than the chosen one: {_mass(c)}"
     if c.criterion is Criterion.USE:
         is_more = c.use > best.use + ALIKE

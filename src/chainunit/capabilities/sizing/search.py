@@ -158,7 +158,7 @@ def _search(trials: MotorTrials, motors: list[CatalogueMotor], report: Report) -
             candidates.append(trials.best_of(following))
             following = next(rest, None)
         _from_all_angles(trials, candidates)
-    if candidates[0].fits and candidates[0].drive.flywheel:
+    if candidates[0].fits and candidates[0].drive.added_inertia:
         report("a larger motor without a flywheel", 0.0, 1.0)
         if (larger := _without_flywheel(trials, motors, candidates)) is not None:
             candidates.append(larger)
@@ -180,7 +180,7 @@ def _remedy(trials: MotorTrials, c: Candidate) -> str:
         return SOFTER[start]
     softly = dataclasses.replace(trials, config=dataclasses.replace(trials.config, start="soft"))
     soft = softly.candidate(c.motor, c.drive.ratio)
-    soft.drive = dataclasses.replace(soft.drive, flywheel=c.drive.flywheel)
+    soft.drive = dataclasses.replace(soft.drive, added_inertia=c.drive.added_inertia)
     if not softly.judged(soft, worst_start=True).fits:
         return SOFTER["direct"]
     check = soft.checks["gear_start"]
@@ -222,7 +222,9 @@ def _is_settled(candidates: list[Candidate], following: CatalogueMotor, larger: 
     if not keeping:
         return False
     best, _ = choice(keeping, larger)
-    is_light = best.unit is not None and (best.trial.start_class or 0) <= LIGHT and not best.drive.flywheel
+    is_light = (
+        best.unit is not None and (best.trial.start_class or 0) <= LIGHT and not best.drive.added_inertia
+    )
     if (
         is_light
         and not best.weakened
@@ -238,7 +240,7 @@ def _without_flywheel(
     """The next larger motor that fits without a flywheel, of the best candidate's number of poles; None where
     the candidates have one, or the `motors` none."""
     best = candidates[0]
-    if any(c.keeps_margin and not c.drive.flywheel and c.power >= best.power for c in candidates):
+    if any(c.keeps_margin and not c.drive.added_inertia and c.power >= best.power for c in candidates):
         return None
     tried = {c.motor.designation for c in candidates}
     poles = best.motor.nameplate.poles

@@ -44,7 +44,7 @@ class TorsionAnalysis(Analysis):
     @staticmethod
     def find(study: StudyRecord, work: Work) -> TorsionFindings | None:
         """The torsion of the line in rotation; None of a slow line without the table [torsion]."""
-        config, drive, modes = study.config, study.drive, study.statics.torsion
+        config, drive, modes = study.config, study.drive, study.statics.modes
         plan: TorsionPlan = config.plans["torsion"]
         assert modes is not None
         turn = study.statics.normal
@@ -89,6 +89,7 @@ class TorsionFindings(Findings):
     """The findings of the analysis."""
 
     analysis: LineAnalysis = part(inline=True)
+    examines = "driveline"
 
     def remark(self, study: StudyRecord) -> None:
         """Add the remarks and notes on the torsion to the study."""

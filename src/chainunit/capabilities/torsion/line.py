@@ -23,6 +23,7 @@ from ...drives.cardan import (
     frozen_frequency,
     sensitivity,
     two_joints,
+    with_damping_ratio,
 )
 from ...drives.torsion import (
     RigidPeaks,
@@ -34,7 +35,6 @@ from ...drives.torsion import (
     simulate,
     simulation_steps,
     steady,
-    with_damping_ratio,
 )
 from ...reading.results import derived, part, result
 from ...study.arrays import stretches

@@ -12,12 +12,11 @@ from pydantic import Field
 
 from ...core.errors import refusal_prefix
 from ...core.quantities import Layout, Value, declaration, quantity
-from ...drives.cardan import check
+from ...drives.cardan import check, with_damping_ratio
 from ...drives.driveline import CardanDriveline, Mounted
 from ...drives.line_table import CORNER, SHAFTS, Damping, form, line_values
 from ...drives.shafts import SECTIONS as PROFILES
 from ...drives.shafts import Shaft
-from ...drives.torsion import with_damping_ratio
 from ..conditions import Schema, is_one_of
 from ..file_section import FileSection, TableForm
 from .part import PartOfLine
@@ -56,7 +55,7 @@ class DrivelinePlan:
     table: Driveline
     place: str
     damping_ratio: float | None
-    """damping ratio of its torsion, in place of d2 and d3"""
+    """its damping ratio, in place of d2 and d3"""
 
 
 def _shaft_keys() -> Iterator[Key]:

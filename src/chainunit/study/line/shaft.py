@@ -14,9 +14,8 @@ import xarray as xr
 
 from ...core.engines import MATH
 from ...core.quantities import Value, declaration, quantity, variables
-from ...drives.cardan import Cardan, ShaftLine, frozen_frequency
+from ...drives.cardan import Cardan, ShaftLine, frozen_frequency, largest_frequency
 from ...drives.driveline import Parameters
-from ...drives.torsion import largest_frequency
 from ...reading.text import number
 from ..arrays import peak
 from ..drive import Drive
@@ -57,7 +56,7 @@ class ShaftAnswers:
 
 
 @declaration
-class Torsion:
+class LineModes:
     """The torsional vibration of the line with this motor and machine, by the formula of paper 002 at i23 =
     1, over the range of the machine's inertia in a turn."""
 
@@ -129,14 +128,14 @@ def two_masses(drive: Drive, inertia: float) -> Cardan:
     return Cardan(**shafts, J1=J1, J4=line.J4 + inertia * line.ratio**2)
 
 
-def torsion(drive: Drive, inertia: Any) -> Torsion:
+def line_modes(drive: Drive, inertia: Any) -> LineModes:
     """Natural frequencies of the drive's line with the machine's `inertia` at the motor [kg m2], an array over the
     turn."""
     lines = [two_masses(drive, float(J)) for J in (np.min(inertia), np.max(inertia))]
     ends = [float(frozen_frequency(MATH, line, 1.0)) for line in lines]
-    longest = LONGEST_STEP / max(float(largest_frequency(line)) for line in lines)
+    longest = LONGEST_STEP / max(float(largest_frequency(MATH, line)) for line in lines)
     behind = [math.sqrt(1.0 / ((1.0 / line.c2 + 1.0 / line.c3) * line.J4)) for line in lines]
-    return Torsion(k_least=min(ends), k_largest=max(ends), antiresonance=min(behind), step_longest=longest)
+    return LineModes(k_least=min(ends), k_largest=max(ends), antiresonance=min(behind), step_longest=longest)
 
 
 def remedies(line: ShaftLine) -> list[str]:

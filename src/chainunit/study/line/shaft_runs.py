@@ -15,7 +15,7 @@ from ...drives.cardan import two_joints
 from ...reading.results import part, result
 from ...study.transients import follow
 from ...system import rigid
-from ..analysis import Analysis, Findings, Work
+from ..analysis import Analysis, Findings, Work, is_examined
 from ..config import Config
 from ..drive import Drive
 from ..record import Amount, StudyRecord
@@ -114,7 +114,7 @@ def _findings(study: StudyRecord, twins: Mapping[str, xr.Dataset]) -> ShaftFindi
 
 def remark(study: StudyRecord) -> None:
     """Add to a study with a driveline the remarks on it."""
-    modes = study.statics.torsion
+    modes = study.statics.modes
     if modes is None:
         return
     line = driveline_of(study.drive)
@@ -141,7 +141,7 @@ def remark(study: StudyRecord) -> None:
     _, i, _ = two_joints(numpy_(), line, np.linspace(0.0, np.pi, 361))
     unevenness = float(np.ptp(i))
     if unevenness > UNEVEN:
-        say = warn if "torsion" in study.findings else note
+        say = warn if is_examined("driveline", study.findings) else note
         say(
             "uneven joints",
             "The joints turn unevenly: shaft 3 turns {least} to {largest} times as fast as shaft 2 (ratio i23), and "
