@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 
 import numpy as np
 import pytest
 import xarray as xr
 from event_tables import HEAVY_MACHINE, event_line
-from reports import said_of
+from reports import page_of, said_of
 from scipy.integrate import solve_ivp
 
 from chainunit.capabilities.sizing import alternatives as coupling_alternatives
@@ -31,7 +32,7 @@ from chainunit.drives.induction_motor import InductionMotor, steady
 from chainunit.drives.motor import T_RATED
 from chainunit.drives.slip_clutch import SlipClutch
 from chainunit.machines.chain_unit import SIDES
-from chainunit.reading.text import entry
+from chainunit.reading.text import entry, number
 from chainunit.report import blocks, terminal
 from chainunit.study import config, run
 from chainunit.study.analyses import all_analyses
@@ -310,6 +311,17 @@ def test_a_drive_whose_start_is_harder_than_its_shocks_has_no_coupling(on_line):
     assert [each["words"] for each in entries["alternatives"]] == [
         way_words(on_line, each, setting) for each in sizing_of(on_line).alternatives
     ]
+    page = page_of(on_line)
+    (table,) = re.findall(r"<table[^>]*><caption>Ways to a safety coupling.*?</table>", page, re.DOTALL)
+    cells = [
+        re.sub(r"<[^>]*>", "", row).replace("\xa0", " ")
+        for row in re.findall(r"<tr>.*?</tr>", table, re.DOTALL)[1:]
+    ]
+    for row, each in zip(cells, sizing_of(on_line).alternatives, strict=True):
+        assert row.startswith(each.way) and number(each.numbers.setting, "N.m") in row
+        assert row.endswith("nothing" if not each.opens else on_line.title_of([*each.opens][-1]))
+    # a sentence in a cell that does not wrap made the page twice as wide as the screen
+    assert "alternatives, 0" not in page
     said = said_of(on_line)
     assert "No safety coupling protects this drive as it starts now" in said
     assert "With a soft starter" in said and "slip clutch" in said

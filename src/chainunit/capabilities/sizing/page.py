@@ -168,6 +168,8 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         yield b.Text(s.words("sizing.protection.coupling"))
         ways = section["protection"]["alternatives"]
         yield from (b.Text(s.words(f"sizing.protection.alternatives.{k}.words")) for k in range(len(ways)))
+        if ways:
+            yield _ways(s, study)
     yield from (b.Text(each, form="long") for each in s.lines("sizing.notes"))
     if candidates:
         if "tried" in section:
@@ -189,11 +191,11 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     # a machine without sides has no one-sided feed
     side_keys = () if study.config.machine.model.sides else ("one_sided_share", "torque_peak_one_sided")
     for name in ("asked", "cycle", "flywheel", "gear", "protection"):
-        # the sentence on the coupling is too long for a cell of a narrow table, and stands above
+        # the sentences on the coupling are too long for a cell of a narrow table, and stand above with the ways to it
         leaves = [
             leaf
             for key, below in (section.get(name) or {}).items()
-            if not isinstance(below, str) and key not in side_keys
+            if not isinstance(below, str) and key not in (*side_keys, "alternatives")
             for leaf in _leaves(below, f"sizing.{name}.{key}", spoken(key))
         ]
         rows = tuple(b.TableRow((title, _leaf(s, path))) for title, path in leaves)
@@ -287,6 +289,21 @@ def _candidates(s: b.Source, row_count: int) -> b.Table:
     long = (b.Column(title, form="long") for title in (*more, *checks.values()))
     columns = (*b.heads("motor", "verdict"), *long)
     return b.Table(tuple(rows), columns, title=title, note_title="because", numeric=False)
+
+
+def _ways(s: b.Source, study: StudyRecord) -> b.Table:
+    """A row for each way to a coupling that a start does not open."""
+    rows = []
+    for k, way in enumerate(s.result["sizing"]["protection"]["alternatives"]):
+        path = f"sizing.protection.alternatives.{k}"
+        numbers = (
+            s.number(f"{path}.{name}", none="-") for name in ("setting", "running", "start", "start_time")
+        )
+        opens = "; ".join(study.title_of(run) for run in way["opens"]) or "nothing"
+        rows.append(b.TableRow((s.words(f"{path}.way"), *numbers, opens)))
+    columns = b.heads("way", "set to", "running", "a start", "start-up", "opens where")
+    title = "Ways to a safety coupling: its setting, and the torques of running and of a start, at the crank"
+    return b.Table(tuple(rows), columns, title=title, numeric=False, form="long")
 
 
 def _trade(s: b.Source) -> Iterator[b.Block]:
