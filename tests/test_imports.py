@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 from importlib import metadata
+from pathlib import Path
 
 import pytest
 
@@ -54,6 +55,20 @@ def test_completion_shows_the_public_names_alone_before_they_are_used():
     code = "import chainunit; print([name for name in dir(chainunit) if name[0] != '_'])"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == str([name for name in chainunit.__all__ if name != "__version__"])
+
+
+def test_a_linkage_is_shown_without_the_capabilities_of_a_study(tmp_path):
+    """A folder is claimed by the kinds of results of all commands, which need no more than the commands."""
+    file = Path(__file__).parents[1] / "examples" / "linkages" / "tipper.toml"
+    call = f"app(['linkage', {str(file)!r}, '-o', {str(tmp_path / 'out')!r}], standalone_mode=False)"
+    code = f"import sys; from chainunit.app.cli import app; {call}"
+    after = "print('loaded', *(m for m in sys.modules if m.startswith('chainunit.capabilities.')))"
+    run = subprocess.run(
+        [sys.executable, "-c", f"{code}; {after}"], capture_output=True, text=True, check=True
+    )
+    loaded = [name.split(".")[2:] for name in run.stdout.splitlines()[-1].split()[1:]]
+    assert ["sweep", "command"] in loaded
+    assert {tuple(name[1:]) for name in loaded} <= {(), ("command",)}
 
 
 def test_the_package_runs_as_a_module_and_names_all_models():

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol, Self
+from typing import Any, Protocol, Self
 
-from ..core.files import ResultKind
 from ..study.capability import StudyCapability
 from ..study.config import Config
 from ..study.record import StudyRecord
@@ -26,10 +25,8 @@ class Contents:
     pictures: tuple[str, ...] = ()
     analysis: str = ""
     """name of its analysis, if the section has another name"""
-    comes_first: bool = False
-    """whether it stands before the turn at constant speed"""
-    leads: bool = False
-    """whether it stands before the section on the runs"""
+    before: str = ""
+    """section of the base before which it stands; empty for one behind the turn at constant speed"""
 
 
 class AnyStudy(Protocol):
@@ -44,9 +41,6 @@ class AnyStudy(Protocol):
 class Capability(StudyCapability):
     """A capability with what it shows: the base of the one that each folder of `chainunit.capabilities` has by the
     name ``CAPABILITY``."""
-
-    results: ClassVar[Mapping[str, ResultKind]] = {}
-    """by command, the kind of result that it leaves in a folder"""
 
     def contents(self) -> Mapping[str, Contents]:
         """The sections of a study's report on its findings, by name: that of the analysis."""

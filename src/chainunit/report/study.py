@@ -210,7 +210,7 @@ def _sections() -> Mapping[str, Contents]:
     return {
         "answer": Contents("The answer", answer.blocks),
         QUESTION: Contents("The question", _question),
-        **{name: each for name, each in analysis_sections().items() if each.leads},
+        **{name: each for name, each in analysis_sections().items() if each.before == "runs"},
         "runs": Contents("Every run in numbers", runs.blocks),
         "shaft": Contents("The driveline", shaft.blocks, shaft.PICTURES.files),
         **analysis_sections(),

@@ -14,7 +14,7 @@ from typing import Any, Generic, TypeVar
 
 from ..core.errors import RunError, WriteError
 from ..core.files import ResultKind, claim, clear, write_all
-from ..study.registry import capabilities
+from ..study.registry import command_modules
 from ..work.progress import Report as Progress
 from . import files
 from .blocks import Report
@@ -37,7 +37,7 @@ _OF_BASE = {
 
 def result_kinds() -> Mapping[str, ResultKind]:
     """The kinds of results that commands leave in a folder, by command: of the base and of the capabilities."""
-    return _OF_BASE | {name: kind for part in capabilities() for name, kind in part.results.items()}
+    return _OF_BASE | {name: kind for module in command_modules() for name, kind in module.KINDS.items()}
 
 
 def no_check(question: Any, **options: Any) -> None:

@@ -3,6 +3,7 @@ stand above the study, or import from it."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cache
 from importlib import import_module
 from typing import Any
@@ -31,6 +32,13 @@ def parts_of_line() -> tuple[Any, ...]:
 def capabilities() -> tuple[Any, ...]:
     """All capabilities in their order, each a `chainunit.study.capability.StudyCapability`."""
     return _all_of(f"{_PACKAGE}.capabilities", "CAPABILITY")
+
+
+def command_modules() -> Iterator[Any]:
+    """The modules of the commands of the capabilities, without the rest of their folders: a command answers at
+    once."""
+    modules: Iterator[Any] = import_module(f"{_PACKAGE}.capabilities").modules("command")
+    return modules
 
 
 @cache

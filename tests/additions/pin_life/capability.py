@@ -7,7 +7,6 @@ from collections.abc import Iterable, Mapping
 from pydantic import Field
 
 from chainunit.core.errors import InputError, near_name, shown
-from chainunit.core.files import ResultKind
 from chainunit.report.capability import Capability, Contents
 from chainunit.study.analysis import Analysis
 from chainunit.study.file_reading import FileReading
@@ -21,7 +20,6 @@ class PinLifeCapability(Capability):
     """The capability, with the table [pin_life]."""
 
     name = "pin_life"
-    results = {"pin-life": ResultKind("the rating life of a pin", "pin_life.json")}  # noqa: RUF012
     tables = {  # noqa: RUF012
         "pin_life": FileSection(
             PinLifeTable,

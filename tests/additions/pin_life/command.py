@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from chainunit.core.files import ResultKind
 from chainunit.report.command_options import OutputFolder
 from chainunit.report.console import carry_out, study_file
 
@@ -26,3 +27,4 @@ def pin_life(
 
 
 COMMAND = pin_life
+KINDS = {"pin-life": ResultKind("the rating life of a pin", "pin_life.json")}

@@ -96,7 +96,7 @@ class ChainsCapability(Capability):
         from . import page
 
         title = "Chains and two bars"
-        return {"chains": Contents(title, page.blocks, page.PICTURES.files, "chain", comes_first=True)}
+        return {"chains": Contents(title, page.blocks, page.PICTURES.files, "chain", "constant_speed")}
 
     def warnings(self, s: Source) -> Iterator[Block]:
         """The speeds to avoid."""

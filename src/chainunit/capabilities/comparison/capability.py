@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from ...core.files import ResultKind
 from ...report.capability import Capability
 
 
@@ -10,7 +9,6 @@ class ComparisonCapability(Capability):
     """The capability, which reads results and no study file: it has a command alone."""
 
     name = "comparison"
-    results = {"compare": ResultKind("a comparison", "comparison.json")}  # noqa: RUF012
 
 
 CAPABILITY = ComparisonCapability()

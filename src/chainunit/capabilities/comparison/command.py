@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ...core.files import ResultKind
 from ...report.command_options import OutputFolder
 from ...report.console import carry_out
 
@@ -26,3 +27,4 @@ def compare(
 
 
 COMMAND = compare
+KINDS = {"compare": ResultKind("a comparison", "comparison.json")}

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from ...core.files import ResultKind
 from ...recordings.measurands import MEASURANDS
 from ...recordings.table import recording_rules
 from ...report.capability import Capability
@@ -24,7 +23,6 @@ class IdentificationCapability(Capability):
     """The capability, with the table [identify]."""
 
     name = "identification"
-    results = {"identify": ResultKind("an identification", key="proposals")}  # noqa: RUF012
     tables = {  # noqa: RUF012
         "identify": FileSection(
             IdentifyTable,

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from ...core.files import ResultKind
 from ...report.command_options import OutputFolder
 from ...report.console import carry_out, study_file, terminal_console
 
@@ -34,3 +35,4 @@ def identify(
 
 
 COMMAND = identify
+KINDS = {"identify": ResultKind("an identification", key="proposals")}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ...core.files import ResultKind
 from ...report.capability import Capability
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
@@ -18,7 +17,6 @@ class OptimizeCapability(Capability):
     """The capability, with the table [optimize]."""
 
     name = "optimize"
-    results = {"optimize": ResultKind("a search for the best machine", key="objectives")}  # noqa: RUF012
     tables = {  # noqa: RUF012
         "optimize": FileSection(
             Optimize,

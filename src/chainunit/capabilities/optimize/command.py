@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ...core.files import ResultKind
 from ...report.command_options import BackendOption, OutputFolder
 from ...report.console import carry_out, study_file
 
@@ -27,3 +28,4 @@ def optimize(
 
 
 COMMAND = optimize
+KINDS = {"optimize": ResultKind("a search for the best machine", key="objectives")}

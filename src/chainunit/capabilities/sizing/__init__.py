@@ -88,7 +88,7 @@ class SizingCapability(Capability):
         """Candidates and choice."""
         from . import page
 
-        return {self.name: Contents("The drive", page.blocks, leads=True)}
+        return {self.name: Contents("The drive", page.blocks, before="runs")}
 
     def head(self, s: Source, study: StudyRecord) -> Iterator[Block]:
         """The drive, and the share that it takes of its limits."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ...core.files import ResultKind
 from ...report.capability import Capability
 from ...study.conditions import given, has_entries, has_entry, is_one_of
 from ...study.file_reading import FileReading
@@ -19,7 +18,6 @@ class SweepCapability(Capability):
     """The capability, with the table [sweep]."""
 
     name = "sweep"
-    results = {"sweep": ResultKind("a sweep", key="best_by")}  # noqa: RUF012
     tables = {  # noqa: RUF012
         "sweep": FileSection(
             SweepTable,

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ...core.files import ResultKind
 from ...report.command_options import OutputFolder
 from ...report.console import carry_out, study_file
 
@@ -40,3 +41,4 @@ def sweep(
 
 
 COMMAND = sweep
+KINDS = {"sweep": ResultKind("a sweep", key="best_by")}

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...core.errors import InputError
-from ...core.files import ResultKind
 from ...recordings.table import FROM_RECORDING, recording_rules
 from ...report.capability import Capability, Contents
 from ...study.analysis import Analysis
@@ -35,7 +34,6 @@ class WatchCapability(Capability):
     """The capability, with the tables [watch] and [observer]."""
 
     name = "watch"
-    results = {"watch": ResultKind("a watched recording", key="learned")}  # noqa: RUF012
     tables = {  # noqa: RUF012
         "watch": FileSection(
             WatchTable,

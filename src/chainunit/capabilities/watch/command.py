@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ...core.files import ResultKind
 from ...report.command_options import OutputFolder
 from ...report.console import carry_out, study_file
 
@@ -26,3 +27,4 @@ def watch(
 
 
 COMMAND = watch
+KINDS = {"watch": ResultKind("a watched recording", key="learned")}
