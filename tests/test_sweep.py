@@ -31,6 +31,7 @@ from chainunit.capabilities.sweep.summary import _correlation, _explained
 from chainunit.core.errors import InputError as Refusal
 from chainunit.core.ledger import Ledger
 from chainunit.core.native.compilers import compiler
+from chainunit.reading.results import as_data
 from chainunit.report.figure import Hatch, hatch_lines
 from chainunit.report.terminal import plain
 from chainunit.study.block_runs import Cause
@@ -555,6 +556,8 @@ def test_the_summary_is_that_of_the_table(grid, spread):
         best = good.sort_values(numbers["best_by"].removeprefix("least "), kind="stable").head(10)
         assert [each["point"]["value"] for each in numbers["best"]] == list(best.index)
         assert [each["machine.r"]["value"] for each in numbers["best"]] == list(best["machine.r"])
+        # one summary serves the report and Python
+        assert result.summary is result.summary and as_data(result.summary)["best"] == numbers["best"]
 
 
 def test_points_beyond_the_limits_of_two_bars_are_counted():
@@ -624,7 +627,7 @@ def test_tables_fit_into_80_columns_with_whole_names(spread):
         lines = plain(result._report, 80).splitlines()
         tables = [line for line in lines if line.startswith(("┃", "│"))]
         assert max(map(len, tables)) <= 80 and "…" not in "".join(tables)
-        for name in result._outcome.variables:
+        for name in result._outcome.findings.variables:
             assert any(name in line for line in tables), name
 
 

@@ -15,17 +15,17 @@ from ...report.task import Task
 from ...study.config import Config
 from ...work.progress import Report as Progress
 from . import figures as sweep_figures
-from .points import SweepFindings, run_sweep
-from .summary import MOST_GAPS, SweepSummary, summary_of
+from .points import run_sweep
+from .summary import MOST_GAPS, SweepSummary, SweptStudy
 
 _MOST_COLUMNS = 8
 """Columns of a table on the terminal."""
 
 
-def report(findings: SweepFindings) -> b.Report:
+def report(swept: SweptStudy) -> b.Report:
     """The report on a sweep."""
-    with shown_in(findings.config.units):
-        summary = summary_of(findings)
+    summary, config = swept.summary, swept.findings.config
+    with shown_in(config.units):
         s = b.Source(as_data(summary))
         sections = (
             b.Section("influences", "Which parameter moves what", tuple(_influences(s, summary))),
@@ -36,13 +36,13 @@ def report(findings: SweepFindings) -> b.Report:
             b.Section("basis", "Basis of the numbers", tuple(_basis(s, summary))),
         )
         return b.Report(
-            findings.config.title,
+            config.title,
             "Sweep",
             s.result,
             tuple(_opening(s)),
             sections,
             source=s.source_line(),
-            units=findings.config.units,
+            units=config.units,
             opening_title="The sweep",
         )
 
@@ -54,19 +54,19 @@ def _compute(
     *,
     workers: int | None = None,
     scheduler: str | None = None,
-) -> SweepFindings:
+) -> SweptStudy:
     """Run the sweep of a study; a store in the folder that fits is continued. Errors are those of `run_sweep`, and an
     InputError for a number of workers that is none."""
     if workers is not None and (
         isinstance(workers, bool) or not isinstance(workers, Integral) or workers < 1
     ):
         raise InputError(f"workers = {shown(workers)}: must be a whole number >= 1")
-    return run_sweep(config, folder, progress, workers, scheduler)
+    return SweptStudy(run_sweep(config, folder, progress, workers, scheduler))
 
 
-def _store_in(findings: SweepFindings, folder: Path) -> Path:
+def _store_in(swept: SweptStudy, folder: Path) -> Path:
     """The store of all points, which is written while the sweep runs."""
-    return folder / findings.outcome.file.name
+    return folder / swept.findings.outcome.file.name
 
 
 def _opening(s: b.Source) -> Iterator[b.Block]:
@@ -294,13 +294,13 @@ def _basis(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
     yield b.Text(s.line("All points: {store} (Zarr)."), "fine", "long")
 
 
-TASK: Task[Config, SweepFindings] = Task(
+TASK: Task[Config, SweptStudy] = Task(
     "sweep",
     _compute,
     report,
     content=SweepSummary,
     files=("sweep_*.png",),
-    writers=lambda findings, folder, of_report: [*of_report, lambda: [_store_in(findings, folder)]],
-    kept=lambda findings, folder: [_store_in(findings, folder)],
-    shortfall=lambda findings: None if findings.passed.counts[0] else "",
+    writers=lambda swept, folder, of_report: [*of_report, lambda: [_store_in(swept, folder)]],
+    kept=lambda swept, folder: [_store_in(swept, folder)],
+    shortfall=lambda swept: None if swept.findings.passed.counts[0] else "",
 )

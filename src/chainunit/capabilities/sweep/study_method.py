@@ -11,44 +11,44 @@ from ...report.reported_result import ReportedResult
 from ...study.config import Config
 from ...work.progress import Report as Progress
 from .page import TASK
-from .points import SweepFindings
-from .summary import SweepSummary, summary_of
+from .summary import SweepSummary, SweptStudy
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
 
-class SweepResult(ReportedResult[Config, SweepFindings]):
+class SweepResult(ReportedResult[Config, SweptStudy]):
     """The results of a sweep. Its `repr` shows the size of the sweep, the best points and the extremes."""
 
     _task = TASK
 
-    @cached_property
+    @property
     def summary(self) -> SweepSummary:
         """Extremes, best points, influences and spread, as the report reads them."""
-        return summary_of(self._outcome)
+        return self._outcome.summary
 
     @property
     def dataset(self) -> xr.Dataset:
         """All results by their names in the study, with units: over the parameters of a grid, else over ``point``,
         with the parameters as coordinates. ``reason`` is 0 where a point has results; its attribute ``reasons`` has
         the texts. Values of points that are no grid are read when they are used."""
-        return self._outcome.dataset
+        return self._outcome.findings.dataset
 
     @cached_property
     def table(self) -> pd.DataFrame:
         """A row for each point: its parameters, its results, and ``reason``, a text, empty where there is none."""
-        points = self._outcome.points.load()
+        findings = self._outcome.findings
+        points = findings.points.load()
         table = points.to_dataframe()
-        reasons = ["", *map(str, self._outcome.task.reasons[1:])]
+        reasons = ["", *map(str, findings.task.reasons[1:])]
         table["reason"] = [reasons[code] for code in points["reason"].values]
-        return table[[*self._outcome.variables, "reason"]]
+        return table[[*findings.variables, "reason"]]
 
     @property
     def file(self) -> Path:
         """The store of all points (Zarr), a folder."""
-        return self._outcome.outcome.file
+        return self._outcome.findings.outcome.file
 
 
 def sweep(

@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from ...core.quantities import quantity
 from ...reading.results import OWN, Estimate, InUnit, part, result
+from ...reading.text import shown_in
 from ...study.cycle_quantities import CycleBasis
 from ...study.heading import Heading
 from ...study.limits import limit_reached
@@ -225,6 +227,19 @@ def summary_of(findings: SweepFindings) -> SweepSummary:
         ),
         store=PointStore(made_anew(damaged, "points", file) if damaged else None, damaged, file),
     )
+
+
+@dataclass(frozen=True)
+class SweptStudy:
+    """A study whose sweep was run: its `findings`, and its numbers, which are made once for report and Python."""
+
+    findings: SweepFindings
+
+    @cached_property
+    def summary(self) -> SweepSummary:
+        """The numbers, with texts in the units of the study."""
+        with shown_in(self.findings.config.units):
+            return summary_of(self.findings)
 
 
 def _range(each: SweptParameter, is_grid: bool) -> SweptRange:
