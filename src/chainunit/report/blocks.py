@@ -125,7 +125,7 @@ class GivenValue:
     description: str
     value: Content
     origin: str = ""
-    """see `chainunit.study.record.StudyRecord.origin`; empty where it is not known"""
+    """see `chainunit.study.origins.origin_of`; empty where it is not known"""
 
 
 @dataclass(frozen=True)

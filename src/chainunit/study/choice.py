@@ -34,7 +34,7 @@ class Choice:
 def choose(config: Config, folder: Path, report: Report, backend: Backend | None = None) -> Choice:
     """The drive of a study. A capability that chooses it writes its FMUs to `folder`."""
     if config.foreign is not None:
-        return _with_foreign(config)
+        return Choice(_with_foreign(config))
     for part in registered():
         proposal = part.drive(config, folder, report, backend)
         if proposal is not None:
@@ -94,14 +94,14 @@ def check_files(config: Config) -> None:
         _with_foreign(config)
 
 
-def _with_foreign(config: Config) -> Choice:
+def _with_foreign(config: Config) -> Drive:
     """The drive of a study that names its motor."""
     assert config.foreign is not None
     with refusal_prefix("system.motor: ", "system.motor"):
         return with_motor(config, config.foreign.file, config.foreign.names)
 
 
-def with_motor(config: Config, file: Path, names: Mapping[str, str] | None = None) -> Choice:
+def with_motor(config: Config, file: Path, names: Mapping[str, str] | None = None) -> Drive:
     """The machine of a study, driven by a foreign motor.
 
     Parameters
@@ -121,16 +121,7 @@ def with_motor(config: Config, file: Path, names: Mapping[str, str] | None = Non
     if config.feed_forward and "tau_ff" not in motor.connectors:
         raise InputError(f"{file}: has no input tau_ff in N.m; leave feed_forward out")
     follows = "w_ref" in motor.connectors
-    return Choice(
-        Drive(
-            Motor,
-            None,
-            config.machine,
-            follows,
-            feed_forward=config.feed_forward,
-            foreign=motor,
-        )
-    )
+    return Drive(Motor, None, config.machine, follows, feed_forward=config.feed_forward, foreign=motor)
 
 
 def with_line(config: Config, drive: Drive) -> Drive:

@@ -1,5 +1,4 @@
-"""The drive of a study in its co-simulation: the start, the runs through events, and the machine behind an
-open coupling."""
+"""The drive of a study in its co-simulation: its signals, its simulations, and their energy balance."""
 
 from __future__ import annotations
 

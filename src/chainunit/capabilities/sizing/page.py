@@ -301,7 +301,7 @@ def _ways(s: b.Source, study: StudyRecord) -> b.Table:
         )
         opens = "; ".join(study.title_of(run) for run in way["opens"]) or "nothing"
         rows.append(b.TableRow((s.words(f"{path}.way"), *numbers, opens)))
-    columns = b.heads("way", "set to", "running", "a start", "start-up", "opens where")
+    columns = b.heads("way", "set to", "running", "a start", "start-up", "opens or slips where")
     title = "Ways to a safety coupling: its setting, and the torques of running and of a start, at the crank"
     return b.Table(tuple(rows), columns, title=title, numeric=False, form="long")
 

@@ -93,6 +93,23 @@ class DrivelinePart(PartOfLine):
 
     name = "driveline"
     model = CardanDriveline
+    tables = {  # noqa: RUF012
+        "driveline": FileSection(
+            Driveline,
+            optional=True,
+            keys={"place": (Literal[PLACES], Field("crank", description="shaft that it is on"))},
+            form=TableForm(
+                form,
+                partial(line_values, prefix="driveline."),
+                Damping,
+                _shaft_keys,
+                _conditions,
+                {"damping_ratio": ("d2", "d3"), **{shaft: (shaft, c) for shaft, c in SHAFTS.items()}},
+            ),
+            title="Driveline",
+            follows={"d2": "from damping_ratio", "d3": "from damping_ratio"},
+        )
+    }
 
     def plan(self, reading: FileReading) -> DrivelinePlan | None:
         """The plan of the table."""
@@ -140,24 +157,6 @@ class DrivelinePart(PartOfLine):
         from .shaft_runs import remark
 
         remark(study)
-
-    tables = {  # noqa: RUF012
-        "driveline": FileSection(
-            Driveline,
-            optional=True,
-            keys={"place": (Literal[PLACES], Field("crank", description="shaft that it is on"))},
-            form=TableForm(
-                form,
-                partial(line_values, prefix="driveline."),
-                Damping,
-                _shaft_keys,
-                _conditions,
-                {"damping_ratio": ("d2", "d3"), **{shaft: (shaft, c) for shaft, c in SHAFTS.items()}},
-            ),
-            title="Driveline",
-            follows={"d2": "from damping_ratio", "d3": "from damping_ratio"},
-        )
-    }
 
 
 PART = DrivelinePart()
