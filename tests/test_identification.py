@@ -149,7 +149,7 @@ def test_a_minute_of_an_induction_motor_from_many_starts(angle):
     best = fit(
         Problem(plant, [run], sought, {"motor.i": Sensor(offset=0.1)}),
         starts=3,
-        report=lambda count, _: seen.append(count),
+        progress=lambda count, _: seen.append(count),
     )
     assert (best.starts, best.agreeing) == (3, 3)
     assert seen == list(range(1, best.rounds + 1)) and best.rounds <= 30

@@ -74,7 +74,9 @@ def export(
     loaded = study_file(study_path) if study_path else None
     kind: Any = backend.value if backend else None
     with terminal_console(stderr=True).status("exporting") as status:
-        model, start = model_and_start(name, loaded, rods, direct=direct, backend=kind, report=status.update)
+        model, start = model_and_start(
+            name, loaded, rods, direct=direct, backend=kind, progress=status.update
+        )
         file = file or Path(f"{model.name}.fmu")
         made = write(
             model,
@@ -83,7 +85,7 @@ def export(
             backend=kind,
             fmi=fmi,
             platforms=_platforms(platforms, fmi),
-            report=status.update,
+            progress=status.update,
         )
     print(f"{file}: {model.name}, {made}")
     if whole and loaded and (words := left_out(loaded)):
@@ -104,7 +106,9 @@ def export_ssp(
         raise InputError(f"-o {output}: must be a file name that ends in .ssp")
     loaded = study_file(config)
     with terminal_console(stderr=True).status("exporting") as status:
-        made = export_study(loaded, output, backend=backend.value if backend else None, report=status.update)
+        made = export_study(
+            loaded, output, backend=backend.value if backend else None, progress=status.update
+        )
     print(f"{output}: {made}")
     if words := left_out(loaded):
         print(words)

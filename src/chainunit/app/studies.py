@@ -34,7 +34,7 @@ from ..study.parts import over_example, parts_of
 from ..study.record import StudyRecord
 from ..study.result import as_dict
 from ..study.window import Phase
-from ..work.progress import Report as Progress
+from ..work.progress import TaskProgress
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -177,7 +177,7 @@ class Study:
         folder: str | Path | None = None,
         check: bool = False,
         backend: Backend | None = None,
-        progress: Progress | None = None,
+        progress: TaskProgress | None = None,
         scheduler: str | None = None,
     ) -> StudyResult:
         """Run the study: start-up, steady running, every event. The packaged example takes half a minute.

@@ -219,9 +219,9 @@ def _all(
     for first in range(0, len(speed), chunk):
         batch = order[first : first + chunk]
         share, count = len(batch) / len(speed), int(max(counts[batch]))
-        report = partial(lambda before, share, x: progress(before + share * x), before, share)
+        of_batch = partial(lambda before, share, x: progress(before + share * x), before, share)
         parts.append(
-            _shoot(_pick(p, batch), speed[batch], load[batch], guess[:, batch], count, iterations, report)
+            _shoot(_pick(p, batch), speed[batch], load[batch], guess[:, batch], count, iterations, of_batch)
         )
         before += share
     back = np.argsort(order, kind="stable")

@@ -35,7 +35,7 @@ def export(
     backend: Backend | None = None,
     fmi: int = 2,
     platforms: Sequence[str] = (),
-    report: Callable[[str], None] = lambda what: None,
+    progress: Callable[[str], None] = lambda what: None,
 ) -> Origin:
     """Write `model` as an FMU; the result tells which backend made it, and why.
 
@@ -44,7 +44,7 @@ def export(
     model, file, start : see `chainunit.fmu.export.export`
     backend : "native" or "python"; by default native where a C compiler is found and works
     fmi : 2 or 3; 3 only by the native backend
-    platforms, report : see `chainunit.fmu.native.export.export`; platforms only by the native backend
+    platforms, progress : see `chainunit.fmu.native.export.export`; platforms only by the native backend
 
     Raises
     ------
@@ -59,7 +59,7 @@ def export(
         return _by_python(model, file, start, fmi, platforms, ", no C compiler for this machine found")
     names, compiler = targets.choose(platforms, fmi)
     try:
-        native.export(model, file, start, fmi=fmi, platforms=platforms, report=report)
+        native.export(model, file, start, fmi=fmi, platforms=platforms, progress=progress)
     except WriteError:
         raise
     except RunError:

@@ -4,7 +4,7 @@ The tables are in ``data/papers``, one for each paper; the functions that comput
 the paper. The errors of the papers stand only here, for comparison; the models have the corrected physics.
 """
 
-from ..work.progress import Report, quiet
+from ..work.progress import TaskProgress, quiet
 from . import paper000, paper001, paper002, paper003
 from .table import PaperNumber, rows
 
@@ -14,7 +14,7 @@ PAPERS = {"000": paper000, "001": paper001, "002": paper002, "003": paper003}
 """The module of each paper."""
 
 
-def reproduce(progress: Report = quiet) -> list[PaperNumber]:
+def reproduce(progress: TaskProgress = quiet) -> list[PaperNumber]:
     """All rows, by paper and item."""
     numbers: list[PaperNumber] = []
     for k, (paper, functions) in enumerate(PAPERS.items()):

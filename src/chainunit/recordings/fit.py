@@ -128,7 +128,7 @@ def fit(
     problem: Problem,
     z: Any = None,
     workers: int = 2,
-    report: Callable[[int, float], None] = lambda *_: None,
+    progress: Callable[[int, float], None] = lambda *_: None,
     starts: int = 1,
     seed: int = 0,
 ) -> Fit:
@@ -147,7 +147,7 @@ def fit(
     counter = itertools.count(1)
 
     def rounds_of(part: Problem) -> _LevenbergMarquardt:
-        return _LevenbergMarquardt(part, workers, lambda cost: report(next(counter), cost))
+        return _LevenbergMarquardt(part, workers, lambda cost: progress(next(counter), cost))
 
     first, rng = _first_turns(problem), np.random.default_rng(seed)
     z = problem.initial_point(workers) if z is None else z
@@ -225,8 +225,8 @@ def _measured_noises(at: NormalEquations) -> dict[tuple[str, str], float]:
 class _LevenbergMarquardt:
     """The rounds of a fit, by Levenberg's and Marquardt's method."""
 
-    def __init__(self, problem: Problem, workers: int, report: Callable[[float], None]) -> None:
-        self._problem, self._workers, self._report, self._count = problem, workers, report, 0
+    def __init__(self, problem: Problem, workers: int, progress: Callable[[float], None]) -> None:
+        self._problem, self._workers, self._progress, self._count = problem, workers, progress, 0
         self._damping = DAMPING
 
     def reweight(self, at: NormalEquations, scales: Scales | None) -> NormalEquations:
@@ -239,7 +239,7 @@ class _LevenbergMarquardt:
         simulations = self._problem.simulate_all(z, self._workers)
         z = _fit_sensors(self._problem, simulations, z, scales)
         equations = assemble(self._problem, z, tuple(self._problem.compare(simulations, z)), scales)
-        self._report(equations.cost)
+        self._progress(equations.cost)
         return equations
 
     def _evaluate_if_possible(self, z: Any, scales: Scales | None) -> NormalEquations | None:

@@ -10,8 +10,7 @@ from typing import Any, ClassVar, Generic, Self
 from ..core.errors import WriteError
 from ..core.files import atomic_file
 from ..core.temporary_folders import in_temporary_folder
-from ..work.progress import Report as Progress
-from ..work.progress import quiet
+from ..work.progress import TaskProgress, quiet
 from . import files, html, terminal
 from .blocks import Report
 from .task import Outcome, Question, Task
@@ -28,7 +27,7 @@ class ReportedResult(Generic[Question, Outcome]):
 
     @classmethod
     def made(
-        cls, question: Question, folder: str | Path | None, progress: Progress | None, **options: Any
+        cls, question: Question, folder: str | Path | None, progress: TaskProgress | None, **options: Any
     ) -> Self:
         """The result of the task, with its files in a `folder` where one is named.
 

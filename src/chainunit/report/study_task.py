@@ -12,7 +12,7 @@ from ..study.config import Config
 from ..study.record import LOAD_CYCLE, SPEED_MISSED, StudyRecord
 from ..study.registry import registered
 from ..study.run import run_study
-from ..work.progress import Report as Progress
+from ..work.progress import TaskProgress
 from . import series
 from . import study as contents
 from .task import Task, Writer
@@ -26,7 +26,7 @@ def _accept(config: Config, *, scheduler: str | None = None, **options: Any) -> 
             part.check_scheduler(config, scheduler)
 
 
-def _compute(config: Config, folder: Path, progress: Progress, **options: Any) -> StudyRecord:
+def _compute(config: Config, folder: Path, progress: TaskProgress, **options: Any) -> StudyRecord:
     """Run a study; options and errors are those of `run_study`. A refusal begins with the name of the study file, if
     there is one."""
     progress("the machine at constant speed", 0.0, 1.0)

@@ -15,7 +15,7 @@ from typing import Any, Generic, TypeVar
 from ..core.errors import RunError, WriteError
 from ..core.files import ResultKind, claim, clear, write_all
 from ..study.registry import command_modules
-from ..work.progress import Report as Progress
+from ..work.progress import TaskProgress
 from . import files
 from .blocks import Report
 
@@ -95,7 +95,9 @@ class Task(Generic[Question, Outcome]):
             names += sorted(file.name for file in folder.glob(name)) if "*" in name else [name]
         clear(folder, *files.names(self._stem, tuple(names)))
 
-    def outcome(self, question: Question, folder: Path | None, progress: Progress, **options: Any) -> Outcome:
+    def outcome(
+        self, question: Question, folder: Path | None, progress: TaskProgress, **options: Any
+    ) -> Outcome:
         """Compute in a claimed folder, or without one. The files of an earlier result are removed once the question
         is accepted.
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..reading.results import as_data
-from ..work.progress import Report
+from ..work.progress import TaskProgress
 
 if TYPE_CHECKING:
     from .config import Config
@@ -57,7 +57,7 @@ class Work:
     state from which the events of the study branched [s]."""
 
     rig: Rig
-    report: Report
+    progress: TaskProgress
     folder: Path | None = None
     scheduler: str | None = None
     steady: float = 0.0

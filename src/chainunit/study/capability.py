@@ -18,7 +18,7 @@ from .file_section import FileSection
 if TYPE_CHECKING:
     from ..fmu.backends import Backend
     from ..machines.machine import Machine
-    from ..work.progress import Report
+    from ..work.progress import TaskProgress
     from .analysis import Analysis
     from .config import Config
     from .cycle import Cycle
@@ -109,7 +109,7 @@ class StudyCapability:
         return ()
 
     def drive(
-        self, config: Config, folder: Path, report: Report, backend: Backend | None
+        self, config: Config, folder: Path, progress: TaskProgress, backend: Backend | None
     ) -> DriveProposal | None:
         """The drive that it chooses; None for a study whose file gives one. The FMUs that it needs are written to
         `folder`."""

@@ -14,7 +14,7 @@ from ..drives.catalogue import check_own
 from ..drives.motor import Motor
 from ..fmu.backends import Backend
 from ..system import foreign_component
-from ..work.progress import Report
+from ..work.progress import TaskProgress
 from .catalogue_drive import catalogue_drive, gear_with, with_inertia
 from .config import Config
 from .cycle import cycle
@@ -31,12 +31,12 @@ class Choice:
     proposal: DriveProposal | None = None
 
 
-def choose(config: Config, folder: Path, report: Report, backend: Backend | None = None) -> Choice:
+def choose(config: Config, folder: Path, progress: TaskProgress, backend: Backend | None = None) -> Choice:
     """The drive of a study. A capability that chooses it writes its FMUs to `folder`."""
     if config.foreign is not None:
         return Choice(_with_foreign(config))
     for part in registered():
-        proposal = part.drive(config, folder, report, backend)
+        proposal = part.drive(config, folder, progress, backend)
         if proposal is not None:
             return Choice(with_line(config, proposal.drive), proposal=proposal)
     return Choice(tune(config, with_line(config, _drive_of_file(config))))

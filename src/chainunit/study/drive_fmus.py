@@ -17,11 +17,11 @@ def export_drive(
     drive: Drive,
     folder: Path,
     backend: Backend | None = None,
-    report: Callable[[str], None] = lambda what: None,
+    progress: Callable[[str], None] = lambda what: None,
 ) -> tuple[dict[str, Path], dict[str, Origin]]:
     """Write the FMUs, with the start values of the drive. Returns the files by component, and the origin of each FMU.
-    `report` is called with a text on the current task."""
-    system, origins = export(drive.graph, folder, backend, report)
+    `progress` is called with a text on the current task."""
+    system, origins = export(drive.graph, folder, backend, progress)
     return {name: c.file for name, c in system.components.items() if c.file}, origins
 
 

@@ -50,7 +50,7 @@ def start_of(
     model: type[Model],
     *,
     backend: Backend | None = None,
-    report: Callable[[str], None] = lambda what: None,
+    progress: Callable[[str], None] = lambda what: None,
 ) -> dict[str, float]:
     """Start values of the parameters and inputs of the `model`, by name, with the values of the study: with
     tuned gains, or with the motor and the ratio that are chosen.
@@ -62,7 +62,7 @@ def start_of(
     RunError
         where no motor is found.
     """
-    drive = _drive(config, backend, report)
+    drive = _drive(config, backend, progress)
     for kind in parts_of_line():
         if model is kind.model:
             if (part := drive.line.part(kind.name)) is None:
@@ -97,7 +97,7 @@ def model_and_start(
     *,
     direct: bool = False,
     backend: Backend | None = None,
-    report: Callable[[str], None] = lambda what: None,
+    progress: Callable[[str], None] = lambda what: None,
 ) -> tuple[type[Model], dict[str, float]]:
     """The model that `chainunit export NAME` writes, and its start values by name.
 
@@ -116,9 +116,9 @@ def model_and_start(
         where no motor is found.
     """
     if config and is_study_file(name):
-        return whole_system(config, backend=backend, report=report)
+        return whole_system(config, backend=backend, progress=progress)
     model = model_named(name, direct)
-    start = start_of(config, model, backend=backend, report=report) if config else {}
+    start = start_of(config, model, backend=backend, progress=progress) if config else {}
     if name == "ChainUnitFlexible":
         if rods is None:
             machine = config and config.machine.simulated
@@ -131,7 +131,7 @@ def whole_system(
     config: Config,
     *,
     backend: Backend | None = None,
-    report: Callable[[str], None] = lambda what: None,
+    progress: Callable[[str], None] = lambda what: None,
 ) -> tuple[type[Model], dict[str, float]]:
     """The one model of the whole system of a study, and its start values by name: parameters, the speed reference and
     the loads of normal running. Where the file leaves the motor open it is chosen first.
@@ -143,7 +143,7 @@ def whole_system(
     RunError
         where no motor is found.
     """
-    drive = _drive(config, backend, report)
+    drive = _drive(config, backend, progress)
     system = study_system(config, drive)
     machine = system.components["machine"]
     name = machine.model.name if isinstance(machine, ModelComponent) else machine.title
@@ -207,9 +207,9 @@ def _machine(config: Config, model: type[Model], machine: Machine) -> dict[str, 
     return machine.by_name | Layout(type(config.feed)).by_name(config.feed) | turning
 
 
-def _drive(config: Config, backend: Backend | None, report: Callable[[str], None]) -> Drive:
+def _drive(config: Config, backend: Backend | None, progress: Callable[[str], None]) -> Drive:
     with scratch() as folder:
-        choice = choose(config, folder, lambda what, done, todo: report(what), backend)
+        choice = choose(config, folder, lambda what, done, todo: progress(what), backend)
     if choice.proposal is not None and choice.proposal.insufficient:
         raise RunError(f"[{choice.proposal.name}]: {choice.proposal.answer}")
     return with_parts_beside(config, choice.drive)
@@ -220,7 +220,7 @@ def export_study(
     file: Path,
     *,
     backend: Backend | None = None,
-    report: Callable[[str], None] = lambda what: None,
+    progress: Callable[[str], None] = lambda what: None,
 ) -> str:
     """Write machine and motor of a study as an SSP package; returns its contents in words. Where the
     file leaves the motor open it is chosen first. The default experiment is as long as the study's
@@ -231,7 +231,7 @@ def export_study(
     InputError, RunError
         see `chainunit.system.ssp.export`; also where no motor is found, or the motor is a foreign FMU.
     """
-    drive = _drive(config, backend, report)
+    drive = _drive(config, backend, progress)
     return export(
         study_system(config, drive),
         file,
@@ -240,5 +240,5 @@ def export_study(
         stop=_running(config),
         step=config.run.step,
         backend=backend,
-        report=report,
+        progress=progress,
     )

@@ -17,7 +17,7 @@ from ..core.errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
 from ..reading.text import number, shown_in
 from ..system import Simulation
-from ..work.progress import Progress, Report, quiet
+from ..work.progress import Progress, TaskProgress, quiet
 from . import verdict
 from .analyses import all_analyses
 from .analysis import Work
@@ -51,7 +51,7 @@ _PEAKS = ("crank_torque", "motor_torque", "rocker_torque")
 def run_study(
     config: Config,
     folder: Path,
-    report: Report = quiet,
+    progress: TaskProgress = quiet,
     *,
     check: bool = False,
     backend: Backend | None = None,
@@ -71,7 +71,7 @@ def run_study(
         save its state.
     """
     with shown_in(config.units):
-        choice = choose(config, folder / "fmu", report, backend)
+        choice = choose(config, folder / "fmu", progress, backend)
         config = as_chosen(config, choice)
         drive = with_parts_beside(config, choice.drive)
         if check and drive.foreign_titles:
@@ -83,22 +83,24 @@ def run_study(
         unmade = Rig(config, drive, {})
         for part in registered():
             part.check_runs(config, unmade)
-        _analyse(study, Work(unmade, report), needs_runs=False)
-        files, study.fmus = export_drive(drive, folder / "fmu", backend, lambda what: report(what, 0.0, 1.0))
+        _analyse(study, Work(unmade, progress), needs_runs=False)
+        files, study.fmus = export_drive(
+            drive, folder / "fmu", backend, lambda what: progress(what, 0.0, 1.0)
+        )
         if backend is None and "python" in {origin.backend for origin in study.fmus.values()}:
             study.note(
                 "no compiler",
                 "No C compiler was found: the FMUs run in Python. With one the runs take about a tenth of the time: "
                 "install gcc or clang, or the compiler that comes with pip install 'chainunit[cross]'.",
             )
-        runner = Runner(study, Rig(config, drive, files), report)
+        runner = Runner(study, Rig(config, drive, files), progress)
         with _ending(study):
             runner.run(check, lambda: export_coasting(drive, folder / "fmu", backend))
-            work = Work(runner.rig, report, folder, scheduler, runner.stop)
+            work = Work(runner.rig, progress, folder, scheduler, runner.stop)
             _analyse(study, work, needs_runs=True)
         if not isinstance(study.failure, InterruptedRunError):
             with _ending(study):
-                _analyse(study, Work(runner.rig, report), needs_runs=True, at_end=True)
+                _analyse(study, Work(runner.rig, progress), needs_runs=True, at_end=True)
         conclude(study)
         return study
 
@@ -150,9 +152,9 @@ def _with_class_of_all_starts(study: StudyRecord) -> None:
 class Runner:
     """Makes the runs of a study on its rig, and writes the results into the record."""
 
-    def __init__(self, study: StudyRecord, rig: Rig, report: Report) -> None:
+    def __init__(self, study: StudyRecord, rig: Rig, progress: TaskProgress) -> None:
         config = study.config
-        self.study, self.rig, self.report = study, rig, report
+        self.study, self.rig, self.progress = study, rig, progress
         self.stop = config.stop
         """time to which the start-up is run [s]; later where the motor takes longer to settle"""
         taken = [event for event in config.events.values() if rig.takes(event)]
@@ -186,7 +188,7 @@ class Runner:
 
     def _progress(self, what: str, before: float) -> Progress:
         def progress(time: float) -> None:
-            self.report(what, min(before + time, self.total), self.total)
+            self.progress(what, min(before + time, self.total), self.total)
 
         return progress
 
@@ -270,7 +272,7 @@ class Runner:
             transient = Transient(event, 0.0, run, self.rig.event_signals(event, 0.0, {}), {})
             self._close(simulation, transient, self.stop, Phase.LOADED_START)
         if check:
-            self.report(f"monolithic reference: {event.title}", self.total, self.total)
+            self.progress(f"monolithic reference: {event.title}", self.total, self.total)
             self._compare(event.name, transient)
 
     def _close(self, simulation: Simulation, transient: Transient, stop: float, phase: Phase) -> None:
@@ -325,7 +327,7 @@ class Runner:
         variants = event.variants()
         if not variants:
             return
-        self.report(f"{event.title}, over the range of its assumption", before, self.total)
+        self.progress(f"{event.title}, over the range of its assumption", before, self.total)
         answers = self.study.answers[event.name]
         peaks = {name: [] if self.rig.guards else [getattr(answers, f"{name}_peak")] for name in _PEAKS}
         for variant in (*variants, event) if self.rig.guards else variants:
@@ -347,10 +349,10 @@ class Runner:
 
     def _check(self, transients: list[Transient]) -> None:
         """Compare every run from the start-up on with the monolithic solution."""
-        self.report("monolithic reference of the start-up", self.total, self.total)
+        self.progress("monolithic reference of the start-up", self.total, self.total)
         states = self._compare("start_up", None)
         for transient in transients:
-            self.report(f"monolithic reference: {transient.event.title}", self.total, self.total)
+            self.progress(f"monolithic reference: {transient.event.title}", self.total, self.total)
             self._compare(transient.event.name, transient, states)
 
     def _compare(

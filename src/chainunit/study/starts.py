@@ -117,7 +117,7 @@ class StartAnalysis(Analysis):
         config = study.config
         if study.start is None or study.start.start_time is None:
             return None
-        work.report("starts from other crank angles", 1.0, 1.0)
+        work.progress("starts from other crank angles", 1.0, 1.0)
         starts = starts_from_all(work.rig, longest_start(config, study.start.start_time))
         limit = config.gear.start_limit if "gear.torque_limit" in config.file.given else math.inf
         running = running_peak(study, at_gear)

@@ -96,14 +96,14 @@ def export_compiled(
     backend: Backend | None = None,
     fmi: int = 2,
     platforms: Sequence[str] = (),
-    report: Callable[[str], None] = lambda what: None,
+    progress: Callable[[str], None] = lambda what: None,
 ) -> Origin:
     """Write a system of models as one FMU, with the start values of the system.
 
     Parameters
     ----------
     system, name, title : see `compiled`
-    file, backend, fmi, platforms, report : see `chainunit.fmu.backends.export`
+    file, backend, fmi, platforms, progress : see `chainunit.fmu.backends.export`
 
     Raises
     ------
@@ -112,7 +112,9 @@ def export_compiled(
     """
     part = compiled(system, name, title)
     start = part.start | input_starts(system, part.model)
-    return export_fmu(part.model, file, start, backend=backend, fmi=fmi, platforms=platforms, report=report)
+    return export_fmu(
+        part.model, file, start, backend=backend, fmi=fmi, platforms=platforms, progress=progress
+    )
 
 
 def input_starts(system: System, model: type[Model]) -> dict[str, float]:

@@ -15,10 +15,10 @@ def export(
     system: System,
     folder: Path,
     backend: Backend | None = None,
-    report: Callable[[str], None] = lambda what: None,
+    progress: Callable[[str], None] = lambda what: None,
 ) -> tuple[System, dict[str, Origin]]:
     """Write an FMU for each model of the system that has none, with the component's start values, to `folder`.
-    Components of one model share the file of the first. `report` is called with texts on the progress.
+    Components of one model share the file of the first. `progress` is called with texts on the work.
 
     Returns
     -------
@@ -34,15 +34,15 @@ def export(
                 file = folder / f"{model.name}.fmu"
                 if file in files.values():
                     file = folder / f"{model.name}_{name}.fmu"
-                progress = _of_model(model.name, report)
-                progress("exporting")
-                origins[name] = export_fmu(model, file, component.start, backend=backend, report=progress)
+                of_model = _of_model(model.name, progress)
+                of_model("exporting")
+                origins[name] = export_fmu(model, file, component.start, backend=backend, progress=of_model)
                 files[model] = file
             component = replace(component, file=files[model])
         components[name] = component
     return replace(system, components=components), origins
 
 
-def _of_model(name: str, report: Callable[[str], None]) -> Callable[[str], None]:
-    """A report that puts the name of the model before each text."""
-    return lambda what: report(f"{name}: {what}")
+def _of_model(name: str, progress: Callable[[str], None]) -> Callable[[str], None]:
+    """A progress that puts the name of the model before each text."""
+    return lambda what: progress(f"{name}: {what}")

@@ -48,7 +48,7 @@ def export(
     stop: float = 10.0,
     step: float = 1e-3,
     backend: Backend | None = None,
-    report: Callable[[str], None] = lambda what: None,
+    progress: Callable[[str], None] = lambda what: None,
 ) -> str:
     """Write `system` as an SSP 1.0 package and return a text on its contents. The same system gives the same file.
 
@@ -59,7 +59,7 @@ def export(
     name, description : name and description of the system
     stop, step : end of the default experiment, and its communication step, an annotation that libcosim reads [s]
     backend : backend of the FMUs, which are FMI 2.0; see `chainunit.fmu.backends.export`
-    report : is called with texts on the progress
+    progress : is called with texts on the work
 
     Raises
     ------
@@ -90,7 +90,9 @@ def export(
                     origins.append(f"{fmu.name} as it is")
                 else:
                     fmu = made / f"{part.title}.fmu"
-                    origins.append(str(export_fmu(part.of, fmu, part.start, backend=backend, report=report)))
+                    origins.append(
+                        str(export_fmu(part.of, fmu, part.start, backend=backend, progress=progress))
+                    )
                 contents[paths[alike]] = fmu.read_bytes()
             sources[name_of] = paths[alike]
     for name_of, part in parts.items():

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 Progress = Callable[[float], None]
 """A function that a task calls with the amount of work that is complete."""
-Report = Callable[[str, float, float], None]
+TaskProgress = Callable[[str, float, float], None]
 """A function that a task calls with its name, the amount of work that is complete, and the total amount."""
 
 

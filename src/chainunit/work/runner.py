@@ -26,7 +26,7 @@ from ..core import temporary_folders
 from ..core.errors import InputError, InterruptedRunError, RunError, printable
 from ..core.files import claim
 from .job import Job
-from .progress import Report
+from .progress import TaskProgress
 from .store import BatchStore
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ class Outcome:
 
 
 def run(
-    job: Job, folder: Path, report: Report, workers: int | None = None, scheduler: str | None = None
+    job: Job, folder: Path, progress: TaskProgress, workers: int | None = None, scheduler: str | None = None
 ) -> Outcome:
     """Make the missing batches of the job, and write each into the store in `folder` when it is finished.
 
@@ -68,7 +68,7 @@ def run(
     ----------
     job : the work; of its store see `BatchStore`
     folder : where the store is, or is made, by its `Job.store_name`
-    report : a function that is called with the title of the job and the numbers of complete and of all points
+    progress : a function that is called with the title of the job and the numbers of complete and of all points
     workers : number of local processes; by default one for each processor. One worker, or a single batch, runs in
         this process itself, without Dask
     scheduler : address of a Dask scheduler, such as ``tcp://10.0.0.5:8786``, whose workers make the batches in
@@ -88,8 +88,8 @@ def run(
     """
     with claim(folder / job.store_name) as path:
         store = BatchStore(job, path)
-        report(job.title, 0, job.points)
-        gaps, damaged = store.missing(lambda complete: report(job.title, complete, job.points))
+        progress(job.title, 0, job.points)
+        gaps, damaged = store.missing(lambda complete: progress(job.title, complete, job.points))
         complete = earlier = job.points - sum(_size(store, batch) for batch in gaps)
         workers = min(workers or os.cpu_count() or 1, len(gaps))
         try:
@@ -97,7 +97,7 @@ def run(
                 for batch, results in batches:
                     store.write(batch, results)
                     complete += _size(store, batch)
-                    report(job.title, complete, job.points)
+                    progress(job.title, complete, job.points)
         except (KeyboardInterrupt, InterruptedRunError) as error:
             words = f"interrupted after {complete} of {job.points} {job.title}"
             raise InterruptedRunError(words) from error

@@ -8,7 +8,7 @@ from chainunit.report.capability import AnyStudy
 from chainunit.report.reported_result import ReportedResult
 from chainunit.study.config import Config
 from chainunit.study.record import StudyRecord
-from chainunit.work.progress import Report as Progress
+from chainunit.work.progress import TaskProgress
 
 from .analysis import PinLife
 from .task import TASK
@@ -27,7 +27,7 @@ class PinLifeResult(ReportedResult[Config, StudyRecord]):
 
 
 def pin_life(
-    study: AnyStudy, folder: str | Path | None = None, progress: Progress | None = None
+    study: AnyStudy, folder: str | Path | None = None, progress: TaskProgress | None = None
 ) -> PinLifeResult:
     """The rating life of the pin that the study names, as ``chainunit pin-life`` finds it; arguments and errors as of
     `run`."""

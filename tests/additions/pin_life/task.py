@@ -14,7 +14,7 @@ from chainunit.report.task import Task
 from chainunit.study.config import Config
 from chainunit.study.record import StudyRecord
 from chainunit.study.result import as_dict
-from chainunit.work.progress import Report as Progress
+from chainunit.work.progress import TaskProgress
 
 from . import page
 
@@ -46,7 +46,7 @@ def _accept(config: Config, **options: Any) -> None:
         raise InputError(f"{config.file.source}: has no table [pin_life], which names the pin and its rating")
 
 
-def _compute(config: Config, folder: Path, progress: Progress, **options: Any) -> StudyRecord:
+def _compute(config: Config, folder: Path, progress: TaskProgress, **options: Any) -> StudyRecord:
     """Start-up and steady running, without the events of the study."""
     return study_task.TASK.compute(replace(config, events={}), folder, progress, **options)
 

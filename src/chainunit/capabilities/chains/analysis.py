@@ -36,7 +36,7 @@ from ...study.quantiles import HIGH, independent_count, quantile
 from ...study.record import StudyRecord
 from ...system.instance import Fmu, Instance
 from ...work.interrupts import stoppable
-from ...work.progress import Progress, Report
+from ...work.progress import Progress, TaskProgress
 from .result import Band, ChainResult, CriticalSpeed, RodSlack, SpeedNumbers
 from .table import ChainOrgans
 
@@ -88,7 +88,7 @@ class ChainAnalysis(Analysis):
         assert work.rig.files is not None
         config, file = study.config, work.rig.files["machine"]
         result, failure = study_chain(
-            study.drive, config.table("chain"), config.feed, config.run.crank_speed, file, work.report
+            study.drive, config.table("chain"), config.feed, config.run.crank_speed, file, work.progress
         )
         study.failure = study.failure or failure
         return result
@@ -278,7 +278,7 @@ def rest_forces(machine: ChainUnitMachine, side: str, feed: Any, rods: int) -> t
 
 
 def study_chain(
-    drive: Drive, chain: ChainOrgans, feed: Feed, own: float, file: Path, report: Report
+    drive: Drive, chain: ChainOrgans, feed: Feed, own: float, file: Path, progress: TaskProgress
 ) -> tuple[ChainResult, RunError | None]:
     """The numbers of chains at the crank speed `own` of a study [rad/s] and over the range of speeds, by the FMU
     `file` of the machine; and the error that ended the runs early, or None. A speed whose run fails is left out and
@@ -307,7 +307,7 @@ def study_chain(
 
         def at(k: int, w: float) -> tuple[SpeedNumbers, dict[str, Any]]:
             def report_share(share: float) -> None:
-                report(f"chains at {w:.3g} rad/s", k + share, float(len(others) + 1))
+                progress(f"chains at {w:.3g} rad/s", k + share, float(len(others) + 1))
 
             report_share(0.0)
             return numbers_at(fmu, drive, chain, feed, w, report_share, is_stopped)

@@ -144,7 +144,7 @@ class FlywheelAnalysis(Analysis):
 
         def run(flywheel: float) -> Wheel:
             finished = float(len(findings.wheels))
-            work.report(f"flywheel of {number(flywheel, 'kg.m2')}", finished, float(len(sizes) + 1))
+            work.progress(f"flywheel of {number(flywheel, 'kg.m2')}", finished, float(len(sizes) + 1))
             return _run(study, work.rig, findings, flywheel)
 
         for size in sizes:

@@ -31,7 +31,7 @@ from ...study.arrays import rms
 from ...study.config import Config
 from ...study.drive import Drive
 from ...system import Profile
-from ...work.progress import Report, quiet
+from ...work.progress import TaskProgress, quiet
 from .information import Combination, Information, information
 from .posterior import Posterior, posterior
 from .reading import IdentificationPlan, PlannedRun
@@ -169,7 +169,7 @@ def system_name(name: str) -> str:
 
 def identify(
     config: Config,
-    report: Report = quiet,
+    progress: TaskProgress = quiet,
     before_fit: Callable[[IdentificationPlan, Information], None] = lambda *_: None,
 ) -> IdentifiedMachine:
     """Identify the machine of a study from the recordings of its table [identify].
@@ -187,13 +187,13 @@ def identify(
     """
     plan = plan_of(config)
     workers = min(2, os.cpu_count() or 1)
-    report("reading recordings", 0.0, 1.0)
+    progress("reading recordings", 0.0, 1.0)
     recordings = read_runs(plan.runs)
     drive = drive_of(config, recordings)
-    report("simulating", 0.1, 1.0)
+    progress("simulating", 0.1, 1.0)
     problem = _problem(config, plan, drive, recordings)
     inspect_runs(problem, workers)
-    report("what the recordings can tell", 0.15, 1.0)
+    progress("what the recordings can tell", 0.15, 1.0)
     start = problem.initial_point(workers)
     before = information(problem, start, workers)
     before_fit(plan, before)
@@ -201,13 +201,13 @@ def identify(
         problem,
         start,
         workers,
-        report=lambda rounds, cost: report(
+        progress=lambda rounds, cost: progress(
             f"round {rounds}", 0.3 + 0.6 * min(1.0, rounds / MOST_ROUNDS), 1.0
         ),
         starts=plan.starts,
         seed=plan.seed,
     )
-    report("checks", 0.95, 1.0)
+    progress("checks", 0.95, 1.0)
     after = information(problem, best.z, workers, propose=False, at=best)
     around = posterior(problem, best, workers, plan.seed)
     tests = tuple(residual_tests(best)), tuple(score_tests(problem, best, workers))

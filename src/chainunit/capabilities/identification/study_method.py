@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ...report.capability import AnyStudy
 from ...report.reported_result import ReportedResult
 from ...study.config import Config
-from ...work.progress import Report as Progress
+from ...work.progress import TaskProgress
 from .identification import IdentifiedMachine
 from .page import TASK
 
@@ -53,7 +53,7 @@ class IdentificationResult(ReportedResult[Config, IdentifiedMachine]):
 
 
 def identify(
-    study: AnyStudy, folder: str | Path | None = None, progress: Progress | None = None
+    study: AnyStudy, folder: str | Path | None = None, progress: TaskProgress | None = None
 ) -> IdentificationResult:
     """Identify the machine from recordings, as the table [identify] asks: two of a minute take some ten seconds.
 

@@ -14,7 +14,7 @@ from ...fmu.backends import Backend
 from ...machines.machine import Machine
 from ...study.cycle import cycle
 from ...study.cycle_quantities import CycleQuantity
-from ...work.progress import Report, quiet
+from ...work.progress import TaskProgress, quiet
 from .checks import FmuValue, Neighbours, by_fmu, neighbours
 from .conflict import Conflict, conflict, nearest
 from .effects import effective_search
@@ -104,7 +104,7 @@ def machine_at(wishes: Wishes, x: Any) -> Machine:
     return wishes.machine.replace(dict(zip(wishes.names, map(float, x), strict=True)))
 
 
-def find_best(wishes: Wishes, report: Report = quiet, backend: Backend | None = None) -> Best:
+def find_best(wishes: Wishes, progress: TaskProgress = quiet, backend: Backend | None = None) -> Best:
     """Search for the best machine, and check it.
 
     Raises
@@ -115,11 +115,11 @@ def find_best(wishes: Wishes, report: Report = quiet, backend: Backend | None = 
     search, idle = effective_search(wishes)
     wishes = search.wishes
     starts, moved = search.starts(wishes.starts)
-    answers = _from_starts(search, starts, wishes.objectives[0], report)
+    answers = _from_starts(search, starts, wishes.objectives[0], progress)
     good = [answer for answer in answers if answer.feasible]
     failure = None
     if not good:
-        report("a machine that meets all limits", 0.0, 1.0)
+        progress("a machine that meets all limits", 0.0, 1.0)
         good, failure = _repaired(search, starts)
     begun = Best(wishes, len(starts), moved, _values(search, search.today), search.effort, idle)
     if not good:
@@ -129,10 +129,10 @@ def find_best(wishes: Wishes, report: Report = quiet, backend: Backend | None = 
     best = min(good, key=lambda answer: answer.value)
     front: tuple[FrontPoint, ...] = ()
     if len(wishes.objectives) > 1:
-        front = _front(search, best, starts, report)
+        front = _front(search, best, starts, progress)
         best = _compromise(search, front)
     agree = sum(answer.value - good_value(good) <= AGREES * abs(good_value(good)) for answer in good)
-    report("the checks", 0.0, 1.0)
+    progress("the checks", 0.0, 1.0)
     objective, limits = _checked(wishes, best, search)
     around = neighbours(search, best.x, objective, limits, search.value(objective, best.x))
     found = _values(search, best.x)
@@ -158,13 +158,13 @@ def good_value(answers: Sequence[Answer]) -> float:
 
 
 def _from_starts(
-    search: Search, starts: Sequence[Any], objective: CycleQuantity, report: Report
+    search: Search, starts: Sequence[Any], objective: CycleQuantity, progress: TaskProgress
 ) -> list[Answer]:
     answers = []
     for k, x in enumerate(starts):
-        report(f"starts, least {objective.name}", float(k), float(len(starts)))
+        progress(f"starts, least {objective.name}", float(k), float(len(starts)))
         answers.append(search.solve(x, objective))
-    report(f"starts, least {objective.name}", float(len(starts)), float(len(starts)))
+    progress(f"starts, least {objective.name}", float(len(starts)), float(len(starts)))
     return answers
 
 
@@ -203,10 +203,12 @@ def _pulls(search: Search, x: Any) -> tuple[float, float] | None:
 # -- two objectives
 
 
-def _front(search: Search, best: Answer, starts: Sequence[Any], report: Report) -> tuple[FrontPoint, ...]:
+def _front(
+    search: Search, best: Answer, starts: Sequence[Any], progress: TaskProgress
+) -> tuple[FrontPoint, ...]:
     """The front of two objectives: the first is least while the second is limited, step by step."""
     first, second = search.wishes.objectives
-    answers = [answer for answer in _from_starts(search, starts, second, report) if answer.feasible]
+    answers = [answer for answer in _from_starts(search, starts, second, progress) if answer.feasible]
     limits, total = list(search.wishes.limits), search.wishes.pareto_points
     ends = [best, min(answers, key=lambda answer: answer.value)] if answers else [best]
     # at either end the other objective is as small as it can be
@@ -217,7 +219,7 @@ def _front(search: Search, best: Answer, starts: Sequence[Any], report: Report) 
         low = ends[1].value
         near = [points[0].x]
         for k in range(1, total):
-            report("front of two objectives", float(k), float(total))
+            progress("front of two objectives", float(k), float(total))
             bound = high + (low - high) * k / (total - 1)
             allowed = TurnLimit(
                 second, None, bound * (1.0 + math.copysign(AGREES, bound)) if k == total - 1 else bound

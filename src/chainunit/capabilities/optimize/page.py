@@ -18,7 +18,7 @@ from ...report.lines import Line, Name, line
 from ...report.task import Task, Writer
 from ...study.config import Config
 from ...study.study_file import toml_text
-from ...work.progress import Report as Progress
+from ...work.progress import TaskProgress
 from .best import Best, find_best
 from .result import BestMachine, best_machine, best_tables, units_of
 from .table import wishes_of
@@ -78,7 +78,7 @@ class OptimizedStudy(NamedTuple):
 
 
 def _compute(
-    config: Config, folder: Path | None, progress: Progress, *, backend: Backend | None = None
+    config: Config, folder: Path | None, progress: TaskProgress, *, backend: Backend | None = None
 ) -> OptimizedStudy:
     """Search for the best machine of a study. A refusal begins with the name of the study file, if there is one."""
     with config.file.refusals():

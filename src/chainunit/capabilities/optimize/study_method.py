@@ -10,7 +10,7 @@ from ...machines.machine import Machine
 from ...report.capability import AnyStudy
 from ...report.reported_result import ReportedResult
 from ...study.config import Config
-from ...work.progress import Report as Progress
+from ...work.progress import TaskProgress
 from .best import Best
 from .page import TASK, OptimizedStudy
 
@@ -60,7 +60,7 @@ def optimize(
     study: AnyStudy,
     folder: str | Path | None = None,
     backend: Backend | None = None,
-    progress: Progress | None = None,
+    progress: TaskProgress | None = None,
 ) -> BestResult:
     """Search for the best machine, as the table [optimize] asks: 20 starts take some ten seconds.
 

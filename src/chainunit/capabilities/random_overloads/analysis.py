@@ -35,4 +35,4 @@ class RandomAnalysis(Analysis):
         assert work.folder is not None and files is not None
         drive = replace(study.drive, observer=None)
         task = RandomTask(study.config, drive, files, work.steady, work.rig.fed_from)
-        return run(task, work.folder, work.report, scheduler=work.scheduler)
+        return run(task, work.folder, work.progress, scheduler=work.scheduler)

@@ -38,7 +38,7 @@ from ...study.record import StudyRecord
 from ...study.rig import Rig
 from ...study.window import Phase, Window
 from ...work.job import Job, ResultVariable, texts
-from ...work.progress import Report
+from ...work.progress import TaskProgress
 from ...work.runner import run as run_job
 from ...work.store import made_anew
 from .table import plan_of
@@ -427,14 +427,18 @@ def job_of(task: RandomTask) -> Job:
 
 
 def run(
-    task: RandomTask, folder: Path, report: Report, workers: int | None = None, scheduler: str | None = None
+    task: RandomTask,
+    folder: Path,
+    progress: TaskProgress,
+    workers: int | None = None,
+    scheduler: str | None = None,
 ) -> MonteCarloResult:
     """Make the missing runs of the task and write them to the store in `folder`; the other arguments and the errors
     are those of `chainunit.work.runner.run`."""
     job = job_of(task)
     if workers is None and scheduler is None and task.is_compiled and job.points <= _IN_PROCESS * BATCH:
         workers = 1
-    outcome = run_job(job, folder, report, workers, scheduler)
+    outcome = run_job(job, folder, progress, workers, scheduler)
     return MonteCarloResult(
         outcome.dataset, outcome.file, task.method, outcome.earlier_points, outcome.damaged_batches
     )

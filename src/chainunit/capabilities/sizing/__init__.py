@@ -17,7 +17,7 @@ from ...study.file_section import FileSection
 from ...study.proposal import DriveProposal
 from ...study.record import StudyRecord
 from ...study.rules import BESIDE_MOTOR, Rule, has_sides
-from ...work.progress import Report
+from ...work.progress import TaskProgress
 from .table import SIZING_KEYS, Sizing, SizingPlan
 
 
@@ -64,14 +64,14 @@ class SizingCapability(Capability):
         return () if config.machine.model.sides else ("sizing.one_sided_share",)
 
     def drive(
-        self, config: Config, folder: Path, report: Report, backend: Backend | None
+        self, config: Config, folder: Path, progress: TaskProgress, backend: Backend | None
     ) -> DriveProposal | None:
         """The best of the motors that it tries."""
         if config.plans[self.name] is None:
             return None
         from .search import size
 
-        return size(config, folder, report, backend).proposal(config)
+        return size(config, folder, progress, backend).proposal(config)
 
     def permitted_temperature(self, config: Config) -> tuple[str, float] | None:
         """That of its table."""

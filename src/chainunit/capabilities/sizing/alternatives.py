@@ -32,7 +32,7 @@ from ...study.transients import follow, lead_times
 from ...study.verdict import STEADY
 from ...system import ModelComponent, monolithic
 from ...system.graph import in_line
-from ...work.progress import Report
+from ...work.progress import TaskProgress
 from .coupling import effects
 from .inverter import boosts
 from .protection import MARGIN, Alternative, Setting, Way, WayNumbers
@@ -53,9 +53,11 @@ _SMOOTH, _FASTEST, _STUCK = 2e-3, 2e4, 5.0
 clutch counts as stuck: there it passes 98 % of its setting."""
 
 
-def alternatives(study: StudyRecord, setting: Setting, rig: Rig, report: Report) -> tuple[Alternative, ...]:
+def alternatives(
+    study: StudyRecord, setting: Setting, rig: Rig, progress: TaskProgress
+) -> tuple[Alternative, ...]:
     """The ways to a coupling that saves what the least setting does not, and to one that a start does not open."""
-    return *_in_time(study, setting), *_for_starts(study, setting, rig, report)
+    return *_in_time(study, setting), *_for_starts(study, setting, rig, progress)
 
 
 def _in_time(study: StudyRecord, setting: Setting) -> Iterator[Alternative]:
@@ -76,7 +78,9 @@ def _in_time(study: StudyRecord, setting: Setting) -> Iterator[Alternative]:
         yield Alternative(Way.GEAR, WayNumbers.of(**basis, gear=gear), setting.opens, setting.effects)
 
 
-def _for_starts(study: StudyRecord, setting: Setting, rig: Rig, report: Report) -> tuple[Alternative, ...]:
+def _for_starts(
+    study: StudyRecord, setting: Setting, rig: Rig, progress: TaskProgress
+) -> tuple[Alternative, ...]:
     """The ways for a sized drive that starts direct on line, if the start decides its setting and an overload would
     open a coupling that running alone allows. A way whose run fails is left out."""
     if study.config.start != "direct" or not setting.start_decides:
@@ -92,7 +96,7 @@ def _for_starts(study: StudyRecord, setting: Setting, rig: Rig, report: Report) 
     )
     ways = []
     for make in makers:
-        report("ways to a safety coupling", 1.0, 1.0)
+        progress("ways to a safety coupling", 1.0, 1.0)
         try:
             ways.append(make(study, rig, setting))
         except InterruptedRunError:

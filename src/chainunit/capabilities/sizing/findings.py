@@ -186,4 +186,4 @@ class ProtectionAnalysis(Analysis):
         sizing: SizingFindings = study.findings["sizing"]
         sizing.setting = recommended_setting(study)
         if sizing.setting is not None:
-            sizing.alternatives = alternatives(study, sizing.setting, work.rig, work.report)
+            sizing.alternatives = alternatives(study, sizing.setting, work.rig, work.progress)

@@ -24,7 +24,7 @@ from ...study.limits import SPEED_DEVIATION
 from ...study.quantiles import HIGH
 from ...study.relay import HEAVIEST, LIGHT, class_words
 from ...study.sections import SOFTER
-from ...work.progress import Report
+from ...work.progress import TaskProgress
 from .candidate import Candidate
 from .duty import Duty, duty_of
 from .findings import SizingFindings
@@ -37,7 +37,9 @@ _WORSE_WITH_POWER = ("gear_start",)
 """Checks that a larger motor makes worse."""
 
 
-def size(config: Config, folder: Path, report: Report, backend: Backend | None = None) -> SizingFindings:
+def size(
+    config: Config, folder: Path, progress: TaskProgress, backend: Backend | None = None
+) -> SizingFindings:
     """Choose a motor of the catalogue for the study. At least `sizing.candidates` motors are tried, from
     small to large, and then more until one fits with the margin, and none that follows could be preferred to
     it, or the catalogue ends.
@@ -46,7 +48,7 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
     ----------
     config : a study with [sizing]
     folder : where the FMUs are written
-    report, backend : see `chainunit.study.run.run_study`
+    progress, backend : see `chainunit.study.run.run_study`
 
     Raises
     ------
@@ -67,7 +69,7 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
         )
     if config.start != "inverter" and "gear.ratio" not in config.file.given:
         check_ratios(plan_of(config).ratios, config.run.crank_speed, motors)
-    report("the machine at constant speed", 0.0, 1.0)
+    progress("the machine at constant speed", 0.0, 1.0)
     duty = duty_of(config, folder, backend)
     numbers = duty.numbers
     notes = [
@@ -88,7 +90,7 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
             f"{number(power, 'W')}: the largest were tried."
         )
         strong = [m for m in motors if m.nameplate.power == motors[-1].nameplate.power]
-    candidates = _search(_trials(config, strong[0], duty, folder, report, backend), strong, report)
+    candidates = _search(_trials(config, strong[0], duty, folder, progress, backend), strong, progress)
     notes += [
         f"{c.motor.designation} would be preferred, but for its start: {c.reason}."
         for c in candidates[1:]
@@ -128,18 +130,23 @@ def check_ratios(ratios: Sequence[float], crank_speed: float, motors: Sequence[C
 
 
 def _trials(
-    config: Config, motor: CatalogueMotor, duty: Duty, folder: Path, report: Report, backend: Backend | None
+    config: Config,
+    motor: CatalogueMotor,
+    duty: Duty,
+    folder: Path,
+    progress: TaskProgress,
+    backend: Backend | None,
 ) -> MotorTrials:
     """The trials of motors such as this one: on the compiled system where there is a compiler."""
     trials = MotorTrials(config, duty)
     drive = trials.candidate(motor).drive
     if compiler() is not None and backend != "python" and not drive.foreign_titles:
         return trials
-    files, _ = export_drive(drive, folder, backend, lambda what: report(what, 0.0, 1.0))
+    files, _ = export_drive(drive, folder, backend, lambda what: progress(what, 0.0, 1.0))
     return dataclasses.replace(trials, files=files)
 
 
-def _search(trials: MotorTrials, motors: list[CatalogueMotor], report: Report) -> list[Candidate]:
+def _search(trials: MotorTrials, motors: list[CatalogueMotor], progress: TaskProgress) -> list[Candidate]:
     """The candidates that `size` tries of the `motors`, in the order of their rank. The start of the best one is that
     from the worst crank angle; a candidate that fails in it makes room for the next."""
     demands = trials.plan.demands
@@ -154,19 +161,19 @@ def _search(trials: MotorTrials, motors: list[CatalogueMotor], report: Report) -
 
     while not candidates or not is_over():
         while following is not None and not is_over():
-            report(f"simulating {following.designation}", float(len(candidates)), float(len(motors)))
+            progress(f"simulating {following.designation}", float(len(candidates)), float(len(motors)))
             candidates.append(trials.best_of(following))
             following = next(rest, None)
         _from_all_angles(trials, candidates)
     if candidates[0].fits and candidates[0].drive.added_inertia:
-        report("a larger motor without a flywheel", 0.0, 1.0)
+        progress("a larger motor without a flywheel", 0.0, 1.0)
         if (larger := _without_flywheel(trials, motors, candidates)) is not None:
             candidates.append(larger)
             _from_all_angles(trials, candidates)
     hard = [c for c in candidates if c.breaks_gear]
     best, _ = choice([candidates[0], *hard], demands.larger) if hard else (candidates[0], {})
     if best.breaks_gear:
-        report("a softer start", 0.0, 1.0)
+        progress("a softer start", 0.0, 1.0)
         best.remedy = _remedy(trials, best)
         rank(candidates, demands.larger)
     return candidates

@@ -13,7 +13,7 @@ from ...report import blocks as b
 from ...report.lines import Line, Name, Number, join, line
 from ...report.task import Task
 from ...study.config import Config
-from ...work.progress import Report as Progress
+from ...work.progress import TaskProgress
 from . import figures as sweep_figures
 from .points import run_sweep
 from .summary import MOST_GAPS, SweepSummary, SweptStudy
@@ -50,7 +50,7 @@ def report(swept: SweptStudy) -> b.Report:
 def _compute(
     config: Config,
     folder: Path,
-    progress: Progress,
+    progress: TaskProgress,
     *,
     workers: int | None = None,
     scheduler: str | None = None,

@@ -30,7 +30,7 @@ from ...study.cycle_quantities import CycleQuantity, cycle_quantity, evaluate
 from ...study.measures import Answers
 from ...study.rig import Rig
 from ...work.job import Job, ResultVariable
-from ...work.progress import Report
+from ...work.progress import TaskProgress
 from ...work.runner import Outcome, check_scheduler
 from ...work.runner import run as run_job
 from .plan import SweepPlan
@@ -354,7 +354,11 @@ class SweepFindings:
 
 
 def run_sweep(
-    config: Config, folder: Path, report: Report, workers: int | None = None, scheduler: str | None = None
+    config: Config,
+    folder: Path,
+    progress: TaskProgress,
+    workers: int | None = None,
+    scheduler: str | None = None,
 ) -> SweepFindings:
     """Make the points of the sweep of a study that its store in `folder` does not have; the other arguments and the
     errors are those of `task_of` and `chainunit.work.runner.run`."""
@@ -365,4 +369,4 @@ def run_sweep(
     if scheduler is None and not task.plan.measures:
         # the native loop leaves so little to Python that threads do; processes take longer to start
         task, workers = replace(task, threads=workers or os.cpu_count() or 1), 1
-    return SweepFindings(config, task, run_job(job_of(task), folder, report, workers, scheduler))
+    return SweepFindings(config, task, run_job(job_of(task), folder, progress, workers, scheduler))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from ...report.capability import AnyStudy
 from ...report.reported_result import ReportedResult
 from ...study.config import Config
-from ...work.progress import Report as Progress
+from ...work.progress import TaskProgress
 from .page import TASK
 from .summary import SweepSummary, SweptStudy
 
@@ -56,7 +56,7 @@ def sweep(
     folder: str | Path | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
-    progress: Progress | None = None,
+    progress: TaskProgress | None = None,
 ) -> SweepResult:
     """Run the sweep of the study, its table ``sweep``, as ``chainunit sweep`` does.
 

@@ -72,7 +72,7 @@ class TorsionAnalysis(Analysis):
         load = float(np.mean(turn.crank_torque)) / drive.driven_machine.ratio
         rotation = Rotation(speed=speed, load=load)
         return TorsionFindings(
-            analyse(line, rotation, plan.table, plan.joint, plan.damping_ratios, work.report, span)
+            analyse(line, rotation, plan.table, plan.joint, plan.damping_ratios, work.progress, span)
         )
 
 

@@ -38,7 +38,7 @@ from ...drives.torsion import (
 )
 from ...reading.results import derived, part, result
 from ...study.arrays import stretches
-from ...work.progress import Progress, Report
+from ...work.progress import Progress, TaskProgress
 from .table import TorsionTable
 
 TONGUES = (1, 2, 3, 4)
@@ -309,24 +309,24 @@ def analyse(
     table: TorsionTable,
     joint: str = "alpha1",
     damping_ratios: tuple[float, ...] = (),
-    report: Report = lambda task, done, whole: None,
+    progress: TaskProgress = lambda task, done, whole: None,
     other_frequencies: tuple[float, ...] = (),
 ) -> LineAnalysis:
     """Make the whole analysis. `joint` names the bend that the map varies; there is a map for each of the
     `damping_ratios`, by default for that of the line. `other_frequencies` are further natural frequencies of
-    the line, as the inertia of the machine varies [rad/s]. `report` is called with the current task and its
-    progress."""
+    the line, as the inertia of the machine varies [rad/s]. `progress` is called with the current task and the
+    completed share of it."""
     xp = numpy_()
     k = float(frozen_frequency(xp, line, 1.0))
     angle = np.linspace(0.0, 2.0 * math.pi, 721)
     phi3, ratio, _ = two_joints(xp, line, angle)
     ends = table.slowest * rotation.speed, table.fastest * rotation.speed
     speed = speeds(*ends, k, int(table.points))
-    curve = steady(line, speed, rotation.load, lambda done: report("torsion: steady motion", done, 1.0))
+    curve = steady(line, speed, rotation.load, lambda done: progress("torsion: steady motion", done, 1.0))
     speed, curve = _refine(line, rotation.load, speed, curve)
     operating = steady(line, rotation.speed, rotation.load)
     simulation = _time_simulation(
-        line, speed[::SIMULATED], rotation.load, lambda done: report("torsion: time simulation", done, 1.0)
+        line, speed[::SIMULATED], rotation.load, lambda done: progress("torsion: time simulation", done, 1.0)
     )
     band = frequency_band(line)
     return LineAnalysis(
@@ -354,7 +354,7 @@ def analyse(
             rotation.load,
             joint,
             damping_ratios or (damping_ratio(line),),
-            lambda done: report("torsion: map of stability", done, 1.0),
+            lambda done: progress("torsion: map of stability", done, 1.0),
         ),
     )
 

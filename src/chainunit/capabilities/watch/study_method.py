@@ -7,7 +7,7 @@ from pathlib import Path
 from ...report.capability import AnyStudy
 from ...report.reported_result import ReportedResult
 from ...study.config import Config
-from ...work.progress import Report as Progress
+from ...work.progress import TaskProgress
 from .page import TASK
 from .watch import Alarm, WatchedRecording
 
@@ -28,7 +28,9 @@ class WatchResult(ReportedResult[Config, WatchedRecording]):
         return self.watched.alarms
 
 
-def watch(study: AnyStudy, folder: str | Path | None = None, progress: Progress | None = None) -> WatchResult:
+def watch(
+    study: AnyStudy, folder: str | Path | None = None, progress: TaskProgress | None = None
+) -> WatchResult:
     """Run the load observer over the recording of the table [watch].
 
     Parameters

@@ -37,7 +37,7 @@ from ...study.arrays import rms, stretches
 from ...study.config import Config
 from ...study.drive import Drive
 from ...system.instance import Fmu, Instance
-from ...work.progress import Report, quiet
+from ...work.progress import TaskProgress, quiet
 from .crank_motion import crank_motion
 from .observation import false_imbalance, tuning, weights
 from .observer_table import ObserverTable
@@ -180,7 +180,7 @@ def watch_plan_of(config: Config) -> WatchPlan:
     return plan
 
 
-def watch(config: Config, report: Report = quiet) -> WatchedRecording:
+def watch(config: Config, progress: TaskProgress = quiet) -> WatchedRecording:
     """Run the load observer over the recording of the table [watch].
 
     Raises
@@ -191,7 +191,7 @@ def watch(config: Config, report: Report = quiet) -> WatchedRecording:
     """
     plan = watch_plan_of(config)
     workers = min(2, os.cpu_count() or 1)
-    report("reading the recording", 0.0, 1.0)
+    progress("reading the recording", 0.0, 1.0)
     recording, errors = _read_files(plan)
     duration = float(recording.time[-1] - recording.time[0])
     least = FEWEST_TURNS * plan.turn
@@ -204,7 +204,7 @@ def watch(config: Config, report: Report = quiet) -> WatchedRecording:
     drive = drive_of(config, {RUN: recording})
     problem = _problem(config, plan, drive, recording)
     inspect_runs(problem, workers)
-    report("learning angle, zero and forces", 0.1, 1.0)
+    progress("learning angle, zero and forces", 0.1, 1.0)
     learned = fit(problem, None, workers)
     learned_values = {u.name: float(x) for u, x in zip(problem.unknowns, learned.z, strict=True)}
     shaft = is_of_shaft(recording.columns)
@@ -222,7 +222,7 @@ def watch(config: Config, report: Report = quiet) -> WatchedRecording:
     signals = {"phi": phi * ratio, "w": w * ratio / of_speed} | {
         name: recording.columns[column] / gain[column] for name, column in _signals(recording).items()
     }
-    report("watching", 0.5, 1.0)
+    progress("watching", 0.5, 1.0)
     # the thresholds of a machine that is known show by how much errors widen them
     tunings = [values, *([values | dict.fromkeys(UNCERTAINTIES, 0.0)] if any(uncertainty) else [])]
     courses = observe(recording, signals, tunings, GAP * plan.turn)

@@ -72,7 +72,7 @@ def export(
     *,
     fmi: int = 2,
     platforms: Sequence[str] = (),
-    report: Callable[[str], None] = lambda what: None,
+    progress: Callable[[str], None] = lambda what: None,
 ) -> Path:
     """Write `model` as a native FMU, Co-Simulation and Model Exchange.
 
@@ -81,7 +81,7 @@ def export(
     model, file, start : see `chainunit.fmu.export.export`
     fmi : version of FMI, 2 or 3
     platforms : names from `chainunit.fmu.native.platforms.PLATFORMS`; by default the platform of this machine
-    report : is called with texts on the progress
+    progress : is called with texts on the work
 
     Raises
     ------
@@ -104,7 +104,7 @@ def export(
         # FMI 2.0 expects the call from every importer
         kinds["ModelExchange"] = {**kinds["ModelExchange"], "needsCompletedIntegratorStep": "true"}
 
-    report("generating C")
+    progress("generating C")
     if fmi == 2:
         description = model_description(interface, "", kinds, version, units)
     else:
@@ -126,7 +126,7 @@ def export(
         contents["sources/buildDescription.xml"] = _build_description(model.name, units)
     for name in names:
         slow = ", the first time about a minute" if compiler.zig and name == "win64" else ""
-        report(f"compiling for {name}{slow}")
+        progress(f"compiling for {name}{slow}")
         contents |= build(compiler, name, fmi, model.name, sources, units)
     with atomic_file(file) as part:
         pack(contents, part)

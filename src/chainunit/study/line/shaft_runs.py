@@ -62,7 +62,7 @@ class ShaftAnalysis(Analysis):
     @staticmethod
     def find(study: StudyRecord, work: Work) -> ShaftFindings:
         """The load in each run; the torque in the rigid shaft is added to the runs."""
-        work.report("the same with a rigid shaft", 1.0, 1.0)
+        work.progress("the same with a rigid shaft", 1.0, 1.0)
         try:
             twins = _rigid_runs(study, work)
         except RunError as error:
