@@ -102,14 +102,9 @@ class InverterControl:
     ramp: Value = quantity("Hz/s", "fastest change of frequency", default=50.0, above=0.0, tunable=True)
     lag: Value = quantity("s", "lag of the frequency behind its reference", default=0.02, above=0.0)
     boost: Value = quantity(
-        "1",
-        "share of the voltage at frequency zero",
-        default=0.05,
-        min=0.0,
-        max=0.5,
-        tunable=True,
-        kind="percent",
-    )
+        "1", "share of the voltage at frequency zero",
+        default=0.05, min=0.0, max=0.5, tunable=True, kind="percent",
+    )  # fmt: skip
     slip: Value = quantity(
         "Hz/(N.m)", "slip compensation: frequency added per air-gap torque", default=0.0, min=0.0, tunable=True,
     )  # fmt: skip
@@ -451,8 +446,8 @@ class InductionMotor(Motor):
     @staticmethod
     def cooling(xp: Any, p: Any, w: Any) -> Any:
         """Cooling by the fan on the shaft: least at rest, full at synchronous speed and above."""
-        turning = xp.minimum(xp.abs(w) * p.pole_pairs / (_TURN * p.supply.f), 1.0)
-        return p.cooling.still + (1.0 - p.cooling.still) * turning
+        speed_share = xp.minimum(xp.abs(w) * p.pole_pairs / (_TURN * p.supply.f), 1.0)
+        return p.cooling.still + (1.0 - p.cooling.still) * speed_share
 
     @staticmethod
     def largest_torque(p: Any, T: float, *at: float) -> float:

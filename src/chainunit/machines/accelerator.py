@@ -80,7 +80,7 @@ class Outputs(PortValues):
 class Accelerator(InverseMachine):
     """The accelerator of a crusher: motion of the motor shaft in, torque and reaction of the bearing out."""
 
-    name, noun, turning = "Accelerator", "accelerator", "accelerator"
+    name, noun, driver_noun = "Accelerator", "accelerator", "accelerator"
     description = (
         "Accelerator of a crusher: a rotor that the material brakes; from motor angle and speed to torque, load port "
         "and reaction of the bearing"

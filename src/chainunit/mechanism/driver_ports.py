@@ -57,7 +57,7 @@ class AddedInertia:
 
 
 @declaration
-class TurningStates:
+class RotatingStates:
     """States of the direct machine; each is an output, too."""
 
     phi: Value = quantity("rad", "motor angle; crank angle is phi/ratio")
@@ -72,7 +72,7 @@ class DrivingTorque:
 
 
 @declaration
-class Turning:
+class RotatingAnswer:
     """Acceleration, and the torque on the shaft."""
 
     a: Value = quantity("rad/s2", "motor acceleration", nominal=100.0)
@@ -86,9 +86,9 @@ ROTATING = DriverPort(
     PortSlopes,
     Start,
     AddedInertia,
-    TurningStates,
+    RotatingStates,
     DrivingTorque,
-    Turning,
+    RotatingAnswer,
     (*flanges("inflow"), load_terminal()),
     flanges("inflow"),
     Requirement(
@@ -130,11 +130,11 @@ _WORDS = {
 """The words on a driver that slides, by those on one that turns; the longer ones come first."""
 
 
-def _sliding(name: str, turning: type, words: str, fields: Fields = ()) -> type:
+def _sliding(name: str, rotating: type, words: str, fields: Fields = ()) -> type:
     """The declaration of a driver that turns, for one that slides: the same names in other units and words, and more
     `fields`. `words` are its description."""
     slid: list[tuple[str, Any, Any]] = []
-    for field in fields_of(turning):
+    for field in fields_of(rotating):
         q = field[2].metadata.get("quantity")
         if q is not None:
             text = q.description
@@ -160,11 +160,11 @@ SLIDING = DriverPort(
     _sliding("WayPortSlopes", PortSlopes, "Exact derivatives of the load of a driver that slides."),
     _sliding("WayStart", Start, "Start of a driver that slides."),
     _sliding("AddedMass", AddedInertia, "The mass on a driver that slides by itself."),
-    _sliding("WayStates", TurningStates, "States of a machine whose driver slides by itself."),
+    _sliding("WayStates", RotatingStates, "States of a machine whose driver slides by itself."),
     _sliding("DrivingForce", DrivingTorque, "Force on a driver that slides."),
     _sliding(
         "WayAnswer",
-        Turning,
+        RotatingAnswer,
         "Acceleration of a driver that slides, and the force that it needs.",
         [("end_stop_force", Value, _END_STOPS)],
     ),

@@ -29,7 +29,7 @@ from ..core.quantities import (
     quantity,
 )
 from ..groups.group import Joint
-from .driver_ports import ROTATING, DriverPort, TurningStates
+from .driver_ports import ROTATING, DriverPort, RotatingStates
 from .end_stops import EndStops, StopAction, stop_action
 from .linkage import Linkage, Topology
 from .machine import MachineState, Mechanism, derived_numbers
@@ -97,7 +97,7 @@ class MachineModel(Model):
     """Output of each bearing by its title."""
     noun: ClassVar[str] = "machine"
     """The machine's name in texts for people."""
-    turning: ClassVar[str] = "crank"
+    driver_noun: ClassVar[str] = "crank"
     """The name, in texts for people, of the link that the motor turns."""
     angle_counts: ClassVar[str] = "from the upward vertical, clockwise"
     """How the angle of that link counts, in texts for people."""
@@ -302,7 +302,7 @@ class DirectMachine(LinkageModel):
 
     inverse: ClassVar[type[InverseMachine]]
     Outputs: ClassVar[type]
-    States = TurningStates
+    States = RotatingStates
 
     def __init_subclass__(cls) -> None:
         if not hasattr(cls, "inverse"):  # a common base of several models
@@ -336,7 +336,7 @@ class DirectMachine(LinkageModel):
     @staticmethod
     def initial_states(xp: Any, p: Any) -> Any:
         """The start angle and speed."""
-        return TurningStates(phi=p.phi_start, w=p.w_start)
+        return RotatingStates(phi=p.phi_start, w=p.w_start)
 
     controlled = True
 

@@ -41,7 +41,7 @@ def report(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Rep
             study.kind,
             s.result,
             (),
-            wording.of_machine(tuple(sections), study.turning),
+            wording.of_machine(tuple(sections), study.driver_noun),
             source=s.source_line(),
             failure=s.words("failure") if study.failure is not None else (),
             units=study.config.units,
@@ -64,7 +64,7 @@ def summary(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Re
             study.kind,
             s.result,
             (),
-            wording.of_machine((b.Section("summary", "Summary", tuple(blocks)),), study.turning),
+            wording.of_machine((b.Section("summary", "Summary", tuple(blocks)),), study.driver_noun),
             failure=s.words("failure") if study.failure is not None else (),
             units=study.config.units,
         )

@@ -178,7 +178,7 @@ def motor_verdict(study: StudyRecord) -> dict[str, Any] | None:
     holds: Holds = "false" if burns else "true" if enough else "in part"
     return {
         "holds": holds,
-        "text": turning(f"{text}.", study.turning),
+        "text": turning(f"{text}.", study.driver_noun),
         "speed": entry(steady.speed_mean, "rad/s", "speed"),
         "asked": entry(requested, "rad/s", "speed"),
         "least_reserve": entry(reserve, "1", "percent"),

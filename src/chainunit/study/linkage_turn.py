@@ -116,7 +116,7 @@ class LinkageFindings:
         """The groups in one line: ``crank + RRR dyad (coupler, rocker) + RRP dyad (rod, ram)``."""
         groups = self.description.structure.groups
         pinned = groups and groups[0].kind == CYLINDER
-        parts = [] if pinned else [self.machine.model.turning]
+        parts = [] if pinned else [self.machine.model.driver_noun]
         for group in groups:
             kind = group.kind if group.kind in ("triad", CYLINDER) else f"{group.kind} dyad"
             parts.append(f"{kind} ({', '.join(group.links)})")

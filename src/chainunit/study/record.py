@@ -157,10 +157,10 @@ class StudyRecord:
         return self.drive.machine.model.noun
 
     @property
-    def turning(self) -> str:
+    def driver_noun(self) -> str:
         """The noun for the part of the machine that the motor turns: "crank", or another word for a machine
         without one."""
-        return "crank" if self.drive.foreign_machine else self.drive.machine.model.turning
+        return "crank" if self.drive.foreign_machine else self.drive.machine.model.driver_noun
 
     @property
     def reaches(self) -> bool:

@@ -71,7 +71,7 @@ def _on_model(study: StudyRecord) -> dict[str, Any] | None:
     if study.verdict is None:
         return None
     verdict = as_data(study.verdict)
-    return verdict | {"text": turning(verdict["text"], study.turning)}
+    return verdict | {"text": turning(verdict["text"], study.driver_noun)}
 
 
 def _given_values(study: StudyRecord) -> dict[str, Any]:

@@ -151,7 +151,7 @@ def _turns(best: Best) -> fig.Figure:
         fig.Curve(name, best.turns["angle"], best.turns[key], look)
         for look, (name, key) in enumerate((("best", "best"), ("today", "today")))
     )
-    torque = fig.Axis(f"torque at the {best.wishes.machine.model.turning}", "N.m")
+    torque = fig.Axis(f"torque at the {best.wishes.machine.model.driver_noun}", "N.m")
     return fig.Figure(
         "best-torque",
         "Torque over the turn, today and best",

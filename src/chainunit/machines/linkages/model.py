@@ -398,7 +398,7 @@ class LinkageDescription(LinkageOutputs):
             __doc__ = f"{data['title'] or data['name']}."
             name = data["name"]
             noun = data["title"] or data["name"]
-            turning = data["driver"]["link"]
+            driver_noun = data["driver"]["link"]
             description = data["title"] or f"linkage {data['name']}"
             made = Making(f"machine_of({described.text!r})", machine_of, (described.text,))
             fmu_data = FmuData(described.notes, About(**data.get("about", {})))
