@@ -13,7 +13,10 @@ from command import chainunit
 from event_tables import event_line
 from reports import said_of
 
-from chainunit.reading.text import chosen_units, number, shown_in, turning
+from chainunit.core.quantities import Quantity
+from chainunit.reading.text import chosen_units, number, shown_in
+from chainunit.report.blocks import Source
+from chainunit.report.lines import Words
 from chainunit.report.markdown import markdown
 from chainunit.report.study import report
 from chainunit.study.config import parse
@@ -68,13 +71,13 @@ trip_torque = 300
     assert any("the crank at 3.00 rad/s" in words for words in sentences(other))
 
 
-def test_a_word_in_place_of_crank():
-    assert (
-        turning("Crank torque over a crank turn", "accelerator")
-        == "Accelerator torque over an accelerator turn"
-    )
-    assert turning("crank_speed of a crank", "rotor") == "crank_speed of a rotor"
-    assert turning("a crank turn", "crank") == "a crank turn"
+def test_a_text_has_slots_for_the_driver():
+    """A sentence with a slot names the driver of the machine; a name that a file gives stays as it is."""
+    speed = Quantity("rad/s", "{driver} speed over {a driver} turn")
+    assert speed.description == "crank speed over a crank turn"
+    assert speed.described("eccentric") == "eccentric speed over an eccentric turn"
+    source = Source({"title": "Crank shaper"}, "gear")
+    assert source.line("The {driver} of the {title}") == ("The gear of the ", Words("Crank shaper", "title"))
 
 
 def test_the_units_of_words_end_where_they_are_written():

@@ -21,6 +21,7 @@ from operator import attrgetter
 from typing import Any, Literal, TypeAlias, TypeVar, dataclass_transform
 
 from . import messages
+from .descriptions import Described
 
 T = TypeVar("T")
 
@@ -187,14 +188,14 @@ def written(x: float, type: Type) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Quantity:
-    """One scalar: its unit, its description, its bounds (with `open_low` the bound `low` itself is not
-    allowed), its start value (None for outputs), its `nominal` size, whether it may change in a run
-    (`tunable`), the range of its `usual` sizes (a value outside it is probably a slip of the unit, and is not
+class Quantity(Described):
+    """One scalar: its unit, the `template` of its description, its bounds (with `open_low` the bound `low`
+    itself is not allowed), its start value (None for outputs), its `nominal` size, whether it may change in a
+    run (`tunable`), the range of its `usual` sizes (a value outside it is probably a slip of the unit, and is not
     refused), its `kind`, which says how it is shown (see `chainunit.reading.text`), and its `type`."""
 
     unit: str
-    description: str
+    template: str
     start: float | None = None
     low: float = -math.inf
     high: float = math.inf
@@ -257,10 +258,10 @@ def quantity(
     kind: str = "",
     type: Type = "Real",
 ) -> Any:
-    """A field that declares one scalar. `default` is its start value (outputs have none); `above` is a lower
-    bound that is not allowed itself. Without `max`, a quantity with a lower bound has the upper bound of
-    `MOST`; without `usual`, its usual sizes are those of `USUAL`. `kind` says how it is shown (see
-    `chainunit.reading.text`). A `type` "Boolean" has the bounds 0 and 1."""
+    """A field that declares one scalar. A `description` may have slots, see `Described`. `default` is its start value
+    (outputs have none); `above` is a lower bound that is not allowed itself. Without `max`, a quantity with a lower
+    bound has the upper bound of `MOST`; without `usual`, its usual sizes are those of `USUAL`. `kind` says how it is
+    shown (see `chainunit.reading.text`). A `type` "Boolean" has the bounds 0 and 1."""
     base_units(unit)
     if type == "Boolean":
         min, max = 0.0, 1.0
@@ -352,11 +353,11 @@ def narrowed(instance: Any, to: type) -> Any:
 
 
 @dataclass(frozen=True, slots=True)
-class Variable:
-    """A declared scalar with the full name and description it has in its model."""
+class Variable(Described):
+    """A declared scalar with the full name and the `template` of the description that it has in its model."""
 
     name: str
-    description: str
+    template: str
     quantity: Quantity
 
     @property
@@ -387,7 +388,7 @@ def variables(cls: type, prefix: str = "", context: str = "", default: Any = Non
             q = field.metadata["quantity"]
             if default is not None:
                 q = dataclasses.replace(q, start=getattr(default, field.name))
-            yield Variable(name, context + q.description, q)
+            yield Variable(name, context + q.template, q)
         else:
             inner = field.metadata["default"] if default is None else getattr(default, field.name)
             words = f"{context}{field.metadata['group']}: "

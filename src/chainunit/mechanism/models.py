@@ -13,6 +13,7 @@ from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Any, ClassVar
 
+from ..core.descriptions import USUAL_DRIVER
 from ..core.engines import MATH
 from ..core.model import Making, Model, Part, Sketch, keep
 from ..core.ports import PortSlopes, ShaftMotion
@@ -97,7 +98,7 @@ class MachineModel(Model):
     """Output of each bearing by its title."""
     noun: ClassVar[str] = "machine"
     """The machine's name in texts for people."""
-    driver_noun: ClassVar[str] = "crank"
+    driver_noun: ClassVar[str] = USUAL_DRIVER
     """The name, in texts for people, of the link that the motor turns."""
     angle_counts: ClassVar[str] = "from the upward vertical, clockwise"
     """How the angle of that link counts, in texts for people."""

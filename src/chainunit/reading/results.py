@@ -14,6 +14,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple, dataclass_transform
 
+from ..core.descriptions import USUAL_DRIVER, of_driver
 from ..core.quantities import group, quantity
 from .text import array_entry, entry
 
@@ -120,7 +121,7 @@ def parts(of: Any) -> tuple[ResultPart, ...]:
     for field in dataclasses.fields(of):
         if "quantity" in field.metadata:
             q = field.metadata["quantity"]
-            own.append(ResultPart(field.name, field.name, q.description, q.unit, q.kind))
+            own.append(ResultPart(field.name, field.name, q.template, q.unit, q.kind))
         elif "group" in field.metadata:
             for each in parts(field.metadata["of"]):
                 attribute, name = (f"{field.name}.{x}" for x in (each.attribute, each.name))
@@ -133,39 +134,40 @@ def parts(of: Any) -> tuple[ResultPart, ...]:
     return (*own, *(x.part for x in members.values() if isinstance(x, _Derived)))
 
 
-def as_data(x: Any, *, titled: bool = False) -> Any:
+def as_data(x: Any, *, titled: bool = False, driver: str = USUAL_DRIVER) -> Any:
     """A result, or a mapping or sequence of results, as a file in JSON has it: each number as an entry with its unit.
 
     Parameters
     ----------
     titled : whether each declared number has its description as its title
+    driver : the noun of the link that the motor turns, for titles
 
     Raises
     ------
     TypeError
         for a number without a unit, and for a value that is no result.
     """
-    return _data(x, "", "", titled)
+    return _data(x, "", "", titled, driver)
 
 
-def _data(x: Any, unit: str, kind: str, titled: bool) -> Any:
+def _data(x: Any, unit: str, kind: str, titled: bool, driver: str) -> Any:
     if isinstance(x, InUnit):
         return _number(x.value, x.unit, x.kind) | ({"title": x.title} if x.title else {})
     if isinstance(x, Estimate):
         ends = {end: entry(getattr(x, end), x.unit, x.kind) for end in ("low", "high")}
         return entry(x.value, x.unit, x.kind) | ends
     if isinstance(x, Mapping):
-        return {str(key): _data(each, unit, kind, titled) for key, each in x.items()}
+        return {str(key): _data(each, unit, kind, titled, driver) for key, each in x.items()}
     if unit == GIVEN:
         return list(x) if isinstance(x, tuple) else x
     if unit:
         return _number(x, unit, kind)
     if dataclasses.is_dataclass(x) and parts(type(x)):  # type: ignore[arg-type]
-        return _table(x, titled)
+        return _table(x, titled, driver)
     if hasattr(x, "tolist"):
         x = x.tolist()
     if isinstance(x, list | tuple | frozenset):
-        return [_data(each, "", "", titled) for each in x]
+        return [_data(each, "", "", titled, driver) for each in x]
     if isinstance(x, Path):
         return str(x)
     if x is None or isinstance(x, str | bool | int):
@@ -173,7 +175,7 @@ def _data(x: Any, unit: str, kind: str, titled: bool) -> Any:
     raise TypeError(f"{x!r} has no declared unit, and no declared parts")
 
 
-def _table(x: Any, titled: bool) -> dict[str, Any]:
+def _table(x: Any, titled: bool, driver: str) -> dict[str, Any]:
     data: dict[str, Any] = {}
     of: Any = type(x)
     for each in parts(of):
@@ -183,11 +185,13 @@ def _table(x: Any, titled: bool) -> dict[str, Any]:
         if value is None and each.optional:
             continue
         unit, kind = (x.unit, getattr(x, "kind", "")) if each.unit == OWN else (each.unit, each.kind)
-        own = _data(value, unit, kind, titled or each.titled)
+        own = _data(value, unit, kind, titled or each.titled, driver)
         if each.inline:
             data |= own
         else:
-            title = {"title": each.description} if titled and unit and "value" in own else {}
+            title = (
+                {"title": of_driver(each.description, driver)} if titled and unit and "value" in own else {}
+            )
             data[each.name] = own | title if title else own
     return data
 
@@ -208,7 +212,7 @@ def documented(of: type, prefix: str = "") -> Iterator[tuple[str, str, str]]:
         own = prefix if each.inline else f"{prefix}{each.name}."
         name = f"{own.removesuffix('.')}{steps}".removeprefix(".")
         if inner is None or each.unit:
-            yield name, "" if each.unit in (OWN, GIVEN) else each.unit, each.description
+            yield name, "" if each.unit in (OWN, GIVEN) else each.unit, of_driver(each.description)
         else:
             yield from documented(inner, name and f"{name}.")
 

@@ -267,17 +267,6 @@ def number(
 _PLAIN = {"−": "-", _THIN: "", "°C": "degC", "°": "deg", "Ω": "Ohm", "∞": "inf"}
 
 
-def turning(text: str, word: str) -> str:
-    """The `text`, which is written for a machine with a crank, with another `word` for the part that the
-    motor turns."""
-
-    def replacement(match: re.Match[str]) -> str:
-        article = f"{match[1]}{'n' if word[0] in 'aeiou' else ''} " if match[1] else ""
-        return article + (word.capitalize() if match[2] == "C" else word)
-
-    return text if word == "crank" else re.sub(r"\b(?:([Aa]) )?([Cc])rank\b", replacement, text)
-
-
 def plain(text: str) -> str:
     """A number and its unit in characters that can be typed, except the powers of units: 2.34 × 10⁻⁷ kg m² ->
     2.34e-7 kg m²."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ..core.descriptions import of_driver
 from ..study.measures import MEASURES
 from ..study.record import StudyRecord
 from . import blocks as b
@@ -34,7 +35,9 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         worst = " Then the overload with the largest value." if study.overloads else ""
         speed = _speed(s, study, reference)
         lead = line(
-            f"First the values of {run_names.title(study, reference)}, the crank at ", speed, f".{worst}"
+            f"First the values of {run_names.title(study, reference)}, the {study.driver_noun} at ",
+            speed,
+            f".{worst}",
         )
         yield b.Text(lead, "lead", "long")
         yield b.Cards(tuple(_cards(s, study, reference)))
@@ -67,7 +70,7 @@ def _cards(s: b.Source, study: StudyRecord, run: str) -> Iterator[b.Card]:
             numbers = [(MEASURES[name].words, number(s, study, run, name)) for name in names]
             lines = [join(line(f"{words} ", size) for words, size in numbers[2:])] if numbers[2:] else []
             cards = tuple((size, words) for words, size in numbers[:2])
-            yield b.Card(of, cards, (*lines, *_worst(s, study, names[0])))
+            yield b.Card(of_driver(of, study.driver_noun), cards, (*lines, *_worst(s, study, names[0])))
 
 
 def _worst(s: b.Source, study: StudyRecord, name: str) -> Iterator[Line]:

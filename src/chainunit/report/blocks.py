@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias
 
+from ..core.descriptions import USUAL_DRIVER, of_driver
 from ..core.quantities import Layout
 from ..reading.text import DEFAULT_UNITS, Units
 from .figure import Figure
@@ -231,9 +232,11 @@ def _matches(node: Any, path: str) -> Iterator[Any]:
 
 @dataclass(frozen=True)
 class Source:
-    """Makes numbers, words and lines for a report from the entries of a `result`."""
+    """Makes numbers, words and lines for a report from the entries of a `result`, on a machine with the noun `driver`
+    for the link that the motor turns."""
 
     result: Mapping[str, Any]
+    driver: str = USUAL_DRIVER
 
     def number(self, path: str, *items: int, **more: Any) -> Number:
         """The number at `path`; where an array stands there, the number at the places `items` in it. `more` are
@@ -252,9 +255,9 @@ class Source:
     def line(self, template: str, **parts: Line) -> tuple[Piece, ...]:
         """A line from a template. A path in braces stands for the entry of the result at that path: ``{run.turns}``
         shows it as a result, ``{=run.turns}`` as a given value, ``{ratio:4}`` with 4 digits. A name of `parts` in
-        braces stands for that part."""
+        braces stands for that part, ``{driver}`` for the noun of the driver, see `of_driver`."""
         text: tuple[Piece, ...] = ()
-        for i, part in enumerate(re.split(r"\{([^}]*)\}", template)):
+        for i, part in enumerate(re.split(r"\{([^}]*)\}", of_driver(template, self.driver))):
             if i % 2 == 0:
                 text += (part,) if part else ()
             elif part in parts:
@@ -303,7 +306,7 @@ class Source:
         """A row (description, number) for each declared quantity that the result has at `path`, or for `only` one."""
         entries = at(self.result, path)
         return tuple(
-            TableRow((v.description, self.number(f"{path}.{v.name}", **more)))
+            TableRow((v.described(self.driver), self.number(f"{path}.{v.name}", **more)))
             for v in Layout(declaration).variables
             if v.name in entries and only in ("", v.name)
         )
@@ -317,13 +320,14 @@ class Source:
         for v in Layout(cls).variables:
             if v.name in entries:
                 full, origin = f"{name}.{v.name}", self.origin(f"{name}.{v.name}")
+                words = v.described(self.driver)
                 if isinstance(entries[v.name]["value"], list):
                     for i, end in enumerate(("least", "most")):
                         value = self.number(f"{path}.{v.name}", i, as_given=True)
-                        yield GivenValue(full, f"{v.description}, {end}", value, origin)
+                        yield GivenValue(full, f"{words}, {end}", value, origin)
                 else:
                     value = self.number(f"{path}.{v.name}", as_given=True, none="none")
-                    yield GivenValue(full, v.description, value, origin)
+                    yield GivenValue(full, words, value, origin)
 
     def origin(self, path: str) -> str:
         """The origin of the given value at `path`; empty where the result has no origins."""

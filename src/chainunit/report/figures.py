@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core.descriptions import of_driver
 from ..core.engines import numpy_
 from ..reading.text import forms, number
 from ..study.bearings import hardest_run
@@ -19,6 +20,7 @@ from ..study.record import StudyRecord
 from . import blocks as b
 from . import figure as fig
 from . import linkage_loads, load_figures, run_names
+from .lines import capital
 from .pictures import Pictures
 from .shaft import TORQUE, shaft_torque
 from .study_motion import machine_state
@@ -26,8 +28,6 @@ from .turn import angle_axis
 
 PICTURES = Pictures()
 _MOTION = ("phi", "w", "a")
-_TORQUE = fig.Axis("crank torque", "N.m")
-_SPEED = fig.Axis("crank speed", "rad/s")
 _CURRENT = fig.Axis("motor current", "A")
 
 
@@ -96,7 +96,8 @@ def _group_title(study: StudyRecord, runs: list[str]) -> str:
 
 @PICTURES.declare(lambda study: study.statics.cycles, "torque_angle.png")
 def _turn(s: b.Source, study: StudyRecord) -> fig.Figure:
-    torques: dict[str, Callable[[Cycle], Any]] = {"crank": lambda c: c.crank_torque}
+    driver = study.driver_noun
+    torques: dict[str, Callable[[Cycle], Any]] = {driver: lambda c: c.crank_torque}
     organs = bool(study.drive.machine.model.sides)
     if organs:
         torques["rocker"] = lambda c: c.outputs.rocker.tau
@@ -108,11 +109,11 @@ def _turn(s: b.Source, study: StudyRecord) -> fig.Figure:
             curves.append(fig.Curve(name, np.append(c.angle, 2.0 * math.pi), np.append(y, y[0]), look))
     return fig.Figure(
         "turn",
-        "Torque over a crank turn at constant speed",
-        f"{' and '.join(torques).capitalize()} torque over the crank angle: {', '.join(study.statics.cycles)}.",
+        of_driver("Torque over {a driver} turn at constant speed", driver),
+        f"{' and '.join(torques).capitalize()} torque over the {driver} angle: {', '.join(study.statics.cycles)}.",
         fig.stacked(angle_axis(study), items.items()),
         s.line(
-            f"Inverse dynamics{' of two bars' * organs} at {{=run.crank_speed:4}} of the crank, without a motor."
+            f"Inverse dynamics{' of two bars' * organs} at {{=run.crank_speed:4}} of the {driver}, without a motor."
         ),
     )
 
@@ -215,7 +216,7 @@ def _overloads(s: b.Source, study: StudyRecord) -> fig.Figure:
     return fig.Figure(
         "overloads",
         "Overloads",
-        "Crank torque, crank speed and motor current of every overload.",
+        f"{capital(study.driver_noun)} torque, {study.driver_noun} speed and motor current of every overload.",
         tuple((*row, *[None] * (widest - len(row))) for row in rows),
         level=True,
         on_page=False,
@@ -227,10 +228,12 @@ def _transient(s: b.Source, study: StudyRecord, name: str) -> fig.Figure:
     run, drive, event = study.runs[name], study.drive, run_names.event_time(study, name)
     time = run["time"].values - (event or 0.0)
     low, high = float(time[0]), float(time[-1])
-    speed: list[fig.Item] = [fig.Curve(_SPEED.label, time, crank_speed(drive, run), in_legend=False)]
+    driver = drive.driver_noun
+    of_torque, of_speed = fig.Axis(f"{driver} torque", "N.m"), fig.Axis(f"{driver} speed", "rad/s")
+    speed: list[fig.Item] = [fig.Curve(of_speed.label, time, crank_speed(drive, run), in_legend=False)]
     items: dict[fig.Axis, list[fig.Item]] = {
-        _TORQUE: [fig.Curve(_TORQUE.label, time, crank_torque(drive, run), in_legend=False)],
-        _SPEED: speed,
+        of_torque: [fig.Curve(of_torque.label, time, crank_torque(drive, run), in_legend=False)],
+        of_speed: speed,
         **_current(drive, run, time),
     }
     if drive.line.part("driveline") is not None:
@@ -241,7 +244,7 @@ def _transient(s: b.Source, study: StudyRecord, name: str) -> fig.Figure:
     if coasting is not None:
         after = coasting["time"].values - (event or 0.0)
         of_crank = crank_speed(drive, coasting)
-        speed.append(fig.Curve("crank behind the open coupling", after, of_crank, 1))
+        speed.append(fig.Curve(f"{driver} behind the open coupling", after, of_crank, 1))
         # until the crank stands: the rest of the run shows nothing
         turning = np.flatnonzero(np.abs(of_crank) > 0.02 * study.config.run.crank_speed)
         stands = float(after[turning[-1]]) if turning.size else high
@@ -254,11 +257,11 @@ def _transient(s: b.Source, study: StudyRecord, name: str) -> fig.Figure:
     return fig.Figure(
         f"time-{name.replace('_', '-')}",
         words,
-        f"Crank torque, crank speed and motor current over time: {words}."
+        f"{capital(driver)} torque, {driver} speed and motor current over time: {words}."
         + ("" if event is None else " The event is marked by a dashed line; the loads change in the shade."),
         fig.stacked(
             fig.Axis("time" if event is None else "time after the event", "s", low=low, high=high),
-            ((axis, (*curves, *marks(axis is _TORQUE))) for axis, curves in items.items()),
+            ((axis, (*curves, *marks(axis is of_torque))) for axis, curves in items.items()),
         ),
         s.line(_after(s, study, name)) if event is not None else (),
         half=True,
@@ -317,7 +320,7 @@ def _after(s: b.Source, study: StudyRecord, run: str) -> str:
         caption += f" The least speed is {{{least}}}"
     elif not forms(share, "1", "dip")[0][1]:
         # a dip so large is shown as words in place of a number
-        caption += f" The crank {{{dip}}}"
+        caption += f" The {{driver}} {{{dip}}}"
     else:
         caption += f" The speed dips by {{{dip}}}"
     if not study.returns:
@@ -335,7 +338,9 @@ def _after(s: b.Source, study: StudyRecord, run: str) -> str:
         assumptions = (
             f"{name} {ranges[name]}" for name in names if ends[f"{name}_low"].get("kind") == "assumed"
         )
-        caption += f" Assumed: {', '.join(assumptions)}; the crank torque peaks at {ranges['crank_torque']}."
+        caption += (
+            f" Assumed: {', '.join(assumptions)}; the {{driver}} torque peaks at {ranges['crank_torque']}."
+        )
     return caption
 
 
@@ -367,7 +372,7 @@ def _reactions(s: b.Source, study: StudyRecord) -> fig.Figure:
         "Bars of the reaction of every pin: peak and RMS in steady running, and the largest peak of all runs.",
         ((fig.Panel(x, fig.Axis("pin", names=tuple(pins)), items),),),
         s.line(
-            f"Means are taken over whole crank turns of {of_run}. Beside a bar: the run of the largest peak."
+            f"Means are taken over whole {{driver}} turns of {of_run}. Beside a bar: the run of the largest peak."
         ),
         heights=(max(0.6, 38.0 * len(pins) / 250.0),),
     )

@@ -23,7 +23,8 @@ def power_over_turn(drive: Drive, steady: xr.Dataset, angle: fig.Axis) -> fig.Fi
     last = phi > phi[-1] - 2.0 * math.pi
     turned = phi[last] % (2.0 * math.pi)
     order = np.argsort(turned)
-    powers = {"crank": crank_torque(drive, steady) * speed, "shaft of the motor": shaft_power(drive, steady)}
+    driver = drive.driver_noun
+    powers = {driver: crank_torque(drive, steady) * speed, "shaft of the motor": shaft_power(drive, steady)}
     if "motor.supply_power" in steady:
         powers["supply of the motor"] = steady["motor.supply_power"].values
     curves = [
@@ -33,7 +34,7 @@ def power_over_turn(drive: Drive, steady: xr.Dataset, angle: fig.Axis) -> fig.Fi
     return fig.Figure(
         "power-turn",
         "Power over a turn in steady running",
-        f"The power at {', '.join(powers)} over the crank angle in the last turn of steady running.",
+        f"The power at {', '.join(powers)} over the {driver} angle in the last turn of steady running.",
         ((fig.Panel(angle, fig.Axis("power", "W"), (*curves, fig.Mark(0.0, axis="y", look="thin"))),),),
         "Below zero the machine gives power back.",
     )
@@ -42,7 +43,8 @@ def power_over_turn(drive: Drive, steady: xr.Dataset, angle: fig.Axis) -> fig.Fi
 def load_histogram(drive: Drive, steady: xr.Dataset) -> fig.Figure:
     """The share of the time in which the torque lies in each class: at the crank and, where it is known, in the air
     gap of the motor, which the inertia of its rotor and a flywheel make smoother."""
-    torques = {"crank torque": crank_torque(drive, steady)}
+    driver = drive.driver_noun
+    torques = {f"{driver} torque": crank_torque(drive, steady)}
     if "motor.air_gap_tau" in steady:
         torques["air-gap torque of the motor"] = steady["motor.air_gap_tau"].values
     panels = []
@@ -59,7 +61,7 @@ def load_histogram(drive: Drive, steady: xr.Dataset) -> fig.Figure:
         "Histogram of the load in steady running",
         f"The share of the time in which the {' and the '.join(torques)} lies in each class.",
         (tuple(panels),),
-        "Classes of equal width, over whole turns of the crank. Between the crank and the air gap, rotor and "
+        f"Classes of equal width, over whole turns of the {driver}. Between the {driver} and the air gap, rotor and "
         "flywheel store energy.",
     )
 

@@ -35,7 +35,7 @@ def _begin(s: b.Source, study: StudyRecord, run: str, phase: Phase) -> Iterator[
     """The demands of a phase before the steady turns: the start-up, or the settling."""
     title = study.title_of(run)
     numbers = [(v, s.number(f"{run}.{v.name}")) for v in measures_of(phase)]
-    rows = [(v.description, size) for v, size in numbers if size.value is not None]
+    rows = [(v.described(study.driver_noun), size) for v, size in numbers if size.value is not None]
     sizes = join((line(f"{words} ", size) for words, size in rows), "; ")
     yield b.Text(line(f"{capital(title)}: ", sizes, "."), form="short")
     yield b.Table(tuple(map(b.TableRow, rows)), title=f"Demands of the {title} on the drive", form="long")
@@ -77,7 +77,7 @@ def table_of_runs(s: b.Source, study: StudyRecord) -> b.Table:
     runs = by_side(study, answers)
     rows = (
         b.TableRow(
-            (v.description, *(number(s, study, run, v.name) for run in runs)),
+            (v.described(study.driver_noun), *(number(s, study, run, v.name) for run in runs)),
             form="long" if MEASURES[v.name].minor else "both",
         )
         for v in Layout(Answers).variables
@@ -86,9 +86,9 @@ def table_of_runs(s: b.Source, study: StudyRecord) -> b.Table:
         or any(answers[run][v.name]["value"] is not None for run in runs)
         or (v.name == "recovery_time" and study.returns and study.overloads)
     )
-    head = "crank at {=run.crank_speed:4}"
+    head = "{driver} at {=run.crank_speed:4}"
     if not study.reaches:
-        head = "crank at {answers.steady.speed_mean}; {=run.crank_speed:4} NOT reached"
+        head = "{driver} at {answers.steady.speed_mean}; {=run.crank_speed:4} NOT reached"
     title = f"Demands of each run on the drive{'; the motor is insufficient' if study.insufficient else ''}"
     return over_runs(study, runs, rows, title, plain_line(s.line(head), study.config.units))
 

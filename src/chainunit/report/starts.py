@@ -14,7 +14,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     if "starts" not in s.result:
         return
     worst = (
-        "Start: the largest torque on the output of the gear is {starts.worst.gear_torque}, from a crank angle of "
+        "Start: the largest torque on the output of the gear is {starts.worst.gear_torque}, from {a driver} angle of "
         "{starts.worst.angle}; {running} puts {starts.running} on it ({starts.over_running} times)."
     )
     yield b.Text(s.line(worst, running=running_words(study, s.result["starts"]["running_in"])))
@@ -24,5 +24,9 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         b.TableRow(tuple((s.number(f"starts.from.{k}.{name}", none="not reached"),) for name in names))
         for k in range(count)
     )
-    columns = b.heads("crank angle", "torque at the gear", "torque on a coupling", "start-up time")
-    yield b.Table(rows, columns, title="Starts from rest, from several crank angles", form="long")
+    columns = b.heads(
+        f"{study.driver_noun} angle", "torque at the gear", "torque on a coupling", "start-up time"
+    )
+    yield b.Table(
+        rows, columns, title=f"Starts from rest, from several {study.driver_noun} angles", form="long"
+    )

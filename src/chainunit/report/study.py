@@ -14,22 +14,24 @@ from ..study.given import GivenSection, description, given_sections
 from ..study.record import StudyRecord
 from ..study.result import as_dict
 from ..study.transients import DIFFERENCE
-from . import answer, figures, run_names, runs, shaft, wording
+from . import answer, figures, run_names, runs, shaft
 from . import blocks as b
 from .analyses import analysis_sections
 from .capability import Contents, capabilities
 from .drawing import drawing
-from .lines import Line, join, line, spoken
+from .lines import Line, capital, join, line, spoken
 from .study_motion import motion
 
 DRAWING, QUESTION = "machine.svg", "question"
-_DRAWING_CAPTION = "Pins and links, and dimensions by their names in a study file. φ is the crank angle, {}."
+_DRAWING_CAPTION = (
+    "Pins and links, and dimensions by their names in a study file. φ is the {driver} angle, {counts}."
+)
 _VERSIONS = ("numpy", "casadi", "fmpy", "plotly")
 
 
 def report(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Report:
     """The report on a study; `result` has its numbers, by default those of `as_dict`."""
-    s = b.Source(as_dict(study) if result is None else result)
+    s = b.Source(as_dict(study) if result is None else result, study.driver_noun)
     with shown_in(study.config.units):
         sections = [
             b.Section(name, each.heading, tuple(each.blocks(s, study)), beside=name == QUESTION)
@@ -41,7 +43,7 @@ def report(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Rep
             study.kind,
             s.result,
             (),
-            wording.of_machine(tuple(sections), study.driver_noun),
+            tuple(sections),
             source=s.source_line(),
             failure=s.words("failure") if study.failure is not None else (),
             units=study.config.units,
@@ -50,7 +52,7 @@ def report(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Rep
 
 def summary(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Report:
     """A short report: the verdicts and the main answers of every run. Arguments as of `report`."""
-    s = b.Source(as_dict(study) if result is None else result)
+    s = b.Source(as_dict(study) if result is None else result, study.driver_noun)
     blocks: list[b.Block] = []
     with shown_in(study.config.units):
         for block in answer.blocks(s, study):
@@ -64,7 +66,7 @@ def summary(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Re
             study.kind,
             s.result,
             (),
-            wording.of_machine((b.Section("summary", "Summary", tuple(blocks)),), study.driver_noun),
+            (b.Section("summary", "Summary", tuple(blocks)),),
             failure=s.words("failure") if study.failure is not None else (),
             units=study.config.units,
         )
@@ -79,7 +81,7 @@ def _motion(study: StudyRecord) -> list[b.Block]:
 
 
 _GIVEN_DRIVE = (
-    "What does the motor of {noun} have to give? It turns the crank through a gear of ratio {=machine.ratio}, in "
+    "What does the motor of {noun} have to give? It turns the {driver} through a gear of ratio {=machine.ratio}, in "
     "normal running at {=run.crank_speed:4}."
 )
 
@@ -110,9 +112,9 @@ def _question(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     ]
     yield b.Table(tuple(rows), title="In short", form="long")
     if not study.drive.foreign_machine:
-        alt, model = f"The {noun}: its pins, links and dimensions", study.drive.machine.model
+        alt, model = f"{capital(noun)}: its pins, links and dimensions", study.drive.machine.model
         yield b.Drawing(
-            drawing(study.drive.machine), alt, DRAWING, _DRAWING_CAPTION.format(model.angle_counts)
+            drawing(study.drive.machine), alt, DRAWING, s.line(_DRAWING_CAPTION, counts=model.angle_counts)
         )
 
 

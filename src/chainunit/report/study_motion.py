@@ -100,11 +100,11 @@ def _run(study: StudyRecord, name: str, interval: float, supplement: Supplement)
         supplement.groups,
         named=hasattr(model, "described_by"),
     )
-    has_motor = name in run_names.motor_runs(study)
+    has_motor, driver = name in run_names.motor_runs(study), capital(study.driver_noun)
     readings = (
-        Reading("Crank angle", angle % (2.0 * math.pi), "rad"),
-        Reading("Crank speed", speed, "rad/s"),
-        *([Reading("Crank torque", crank_torque(drive, part), "N.m")] if has_motor else []),
+        Reading(f"{driver} angle", angle % (2.0 * math.pi), "rad"),
+        Reading(f"{driver} speed", speed, "rad/s"),
+        *([Reading(f"{driver} torque", crank_torque(drive, part), "N.m")] if has_motor else []),
         *(
             Reading(capital(v.description), loads[v.name], v.unit, v.kind)
             for v in model.feed_layout.variables

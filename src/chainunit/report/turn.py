@@ -20,14 +20,14 @@ PICTURE = "turn.png"
 def angle_axis(study: StudyRecord) -> fig.Axis:
     """The axis of the crank angle over a turn."""
     counts = study.drive.machine.model.angle_counts
-    return fig.Axis(f"crank angle {counts}", "rad", low=0.0, high=2.0 * math.pi, step=45.0)
+    return fig.Axis(f"{study.driver_noun} angle {counts}", "rad", low=0.0, high=2.0 * math.pi, step=45.0)
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The tables and the figure of a turn at constant speed."""
     turn: TurnFindings = study.findings["constant_speed"]
     bars = f", of {words}" if (words := study.drive.machine.in_place) else ""
-    lead = s.line("Inverse dynamics at {=run.crank_speed:4} of the crank, without a motor" + bars + ".")
+    lead = s.line("Inverse dynamics at {=run.crank_speed:4} of the {driver}, without a motor" + bars + ".")
     yield b.Text(lead, "lead", "long")
     yield b.Table(
         s.rows(Turn, "constant_speed", none="none"), title=f"A turn at constant speed{bars}", form="long"
@@ -41,10 +41,10 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         heads = b.heads("pin", "peak, with feed", "at", "peak, without feed", "at")
         title = f"Largest forces in the pins over a turn at constant speed{bars}"
         yield b.Table(tuple(rows), heads, title=title, form="long")
-    yield _figure(turn, angle_axis(study), bars)
+    yield _figure(turn, angle_axis(study), bars, study.driver_noun)
 
 
-def _figure(turn: TurnFindings, angle: fig.Axis, bars: str) -> fig.Figure:
+def _figure(turn: TurnFindings, angle: fig.Axis, bars: str, driver: str) -> fig.Figure:
     inertia = fig.Curve("inertia", turn.loaded.angle, turn.inertia, in_legend=False)
     panels = [fig.Panel(angle, fig.Axis("reflected inertia", "kg.m2", low=0.0), (inertia,))]
     if turn.pins:
@@ -52,8 +52,8 @@ def _figure(turn: TurnFindings, angle: fig.Axis, bars: str) -> fig.Figure:
     return fig.Figure(
         "turn-at-constant-speed",
         f"Inertia and largest reactions over a turn at constant speed{bars}",
-        "The inertia reflected to the crank over the crank angle; bars of the largest reaction of every pin, with "
-        "feed and without it, with the crank angle at which it comes.",
+        f"The inertia reflected to the {driver} over the {driver} angle; bars of the largest reaction of every pin, "
+        f"with feed and without it, with the {driver} angle at which it comes.",
         tuple((panel,) for panel in panels),
         file=PICTURE,
         heights=(1.0, 0.17 * len(turn.pins))[: len(panels)],

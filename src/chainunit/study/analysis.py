@@ -37,7 +37,7 @@ class Findings(ABC):
 
     def data(self, study: StudyRecord) -> dict[str, Any]:
         """Its part of result.json: its declared parts."""
-        data: dict[str, Any] = as_data(self)
+        data: dict[str, Any] = as_data(self, driver=study.driver_noun)
         return data
 
     @abstractmethod

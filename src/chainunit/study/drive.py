@@ -138,6 +138,12 @@ class Drive:
         return self.driven_machine if isinstance(self.driven_machine, ForeignMachine) else None
 
     @property
+    def driver_noun(self) -> str:
+        """The noun for the part of the machine that the motor turns: "crank", or another word for a machine
+        without one."""
+        return self.machine.model.driver_noun
+
+    @property
     def foreign_titles(self) -> list[str]:
         """Titles of the foreign FMUs."""
         parts = self.foreign_machine and self.foreign_machine.component, self.foreign

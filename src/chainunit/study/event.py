@@ -65,13 +65,13 @@ class Timing:
 
     crank_angle: Value = quantity(
         "rad",
-        "crank angle at which the event begins",
+        "{driver} angle at which the event begins",
         default=0.0,
         usual=(0.0, 6.3),
     )
     turns: Value = quantity(
         "1",
-        "crank turns that are followed after the event begins; a turn after its last change at least",
+        "{driver} turns that are followed after the event begins; a turn after its last change at least",
         default=2.0,
         min=1.0,
         max=1e4,

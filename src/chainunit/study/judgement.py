@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..reading.text import entry, number, turning
+from ..reading.text import entry, number
 from . import verdict
 from .limits import Check, given_motor, reaches
 from .organ_limits import slack_and_mode
@@ -28,7 +28,7 @@ def model_verdict(study: StudyRecord) -> Verdict:
     if study.drive.foreign_machine:
         return verdict.foreign_machine(speed, residuals, actual=mean)
     if not study.drive.machine.model.sides:
-        return verdict.rigid_links(speed, residuals, actual=mean)
+        return verdict.rigid_links(speed, residuals, actual=mean, driver=study.driver_noun)
     for part in registered():
         if (judged := part.model_verdict(study, speed, mean, residuals)) is not None:
             return judged
@@ -103,20 +103,18 @@ def lasts(study: StudyRecord) -> bool:
 def _no_judgement(study: StudyRecord, speed: str) -> str:
     """Words on a motor that is not told as one that keeps the speed, though the mean `speed` is near: it does not
     start from another angle, or its turns are not steady; empty where neither is so."""
-    found = study.findings.get(StartAnalysis.name)
+    found, driver = study.findings.get(StartAnalysis.name), study.driver_noun
     if found is not None and found.stuck:
         where = " and ".join(number(each.angle, "rad") for each in found.stuck)
-        return (
-            f"The motor does NOT bring the crank to its speed from {where}, though it turns at {speed} here"
-        )
+        return f"The motor does NOT bring the {driver} to its speed from {where}, though it turns at {speed} here"
     if lasts(study):
         return ""
-    steady, why = study.answers[STEADY], "the crank does not make a whole turn"
+    steady, why = study.answers[STEADY], f"the {driver} does not make a whole turn"
     if has_turn(study.drive, study.steady):
         gap, energy = (number(abs(x), "1", "percent") for x in (steady.cycle_gap, steady.energy_gap))
         why = f"their ends differ by {gap}, and the moving masses take up or give {energy} of the energy that passes"
     return (
-        f"The motor is not judged: the crank turns at {speed}, but its turns are not steady ({why}); raise "
+        f"The motor is not judged: the {driver} turns at {speed}, but its turns are not steady ({why}); raise "
         "run.settle_turns or run.turns"
     )
 
@@ -144,13 +142,13 @@ def motor_verdict(study: StudyRecord) -> dict[str, Any] | None:
     if unjudged:
         text, keeps_speed = unjudged, False
     elif keeps_speed:
-        text = f"The motor keeps the crank at {speed}"
+        text = f"The motor keeps the {study.driver_noun} at {speed}"
         if speed != number(requested, "rad/s", "speed", beside=False):
             text += f", near enough to the {requested_text} asked for"
     elif steady.speed_mean > requested:
         text = (
-            f"The motor does NOT keep the speed: the crank turns at {speed}, faster than the {requested_text} "
-            "asked for"
+            f"The motor does NOT keep the speed: the {study.driver_noun} turns at {speed}, faster than the "
+            f"{requested_text} asked for"
         )
     else:
         text = f"The motor does NOT reach the speed: {speed} in place of {requested_text}"
@@ -178,7 +176,7 @@ def motor_verdict(study: StudyRecord) -> dict[str, Any] | None:
     holds: Holds = "false" if burns else "true" if enough else "in part"
     return {
         "holds": holds,
-        "text": turning(f"{text}.", study.driver_noun),
+        "text": f"{text}.",
         "speed": entry(steady.speed_mean, "rad/s", "speed"),
         "asked": entry(requested, "rad/s", "speed"),
         "least_reserve": entry(reserve, "1", "percent"),

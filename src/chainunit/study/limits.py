@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
+from ..core.descriptions import USUAL_DRIVER
 from ..drives.nameplate import Nameplate
 from ..reading.results import OWN, derived, part, result
 from ..reading.text import MOST_PERCENT, number
@@ -94,11 +95,11 @@ def lasting_current(rms: float, plate: Nameplate) -> Check:
     return Check("RMS current", rms, plate.rated_current, "A")
 
 
-def keeping_speed(speed: float, requested: float) -> Check:
+def keeping_speed(speed: float, requested: float, driver: str = USUAL_DRIVER) -> Check:
     """The deviation of the mean speed of the crank from the `requested` one [rad/s]; both may be motor speeds
-    as well."""
+    as well. The title names the `driver`."""
     return Check(
-        "deviation of the crank speed", abs(speed / requested - 1.0), SPEED_DEVIATION, "1", "percent"
+        f"deviation of the {driver} speed", abs(speed / requested - 1.0), SPEED_DEVIATION, "1", "percent"
     )
 
 

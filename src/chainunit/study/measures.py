@@ -207,11 +207,11 @@ class Answers:
     """
 
     crank_torque_peak: Value = measure(
-        "N.m", "peak", lambda w: peak(w.crank_torque), during=_ALL, of="crank torque", card=True
+        "N.m", "peak", lambda w: peak(w.crank_torque), during=_ALL, of="{driver} torque", card=True
     )
-    crank_torque_rms: Value = measure("N.m", "RMS", lambda w: w.rms(crank_torque), of="crank torque")
+    crank_torque_rms: Value = measure("N.m", "RMS", lambda w: w.rms(crank_torque), of="{driver} torque")
     crank_torque_mean: Value = measure(
-        "N.m", "mean", lambda w: w.mean(crank_torque), of="crank torque", minor=True
+        "N.m", "mean", lambda w: w.mean(crank_torque), of="{driver} torque", minor=True
     )
     motor_torque_peak: Value = measure(
         "N.m", "peak", lambda w: w.largest("motor.air_gap_tau"), during=_ALL, of="motor torque", card=True
@@ -262,10 +262,10 @@ class Answers:
         "N.m", "peak", lambda w: w.largest("machine.rocker.tau"), during=_ALL, of="rocker torque"
     )
     speed_mean: Value = measure(
-        "rad/s", "mean", lambda w: w.speed_mean, kind="speed", of="crank speed", minor=True
+        "rad/s", "mean", lambda w: w.speed_mean, kind="speed", of="{driver} speed", minor=True
     )
     speed_least: Value = measure(
-        "rad/s", "least", lambda w: float(np.min(w.speed)), kind="speed", of="crank speed", minor=True
+        "rad/s", "least", lambda w: float(np.min(w.speed)), kind="speed", of="{driver} speed", minor=True
     )
     start_time: Value = measure(
         "s", "start-up time", _start_time, during=frozenset({Phase.START_UP, Phase.LOADED_START})
@@ -342,7 +342,7 @@ class Answers:
     torque_reserve: Value = measure("1", "reserve of torque", _reserve, kind="percent", during=_AT_SPEED)
     stall_time: Value = measure(
         "s",
-        "crank stands after",
+        "{driver} stands after",
         lambda w: stall(w.since, w.speed, w.normal_speed),
         during=_EVENTS,
     )

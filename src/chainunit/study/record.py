@@ -158,9 +158,8 @@ class StudyRecord:
 
     @property
     def driver_noun(self) -> str:
-        """The noun for the part of the machine that the motor turns: "crank", or another word for a machine
-        without one."""
-        return "crank" if self.drive.foreign_machine else self.drive.machine.model.driver_noun
+        """See `Drive.driver_noun`."""
+        return self.drive.driver_noun
 
     @property
     def reaches(self) -> bool:

@@ -7,7 +7,7 @@ from typing import Any
 from ..core.quantities import variables
 from ..drives.catalogue import CatalogueMotor
 from ..reading.results import as_data
-from ..reading.text import entries, entry, shown_in, turning
+from ..reading.text import entries, entry, shown_in
 from .given import given_sections
 from .heading import Heading
 from .judgement import motor_verdict
@@ -55,7 +55,7 @@ def _as_dict(study: StudyRecord) -> dict[str, Any]:
         **as_data(Heading.of(config)),
         "status": f"failed: {study.failure}" if study.failure else "complete",
         "failure": str(study.failure) if study.failure else None,
-        "verdict": {"model": _on_model(study), "motor": motor_verdict(study)},
+        "verdict": {"model": as_data(study.verdict), "motor": motor_verdict(study)},
         "warnings": as_data(study.warnings),
         "notes": as_data(study.notes),
         "slips": as_data(config.file.unusual),
@@ -65,13 +65,6 @@ def _as_dict(study: StudyRecord) -> dict[str, Any]:
         **{name: given.get(name, {}) | part for name, part in _parts(study).items()},
         "fmus": {name: str(origin) for name, origin in study.fmus.items()},
     }
-
-
-def _on_model(study: StudyRecord) -> dict[str, Any] | None:
-    if study.verdict is None:
-        return None
-    verdict = as_data(study.verdict)
-    return verdict | {"text": turning(verdict["text"], study.driver_noun)}
 
 
 def _given_values(study: StudyRecord) -> dict[str, Any]:

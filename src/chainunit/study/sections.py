@@ -37,7 +37,7 @@ class Run:
     """Speed, duration and step of the runs."""
 
     crank_speed: Value = quantity(
-        "rad/s", "speed of the crank in normal running", default=3.0, min=0.01, max=1000.0, kind="speed"
+        "rad/s", "speed of the {driver} in normal running", default=3.0, min=0.01, max=1000.0, kind="speed"
     )
     ramp: Value = quantity(
         "s",
@@ -48,11 +48,11 @@ class Run:
         usual=(1e-3, 600.0),
     )
     settle_turns: Value = quantity(
-        "1", "crank turns after the ramp, before running counts as steady", default=2.0, min=0.0, max=1e4
+        "1", "{driver} turns after the ramp, before running counts as steady", default=2.0, min=0.0, max=1e4
     )
     turns: Value = quantity(
         "1",
-        "whole crank turns of steady running that are evaluated and that load_cycle.csv holds",
+        "whole {driver} turns of steady running that are evaluated and that load_cycle.csv holds",
         default=1,
         min=1,
         max=10_000,
@@ -72,7 +72,9 @@ class Run:
 class Coupling:
     """A safety coupling or shear pin on the motor shaft."""
 
-    trip_torque: Value = quantity("N.m", "torque of the crank at which it opens", default=1000.0, above=0.0)
+    trip_torque: Value = quantity(
+        "N.m", "torque of the {driver} at which it opens", default=1000.0, above=0.0
+    )
     release_time: Value = quantity(
         "s",
         "time from the trip until no torque passes; near 0 for a shear pin",

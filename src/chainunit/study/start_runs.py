@@ -32,10 +32,10 @@ _AFTER = 0.25
 class StartNumbers:
     """A start from rest."""
 
-    angle: Value = quantity("rad", "crank angle from which it starts")
+    angle: Value = quantity("rad", "{driver} angle from which it starts")
     gear_torque: Value = quantity("N.m", "largest torque at the output of the gear")
     coupling_torque: Value = quantity(
-        "N.m", "largest torque on a coupling on the motor's shaft, at the crank"
+        "N.m", "largest torque on a coupling on the motor's shaft, at the {driver}"
     )
     start_time: Value = quantity("s", "start-up time")
     start_class: Value = quantity(

@@ -25,15 +25,15 @@ class Turn:
     """A turn of the crank at constant speed, with the feed of normal running unless a description says
     otherwise."""
 
-    torque_peak: Value = quantity("N.m", "crank torque, peak")
-    torque_peak_free: Value = quantity("N.m", "crank torque, peak, without feed")
-    torque_mean: Value = quantity("N.m", "crank torque, mean")
+    torque_peak: Value = quantity("N.m", "{driver} torque, peak")
+    torque_peak_free: Value = quantity("N.m", "{driver} torque, peak, without feed")
+    torque_mean: Value = quantity("N.m", "{driver} torque, mean")
     lost: Value = quantity("J", "energy that load and pins take in a turn")
     lost_free: Value = quantity("J", "energy that the pins take in a turn without feed")
     energy_swing: Value = quantity("J", "energy to be stored at constant torque of the drive")
-    inertia_least: Value = quantity("kg.m2", "inertia reflected to the crank, least")
-    inertia_largest: Value = quantity("kg.m2", "inertia reflected to the crank, largest")
-    inertia_mean: Value = quantity("kg.m2", "inertia reflected to the crank, mean")
+    inertia_least: Value = quantity("kg.m2", "inertia reflected to the {driver}, least")
+    inertia_largest: Value = quantity("kg.m2", "inertia reflected to the {driver}, largest")
+    inertia_mean: Value = quantity("kg.m2", "inertia reflected to the {driver}, mean")
     margin: Value = quantity("1", "margin from a dead position, least")
 
 
@@ -42,19 +42,19 @@ class Reaction:
     """The largest reaction of a pin over the turn, and the crank angle at which it comes."""
 
     peak: Value = quantity("N", "largest reaction")
-    angle: Value = quantity("rad", "crank angle of it")
+    angle: Value = quantity("rad", "{driver} angle of it")
     peak_free: Value = quantity("N", "largest reaction, without feed")
-    angle_free: Value = quantity("rad", "crank angle of it")
+    angle_free: Value = quantity("rad", "{driver} angle of it")
 
 
 @result
 class TurnCourse:
     """The course of a turn, at one of `EVERY` crank angles."""
 
-    angle: Any = quantity("rad", "crank angle")
-    torque: Any = quantity("N.m", "crank torque")
-    torque_free: Any = quantity("N.m", "crank torque, without feed")
-    inertia: Any = quantity("kg.m2", "inertia reflected to the crank")
+    angle: Any = quantity("rad", "{driver} angle")
+    torque: Any = quantity("N.m", "{driver} torque")
+    torque_free: Any = quantity("N.m", "{driver} torque, without feed")
+    inertia: Any = quantity("kg.m2", "inertia reflected to the {driver}")
 
 
 @result

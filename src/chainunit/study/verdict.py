@@ -12,6 +12,7 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import field
 from typing import Any, Literal, NamedTuple
 
+from ..core.descriptions import USUAL_DRIVER
 from ..core.quantities import quantity
 from ..machines.chain_unit import RodName
 from ..reading.results import OWN, derived, part, result
@@ -141,6 +142,8 @@ class Verdict:
     reasons: tuple[Reason, ...] = part("the limits that are exceeded", default=())
     actual: float | None = None
     """crank speed in the runs [rad/s], if the model is judged at the requested speed instead; else None"""
+    driver: str = USUAL_DRIVER
+    """the noun of the link that the motor turns"""
     step: float | None = None
     """communication step of the runs [s]; None where it is not known"""
     finer: str = ""
@@ -202,7 +205,7 @@ class Verdict:
         """The verdict in a line."""
         holds = {"true": "holds", "in part": "holds in part", "false": "does not hold"}[self.holds]
         model = f"{self.model}, " if self.model else ""
-        line = f"{_SUBJECTS[self.subject]} {holds}: {model}the crank at "
+        line = f"{_SUBJECTS[self.subject]} {holds}: {model}the {self.driver} at "
         line += (
             f"{self._turns}, judged at the {self._judged_speed} asked for"
             if self._is_at_requested_speed
@@ -372,15 +375,18 @@ def two_bars(
     return Verdict("organs", "two bars", speed, (*reasons, *balance_faults(residuals)), actual, finer=finer)
 
 
-def rigid_links(speed: float, residuals: Mapping[str, float], *, actual: float | None = None) -> Verdict:
+def rigid_links(
+    speed: float, residuals: Mapping[str, float], *, actual: float | None = None, driver: str = USUAL_DRIVER
+) -> Verdict:
     """The verdict on a linkage without organs, whose links are rigid: it holds where the energy balance is kept.
 
     Parameters
     ----------
     speed, actual : crank speed at which the model is judged, and crank speed in the runs, if that is another [rad/s]
     residuals : by run, the energy residual over the energy moved
+    driver : the noun of the link that the motor turns
     """
-    return Verdict("machine", "rigid links", speed, tuple(balance_faults(residuals)), actual)
+    return Verdict("machine", "rigid links", speed, tuple(balance_faults(residuals)), actual, driver)
 
 
 def foreign_machine(speed: float, residuals: Mapping[str, float], *, actual: float | None = None) -> Verdict:

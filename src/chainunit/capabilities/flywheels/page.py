@@ -12,7 +12,7 @@ from ...core.quantities import Layout
 from ...reading.text import number
 from ...report import blocks as b
 from ...report import figure as fig
-from ...report.lines import Line, line
+from ...report.lines import Line, capital, line
 from ...report.style import LINES
 from ...report.turn import angle_axis
 from ...study.readings import crank_motion
@@ -60,7 +60,7 @@ def _table(s: b.Source, findings: FlywheelFindings) -> b.Table:
         for v in Layout(FlywheelAnswers).variables
         if v.name in _HEADS and any(getattr(wheel.answers, v.name) is not None for _, wheel, _ in rows)
     ]
-    heads = (b.Column(v.description, _HEADS[v.name]) for v in columns)
+    heads = (b.Column(v.described(s.driver), _HEADS[v.name]) for v in columns)
 
     def head(words: str, path: str) -> Line:
         return line(s.number(f"{path}.flywheel"), f" ({words})" if words else "")
@@ -80,7 +80,7 @@ def _figure(study: StudyRecord, findings: FlywheelFindings, running: list[Wheel]
     # at most as many flywheels as there are distinct looks of a line, from the least to the largest
     some = [running[round(k)] for k in np.linspace(0, len(running) - 1, min(len(running), len(LINES)))]
     speed, torque, current = (
-        fig.Axis("crank speed", "rad/s", "speed"),
+        fig.Axis(f"{study.driver_noun} speed", "rad/s", "speed"),
         fig.Axis("motor torque, air gap", "N.m"),
         fig.Axis("motor current", "A"),
     )
@@ -102,7 +102,8 @@ def _figure(study: StudyRecord, findings: FlywheelFindings, running: list[Wheel]
     return fig.Figure(
         "flywheel",
         "A turn with each flywheel, and the ripple of the speed over the inertia",
-        "Crank speed, motor torque and current over a turn with each flywheel; ripple of the speed over inertia.",
+        f"{capital(study.driver_noun)} speed, motor torque and current over a turn with each flywheel; ripple of the "
+        "speed over inertia.",
         ((panels[0], panels[1]), (panels[2], _ripple(findings, running))),
         file=PICTURE,
         heights=(1.3, 1.3),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ...core.descriptions import of_driver
 from ...core.quantities import Layout
 from ...report import blocks as b
 from ...report.lines import Line, join, line
@@ -12,7 +13,7 @@ from .runs import ENDS, Sample
 
 _LARGEST, _ENDS = (
     "crank_torque_peak",
-    {"trips": "the safety coupling opens", "stalls": "the crank stands at the end"},
+    {"trips": "the safety coupling opens", "stalls": "the {driver} stands at the end"},
 )
 """The quantity of random overloads that the answer states, and the ways in which a run may end badly."""
 
@@ -22,13 +23,16 @@ def summary(s: b.Source, study: StudyRecord) -> Line:
     quantiles = s.result["monte_carlo"]["quantiles"]
     ends = dict(_ENDS) if study.config.coupling else {"stalls": _ENDS["stalls"]}
     parts: list[Line] = [
-        line(f"{words} in ", s.estimate(f"monte_carlo.quantiles.{name}.share", ".low", ".high"))
+        line(
+            f"{of_driver(words, s.driver)} in ",
+            s.estimate(f"monte_carlo.quantiles.{name}.share", ".low", ".high"),
+        )
         for name, words in ends.items()
         if name in quantiles
     ]
     if quantile_names := list(quantiles.get(_LARGEST, ())):
         peak = s.estimate(f"monte_carlo.quantiles.{_LARGEST}.{quantile_names[-1]}", ".low", ".high")
-        parts.insert(0, line(f"{quantile_names[-1][1:]} % stay below a crank torque of ", peak))
+        parts.insert(0, line(f"{quantile_names[-1][1:]} % stay below a {s.driver} torque of ", peak))
     return s.line("Of {=monte_carlo.runs} overloads at random: {parts}.", parts=join(parts, "; "))
 
 
@@ -43,7 +47,7 @@ _METHODS: dict[str, str] = {
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The table of the quantiles of random overloads, and how they were run."""
     quantiles = {name: sizes for name, sizes in s.result["monte_carlo"]["quantiles"].items() if sizes}
-    descriptions = {v.name: v.description for v in Layout(Sample).variables} | ENDS
+    descriptions = {v.name: v.template for v in Layout(Sample).variables} | ENDS
     columns = list(dict.fromkeys(k for sizes in quantiles.values() for k in sizes))
 
     def cell(name: str, k: str) -> Line:
@@ -51,7 +55,10 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
             s.estimate(f"monte_carlo.quantiles.{name}.{k}", ".low", ".high") if k in quantiles[name] else ""
         )
 
-    rows = tuple(b.TableRow((descriptions[name], *(cell(name, k) for k in columns))) for name in quantiles)
+    rows = tuple(
+        b.TableRow((of_driver(descriptions[name], s.driver), *(cell(name, k) for k in columns)))
+        for name in quantiles
+    )
     heads = (f"{k[1:]} % of runs below" if k.startswith("q") else "share of runs" for k in columns)
     sides = join(s.line(f"{{=monte_carlo.sides.{side}}} {side}") for side in s.result["monte_carlo"]["sides"])
     of_sides = line(" (", sides, ")") if sides else ()

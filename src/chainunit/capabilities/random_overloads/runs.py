@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-ENDS = {"stalls": "the crank stands at the end of the run", "trips": "the safety coupling opens"}
+ENDS = {"stalls": "the {driver} stands at the end of the run", "trips": "the safety coupling opens"}
 """By switch of a run, its meaning."""
 
 
@@ -55,9 +55,9 @@ ENDS = {"stalls": "the crank stands at the end of the run", "trips": "the safety
 class Sample:
     """One run: its event and its results."""
 
-    crank_angle: Value = quantity("rad", "crank angle at which the event begins")
+    crank_angle: Value = quantity("rad", "{driver} angle at which the event begins")
     event: Value = quantity("s", "time at which the event begins")
-    trip_torque: Value = quantity("N.m", "crank torque at which the safety coupling opens in this run")
+    trip_torque: Value = quantity("N.m", "{driver} torque at which the safety coupling opens in this run")
     crank_torque_peak: Value = same_measure("crank_torque_peak")
     motor_torque_peak: Value = same_measure("motor_torque_peak")
     current_peak: Value = same_measure("current_peak")

@@ -38,7 +38,7 @@ class Flywheel:
     diameter: Value = quantity("m", "steel disc, diameter")
     width: Value = quantity("m", "steel disc, width")
     rim_speed: Value = quantity("m/s", "steel disc, speed of the rim")
-    fluctuation: Value = quantity("1", "fluctuation of the crank speed in the run", kind="percent")
+    fluctuation: Value = quantity("1", "fluctuation of the {driver} speed in the run", kind="percent")
 
 
 @declaration

@@ -43,7 +43,7 @@ class CycleNumbers:
     inertia_largest: Value = quantity("kg.m2", "reflected inertia, largest")
     inertia_wanted: Value = quantity(
         "kg.m2",
-        "inertia at the crank that the wanted fluctuation takes by hand: machine, rotor, gear and flywheel",
+        "inertia at the {driver} that the wanted fluctuation takes by hand: machine, rotor, gear and flywheel",
     )
 
 

@@ -134,7 +134,7 @@ class SizingFindings(Findings):
             best.drive,
             best.motor,
             gear_with(config, best.drive.ratio, self.plan.offer),
-            "Which motor, gear and flywheel does {noun} need? Its crank turns at {=run.crank_speed:4}.",
+            "Which motor, gear and flywheel does {noun} need? Its {driver} turns at {=run.crank_speed:4}.",
             self.answer,
             insufficient="" if fits else INSUFFICIENT,
             keys={"ambient.T": "sizing.ambient"},

@@ -30,7 +30,7 @@ def answer(s: b.Source) -> Iterator[b.Block]:
     gear = (*_gear(s, path), *_gear_torque(s))
     cards = [
         b.Card("Motor", ((motor, str(b.at(s.result, f"{path}.verdict"))),), (*_data(s), *_starter(s, path))),
-        b.Card("Gear ratio", ((ratio, "motor turns per crank turn"),), gear),
+        b.Card("Gear ratio", ((ratio, f"motor turns per {s.driver} turn"),), gear),
         *(
             b.Card(capital(name), ((size or "none", title),), tuple(also[name](s)))
             for name, title, size in _sizes(s)
@@ -302,7 +302,7 @@ def _ways(s: b.Source, study: StudyRecord) -> b.Table:
         opens = "; ".join(study.title_of(run) for run in way["opens"]) or "nothing"
         rows.append(b.TableRow((s.words(f"{path}.way"), *numbers, opens)))
     columns = b.heads("way", "set to", "running", "a start", "start-up", "opens or slips where")
-    title = "Ways to a safety coupling: its setting, and the torques of running and of a start, at the crank"
+    title = f"Ways to a safety coupling: its setting, and the torques of running and of a start, at the {s.driver}"
     return b.Table(tuple(rows), columns, title=title, numeric=False, form="long")
 
 

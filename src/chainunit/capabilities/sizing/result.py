@@ -57,7 +57,7 @@ def protection_data(
         return entry(value, "N.m") | {"title": title}
 
     return {
-        "trip_torque": torque(setting.torque, "safety coupling, trip torque at the crank"),
+        "trip_torque": torque(setting.torque, f"safety coupling, trip torque at the {study.driver_noun}"),
         "trip_torque_at_motor": torque(
             setting.torque and setting.torque / study.drive.ratio,
             "safety coupling, trip torque at the motor's shaft",
@@ -69,11 +69,11 @@ def protection_data(
         if setting.overloads or setting.obstacle is not Obstacle.OVERLOADS
         else _UNTRIED,
         "normal_torque": torque(
-            setting.normal, "largest torque of normal duty on the coupling, at the crank"
+            setting.normal, f"largest torque of normal duty on the coupling, at the {study.driver_noun}"
         ),
         "running_torque": torque(setting.running, "largest torque of running on the coupling"),
         "start_torque": torque(setting.start, "largest torque of a start on the coupling"),
-        "breakdown_torque": torque(setting.motor, "most that the motor gives at the crank"),
+        "breakdown_torque": torque(setting.motor, f"most that the motor gives at the {study.driver_noun}"),
         "effects": _effects(study, setting.effects),
         "overloads": {
             name: torque(

@@ -31,7 +31,7 @@ class Sizing:
     starts_per_hour: Value = quantity("1", "starts per hour", default=2.0, min=0.0, max=1000.0)
     fluctuation: Value = quantity(
         "1",
-        "permitted fluctuation of the crank speed, (largest - least)/mean",
+        "permitted fluctuation of the {driver} speed, (largest - least)/mean",
         default=0.05,
         above=0.0,
         max=1.0,
@@ -39,7 +39,7 @@ class Sizing:
     )
     margin: Value = quantity(
         "1",
-        "share of each limit that the chosen drive leaves free; not of the tolerance of the crank speed",
+        "share of each limit that the chosen drive leaves free; not of the tolerance of the {driver} speed",
         default=0.1,
         min=0.0,
         max=0.9,

@@ -282,7 +282,7 @@ class Trial:
             "starts": Check(
                 "starts per hour", demands.starts_per_hour, self.permitted_starts, "1", forbidden=too_hot
             ),
-            "crank_speed": keeping_speed(self.speed, requested_speed),
+            "crank_speed": keeping_speed(self.speed, requested_speed, self.drive.driver_noun),
             "speed": Check("speed fluctuation", self.fluctuation, demands.fluctuation, "1", "percent"),
         }
         if self.start_time is None:
