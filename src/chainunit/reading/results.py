@@ -35,6 +35,11 @@ class InUnit(NamedTuple):
     title: str = ""
 
 
+def difference(x: float | None, unit: str) -> InUnit:
+    """A number that is no temperature itself, such as a standard deviation."""
+    return InUnit(x, unit, "difference" if unit == "K" else "")
+
+
 @dataclasses.dataclass(frozen=True)
 class Estimate:
     """A number that is estimated from random runs, and the interval that holds the true number; all in one unit."""

@@ -217,11 +217,6 @@ def entry(value: float | None, unit: str, kind: str = "") -> dict[str, Any]:
     return {"value": finite(value), "unit": unit} | ({"kind": kind} if kind else {})
 
 
-def difference_entry(x: float | None, unit: str) -> dict[str, Any]:
-    """The entry of a number that is no temperature itself, such as a standard deviation."""
-    return entry(x, unit, "difference" if unit == "K" else "")
-
-
 def array_entry(x: Any, unit: str, kind: str = "") -> dict[str, Any]:
     """An array as a result holds it, see `entry`; None for each number that is not finite."""
 

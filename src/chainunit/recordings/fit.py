@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import RunError
-from ..reading.text import difference_entry, entry
+from ..reading.results import InUnit, difference, part, result
 from .plant import ANGLE
 from .problem import MARK_ANGLE, OUTLIER, Comparison, Problem, SimulatedRun
 from .unknown import Unknown
@@ -318,12 +318,20 @@ def _next_point(problem: Problem, at: NormalEquations, damping: float) -> Any:
     return np.clip(at.z + step, low, high)
 
 
-def fitted_entries(problem: Problem, best: NormalEquations) -> Iterator[tuple[Unknown, dict[str, Any]]]:
-    """Each unknown of a fit with its value and standard deviation as entries of a result. The angle of a run is
-    within a turn; that of the mark lies on both sides of 0."""
+@result
+class FittedValue:
+    """An unknown of a fit."""
+
+    value: InUnit = part("value")
+    deviation: InUnit = part("standard deviation")
+
+
+def fitted_values(problem: Problem, best: NormalEquations) -> Iterator[tuple[Unknown, FittedValue]]:
+    """Each unknown of a fit with its value and standard deviation. The angle of a run is within a turn; that of the
+    mark lies on both sides of 0."""
     for unknown, x, s in zip(problem.unknowns, best.z, best.deviations, strict=True):
         value, unit = float(x), unknown.unit
         if unknown.is_nuisance and unknown.name.endswith(f".{ANGLE}") and unknown.name != MARK_ANGLE:
             value %= 2.0 * math.pi
         kind = "temperature" if unit == "K" else ""
-        yield unknown, {"value": entry(value, unit, kind), "deviation": difference_entry(float(s), unit)}
+        yield unknown, FittedValue(InUnit(value, unit, kind), difference(float(s), unit))

@@ -13,7 +13,10 @@ import numpy as np
 from scipy.stats import f
 
 from ..core.messages import unit_behind
+from ..core.quantities import quantity
+from ..reading.results import InUnit, derived, part, result
 from .fit import NormalEquations
+from .measurands import MEASURANDS
 from .problem import Comparison, Problem
 from .unknown import Unknown
 
@@ -34,7 +37,15 @@ CONFLICT = 5.0
 """Deviation from what is known of a clock or a sensor, in standard deviations, that is no chance."""
 
 
-@dataclass(frozen=True)
+@result
+class OrderAmplitude:
+    """An order of the crank in the residuals of a column."""
+
+    order: int = quantity("1", "the order")
+    amplitude: InUnit = part("its amplitude")
+
+
+@result
 class ResidualTest:
     """The residuals of a column of a run.
 
@@ -46,17 +57,19 @@ class ResidualTest:
     the unit of the column.
     """
 
-    run: str
-    column: str
-    statistic: float
-    limit: float
+    run: str = part("the run")
+    column: str = part("the column")
+    statistic: float = quantity("1", "sum of squares of the parts along all orders, in deviations of noise")
+    limit: float = quantity("1", "limit of the statistic")
     orders: tuple[tuple[int, float], ...]
-    noise: float
-    slow: float = 0.0
-    slow_limit: float = math.inf
+    noise: float = quantity("1", "standard deviation of the rest, in parts of the stated noise")
+    slow: float = part(
+        "sum of squares of the means over parts of the run, in the same deviations", unit="1", default=0.0
+    )
+    slow_limit: float = part("its limit", unit="1", default=math.inf)
     changes: float = 0.0
 
-    @property
+    @derived()
     def reason(self) -> str:
         """Why the residuals are no noise: "slow", "orders"; empty where they may be noise. The size of noise alone is
         no reason."""
@@ -64,10 +77,21 @@ class ResidualTest:
             return "slow"
         return "orders" if not self.statistic <= self.limit else ""
 
-    @property
+    @derived()
     def is_noise(self) -> bool:
         """Whether the residuals may be noise."""
         return not self.reason
+
+    @derived(name="changes")
+    def slow_changes(self) -> InUnit:
+        """Standard deviation of the means over parts of the run."""
+        return InUnit(self.changes, MEASURANDS[self.column].unit)
+
+    @derived(name="orders")
+    def largest_orders(self) -> list[OrderAmplitude]:
+        """The three largest orders."""
+        unit = MEASURANDS[self.column].unit
+        return [OrderAmplitude(order, InUnit(size, unit)) for order, size in self.orders]
 
 
 @dataclass(frozen=True)

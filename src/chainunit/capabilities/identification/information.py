@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from ...core.quantities import quantity
+from ...reading.results import part, result
 from ...recordings.fit import NormalEquations, inverse, normal_equations
 from ...recordings.plant import CRANK
 from ...recordings.problem import Problem, RecordedRun
@@ -78,14 +80,15 @@ class Combination:
         return short_name(first[0]) + words
 
 
-@dataclass(frozen=True)
+@result
 class Proposal:
-    """A further run, in words, with the mean factor by which the standard deviations of the sought numbers
-    would fall, and the count of numbers that would be determined."""
+    """A further run."""
 
-    words: str
-    factor: float
-    determined: int
+    words: str = part("the run in words", name="text")
+    factor: float = quantity(
+        "1", "mean factor by which the standard deviations of the sought numbers would fall"
+    )
+    determined: int = part("count of numbers that would be determined", unit="1", name="told")
 
 
 @dataclass(frozen=True)
@@ -234,8 +237,8 @@ def _proposals(
             single, np.array([at[more.place[name]] for name in single.place]), workers, scales
         ).fisher
         total = np.zeros((len(at), len(at)))
-        for part, matrix in ((problem, fisher), (single, own)):
-            places = [more.place[name] for name in part.place]
+        for of_runs, matrix in ((problem, fisher), (single, own)):
+            places = [more.place[name] for name in of_runs.place]
             total[np.ix_(places, places)] += matrix
         then = _determinations(more, total)
         factor = np.exp(np.mean([math.log(a.by_both / b.by_both) for a, b in zip(now, then, strict=True)]))

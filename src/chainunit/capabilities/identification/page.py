@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from ...core.files import atomic_file
+from ...reading.results import as_data
 from ...reading.text import shown_in
 from ...recordings.measurands import MEASURANDS
 from ...report import blocks as b
@@ -15,7 +16,7 @@ from ...report.task import Task, Writer
 from ...study.config import Config
 from ...study.study_file import toml_text
 from .identification import IdentifiedMachine, identify
-from .result import as_dict, identified_notes, identified_tables, sentences
+from .result import IdentificationSummary, identified_notes, identified_tables, sentences, summary_of
 
 WRONG = "The model does not describe the recordings: these are not the numbers of the machine."
 FILE = "identified.toml"
@@ -24,7 +25,7 @@ FILE = "identified.toml"
 
 def identification_report(machine: IdentifiedMachine) -> b.Report:
     """The report on an identification."""
-    result = as_dict(machine)
+    result = as_data(summary_of(machine))
     s = b.Source(result)
     config: Config = machine.config
     with shown_in(config.units):
@@ -71,6 +72,7 @@ TASK: Task[Config, IdentifiedMachine] = Task(
     identification_report,
     files=(FILE, "course_*.png"),
     writers=_writers,
+    content=IdentificationSummary,
     shortfall=lambda machine: None if machine.is_described else "",
 )
 

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...core.messages import unit_behind
-from ...reading.results import as_data
-from ...reading.text import array_entry, difference_entry, entry, shown_in
-from ...recordings.fit import fitted_entries
+from ...core.quantities import quantity
+from ...reading.results import GIVEN, OWN, InUnit, difference, part, result
+from ...reading.text import shown_in
+from ...recordings.fit import FittedValue, fitted_values
 from ...recordings.measurands import MEASURANDS
 from ...recordings.residuals import EXCESS_NOISE, ResidualTest
 from ...study.capability import Estimates
@@ -20,7 +21,7 @@ from ...study.heading import Heading
 from ...study.registry import registered
 from ...study.study_file import changed_tables
 from .identification import FittedNumber, IdentifiedMachine, remarks, system_name
-from .information import Combination, Information, short_name
+from .information import Combination, Information, Proposal, short_name
 from .reading import IdentificationPlan
 
 RESULT = "result.json"
@@ -36,96 +37,191 @@ CLASSES_OF_TIME = 600
 """Number of times at which those of a run that is not steady are shown."""
 
 
-def as_dict(machine: IdentifiedMachine) -> dict[str, Any]:
-    """All results, ready for JSON, each number with its unit."""
+@result
+class IdentifiedRun:
+    """A run, and its recording."""
+
+    file: str = part("the recording")
+    columns: list[str] = part("columns of the recording")
+    rows: int = quantity("1", "number of rows")
+    duration: float = quantity("s", "time from the first to the last row")
+    rate: float = quantity("1", "rows in a second")
+    crank_speed: float = quantity("rad/s", "speed of the crank", kind="speed")
+    ambient: float = quantity("K", "temperature of the surroundings", kind="temperature")
+    feed: str = part("the feed of the run")
+    added: Mapping[str, InUnit] = part("amounts that were added to sought numbers")
+
+
+@result
+class IdentifiedNumber:
+    """A sought number: with its value only where the recordings determine it."""
+
+    unit: str
+    kind: str
+    title: str = part("description")
+    told: bool = part("whether the recordings determine the number")
+    value: float | None = part("mean in the distribution that the recordings leave", unit=OWN)
+    fitted: float | None = part("value in the best fit, together with all others", unit=OWN)
+    deviation: InUnit = part("standard deviation")
+    low: float = part("lower end of the interval of 95 %", unit=OWN, name="from")
+    high: float = part("upper end of the interval of 95 %", unit=OWN, name="to")
+    given: float = part("value before the fit", unit=OWN)
+    given_deviation: InUnit = part("standard deviation before the fit")
+    least: float = part("lower bound", unit=OWN)
+    most: float = part("upper bound", unit=OWN)
+    expected: InUnit = part(
+        "standard deviation that the recordings and the knowledge before the fit let expect"
+    )
+    by_runs: InUnit = part("standard deviation that the recordings alone let expect")
+
+
+@result
+class Covariance:
+    """The covariance of the sought numbers."""
+
+    names: list[str] = part("the numbers")
+    units: list[str] = part("their units")
+    matrix: list[list[float]] = part("covariance of each pair", unit=GIVEN)
+
+
+@result
+class Correlation:
+    """A pair of numbers with a large correlation."""
+
+    first: str = part("first number")
+    second: str = part("second number")
+    correlation: float = quantity("1", "their correlation")
+
+
+@result
+class UnseenChange:
+    """A change of numbers together that leaves no trace in the recordings."""
+
+    text: str = part("the change in words")
+    terms: Mapping[str, float] = part("factor of each number", unit=GIVEN)
+
+
+@result
+class DeterminedSum:
+    """A sum of numbers that the recordings determine, whose first number they do not determine."""
+
+    text: str = part("the sum in words")
+    terms: Mapping[str, float] = part("factor of each number", unit=GIVEN)
+    value: InUnit = part("value")
+    deviation: InUnit = part("standard deviation")
+
+
+@result
+class FitCounts:
+    """Counts of the fit."""
+
+    rounds: int = quantity("1", "rounds of the best start")
+    starts: int = quantity("1", "number of starts")
+    agreeing: int = quantity("1", "number of starts that ended at the best fit")
+
+
+@result
+class IdentificationSummary:
+    """All results of an identification: the content of its result.json."""
+
+    heading: Heading = part(inline=True)
+    is_described: bool = part("whether the model describes the recordings")
+    status: str = part("whether the identification is complete")
+    sought: int = quantity("1", "number of sought numbers")
+    told: int = quantity("1", "number of numbers that the recordings determine")
+    runs: Mapping[str, IdentifiedRun] = part("the runs")
+    numbers: Mapping[str, IdentifiedNumber] = part("the sought numbers")
+    covariance: Covariance = part("covariance of the sought numbers")
+    correlations: list[Correlation] = part("pairs with the largest correlations")
+    combinations: list[DeterminedSum] = part("sums that the recordings determine")
+    blind: list[UnseenChange] = part("changes of numbers together that leave no trace in the recordings")
+    told_at_start: int = quantity("1", "number of numbers that the recordings could determine before the fit")
+    proposals: tuple[Proposal, ...] = part("further runs, the best first")
+    residuals: tuple[ResidualTest, ...] = part("tests of the residuals")
+    sensors: Mapping[str, FittedValue] = part("numbers of clocks and sensors")
+    fit: FitCounts = part("counts of the fit")
+    remarks: list[str] = part("sentences on data that are missing or assumed")
+    courses: Mapping[str, Mapping[str, Mapping[str, InUnit]]] = part(
+        "by run and column, the mean measured and simulated values in classes of the crank angle, or of the time"
+    )
+
+
+def summary_of(machine: IdentifiedMachine) -> IdentificationSummary:
+    """All results of an identification, with texts in the units of the study."""
     with shown_in(machine.config.units):
-        return _as_dict(machine)
+        return _summary(machine)
 
 
-def _as_dict(machine: IdentifiedMachine) -> dict[str, Any]:
-    config, best = machine.config, machine.best
-    estimates, start = machine.estimates, machine.information_at_start
-    determined = sum(each.is_determined for each in estimates.values())
-    return {
-        **as_data(Heading.of(config)),
-        "is_described": machine.is_described,
-        "status": "complete" if machine.is_described else "the model does not describe the recordings",
-        "sought": entry(float(len(estimates)), "1"),
-        "told": entry(float(determined), "1"),
-        "runs": {run.name: _run(machine, k) for k, run in enumerate(machine.plan.runs)},
-        "numbers": {name: _number(machine, each) for name, each in estimates.items()},
-        "covariance": {
-            "names": list(estimates),
-            "units": [each.unknown.unit for each in estimates.values()],
-            "matrix": machine.covariance.tolist(),
-        },
-        "correlations": list(_correlations(machine)),
-        "combinations": [_combination(machine, each) for each in machine.information_at_fit.combinations],
-        "blind": [_unseen_change(machine, each) for each in machine.information_at_fit.null_space],
-        "told_at_start": entry(float(sum(each.is_determined for each in start.determinations)), "1"),
-        "proposals": [
-            {
-                "text": each.words,
-                "factor": entry(each.factor, "1"),
-                "told": entry(float(each.determined), "1"),
-            }
-            for each in start.proposals
-        ],
-        "residuals": [_check(each) for each in machine.residual_tests],
-        "sensors": {
+def _summary(machine: IdentifiedMachine) -> IdentificationSummary:
+    best, estimates, start = machine.best, machine.estimates, machine.information_at_start
+    return IdentificationSummary(
+        heading=Heading.of(machine.config),
+        is_described=machine.is_described,
+        status="complete" if machine.is_described else "the model does not describe the recordings",
+        sought=len(estimates),
+        told=sum(each.is_determined for each in estimates.values()),
+        runs={run.name: _run(machine, k) for k, run in enumerate(machine.plan.runs)},
+        numbers={name: _number(machine, each) for name, each in estimates.items()},
+        covariance=Covariance(
+            list(estimates), [each.unknown.unit for each in estimates.values()], machine.covariance.tolist()
+        ),
+        correlations=list(_correlations(machine)),
+        combinations=[_sum(machine, each) for each in machine.information_at_fit.combinations],
+        blind=[_unseen_change(machine, each) for each in machine.information_at_fit.null_space],
+        told_at_start=sum(each.is_determined for each in start.determinations),
+        proposals=start.proposals,
+        residuals=machine.residual_tests,
+        sensors={
             unknown.name: each
-            for unknown, each in fitted_entries(machine.problem, best)
+            for unknown, each in fitted_values(machine.problem, best)
             if unknown.is_nuisance
         },
-        "fit": {
-            "rounds": entry(float(best.rounds), "1"),
-            "starts": entry(float(best.starts), "1"),
-            "agreeing": entry(float(best.agreeing), "1"),
-        },
-        "remarks": list(remarks(machine)),
-        "courses": {run.name: _courses(machine, run.name) for run in machine.plan.runs},
-    }
+        fit=FitCounts(best.rounds, best.starts, best.agreeing),
+        remarks=list(remarks(machine)),
+        courses={run.name: _courses(machine, run.name) for run in machine.plan.runs},
+    )
 
 
-def _run(machine: IdentifiedMachine, k: int) -> dict[str, Any]:
+def _run(machine: IdentifiedMachine, k: int) -> IdentifiedRun:
     run, recording = machine.plan.runs[k], machine.problem.runs[k].recording
-    return {
-        "file": str(run.file),
-        "columns": list(recording.columns),
-        "rows": entry(float(len(recording.time)), "1"),
-        "duration": entry(float(recording.time[-1] - recording.time[0]), "s"),
-        "rate": entry(1.0 / recording.step, "1"),
-        "crank_speed": entry(run.crank_speed, "rad/s", "speed"),
-        "ambient": entry(run.ambient, "K", "temperature"),
-        "feed": "that of all loaded runs" if run.has_feed else "none",
-        "added": {name: entry(x, machine.plan.variables[name].unit) for name, x in run.added.items()},
-    }
+    return IdentifiedRun(
+        file=str(run.file),
+        columns=list(recording.columns),
+        rows=len(recording.time),
+        duration=float(recording.time[-1] - recording.time[0]),
+        rate=1.0 / recording.step,
+        crank_speed=run.crank_speed,
+        ambient=run.ambient,
+        feed="that of all loaded runs" if run.has_feed else "none",
+        added={name: InUnit(x, machine.plan.variables[name].unit) for name, x in run.added.items()},
+    )
 
 
-def _number(machine: IdentifiedMachine, each: FittedNumber) -> dict[str, Any]:
-    """A sought number: with its value only where the recordings determine it."""
+def _number(machine: IdentifiedMachine, each: FittedNumber) -> IdentifiedNumber:
     variable = machine.plan.variables[each.unknown.name]
     name, start = system_name(each.unknown.name), machine.information_at_start
     before = next(one for one in start.determinations if one.name == name)
-    own, unit, kind = each.unknown, variable.unit, variable.kind
-    return {
-        "title": variable.description,
-        "told": each.is_determined,
-        "value": entry(each.value if each.is_determined else None, unit, kind),
-        "fitted": entry(each.fitted if each.is_determined else None, unit, kind),
-        "deviation": difference_entry(each.deviation, unit),
-        "from": entry(each.low, unit, kind),
-        "to": entry(each.high, unit, kind),
-        "given": entry(own.start, unit, kind),
-        "given_deviation": difference_entry(own.prior_deviation, unit),
-        "least": entry(own.low, unit, kind),
-        "most": entry(own.high, unit, kind),
-        "expected": difference_entry(before.by_both, unit),
-        "by_runs": difference_entry(before.by_runs, unit),
-    }
+    own, unit = each.unknown, variable.unit
+    return IdentifiedNumber(
+        unit,
+        variable.kind,
+        title=variable.description,
+        told=each.is_determined,
+        value=each.value if each.is_determined else None,
+        fitted=each.fitted if each.is_determined else None,
+        deviation=difference(each.deviation, unit),
+        low=each.low,
+        high=each.high,
+        given=own.start,
+        given_deviation=difference(own.prior_deviation, unit),
+        least=own.low,
+        most=own.high,
+        expected=difference(before.by_both, unit),
+        by_runs=difference(before.by_runs, unit),
+    )
 
 
-def _correlations(machine: IdentifiedMachine) -> Iterator[dict[str, Any]]:
+def _correlations(machine: IdentifiedMachine) -> Iterator[Correlation]:
     """The pairs of numbers with the largest correlations."""
     names = [each.name for each in machine.plan.sought]
     scale = 1.0 / np.sqrt(np.diag(machine.covariance))
@@ -133,22 +229,16 @@ def _correlations(machine: IdentifiedMachine) -> Iterator[dict[str, Any]]:
     pairs = sorted(((i, k) for i in range(len(names)) for k in range(i)), key=lambda pair: -abs(matrix[pair]))
     for i, k in pairs[:MOST_PAIRS]:
         if abs(matrix[i, k]) >= CORRELATED:
-            yield {"first": names[k], "second": names[i], "correlation": entry(float(matrix[i, k]), "1")}
+            yield Correlation(names[k], names[i], float(matrix[i, k]))
 
 
-def _combination(machine: IdentifiedMachine, each: Combination) -> dict[str, Any]:
-    value, deviation = machine.value_of_sum(each)
-    return {
-        "text": str(each),
-        "terms": dict(each.terms),
-        # of temperatures, a sum is no temperature
-        "value": difference_entry(value, each.unit),
-        "deviation": difference_entry(deviation, each.unit),
-    }
+def _sum(machine: IdentifiedMachine, each: Combination) -> DeterminedSum:
+    # of temperatures, a sum is no temperature
+    value, deviation = (difference(x, each.unit) for x in machine.value_of_sum(each))
+    return DeterminedSum(str(each), dict(each.terms), value, deviation)
 
 
-def _unseen_change(machine: IdentifiedMachine, each: Combination) -> dict[str, Any]:
-    """A change of numbers together that leaves no trace."""
+def _unseen_change(machine: IdentifiedMachine, each: Combination) -> UnseenChange:
     units = {system_name(u.name): u.unit for u in machine.plan.sought}
     changes = [
         f"{short_name(name)} {'up' if factor > 0.0 else 'down'} by {abs(factor):.3g}{unit_behind(units[name])}"
@@ -158,32 +248,13 @@ def _unseen_change(machine: IdentifiedMachine, each: Combination) -> dict[str, A
     if len(changes) > MOST_CHANGES:
         names = ", ".join(short_name(name) for name, _ in each.terms)
         words = f"a change of {len(changes)} numbers together ({names})"
-    return {"text": words, "terms": dict(each.terms)}
+    return UnseenChange(words, dict(each.terms))
 
 
-def _check(each: ResidualTest) -> dict[str, Any]:
-    unit = MEASURANDS[each.column].unit
-    return {
-        "run": each.run,
-        "column": each.column,
-        "is_noise": each.is_noise,
-        "reason": each.reason,
-        "statistic": entry(each.statistic, "1"),
-        "limit": entry(each.limit, "1"),
-        "noise": entry(each.noise, "1"),
-        "slow": entry(each.slow, "1"),
-        "slow_limit": entry(each.slow_limit if math.isfinite(each.slow_limit) else None, "1"),
-        "changes": entry(each.changes, unit),
-        "orders": [
-            {"order": entry(float(order), "1"), "amplitude": entry(size, unit)} for order, size in each.orders
-        ],
-    }
-
-
-def _courses(machine: IdentifiedMachine, run: str) -> dict[str, Any]:
+def _courses(machine: IdentifiedMachine, run: str) -> dict[str, dict[str, InUnit]]:
     """By analog column, the mean measured and simulated values in classes: of the crank angle over all turns of a
     steady run, of the time of another one."""
-    courses: dict[str, Any] = {}
+    courses = dict[str, dict[str, InUnit]]()
     steady = machine.is_steady(run)
     for each in machine.best.comparisons:
         if each.run != run or not MEASURANDS[each.column].analog:
@@ -199,9 +270,9 @@ def _courses(machine: IdentifiedMachine, run: str) -> dict[str, Any]:
         unit = MEASURANDS[each.column].unit
         middle = 0.5 * (edges[1:] + edges[:-1])[some]
         courses[each.column] = {
-            "angle" if steady else "time": array_entry(middle, "rad" if steady else "s"),
-            "measured": array_entry(means[0], unit),
-            "simulated": array_entry(means[1], unit),
+            "angle" if steady else "time": InUnit(middle, "rad" if steady else "s"),
+            "measured": InUnit(means[0], unit),
+            "simulated": InUnit(means[1], unit),
         }
     return courses
 
@@ -268,8 +339,8 @@ def identified_tables(machine: IdentifiedMachine, folder: Path) -> dict[str, Any
     tables = changed_tables(machine.config, values, "identified", folder)
     tables.pop("identify", None)
     estimates = Estimates(values, machine.covariance, RESULT)
-    for part in registered():
-        part.take_estimates(machine.config, estimates, tables)
+    for capability in registered():
+        capability.take_estimates(machine.config, estimates, tables)
     return tables
 
 

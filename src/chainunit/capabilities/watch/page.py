@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ...reading.results import as_data
 from ...reading.text import shown_in
 from ...recordings.residuals import EXCESS_NOISE
 from ...report import blocks as b
@@ -14,7 +15,7 @@ from ...report import figure as fig
 from ...report.lines import Name, join, line
 from ...report.task import Task
 from ...study.config import Config
-from .result import as_dict
+from .result import WatchSummary, summary_of
 from .watch import WatchedRecording, watch
 
 PICTURES = ("loads.png", "imbalance.png")
@@ -34,7 +35,7 @@ _USUAL = {
 
 def watch_report(watched: WatchedRecording) -> b.Report:
     """The report on a watched recording."""
-    result = as_dict(watched)
+    result = as_data(summary_of(watched))
     s = b.Source(result)
     with shown_in(watched.config.units):
         return b.Report(
@@ -55,7 +56,11 @@ def watch_report(watched: WatchedRecording) -> b.Report:
 
 
 TASK: Task[Config, WatchedRecording] = Task(
-    "watch", lambda config, folder, progress: watch(config, progress), watch_report, files=PICTURES
+    "watch",
+    lambda config, folder, progress: watch(config, progress),
+    watch_report,
+    files=PICTURES,
+    content=WatchSummary,
 )
 
 

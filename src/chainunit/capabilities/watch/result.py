@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from ...core.quantities import quantity
 from ...machines.load_observer import LoadObserver
-from ...reading.results import as_data
-from ...reading.text import array_entry, entry, shown_in
-from ...recordings.fit import fitted_entries
+from ...reading.results import InUnit, part, result
+from ...reading.text import shown_in
+from ...recordings.fit import FittedValue, fitted_values
+from ...recordings.residuals import ResidualTest
 from ...study.heading import Heading
 from .watch import GAP, OUTPUTS, Alarm, WatchedRecording, file_name
 
@@ -19,36 +20,124 @@ ROWS = 1500
 GROUNDS = {"feed": "imbalance of the feed", "force": "imbalance of the processing forces"}
 
 
-def as_dict(watched: WatchedRecording) -> dict[str, Any]:
-    """All results, ready for JSON, each number with its unit."""
+@result
+class WatchedFile:
+    """The recording, and the time of learning."""
+
+    file: str = part("the recording")
+    columns: list[str] = part("columns of the recording")
+    duration: float = quantity("s", "time from the first to the last row")
+    turns: float = quantity("1", "turns of the crank")
+    crank_speed: float = quantity("rad/s", "speed of the crank", kind="speed")
+    learning: float = quantity("s", "time from the begin in which the observer learns")
+
+
+@result
+class ReportedAlarm:
+    """An alarm."""
+
+    side: str = part("side that is overloaded")
+    ground: str = part("the imbalance on which it rests")
+    begin: float = quantity("s", "its begin")
+    end: float = quantity("s", "its end")
+    lasts: bool = part("whether it lasts up to the end of the recording")
+    in_learning: bool = part("whether it begins in the time of learning")
+    turn: float = quantity("1", "turns of the crank before its begin")
+    at: float = quantity("s", "time at which its statistic is largest")
+    values: Mapping[str, InUnit] = part("outputs of the observer at this time")
+
+
+@result
+class Thresholds:
+    """The range of the thresholds over the crank angle, after the time of learning."""
+
+    feed_threshold_least: float = quantity("kg", "imbalance of the feed, least threshold")
+    feed_threshold_most: float = quantity("kg", "imbalance of the feed, largest threshold")
+    force_threshold_least: float = quantity("N", "imbalance of the forces, least threshold")
+    force_threshold_most: float = quantity("N", "imbalance of the forces, largest threshold")
+
+
+@result
+class FalseImbalance:
+    """The false imbalance by errors of the machine's parameters."""
+
+    uncertainty: float = quantity("kg", "false imbalance of the feed by errors of the machine's parameters")
+    force_uncertainty: float = quantity(
+        "N", "false imbalance of the forces by errors of the machine's parameters"
+    )
+    widening: float = quantity("1", "factor by which the thresholds of the feed are wider for it")
+    force_widening: float = quantity("1", "factor by which the thresholds of the forces are wider for it")
+
+
+@result
+class Gap:
+    """A part of the recording without rows."""
+
+    begin: float = part("its begin", unit="s", name="from")
+    end: float = part("its end", unit="s", name="to")
+
+
+@result
+class UsualOutput:
+    """The medians of an output of the observer without an alarm."""
+
+    value: InUnit = part("median of the output")
+    deviation: InUnit = part("median of its standard deviation")
+    threshold: InUnit = part("median of its threshold")
+
+
+@result
+class WatchSummary:
+    """The alarms and their basis: the content of a watch's result.json."""
+
+    heading: Heading = part(inline=True)
+    recording: WatchedFile = part(inline=True)
+    learned: Mapping[str, FittedValue] = part("numbers that were learned from the begin of the recording")
+    is_described: bool = part("whether the machine of the study describes the begin of the recording")
+    residuals: tuple[ResidualTest, ...] = part("tests of the residuals at the begin")
+    doubts: list[str] = part("why the machine of the study does not describe the begin")
+    of_feed_alone: bool = part("whether nothing but another feed speaks against the machine of the study")
+    alarms: list[ReportedAlarm] = part("the alarms in order")
+    thresholds: Thresholds = part(inline=True)
+    false_imbalance: FalseImbalance = part(inline=True)
+    noise: Mapping[str, float] = part("noise of signal and speed over the stated noise", unit="1")
+    constant_parts: list[str] = part("parts in which a column keeps a value, in words")
+    gaps: list[Gap] = part("parts without rows, behind which the observer starts anew")
+    failed_identification: bool = part("whether the identification of this machine failed")
+    identification: str | None = part("the result of the identification")
+    tuning: Mapping[str, InUnit] = part("parameters of the observer")
+    usual: Mapping[str, UsualOutput] = part("outputs between the time of learning and the first alarm")
+    course: Mapping[str, InUnit] = part("outputs of the observer over time, at a part of the rows")
+
+
+def summary_of(watched: WatchedRecording) -> WatchSummary:
+    """All results of a watched recording, with texts in the units of the study."""
     with shown_in(watched.config.units):
-        return _as_dict(watched)
+        return _summary(watched)
 
 
-def _as_dict(watched: WatchedRecording) -> dict[str, Any]:
-    config, plan, recording = watched.config, watched.plan, watched.recording
-    p = watched.parameters
-    return {
-        **as_data(Heading.of(config)),
-        "file": str(plan.file),
-        "columns": list(recording.columns),
-        "duration": entry(float(recording.time[-1] - recording.time[0]), "s"),
-        "turns": entry(float(recording.time[-1] - recording.time[0]) / watched.plan.turn, "1"),
-        "crank_speed": entry(plan.crank_speed, "rad/s", "speed"),
-        "learning": entry(plan.learning, "s"),
-        "learned": dict(_learned(watched)),
-        "is_described": watched.is_described,
-        "residuals": [
-            {
-                "column": each.column,
-                "is_noise": each.is_noise,
-                "reason": each.reason,
-                "statistic": entry(each.statistic, "1"),
-                "limit": entry(each.limit, "1"),
-            }
-            for each in watched.residual_tests
-        ],
-        "doubts": [
+def _summary(watched: WatchedRecording) -> WatchSummary:
+    plan, recording, p = watched.plan, watched.recording, watched.parameters
+    duration = float(recording.time[-1] - recording.time[0])
+    return WatchSummary(
+        heading=Heading.of(watched.config),
+        recording=WatchedFile(
+            file=str(plan.file),
+            columns=list(recording.columns),
+            duration=duration,
+            turns=duration / plan.turn,
+            crank_speed=plan.crank_speed,
+            learning=plan.learning,
+        ),
+        learned={
+            file_name(unknown.name): each
+            for unknown, each in fitted_values(watched.problem, watched.learned)
+            # without the orders of a motion
+            if ".order." not in unknown.name
+        },
+        is_described=watched.is_described,
+        residuals=watched.residual_tests,
+        doubts=[
             *(
                 f"order {each.orders[0][0]} of the crank remains in {each.column}"
                 if each.reason == "orders"
@@ -58,103 +147,79 @@ def _as_dict(watched: WatchedRecording) -> dict[str, Any]:
             ),
             *map(str, watched.prior_conflicts),
         ],
-        "of_feed_alone": watched.only_feed_differs,
-        "alarms": [_alarm(watched, each) for each in watched.alarms],
-        **_thresholds(watched),
-        "uncertainty": entry(watched.uncertainty[0], "kg"),
-        "force_uncertainty": entry(watched.uncertainty[1], "N"),
-        "widening": entry(watched.widening[0], "1"),
-        "force_widening": entry(watched.widening[1], "1"),
-        "noise": {name: entry(x, "1") for name, x in zip(("signal", "speed"), watched.noises, strict=True)},
-        "constant_parts": watched.constant_parts,
-        "gaps": [
-            {"from": entry(begin, "s"), "to": entry(end, "s")}
-            for begin, end in recording.gaps
-            if end - begin > GAP * watched.plan.turn
-        ],
-        "failed_identification": watched.failed,
-        "identification": None if plan.identification is None else str(plan.identification),
-        "tuning": {
-            v.name: entry(p.get(v.name, v.quantity.start), v.unit, v.kind)
+        of_feed_alone=watched.only_feed_differs,
+        alarms=[_alarm(watched, each) for each in watched.alarms],
+        thresholds=_thresholds(watched),
+        false_imbalance=FalseImbalance(*watched.uncertainty, *watched.widening),
+        noise=dict(zip(("signal", "speed"), watched.noises, strict=True)),
+        constant_parts=watched.constant_parts,
+        gaps=[Gap(begin, end) for begin, end in recording.gaps if end - begin > GAP * plan.turn],
+        failed_identification=watched.failed,
+        identification=None if plan.identification is None else str(plan.identification),
+        tuning={
+            v.name: InUnit(p.get(v.name, v.quantity.start), v.unit, v.kind)
             for v in LoadObserver.parameter_layout.variables
             if v.name.split(".")[0] in ("noise", "feed", "force", "offset", "imbalance", "alarm")
         },
-        "usual": dict(_usual(watched)),
-        "course": _course(watched),
-    }
+        usual=dict(_usual(watched)),
+        course=_course(watched),
+    )
 
 
-def _learned(watched: WatchedRecording) -> Iterator[tuple[str, dict[str, Any]]]:
-    """The numbers that were learned from the begin of the recording, without the orders of a motion."""
-    for unknown, each in fitted_entries(watched.problem, watched.learned):
-        if ".order." not in unknown.name:
-            yield file_name(unknown.name), each
-
-
-def _thresholds(watched: WatchedRecording) -> dict[str, Any]:
-    """The range of the thresholds over the crank angle, after the time of learning."""
+def _thresholds(watched: WatchedRecording) -> Thresholds:
     time = watched.recording.time
     rows = time > time[0] + watched.plan.learning
-    ranges = dict[str, Any]()
-    for name, unit in (("feed", "kg"), ("force", "N")):
-        ends = np.percentile(watched.outputs[f"imbalance.{name}_threshold"][rows], [2.0, 98.0])
-        ranges |= {
-            f"{name}_threshold_{end}": entry(float(x), unit)
-            for end, x in zip(("least", "most"), ends, strict=True)
-        }
-    return ranges
+    ends = (
+        np.percentile(watched.outputs[f"imbalance.{name}_threshold"][rows], [2.0, 98.0])
+        for name in ("feed", "force")
+    )
+    return Thresholds(*(float(x) for pair in ends for x in pair))
 
 
-def _alarm(watched: WatchedRecording, each: Alarm) -> dict[str, Any]:
-    units = _units()
-    start = float(watched.recording.time[0])
-    return {
-        "side": each.side,
-        "ground": GROUNDS[each.ground],
-        "begin": entry(each.begin, "s"),
-        "end": entry(each.end, "s"),
-        "lasts": each.lasts,
-        "in_learning": each.begin - start < watched.plan.learning,
-        "turn": entry((each.begin - start) / watched.plan.turn, "1"),
-        "at": entry(each.at, "s"),
-        "values": {name: entry(x, units[name]) for name, x in each.values.items()},
-    }
+def _alarm(watched: WatchedRecording, each: Alarm) -> ReportedAlarm:
+    units, after = _units(), each.begin - float(watched.recording.time[0])
+    return ReportedAlarm(
+        side=each.side,
+        ground=GROUNDS[each.ground],
+        begin=each.begin,
+        end=each.end,
+        lasts=each.lasts,
+        in_learning=after < watched.plan.learning,
+        turn=after / watched.plan.turn,
+        at=each.at,
+        values={name: InUnit(x, units[name]) for name, x in each.values.items()},
+    )
 
 
-def _usual(watched: WatchedRecording) -> Iterator[tuple[str, dict[str, Any]]]:
-    """The medians of the outputs after the time of learning and before the first alarm, with those of their standard
-    deviations and thresholds."""
+def _usual(watched: WatchedRecording) -> Iterator[tuple[str, UsualOutput]]:
+    """The medians of the outputs after the time of learning and before the first alarm, with standard deviations and
+    thresholds."""
     time, units = watched.recording.time, _units()
     end = watched.alarms[0].begin if watched.alarms else float(time[-1])
     rows = (time > time[0] + watched.plan.learning) & (time <= end)
     if not rows.any():
         return
 
-    def median(name: str) -> float | None:
-        return float(np.median(watched.outputs[name][rows])) if name in watched.outputs else None
+    def median(name: str, unit: str) -> InUnit:
+        x = float(np.median(watched.outputs[name][rows])) if name in watched.outputs else None
+        return InUnit(x, unit)
 
     for name in OUTPUTS:
         if not name.endswith(("_deviation", "_threshold")):
-            yield (
-                name,
-                {
-                    "value": entry(median(name), units[name]),
-                    "deviation": entry(median(f"{name}_deviation"), units[name]),
-                    "threshold": entry(median(f"{name}_threshold"), units[name]),
-                },
-            )
+            of = (f"{name}{kind}" for kind in ("", "_deviation", "_threshold"))
+            yield name, UsualOutput(*(median(each, units[name]) for each in of))
 
 
-def _course(watched: WatchedRecording) -> dict[str, Any]:
+def _course(watched: WatchedRecording) -> dict[str, InUnit]:
     """The outputs of the observer over time, at a part of the rows."""
     every = max(1, -(-len(watched.recording.time) // ROWS))
     units = _units()
-    return {"time": array_entry(watched.recording.time[::every], "s")} | {
-        name: array_entry(watched.outputs[name][::every], units[name]) for name in OUTPUTS
+    return {"time": InUnit(watched.recording.time[::every], "s")} | {
+        name: InUnit(watched.outputs[name][::every], units[name]) for name in OUTPUTS
     }
 
 
 def _units() -> dict[str, str]:
     """The units of the outputs and states of the observer."""
-    layouts = [*(part.layout for part in LoadObserver.parts), LoadObserver.state_layout]
+    layouts = [*(each.layout for each in LoadObserver.parts), LoadObserver.state_layout]
     return {v.name: v.unit for layout in layouts if layout is not None for v in layout.variables}
