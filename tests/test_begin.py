@@ -182,7 +182,7 @@ def test_a_heavy_machine_is_waited_for_until_it_has_its_speed(tmp_path):
     assert long["value"][0] == max(start.start_time, worst) > 2.0 * locked and long["limit"][0] == locked
     assert worst == pytest.approx(start.start_time, rel=0.01)
     verdict = motor_verdict(study)
-    assert verdict["holds"] == "in part" and "its start takes too long" in verdict["text"]
+    assert verdict.holds == "in part" and "its start takes too long" in verdict.text
     turns, J = study.steady, study.drive.fmu_parameters.rotor.J
     energy = 0.5 * J * turns["motor.w"].values ** 2
     work = steady.power_mean * float(turns["time"][-1] - turns["time"][0])

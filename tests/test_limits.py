@@ -55,9 +55,9 @@ def test_a_motor_that_burns_in_steady_running_is_no_good(tmp_path):
     study, verdict, warnings = studied(KNIFE, tmp_path)
     steady, plate = study.answers["steady"], study.config.plate.nameplate
     assert study.reaches and steady.current_share > 1.2 and steady.winding_temperature > 450.0
-    assert verdict["holds"] == "false" and "keeps the crank" in verdict["text"]
-    assert "its winding becomes too hot in steady running" in verdict["text"]
-    assert verdict["limits"]["temperature"]["value"] > 1.5
+    assert verdict.holds == "false" and "keeps the crank" in verdict.text
+    assert "its winding becomes too hot in steady running" in verdict.text
+    assert verdict.limits["temperature"] > 1.5
     hot, current = warnings["motor temperature"], warnings["motor current"]
     assert hot.quantities["value"][0] == steady.winding_temperature and hot.quantities["limit"][0] == 393.15
     assert "(run.winding_temperature)" in hot.text and "a larger motor" in hot.text
@@ -65,7 +65,7 @@ def test_a_motor_that_burns_in_steady_running_is_no_good(tmp_path):
     assert current.quantities["value"][0] == pytest.approx(steady.current_share * plate.rated_current)
     assert warnings["no reserve"].quantities["over"][0] == -steady.torque_reserve > 0.1
     # steady running comes in each turn, a dip for a moment: one sentence, of the verdict as of the warning
-    for when, where in (("in each turn", warnings["no reserve"].text), ("for a moment", verdict["text"])):
+    for when, where in (("in each turn", warnings["no reserve"].text), ("for a moment", verdict.text)):
         assert re.search(rf"overloaded {when}: .* above its breakdown torque", where)
         assert "a moment the motor gives" not in where
     assert "; a heavier load or a dip of the voltage stalls it; " in warnings["no reserve"].text
@@ -96,7 +96,7 @@ def test_a_motor_below_its_breakdown_speed_stalls_under_the_load(tmp_path):
     slower, there, faster = (induction.steady(MATH, motor, w * x, T=T).tau for x in (0.9, 1.0, 1.1))
     assert there > max(slower, faster)
     said = "overloaded in each turn: 100 % or more above its breakdown torque"
-    assert said in verdict["text"]
+    assert said in verdict.text
     # it is stalled already
     assert warnings["no reserve"].text.endswith(f"{said}; take a larger motor or a heavier flywheel.")
 
@@ -114,16 +114,16 @@ def test_the_permitted_temperature_of_a_dc_motor(tmp_path):
     """One that is badly cooled passes the permitted temperature, which the file may set."""
     study, verdict, warnings = studied(JAM + CHAIN_UNIT.format(R_th=60), tmp_path)
     T = study.answers["steady"].winding_temperature
-    assert T > 500.0 and verdict["holds"] == "false" and set(motor_limits(study)) == {"temperature"}
+    assert T > 500.0 and verdict.holds == "false" and set(motor_limits(study)) == {"temperature"}
     assert warnings["motor temperature"].quantities["value"][:2] == (T, "K")
     hot = JAM + CHAIN_UNIT.format(R_th=60).replace(
         "ramp = 0.5", f"ramp = 0.5\nwinding_temperature = {T + 1.0}"
     )
     _, verdict, warnings = studied(hot, tmp_path / "hot")
-    assert verdict["holds"] != "false" and "too hot" not in verdict["text"]
+    assert verdict.holds != "false" and "too hot" not in verdict.text
     assert not any(kind.startswith("motor ") for kind in warnings)
     _, verdict, warnings = studied(JAM + CHAIN_UNIT.format(R_th=0.9), tmp_path / "cool")
-    assert verdict["holds"] != "false" and "too hot" not in verdict["text"]
+    assert verdict.holds != "false" and "too hot" not in verdict.text
     assert not any(kind.startswith("motor ") for kind in warnings)
 
 
@@ -142,7 +142,7 @@ def test_a_motor_that_fits_by_its_speed_keeps_it(tmp_path):
     assert 0.5 < check.utilisation < 1.0 and check.limit == SPEED_DEVIATION
     mean = study.answers["steady"].speed_mean
     assert mean == pytest.approx(3.0 * (1.0 + check.value), rel=2e-3)
-    assert verdict["holds"] == "true" and verdict["text"].startswith(
+    assert verdict.holds == "true" and verdict.text.startswith(
         "The motor keeps the crank at 3.08 rad/s, near enough to the 3 rad/s asked for; "
     )
     assert "speed missed" not in warnings
@@ -156,7 +156,7 @@ def test_a_motor_whose_gear_misses_the_speed_starts_all_the_same(tmp_path):
     assert 0.7 < study.answers["steady"].speed_mean / study.config.run.crank_speed < 0.8
     check = motor_limits(study)["start"]
     assert 0.0 < check.utilisation < 1.0 and check.value == study.start.start_time
-    assert "does NOT reach the speed" in verdict["text"] and "start takes too long" not in verdict["text"]
+    assert "does NOT reach the speed" in verdict.text and "start takes too long" not in verdict.text
 
 
 def test_surroundings_as_hot_as_the_winding_may_be_pass_the_limit():

@@ -142,17 +142,14 @@ def test_the_relay_that_is_ordered_is_simulated(on_line, monkeypatch):
 def test_a_motor_is_not_judged_by_turns_that_are_not_steady(on_line):
     """Turns that begin in the start take up energy: no mean of them stands for running that lasts. A motor that does
     not start from another angle is not told as one that keeps the speed."""
-    assert motor_verdict(on_line)["text"].startswith("The motor keeps the crank at")
+    assert motor_verdict(on_line).text.startswith("The motor keeps the crank at")
     found = on_line.findings["starts"]
     stuck = dataclasses.replace(found.starts[3], start_time=None)
     study = dataclasses.replace(
         on_line, findings={"starts": dataclasses.replace(found, starts=(found.starts[0], stuck))}
     )
     verdict = motor_verdict(study)
-    assert (
-        verdict["holds"] == "false"
-        and "does NOT bring the crank to its speed from 135 deg" in verdict["text"]
-    )
+    assert verdict.holds == "false" and "does NOT bring the crank to its speed from 135 deg" in verdict.text
     early = dataclasses.replace(
         on_line,
         started=dataclasses.replace(on_line.started, steady_from=0.0),
@@ -167,10 +164,8 @@ def test_a_motor_is_not_judged_by_turns_that_are_not_steady(on_line):
     refused = early.answers["steady"]
     assert refused.power_mean is refused.supply_power_mean is refused.winding_temperature is None
     verdict = motor_verdict(early)
-    assert verdict["holds"] == "false" and verdict["text"].startswith(
-        "The motor is not judged: the crank turns at"
-    )
-    assert "its turns are not steady" in verdict["text"] and GearAnalysis.find(early, None) is None
+    assert verdict.holds == "false" and verdict.text.startswith("The motor is not judged: the crank turns at")
+    assert "its turns are not steady" in verdict.text and GearAnalysis.find(early, None) is None
 
 
 def test_a_stall_is_the_time_from_which_it_stands():
@@ -747,7 +742,7 @@ def test_a_motor_at_its_voltage_limit_has_no_reserve(tmp_path):
     result, p = study.answers["steady"], study.motor
     assert result.speed_mean < 5.0 and result.torque_reserve == 0.0
     verdict = motor_verdict(study)
-    assert verdict["holds"] == "false" and "least reserve of torque 0 %" in verdict["text"]
+    assert verdict.holds == "false" and "least reserve of torque 0 %" in verdict.text
     run = study.steady
     warm = p.armature.R * (1.0 + p.armature.alpha * (result.winding_temperature - T_RATED))
     left = p.armature.k * (p.limit.v - p.armature.k * run["motor.w"].values) / warm

@@ -149,7 +149,7 @@ def test_rainflow_is_that_of_the_standard():
     assert counted == {3.0: 0.5, 4.0: 1.5, 6.0: 0.5, 8.0: 1.0, 9.0: 0.5}
     assert result.damage(2.0) == 0.5 * 9 + 1.5 * 16 + 0.5 * 36 + 64 + 0.5 * 81
     rows = result.classes(9.0)
-    assert sum(row["count"] for row in rows) == 4.0 and rows[0]["to"] == 9.0
+    assert sum(row.count for row in rows) == 4.0 and rows[0].high == 9.0
     assert rainflow([1.0, 1.0]).damage(5.0) == 0.0
 
 

@@ -194,10 +194,9 @@ def _table(x: Any, titled: bool, driver: str) -> dict[str, Any]:
         if each.inline:
             data |= own
         else:
-            title = (
-                {"title": of_driver(each.description, driver)} if titled and unit and "value" in own else {}
-            )
-            data[each.name] = own | title if title else own
+            if titled and unit and "value" in own and "title" not in own:
+                own = own | {"title": of_driver(each.description, driver)}
+            data[each.name] = own
     return data
 
 

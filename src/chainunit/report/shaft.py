@@ -57,9 +57,9 @@ def _driveline(s: b.Source, study: StudyRecord) -> fig.Figure:
         title = study.title_of(name)
         above.append(fig.Panel(x, TORQUE, tuple(shaft_torque(run, time)), title))
         classes = shaft.cycles[name].classes(largest)
-        middle = [0.5 * (row["from"] + row["to"]) for row in classes]
+        middle = [0.5 * (row.low + row.high) for row in classes]
         wide = 0.9 * largest / CLASSES
-        bars = fig.Bars("cycles", middle, [row["count"] for row in classes], wide, 1)
+        bars = fig.Bars("cycles", middle, [row.count for row in classes], wide, 1)
         cycles = fig.Axis("cycles counted (rainflow)", low=0.0), fig.Axis("range of torque", "N.m", low=0.0)
         below.append(fig.Panel(*cycles, (bars,)))
     rows = [

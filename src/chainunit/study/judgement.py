@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
 
-from ..reading.text import entry, number
+from ..core.quantities import quantity
+from ..reading.results import part, result
+from ..reading.text import number
 from . import verdict
 from .limits import Check, given_motor, reaches
 from .organ_limits import slack_and_mode
@@ -29,8 +31,8 @@ def model_verdict(study: StudyRecord) -> Verdict:
         return verdict.foreign_machine(speed, residuals, actual=mean)
     if not study.drive.machine.model.sides:
         return verdict.rigid_links(speed, residuals, actual=mean, driver=study.driver_noun)
-    for part in registered():
-        if (judged := part.model_verdict(study, speed, mean, residuals)) is not None:
+    for capability in registered():
+        if (judged := capability.model_verdict(study, speed, mean, residuals)) is not None:
             return judged
     empty = {name for name in study.overloads if config.events[name].empties}
     always = 0.0 in (config.feed.left.material_mass, config.feed.right.material_mass)
@@ -119,8 +121,22 @@ def _no_judgement(study: StudyRecord, speed: str) -> str:
     )
 
 
-def motor_verdict(study: StudyRecord) -> dict[str, Any] | None:
-    """The verdict on the motor, ready for JSON; None without steady running. It is "false" where the motor
+@result
+class MotorVerdict:
+    """The verdict on the motor."""
+
+    holds: Holds = part("whether the motor suffices: true, in part or false")
+    text: str = part("the verdict in a sentence")
+    speed: float = quantity("rad/s", "mean speed in steady running", kind="speed")
+    asked: float = quantity("rad/s", "speed asked for", kind="speed")
+    least_reserve: float | None = quantity("1", "least reserve of torque", kind="percent")
+    run: str | None = part("the run of the least reserve")
+    left_out: list[str] = part("runs that are left out, as their energy balance is not kept")
+    limits: Mapping[str, float | None] = part("used share of each limit", unit="1", kind="used")
+
+
+def motor_verdict(study: StudyRecord) -> MotorVerdict | None:
+    """The verdict on the motor; None without steady running. It is "false" where the motor
     does not reach the speed or becomes too hot. It is "in part" where no reserve of torque is left or known,
     another limit is exceeded, or no motor was found that suffices. The least reserve is given with its
     run. Runs whose energy balance is not kept are left out, as they say nothing about the motor."""
@@ -174,13 +190,13 @@ def motor_verdict(study: StudyRecord) -> dict[str, Any] | None:
     enough = reserve is not None and reserve >= AMPLE and not study.insufficient and not excesses
     burns = not keeps_speed or "temperature" in excesses
     holds: Holds = "false" if burns else "true" if enough else "in part"
-    return {
-        "holds": holds,
-        "text": f"{text}.",
-        "speed": entry(steady.speed_mean, "rad/s", "speed"),
-        "asked": entry(requested, "rad/s", "speed"),
-        "least_reserve": entry(reserve, "1", "percent"),
-        "run": run,
-        "left_out": left_out,
-        "limits": {name: entry(check.utilisation, "1", "used") for name, check in limits.items()},
-    }
+    return MotorVerdict(
+        holds,
+        f"{text}.",
+        steady.speed_mean,
+        requested,
+        reserve,
+        run,
+        left_out,
+        {name: check.utilisation for name, check in limits.items()},
+    )

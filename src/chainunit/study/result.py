@@ -2,69 +2,132 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
-from ..core.quantities import variables
+from ..core.quantities import quantity, variables
 from ..drives.catalogue import CatalogueMotor
-from ..reading.results import as_data
+from ..drives.speed_control import Loop, Tuning
+from ..reading.results import InUnit, as_data, part, result
+from ..reading.tables import UnusualValue
 from ..reading.text import entries, entry, shown_in
 from .given import given_sections
 from .heading import Heading
-from .judgement import motor_verdict
+from .judgement import MotorVerdict, motor_verdict
 from .line.shaft import driveline_of
 from .line.shaft_runs import shaft_findings
-from .measures import measures_of
+from .measures import Answers, measures_of
 from .origins import origin_of
-from .record import StudyRecord
+from .record import Remark, StudyRecord
+from .verdict import Verdict
 from .window import Phase
 
 
-def _motor(study: StudyRecord) -> dict[str, Any]:
-    kind = study.drive.graph.components["motor"].title
-    plate = study.plate
-    titles = {"kind": kind, "title": plate.designation if plate else kind}
-    # the parameters of a foreign motor are not known
-    return titles | _rating(plate) | ({} if study.motor is None else entries(study.motor))
-
-
-def _rating(motor: CatalogueMotor | None) -> dict[str, Any]:
+@result
+class MotorRating:
     """The rating of a motor of the catalogue."""
-    if motor is None:
-        return {}
-    plate = motor.nameplate
-    return {
-        "rated_power": entry(plate.power, "W"),
-        "rated_speed": entry(plate.speed, "rad/s", "speed"),
-        "rated_torque": entry(plate.torque, "N.m"),
-        "rated_current": entry(plate.rated_current, "A"),
-        "rated_voltage": entry(plate.voltage, "V"),
-        "rated_frequency": entry(plate.frequency, "Hz"),
-        "poles": entry(plate.poles, "1"),
-    }
+
+    rated_power: float = quantity("W", "rated power")
+    rated_speed: float = quantity("rad/s", "rated speed", kind="speed")
+    rated_torque: float = quantity("N.m", "rated torque")
+    rated_current: float = quantity("A", "rated current")
+    rated_voltage: float = quantity("V", "rated voltage")
+    rated_frequency: float = quantity("Hz", "rated frequency")
+    poles: float = quantity("1", "number of poles")
+
+    @classmethod
+    def of(cls, motor: CatalogueMotor) -> MotorRating:
+        """The rating of that motor."""
+        plate = motor.nameplate
+        return cls(
+            plate.power,
+            plate.speed,
+            plate.torque,
+            plate.rated_current,
+            plate.voltage,
+            plate.frequency,
+            plate.poles,
+        )
+
+
+@result
+class EventData:
+    """An event of the study."""
+
+    type: str = part("type of the event")
+    side: str | None = part("side that it comes on")
+    title: str = part("the event in words")
+    begin: float | None = quantity("s", "time at which it began")
+
+
+@result
+class Verdicts:
+    """The verdicts on a study."""
+
+    model: Verdict | None = part("verdict on the model of the machine")
+    motor: MotorVerdict | None = part("verdict on the motor")
+
+
+@result
+class RunData:
+    """The results of the runs, by the names of the runs."""
+
+    events: Mapping[str, EventData] = part("the events")
+    answers: Mapping[str, Answers] = part("the demands of each run on the drive")
+    start_up: Mapping[str, InUnit] | None = part("the demands of the start-up on the drive")
+    settling: Mapping[str, InUnit] | None = part("the demands of the settling under the feed on the drive")
+    pins: Mapping[str, Mapping[str, Mapping[str, float | None]]] = part("forces in the bearings", unit="N")
+    certificate: Mapping[str, Mapping[str, float]] = part("missing shares of the energy moved", unit="1")
+    block_peaks: Mapping[str, Mapping[str, InUnit]] = part("assumptions of an event, and the peaks over them")
+    ripple_without_feed_forward: float | None = part(
+        "fluctuation of the speed without feed-forward", unit="1", kind="percent", default=None
+    )
+
+
+@result
+class StudyData:
+    """The results of the base of a study, beside its given values and the findings of its analyses."""
+
+    heading: Heading = part(inline=True)
+    status: str = part("whether the study is complete")
+    failure: str | None = part("the error that ended the study early")
+    verdict: Verdicts = part("the verdicts")
+    warnings: list[Remark] = part("faults, and demands that are not met")
+    notes: list[Remark] = part("assumptions behind the numbers")
+    slips: tuple[UnusualValue, ...] = part("given values of an unusual size")
+    speed_loop: Mapping[str, Loop] = part("the linearised speed loop, by inertia")
+    control: Tuning | str = part("the tuned gains of the speed control, or words on it")
+    runs: RunData = part(inline=True)
+    fmus: Mapping[str, str] = part("origin of each FMU")
 
 
 def as_dict(study: StudyRecord) -> dict[str, Any]:
     """All results except the time series, ready for JSON, each number with its unit."""
     with shown_in(study.config.units):
-        return _as_dict(study)
+        base, given = as_data(_data(study)), _given_values(study)
+        return base | given | {name: given.get(name, {}) | each for name, each in _parts(study).items()}
 
 
-def _as_dict(study: StudyRecord) -> dict[str, Any]:
-    config = study.config
-    return {
-        **as_data(Heading.of(config)),
-        "status": f"failed: {study.failure}" if study.failure else "complete",
-        "failure": str(study.failure) if study.failure else None,
-        "verdict": {"model": as_data(study.verdict), "motor": motor_verdict(study)},
-        "warnings": as_data(study.warnings),
-        "notes": as_data(study.notes),
-        "slips": as_data(config.file.unusual),
-        **(given := _given_values(study)),
-        **_statics(study),
-        **_runs(study),
-        **{name: given.get(name, {}) | part for name, part in _parts(study).items()},
-        "fmus": {name: str(origin) for name, origin in study.fmus.items()},
-    }
+def _data(study: StudyRecord) -> StudyData:
+    drive, failure = study.drive, study.failure
+    return StudyData(
+        heading=Heading.of(study.config),
+        status=f"failed: {failure}" if failure else "complete",
+        failure=str(failure) if failure else None,
+        verdict=Verdicts(study.verdict, motor_verdict(study)),
+        warnings=study.warnings,
+        notes=study.notes,
+        slips=study.config.file.unusual,
+        speed_loop=study.statics.loops,
+        control=drive.tuning
+        or (
+            drive.motor.control
+            if drive.follows
+            else "none: the motor takes the speed that its supply and the load give"
+        ),
+        runs=_runs(study),
+        fmus={name: str(origin) for name, origin in study.fmus.items()},
+    )
 
 
 def _given_values(study: StudyRecord) -> dict[str, Any]:
@@ -80,6 +143,14 @@ def _given_values(study: StudyRecord) -> dict[str, Any]:
     return {"origins": origins} | values
 
 
+def _motor(study: StudyRecord) -> dict[str, Any]:
+    kind, plate = study.drive.graph.components["motor"].title, study.plate
+    titles = {"kind": kind, "title": plate.designation if plate else kind}
+    rating = {} if plate is None else as_data(MotorRating.of(plate))
+    # the parameters of a foreign motor are not known
+    return titles | rating | ({} if study.motor is None else entries(study.motor))
+
+
 def _put(tree: dict[str, Any], place: str, values: dict[str, Any]) -> None:
     """Add values at the dotted `place` of a tree."""
     for key in filter(None, place.split(".")):
@@ -87,61 +158,34 @@ def _put(tree: dict[str, Any], place: str, values: dict[str, Any]) -> None:
     tree |= values
 
 
-def _statics(study: StudyRecord) -> dict[str, Any]:
-    """The results that need no co-simulation."""
-    statics = study.statics
-    return {
-        "speed_loop": as_data(statics.loops),
-        "control": as_data(study.drive.tuning)
-        if study.drive.tuning
-        else study.drive.motor.control
-        if study.drive.follows
-        else "none: the motor takes the speed that its supply and the load give",
-    }
+def _runs(study: StudyRecord) -> RunData:
+    def begin(phase: Phase, answers: Answers | None) -> dict[str, InUnit] | None:
+        if answers is None:
+            return None
+        return {v.name: InUnit(getattr(answers, v.name), v.unit, v.kind) for v in measures_of(phase)}
 
-
-def _runs(study: StudyRecord) -> dict[str, Any]:
-    """The results of the runs, by the names of the runs."""
-    begins = {"start_up": (Phase.START_UP, study.start), "settling": (Phase.SETTLING, study.settling)}
-    return {
-        "events": {
-            name: {
-                "type": event.kind,
-                "side": event.side or None,
-                "title": event.title,
-                "begin": entry(study.event.get(name), "s"),
-            }
+    return RunData(
+        events={
+            name: EventData(event.kind, event.side or None, event.title, study.event.get(name))
             for name, event in study.config.events.items()
         },
-        "answers": {name: entries(answers) for name, answers in study.answers.items()},
-        **{
-            name: answers
-            and {v.name: entry(getattr(answers, v.name), v.unit, v.kind) for v in measures_of(phase)}
-            for name, (phase, answers) in begins.items()
-        },
-        "pins": {
-            run: {pin: {k: entry(v, "N") for k, v in sizes.items()} for pin, sizes in table.items()}
-            for run, table in study.pins.items()
-        },
-        "certificate": {
-            name: {of: entry(share, "1") for of, share in shares.items()}
-            for name, shares in study.certificate.items()
-        },
-        "block_peaks": {name: _spread(study, name) for name in study.spreads},
-        "ripple_without_feed_forward": entry(None, "1", "percent"),
-    }
-
-
-def _spread(study: StudyRecord, name: str) -> dict[str, Any]:
-    """The range of the assumed quantities of an event, and the peaks over it."""
-    spread, units = (
-        study.spreads[name],
-        {v.name: v.unit for v in variables(study.config.events[name].Parameters)},
+        answers=study.answers,
+        start_up=begin(Phase.START_UP, study.start),
+        settling=begin(Phase.SETTLING, study.settling),
+        pins=study.pins,
+        certificate=study.certificate,
+        block_peaks={name: _spread(study, name) for name in study.spreads},
     )
+
+
+def _spread(study: StudyRecord, name: str) -> dict[str, InUnit]:
+    """The range of the assumed quantities of an event, and the peaks over it."""
+    spread = study.spreads[name]
+    units = {v.name: v.unit for v in variables(study.config.events[name].Parameters)}
     ranges = [(each, ends, units[each], "assumed") for each, ends in spread.ranges.items()]
     ranges += [(each, ends, "N.m", "") for each, ends in spread.peaks.items()]
     return {
-        f"{each}_{end}": entry(x, unit, kind)
+        f"{each}_{end}": InUnit(x, unit, kind)
         for each, ends, unit, kind in ranges
         for end, x in zip(("low", "high"), ends, strict=True)
     }
@@ -156,7 +200,6 @@ def _parts(study: StudyRecord) -> dict[str, Any]:
 
 
 def _driveline(study: StudyRecord) -> dict[str, Any]:
-    units = {"from": "N.m", "to": "N.m", "count": "1"}
     shaft = shaft_findings(study)
     largest = max((answers.range_largest for answers in shaft.answers.values()), default=0.0)
     return {
@@ -166,8 +209,5 @@ def _driveline(study: StudyRecord) -> dict[str, Any]:
             **entries(study.statics.modes),
         },
         "shaft": as_data(shaft),
-        "torque_cycles": {
-            name: [{k: entry(x, units[k]) for k, x in row.items()} for row in cycles.classes(largest)]
-            for name, cycles in shaft.cycles.items()
-        },
+        "torque_cycles": {name: as_data(cycles.classes(largest)) for name, cycles in shaft.cycles.items()},
     }

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ...reading.results import GIVEN, derived, part, result
+from ...reading.results import GIVEN, as_data, derived, part, result
 from ...study.analysis import Analysis, Findings, Work
 from ...study.catalogue_drive import gear_with
 from ...study.config import Config
@@ -19,7 +19,7 @@ from .coupling import recommended_setting
 from .duty import Duty
 from .preference import ORDER, poles_rank
 from .protection import Alternative, Obstacle, Setting
-from .result import gear_data, protection_data
+from .result import drive_protection, ordered_gear
 from .table import Sizing, SizingPlan
 
 INSUFFICIENT = "No motor of the catalogue fits; all runs are with the nearest, which is insufficient."
@@ -143,12 +143,20 @@ class SizingFindings(Findings):
             inverter_current=trial.inverter_current,
         )
 
+    def coupling(self, study: StudyRecord) -> Setting | None:
+        """The recommended safety coupling; of a study that ended before it was judged, by the runs up to there."""
+        return self.setting or recommended_setting(study)
+
     def data(self, study: StudyRecord) -> dict[str, Any]:
         """Its declared parts, with the gear to order and the protection."""
-        rated = self.best.motor.nameplate.rated_current
+        setting, rated = self.coupling(study), self.best.motor.nameplate.rated_current
+        ordered = {
+            "gear": ordered_gear(study, setting, self.plan.demands.margin),
+            "protection": drive_protection(study, setting, self.alternatives, rated),
+        }
         return super().data(study) | {
-            "gear": gear_data(study, self.setting, self.plan.demands.margin),
-            "protection": protection_data(study, self.setting, self.alternatives, rated),
+            name: {} if each is None else as_data(each, titled=True, driver=study.driver_noun)
+            for name, each in ordered.items()
         }
 
     def remark(self, study: StudyRecord) -> None:
@@ -160,8 +168,7 @@ class SizingFindings(Findings):
         if study.statics.modes is not None:
             rigid = "Sizing took the shafts as rigid and the driveline as massless; the runs include it."
             study.note("sized without line", rigid)
-        # a study that ended early has a recommendation, too
-        self.setting = setting = self.setting or recommended_setting(study)
+        setting = self.coupling(study)
         if setting is not None and setting.obstacle in (None, Obstacle.RELEASE):
             # this is the setting that the answer names, recommended or not
             remark_on_rams(study, setting.least)

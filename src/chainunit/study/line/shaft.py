@@ -16,6 +16,7 @@ from ...core.engines import MATH
 from ...core.quantities import Value, declaration, quantity, variables
 from ...drives.cardan import Cardan, ShaftLine, frozen_frequency, largest_frequency
 from ...drives.driveline import Parameters
+from ...reading.results import part, result
 from ...reading.text import number
 from ..arrays import peak
 from ..drive import Drive
@@ -68,6 +69,15 @@ class LineModes:
     step_longest: Value = quantity("s", "longest communication step")
 
 
+@result
+class CycleClass:
+    """A class of torque cycles by their range."""
+
+    low: float = part("least range", unit="N.m", name="from")
+    high: float = part("largest range", unit="N.m", name="to")
+    count: float = quantity("1", "number of cycles")
+
+
 @dataclass(frozen=True)
 class Cycles:
     """Rainflow cycles (ASTM E1049) of a torque: range and mean [N m], count (1, or 0.5 of an open cycle)."""
@@ -85,7 +95,7 @@ class Cycles:
         """Sum of count times range to the power of `exponent`."""
         return float(np.sum(self.count * self.range**exponent))
 
-    def classes(self, largest: float) -> list[dict[str, float]]:
+    def classes(self, largest: float) -> list[CycleClass]:
         """Number of cycles in equal classes of range up to the `largest` [N m], largest class first; empty
         classes are left out."""
         if not largest > 0.0:
@@ -93,7 +103,7 @@ class Cycles:
         edges = np.linspace(0.0, largest, CLASSES + 1)
         counts, _ = np.histogram(self.range, edges, weights=self.count)
         rows = zip(edges[:-1], edges[1:], counts, strict=True)
-        return [{"from": float(a), "to": float(b), "count": float(n)} for a, b, n in rows if n][::-1]
+        return [CycleClass(float(a), float(b), float(n)) for a, b, n in rows if n][::-1]
 
 
 def rainflow(torque: Any) -> Cycles:
