@@ -9,6 +9,7 @@ import typer.main
 
 from chainunit.app.cli import app
 from chainunit.capabilities import modules
+from chainunit.report import study_task
 from chainunit.report.markdown import markdown
 from chainunit.report.reference import reference
 
@@ -40,7 +41,7 @@ def text() -> str:
         "`chainunit keys [TABLE]` shows the same on the terminal;\n`chainunit schema` writes a JSON Schema by which "
         "editors complete and check a study file.\n"
     )
-    tasks = [module.RESULT._task for module in modules("study_method")]
+    tasks = [study_task.TASK, *(module.RESULT._task for module in modules("study_method"))]
     contents = {task.name: task.content for task in tasks}
     return head + markdown(reference(commands(), contents), ()).removeprefix("# Reference\n")
 

@@ -19,6 +19,7 @@ from chainunit.capabilities.identification.result import _number, identified_tab
 from chainunit.capabilities.watch.false_loads import false_loads
 from chainunit.core.native.compilers import compiler
 from chainunit.machines.load_observer import LoadObserver
+from chainunit.reading.results import as_data
 from chainunit.recordings.measurands import MEASURANDS
 from chainunit.recordings.unknown import Unknown
 from chainunit.report import blocks
@@ -343,7 +344,7 @@ def test_a_deviation_of_a_temperature_is_a_difference():
         information_at_start=SimpleNamespace(determinations=[expected]),
     )
     each = identification.FittedNumber(unknown, 300.0, 300.0, 2.0, 296.0, 304.0, True)
-    own = _number(found, each)
+    own = as_data(_number(found, each))
     for key in ("deviation", "given_deviation", "expected", "by_runs"):
         assert own[key]["kind"] == "difference", key
     assert own["value"]["kind"] == "temperature"

@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,8 +18,9 @@ import numpy as np
 
 from .. import __version__
 from ..core.errors import GeometryError
+from ..core.quantities import quantity
 from ..machines import hanging
-from ..reading.text import array_entry
+from ..reading.results import InUnit, as_data, part, result
 from ..report.blocks import Column, Report, Section, Table, TableRow, Text
 from ..report.figure import Axis, Curve, Field, Figure, Item, Panel
 from ..report.print_figures import contours
@@ -129,30 +131,55 @@ def statement(comparison: TwoBarError) -> list[str]:
     return lines
 
 
-def as_dict(comparison: TwoBarError) -> dict[str, Any]:
-    """Every number with its unit, ready for JSON."""
-    axes = {"mu": "1", "zeta": "1", "psi": "rad"}
-    tables = {
-        "error_t": "R_t of two bars less that of the catenary, over the weight",
-        "error_n": "R_n of two bars less that of the catenary, over the weight",
-        "load_t": "R_t of the catenary, over the weight",
-    }
-    return {
-        "chainunit": __version__,
-        **{name: array_entry(getattr(comparison, name), unit) for name, unit in axes.items()},
-        **{
-            name: array_entry(getattr(comparison, name), "1") | {"description": text, "axes": list(axes)}
-            for name, text in tables.items()
-        },
-        "good_zeta": {
+@result
+class ErrorTable:
+    """A number over the grid of mu, zeta and psi."""
+
+    numbers: InUnit = part(inline=True)
+    description: str = part("the number in words")
+    axes: tuple[str, ...] = part("the axes of the grid", default=("mu", "zeta", "psi"))
+
+
+@result
+class TwoBarData:
+    """The content of two_bar_error.json."""
+
+    chainunit: str = part("version of chainunit")
+    mu: Any = quantity("1", "e/l1, shape (mu,)")
+    zeta: Any = quantity("1", "z/z_max, shape (zeta,)")
+    psi: Any = quantity("rad", "rocker angle, shape (psi,)")
+    error_t: ErrorTable = part("error of R_t")
+    error_n: ErrorTable = part("error of R_n")
+    load_t: ErrorTable = part("R_t of the catenary")
+    good_zeta: Mapping[str, Mapping[str, list[tuple[float, float]]]] = part(
+        "by largest error and mu, the ranges of zeta over which two bars are good", unit="1"
+    )
+    statement: list[str] = part("sentences on the range in which two bars are good enough")
+
+
+def data_of(comparison: TwoBarError) -> TwoBarData:
+    """Every number of a comparison."""
+
+    def table(numbers: Any, words: str) -> ErrorTable:
+        return ErrorTable(InUnit(numbers, "1"), f"{words}, over the weight")
+
+    return TwoBarData(
+        __version__,
+        comparison.mu,
+        comparison.zeta,
+        comparison.psi,
+        table(comparison.error_t, "R_t of two bars less that of the catenary"),
+        table(comparison.error_n, "R_n of two bars less that of the catenary"),
+        table(comparison.load_t, "R_t of the catenary"),
+        {
             f"{100 * limit:.0f} %": {
-                f"mu = {mu:.2f}": array_entry(ranges, "1")
+                f"mu = {mu:.2f}": ranges
                 for mu, ranges in zip(comparison.mu, comparison.good_zeta(limit), strict=True)
             }
             for limit in LIMITS
         },
-        "statement": statement(comparison),
-    }
+        statement(comparison),
+    )
 
 
 def report(comparison: TwoBarError) -> Report:
@@ -160,7 +187,7 @@ def report(comparison: TwoBarError) -> Report:
     return Report(
         "Two bars against a hanging chain",
         "Errors of the loads R_t and R_n by two bars",
-        as_dict(comparison),
+        as_data(data_of(comparison)),
         (),
         (
             Section("statement", "Statement", tuple(Text((line,)) for line in statement(comparison))),

@@ -11,6 +11,7 @@ from ..study.choice import check_files
 from ..study.config import Config
 from ..study.record import LOAD_CYCLE, SPEED_MISSED, StudyRecord
 from ..study.registry import registered
+from ..study.result import StudyData
 from ..study.run import run_study
 from ..work.progress import TaskProgress
 from . import series
@@ -64,4 +65,5 @@ TASK: Task[Config, StudyRecord] = Task(
     failure=lambda record: record.failure,
     shortfall=_shortfall,
     tells_remarks=True,
+    content=StudyData,
 )
