@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import importlib.util
 import json
 import os
 import shutil
@@ -70,6 +71,38 @@ def test_nothing_outside_a_folder_imports_from_it():
             if target[0] == "capabilities" and len(target) > 1 and target[1] != own:
                 outside.add("/".join(parts))
     assert outside == set()
+
+
+USER = """
+from chainunit import Study, SweepResult, WatchResult
+
+study = Study.from_file()
+swept: SweepResult = study.sweep(workers=2)
+begin: float = study.watch().alarms[0].begin
+study.optimise()
+study.identify(runs=3)
+"""
+
+
+def test_the_types_of_methods_are_those_of_the_list():
+    """`docs/make_types.py` wrote the file from which type checkers know the methods of `Study`."""
+    script = Path(__file__).parents[1] / "docs" / "make_types.py"
+    spec = importlib.util.spec_from_file_location("make_types", script)
+    made = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(made)
+    assert made.FILE.read_text("utf-8") == made.text()
+
+
+@pytest.mark.second
+def test_a_type_checker_sees_the_methods_and_results_of_capabilities(tmp_path):
+    pytest.importorskip("mypy")
+    (tmp_path / "user.py").write_text(USER)
+    call = [sys.executable, "-m", "mypy", "--config-file=", "--cache-dir", str(tmp_path), "user.py"]
+    env = os.environ | {"MYPYPATH": str(PACKAGE.parent)}
+    said = subprocess.run(call, env=env, capture_output=True, text=True, cwd=tmp_path).stdout.splitlines()
+    errors = [line for line in said if line.startswith("user.py") and ": error: " in line]
+    assert len(errors) == 2
+    assert '"Study" has no attribute "optimise"' in errors[0] and "runs" in errors[1]
 
 
 @pytest.mark.second

@@ -5,11 +5,12 @@ alone, for scripts; ``ChamberForces`` is its model, which becomes an FMU.
 """
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .app.studies import Study as Study
     from .app.studies import StudyResult as StudyResult
+    from .app.study_methods import *  # noqa: F403 - the results of capabilities, by name
     from .core.errors import GeometryError as GeometryError
     from .core.errors import InputError as InputError
     from .core.errors import RunError as RunError
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
     from .machines.chain_unit import SideLoads as SideLoads
 
     __version__: str
-
-    def __getattr__(name: str) -> Any: ...
 
 else:
     # numpy and scipy take longer to import than a command takes to answer: import them when they are needed; a

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from ..capabilities import modules
 from ..core.errors import InputError, RemarkWarning, near_name, shown
 from ..core.quantities import Layout
 from ..fmu.backends import Backend
@@ -35,6 +34,7 @@ from ..study.record import StudyRecord
 from ..study.result import as_dict
 from ..study.window import Phase
 from ..work.progress import TaskProgress
+from .study_methods import StudyMethods
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 _TABLES, _TEXT = "tables in Python", "text in Python"
 
 
-class Study:
+class Study(StudyMethods):
     """A machine with its motor, and the runs that are to be made.
 
     Parameters
@@ -73,9 +73,6 @@ class Study:
 
     config: Config
     """The configuration of the study, checked."""
-    if TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Any: ...
 
     def __init__(self, **tables: Any) -> None:
         self._take(study_files.of_tables(_plain(tables), _TABLES), _TABLES)
@@ -296,10 +293,6 @@ class StudyResult(ReportedResult[Config, StudyRecord]):
     def notes(self) -> list[str]:
         """The assumptions behind the numbers, a text each."""
         return [note["text"] for note in self._numbers["notes"]]
-
-
-for _module in modules("study_method"):
-    setattr(Study, _module.METHOD.__name__, _module.METHOD)
 
 
 def _plain(value: Any) -> Any:

@@ -25,7 +25,7 @@ def angle_axis(study: StudyRecord) -> fig.Axis:
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The tables and the figure of a turn at constant speed."""
-    turn: TurnFindings = study.findings["constant_speed"]
+    turn = TurnFindings.of_study(study)
     bars = f", of {words}" if (words := study.drive.machine.in_place) else ""
     lead = s.line("Inverse dynamics at {=run.crank_speed:4} of the {driver}, without a motor" + bars + ".")
     yield b.Text(lead, "lead", "long")

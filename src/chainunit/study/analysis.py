@@ -11,38 +11,16 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
-from ..reading.results import as_data
 from ..work.progress import TaskProgress
+from .record import Findings as Findings
 
 if TYPE_CHECKING:
     from .config import Config
     from .drive import Drive
     from .record import StudyRecord
     from .rig import Rig
-
-
-class Findings(ABC):
-    """What an analysis found: a declared result (`chainunit.reading.results`), whose data are the part of result.json
-    under the name of the analysis."""
-
-    examines: ClassVar[str] = ""
-    """name of the part of the line of which it says more than the base of a study"""
-
-    @property
-    def store(self) -> Path | None:
-        """The store of its runs, a folder beside the files of the study, if it has one."""
-        return None
-
-    def data(self, study: StudyRecord) -> dict[str, Any]:
-        """Its part of result.json: its declared parts."""
-        data: dict[str, Any] = as_data(self, driver=study.driver_noun)
-        return data
-
-    @abstractmethod
-    def remark(self, study: StudyRecord) -> None:
-        """Add to the study the remarks that the reader needs beside the numbers."""
 
 
 def is_examined(part: str, findings: Mapping[str, Findings]) -> bool:

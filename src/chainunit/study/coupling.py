@@ -12,7 +12,7 @@ from .event_torques import peaks_in_events
 from .ram_force import TIMES, rams
 from .readings import pull_out_torque
 from .record import StudyRecord
-from .starts import StartAnalysis
+from .starts import StartFindings
 from .torques import on_coupling
 from .verdict import START
 from .window import Phase
@@ -42,7 +42,7 @@ def start_peaks(study: StudyRecord) -> list[StartPeak]:
     events, peaks = study.config.events, peaks_in_events(study)
     run = study.runs[START].sel(time=slice(None, study.steady_begin))
     parts = [StartPeak(on_coupling(study.drive, run))]
-    if findings := study.findings.get(StartAnalysis.name):
+    if findings := StartFindings.found_in(study):
         parts += [StartPeak(start.coupling_torque, angle=start.angle) for start in findings.starts]
     return parts + [StartPeak(peak, name) for name, peak in peaks.items() if events[name].from_rest]
 

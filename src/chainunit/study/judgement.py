@@ -16,7 +16,7 @@ from .registry import registered
 from .rig import worst_residual
 from .rules import other_models
 from .start_runs import longest_of
-from .starts import StartAnalysis
+from .starts import StartFindings
 from .verdict import RESIDUAL, STEADY, Holds, Verdict, shown_speed
 from .window import Phase
 
@@ -70,7 +70,7 @@ def motor_limits(study: StudyRecord) -> dict[str, Check]:
     steady, start = study.answers.get(STEADY), study.start
     if steady is None or start is None:
         return {}
-    time, found = start.start_time, study.findings.get(StartAnalysis.name)
+    time, found = start.start_time, StartFindings.found_in(study)
     if found is not None:
         # the worst crank angle counts
         others = longest_of(found.starts)
@@ -105,7 +105,7 @@ def lasts(study: StudyRecord) -> bool:
 def _no_judgement(study: StudyRecord, speed: str) -> str:
     """Words on a motor that is not told as one that keeps the speed, though the mean `speed` is near: it does not
     start from another angle, or its turns are not steady; empty where neither is so."""
-    found, driver = study.findings.get(StartAnalysis.name), study.driver_noun
+    found, driver = StartFindings.found_in(study), study.driver_noun
     if found is not None and found.stuck:
         where = " and ".join(number(each.angle, "rad") for each in found.stuck)
         return f"The motor does NOT bring the {driver} to its speed from {where}, though it turns at {speed} here"

@@ -18,7 +18,7 @@ import numpy as np
 from ..mechanism.assur import GROUND, PRISMATIC, REVOLUTE
 from ..mechanism.sampled_quantities import ROUNDING, roots
 from .record import StudyRecord
-from .turn import TurnAnalysis
+from .turn import TurnAnalysis, TurnFindings
 
 TIMES = 2.0
 """Multiple of the working force from which on the ram counts as overloaded."""
@@ -70,7 +70,7 @@ def rams(study: StudyRecord) -> Iterator[RamForce]:
     description = getattr(study.drive.machine.model, "described_by", None)
     if description is None or TurnAnalysis.name not in study.findings:
         return
-    turn = study.findings[TurnAnalysis.name].loaded
+    turn = TurnFindings.of_study(study).loaded
     joints = description.structure.joints
     for name, joint in joints.items():
         if joint.kind != PRISMATIC or GROUND not in (joint.on[0], joint.by[0]):

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, TypeAlias
+from pathlib import Path
+from typing import Any, ClassVar, Literal, Self, TypeAlias
 
 import xarray as xr
 
@@ -12,7 +14,7 @@ from ..core.errors import RunError
 from ..drives.catalogue import CatalogueMotor
 from ..fmu.backends import Origin
 from ..machines.chain_unit import RodName
-from ..reading.results import InUnit, part, result
+from ..reading.results import InUnit, as_data, part, result
 from ..reading.text import number
 from . import verdict
 from .config import Config
@@ -110,8 +112,8 @@ class StudyRecord:
     """the spread of each event that rests on an assumption"""
     relay_class: int = LIGHT
     """trip class of the thermal relay that holds in the start, of a motor of the catalogue on the line"""
-    findings: dict[str, Any] = field(default_factory=dict)
-    """`Findings` of each analysis, by its name"""
+    findings: dict[str, Findings] = field(default_factory=dict)
+    """findings of each analysis, by its name"""
     verdict: Verdict | None = None
     """the verdict on the model, once there are runs"""
     remarks: list[Remark] = field(default_factory=list)
@@ -228,3 +230,37 @@ class StudyRecord:
     def motor(self) -> Any:
         """Parameters of the motor."""
         return self.drive.parameters
+
+
+class Findings(ABC):
+    """What an analysis found: a declared result (`chainunit.reading.results`), whose data are the part of result.json
+    under the name of the analysis."""
+
+    examines: ClassVar[str] = ""
+    """name of the part of the line of which it says more than the base of a study"""
+
+    @classmethod
+    def found_in(cls, study: StudyRecord) -> Self | None:
+        """The findings of this kind of a study; None where it has none."""
+        return next((each for each in study.findings.values() if isinstance(each, cls)), None)
+
+    @classmethod
+    def of_study(cls, study: StudyRecord) -> Self:
+        """The findings of this kind of a study that has them."""
+        findings = cls.found_in(study)
+        assert findings is not None, cls.__name__
+        return findings
+
+    @property
+    def store(self) -> Path | None:
+        """The store of its runs, a folder beside the files of the study, if it has one."""
+        return None
+
+    def data(self, study: StudyRecord) -> dict[str, Any]:
+        """Its part of result.json: its declared parts."""
+        data: dict[str, Any] = as_data(self, driver=study.driver_noun)
+        return data
+
+    @abstractmethod
+    def remark(self, study: StudyRecord) -> None:
+        """Add to the study the remarks that the reader needs beside the numbers."""

@@ -36,7 +36,7 @@ from .relay import start_class
 from .remarks import conclude
 from .rig import Rig
 from .start_up import start_up
-from .starts import StartAnalysis
+from .starts import StartAnalysis, StartFindings
 from .statics import statics
 from .torques import on_coupling
 from .transients import Transient, coast, compare, follow, lead_times, release
@@ -137,7 +137,7 @@ def _analyse(study: StudyRecord, work: Work, *, needs_runs: bool, at_end: bool =
 def _with_class_of_all_starts(study: StudyRecord) -> None:
     """Where a start from another crank angle takes a relay of a heavier class, read its trips in the events once
     more."""
-    found = study.findings.get(StartAnalysis.name)
+    found = StartFindings.found_in(study)
     if found is None or found.start_class <= study.relay_class:
         return
     study.relay_class = found.start_class

@@ -27,7 +27,7 @@ _EDGE = DrawnLink("edge", ENDS, "heavy")
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The table and the figure of the blade."""
     yield b.Table(s.rows(Cutting, "blade", digits=4), title="The blade over a turn at constant speed")
-    yield _figure(study, study.findings["blade"])
+    yield _figure(study, BladeFindings.of_study(study))
 
 
 def _polyline(links: tuple[DrawnLink, ...], at: Mapping[str, tuple[Any, Any]]) -> tuple[Any, Any]:

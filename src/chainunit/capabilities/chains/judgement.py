@@ -50,7 +50,7 @@ def verdict_on(study: StudyRecord, speed: float, actual: float, residuals: Mappi
     folds = {name: a.fold_largest for name, a in runs.items() if a is not None}
     slack = {name: a.slack_time for name, a in runs.items() if a is not None}
     residuals, turns = dict(residuals), math.inf
-    found: ChainResult | None = study.findings.get("chain")
+    found = ChainResult.found_in(study)
     if found is not None:
         own = found.own
         folds[CONSTANT], slack[CONSTANT] = own.fold_largest, own.slack_time
@@ -103,7 +103,7 @@ def chains(
 def remark_on(study: StudyRecord) -> None:
     """The remarks on chains."""
     chain: ChainOrgans = study.config.table("chain")
-    result: ChainResult | None = study.findings.get("chain")
+    result = ChainResult.found_in(study)
     walls, webs = rods_of(study.drive)
     warn, note = study.warn, study.note
     note(

@@ -156,7 +156,7 @@ def _critical(s: b.Source, chain: Mapping[str, Any], study: StudyRecord) -> Iter
     orders = (s.line(f"order {{={path}.{i}.order}}") for i in next(iter(places.values())).values())
     title = f"Critical crank speeds. {_ORDERS}"
     yield b.Table(tuple(rows), b.heads("", *orders), title=title, form="long")
-    found: ChainResult = study.findings["chain"]
+    found = ChainResult.of_study(study)
     inside = [
         s.line(f"{{{path}.{places[each.mode][each.order]}.speed}} (mode {each.mode}, order {each.order})")
         for each in sorted(found.within_speeds(), key=lambda each: each.speed)
@@ -165,10 +165,10 @@ def _critical(s: b.Source, chain: Mapping[str, Any], study: StudyRecord) -> Iter
         yield b.Text(line("Critical speeds within the sweep: ", join(inside), f". {_ORDERS}"), form="short")
 
 
-@PICTURES.declare(lambda study: len(study.findings["chain"].speeds) > 1, "chain_sweep.png")
+@PICTURES.declare(lambda study: len(ChainResult.of_study(study).speeds) > 1, "chain_sweep.png")
 def _over_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
     """Torques of chains and two bars, and the share of the time with a slack rod, over the crank speed."""
-    result: ChainResult = study.findings["chain"]
+    result = ChainResult.of_study(study)
     rows = result.speeds
     speed = np.array([n.speed for n in rows])
     x = fig.Axis("crank speed", "rad/s", "speed", low=float(speed[0]), high=float(speed[-1]))

@@ -26,7 +26,7 @@ from ...study.measures import Answers, read_answers
 from ...study.record import Amount, StudyRecord
 from ...study.rig import Rig, worst_residual
 from ...study.start_up import start_up
-from ...study.turn import Turn, TurnAnalysis
+from ...study.turn import TurnFindings
 from ...study.verdict import CREEPS, RESIDUAL, STEADY
 from ...study.window import Phase, Window, whole_turns
 from .table import FlywheelTable
@@ -130,7 +130,7 @@ class FlywheelAnalysis(Analysis):
         """
         config, plan, drive = study.config, study.config.plans["flywheels"], study.drive
         table: FlywheelTable = plan.table
-        turn: Turn = study.findings[TurnAnalysis.name].numbers
+        turn = TurnFindings.of_study(study).numbers
         findings = FlywheelFindings(
             own=table.J,
             permitted_fluctuation=table.fluctuation,

@@ -36,7 +36,7 @@ _HEADS = {
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The table and the figure of the flywheels."""
-    findings: FlywheelFindings = study.findings["flywheels"]
+    findings = FlywheelFindings.of_study(study)
     if study.config.plate is not None:
         nameplate = ", ".join(f"{{motor.rated_{name}}}" for name in ("power", "speed", "torque", "current"))
         yield b.Text(s.line(f"Motor: {{motor.title}}, rated {nameplate}; ratio {{machine.ratio:4}}."))

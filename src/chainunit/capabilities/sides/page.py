@@ -13,7 +13,7 @@ from ...report.pictures import Pictures
 from ...study.one_sided import OverloadFactors
 from ...study.record import StudyRecord
 from ...study.verdict import CRANK_GOOD, ROCKER_GOOD_EMPTY
-from .analysis import Limits
+from .analysis import Limits, OrganFindings
 
 PICTURES = Pictures()
 
@@ -75,7 +75,7 @@ _SHADED = (
 
 @PICTURES.declare(lambda study: True, "sides_over_speed.png")
 def _sides(s: b.Source, study: StudyRecord) -> fig.Figure:
-    sides = study.findings["organs"].sides
+    sides = OrganFindings.of_study(study).sides
     words = {"both": "both sides"} | {str(side): f"{side} side alone" for side in SIDES}
 
     def items(of: str) -> Iterator[fig.Item]:

@@ -13,6 +13,7 @@ import xarray as xr
 from ...core.errors import InterruptedRunError, RunError
 from ...drives.induction_motor import SoftStart
 from ...drives.slip_clutch import SlipClutch
+from ...machines.chain_unit import SIDES
 from ...study.arrays import peak
 from ...study.catalogue_drive import with_inertia, with_starter
 from ...study.cycle import cycle
@@ -26,7 +27,7 @@ from ...study.record import StudyRecord
 from ...study.rig import Rig, join
 from ...study.start_runs import StartNumbers, from_angle, hardest, longest_start, start_from, starts_from_all
 from ...study.start_up import start_up
-from ...study.starts import StartAnalysis
+from ...study.starts import StartAnalysis, StartFindings
 from ...study.torques import PeakOf, all_feed_on, duty_peak, on_coupling
 from ...study.transients import follow, lead_times
 from ...study.verdict import STEADY
@@ -108,9 +109,7 @@ def _for_starts(
 
 def _worst(study: StudyRecord) -> StartNumbers:
     """The start from the angle at which the direct start puts most on the coupling."""
-    worst: StartNumbers = max(
-        study.findings[StartAnalysis.name].starts, key=lambda start: start.coupling_torque
-    )
+    worst: StartNumbers = max(StartFindings.of_study(study).starts, key=lambda start: start.coupling_torque)
     return worst
 
 
@@ -273,7 +272,7 @@ def _runs(study: StudyRecord, rig: Rig, of: PeakOf) -> tuple[float, dict[str, xr
                 duty.append((name, run))
             elif event.role is Role.SHOCK:
                 shocks[name] = run
-        for side in study.findings["sizing"].duty.one_sided:
+        for side in (each for each in SIDES if each in config.machine.model.sides):
             event = config.one_sided(side)
             run = follow(rig, simulation, event, begin, begin + event.p.shift + 2.0 * config.turn).run
             duty.append((all_feed_on(side), run))
@@ -323,7 +322,7 @@ def _slip_clutch(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative 
     capacity = setting.least_in_running
     if rig.drive.foreign_titles or capacity >= setting.gear:
         return None
-    slowest = max(study.findings[StartAnalysis.name].starts, key=lambda start: start.start_time or 0.0)
+    slowest = max(StartFindings.of_study(study).starts, key=lambda start: start.start_time or 0.0)
     run = slip_run(rig, slowest, capacity)
     if run is None:
         return Alternative(Way.SLIP_CLUTCH, WayNumbers.of(running=setting.running), {})

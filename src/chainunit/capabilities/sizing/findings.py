@@ -190,7 +190,7 @@ class ProtectionAnalysis(Analysis):
     @staticmethod
     def find(study: StudyRecord, work: Work) -> None:
         """Judge the coupling by the runs of the study, and try each way."""
-        sizing: SizingFindings = study.findings["sizing"]
+        sizing = SizingFindings.of_study(study)
         sizing.setting = recommended_setting(study)
         if sizing.setting is not None:
             sizing.alternatives = alternatives(study, sizing.setting, work.rig, work.progress)

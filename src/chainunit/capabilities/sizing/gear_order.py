@@ -9,7 +9,7 @@ from ...study.event import Role
 from ...study.event_torques import peaks_in_events, running_peak, running_words
 from ...study.judgement import wrong_runs
 from ...study.record import StudyRecord
-from ...study.starts import StartAnalysis
+from ...study.starts import StartFindings
 from ...study.torques import at_gear
 from ...study.verdict import STEADY
 from .protection import Setting
@@ -53,7 +53,7 @@ def gear_order(study: StudyRecord, setting: Setting | None, margin: float) -> Ge
         return None
     running, factor = running_peak(study, at_gear), study.config.gear.start_factor
     loads = {"running": GearLoad(running.torque, running_words(study, running.run))}
-    if starts := study.findings.get(StartAnalysis.name):
+    if starts := StartFindings.found_in(study):
         loads["start"] = GearLoad(starts.worst.gear_torque, "a start", factor)
     peaks, wrong = _overloads(study, setting), wrong_runs(study)
     if kept := {name: peak for name, peak in peaks.items() if name not in wrong}:

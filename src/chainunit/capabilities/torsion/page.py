@@ -12,6 +12,7 @@ from ...report import blocks as b
 from ...report import figure as fig
 from ...report.lines import Line, line
 from ...study.record import StudyRecord
+from .analysis import TorsionFindings
 from .line import LineAnalysis
 
 PICTURES = ("campbell.png", "stability.png", "resonance.png", "ratio.png")
@@ -27,7 +28,7 @@ _JOINTS = {
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """A text on the line, the tables of its numbers, and the figures."""
-    analysis: LineAnalysis = study.findings["torsion"].analysis
+    analysis = TorsionFindings.of_study(study).analysis
     lead = (
         "This section is on the line alone, between the rotor J1 and the machine J4. Shaft 2 belongs to the motor, "
         "shaft 3 to the machine, and a cardan shaft with two joints connects them. Shaft 3 turns i23 times as fast "

@@ -13,7 +13,7 @@ from ...report import run_names
 from ...report.pictures import Pictures
 from ...report.runs import by_side, over_runs
 from ...study.record import StudyRecord
-from .notices import DEVICES, Observed
+from .notices import DEVICES, Observed, ObserverFindings
 
 PICTURES = Pictures()
 
@@ -63,10 +63,10 @@ _FORCE = fig.Axis("processing force", "N")
 _SHARE = fig.Axis("imbalance over its threshold", low=-4.0, high=4.0)
 
 
-@PICTURES.declare(lambda study: study.findings["observer"].notices, "observer.png")
+@PICTURES.declare(lambda study: ObserverFindings.of_study(study).notices, "observer.png")
 def _print(s: b.Source, study: StudyRecord) -> fig.Figure:
     """All events beside each other, for print."""
-    events = [_event(study, name) for name in study.findings["observer"].notices]
+    events = [_event(study, name) for name in ObserverFindings.of_study(study).notices]
     rows = zip(*(each.panels for each in events), strict=True)
     panels = (
         tuple(
@@ -79,14 +79,14 @@ def _print(s: b.Source, study: StudyRecord) -> fig.Figure:
     return fig.Figure("observers", words, f"{words}: loads and imbalances.", tuple(panels), on_page=False)
 
 
-@PICTURES.declare(lambda study: study.findings["observer"].notices)
+@PICTURES.declare(lambda study: ObserverFindings.of_study(study).notices)
 def _events(s: b.Source, study: StudyRecord) -> Iterator[fig.Figure]:
-    return (_event(study, name) for name in study.findings["observer"].notices)
+    return (_event(study, name) for name in ObserverFindings.of_study(study).notices)
 
 
 def _event(study: StudyRecord, name: str) -> fig.Figure:
     """The estimates of an event over time."""
-    run, notice = study.runs[name], study.findings["observer"].notices[name]["observer"]
+    run, notice = study.runs[name], ObserverFindings.of_study(study).notices[name]["observer"]
     time = run["time"].values - study.event[name]
     low = max(float(time[0]), -0.5 * math.pi / study.config.run.crank_speed)
 

@@ -44,7 +44,7 @@ class ShaftFindings(Findings):
 
 def shaft_findings(study: StudyRecord) -> ShaftFindings:
     """The load of the driveline; empty where the study has none, or failed before."""
-    findings: ShaftFindings = study.findings.get(ShaftAnalysis.name, ShaftFindings({}, {}))
+    findings = ShaftFindings.found_in(study) or ShaftFindings({}, {})
     return findings
 
 
