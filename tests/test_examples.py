@@ -78,7 +78,7 @@ def test_the_heavy_mill_is_ordered_without_a_flywheel(result):
     assert small["flywheel"]["mass"]["value"] == pytest.approx(29.0, abs=1.0)
     assert small["checks"]["start"]["value"]["value"] == pytest.approx(8.0, abs=0.5)
     assert "no flywheel; " in message and "A flywheel, or a larger motor." in message
-    assert "Order of preference among those that fit: 1. " in (folder / "result.md").read_text("utf-8")
+    assert "Order of preference among drives that fit: 1. " in (folder / "result.md").read_text("utf-8")
 
 
 @pytest.mark.slow

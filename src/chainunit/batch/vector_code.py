@@ -26,8 +26,8 @@ def c_file(name: str) -> str:
 class VectorCode:
     """Code of `operations` in which the arguments `varying` are vectors and all others are uniform.
 
-    `inputs` are the entries of the uniform arguments that are used, and `columns` those of the varying ones, in the
-    order in which the code takes them.
+    `inputs` are the entries of the uniform arguments that are used, and `columns` the entries of the varying ones, in
+    the order in which the code takes them.
     """
 
     def __init__(self, operations: Operations, varying: Sequence[tuple[int, int]]) -> None:

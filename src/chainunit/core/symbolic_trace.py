@@ -18,7 +18,7 @@ class Trace:
 
     `symbols` are the casadi vectors (p, u, x, derived values); `p`, `u` and `x` the same as instances of their
     declarations, `p` prepared with the derived values; `outputs` the outputs part by part in declared order, and
-    `derivatives` those of the states.
+    `derivatives` the derivatives of the states.
     """
 
     model: type[Model]

@@ -126,9 +126,9 @@ class SystemDescription:
 
     The description has the `name` and `title` of the model, a `reference` of each of the `components`, the
     `connections`, the inputs and outputs that are `left_out`, the free `terminals` by full name, the `extra` outputs
-    besides those of the first parts; the outputs in the order of their dependencies, all (`steps`), those for the
-    derivatives (`rate_steps`) and those for the constraints (`closed_steps`); and the order of the `start`, in which
-    no outputs stand for the states.
+    besides the variables of the first parts; the outputs in the order of their dependencies, all (`steps`), the
+    outputs for the derivatives (`rate_steps`) and for the constraints (`closed_steps`); and the order of the `start`,
+    in which no outputs stand for the states.
     """
 
     def __init__(self, data: Mapping[str, Any], models: Iterable[type[Model]]) -> None:

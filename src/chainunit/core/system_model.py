@@ -198,8 +198,8 @@ class SystemModel(Model):
 
     @classmethod
     def tolerance(cls, xp: Any, p: Any) -> Any:
-        """The parameter `solver.tolerance`, or the least of those of the components that control the error if it is
-        less."""
+        """The parameter `solver.tolerance`, or the least tolerance of the components that control the error if it
+        is less."""
         own = cls.system.parameters(p)
         models = [(name, model) for name, model in cls._components() if model.controlled]
         return cls._least(

@@ -53,7 +53,7 @@ class SideMasses:
 
 @declaration
 class Parameters:
-    """Parameters of the chain unit. The start values are those of the packaged machine: plausible assumptions of this
+    """Parameters of the chain unit. The start values describe the packaged machine: plausible assumptions of this
     package, as the papers print no masses and no absolute lengths."""
 
     r: Value = quantity("m", "crank O1-A", default=0.15, above=0.0, max=1e4)
@@ -439,7 +439,7 @@ class ChamberForces(InverseMachine):
 
     name, noun, sides = "ChamberForces", "chain unit", SIDES
     fmu_data = FmuData(
-        notes="\n\nThe start values are those of the packaged study, with three exceptions: the shaft stands, "
+        notes="\n\nThe start values describe the packaged study, with three exceptions: the shaft stands, "
         "ratio is 1 (there 50), and the processing forces are 0 (there 10 N a side), which makes the rocker torque "
         "some percent less."
     )

@@ -110,8 +110,8 @@ class AlarmRule:
 
 @declaration
 class Parameters(chain_unit.Parameters):
-    """Parameters of the machine, of the signal, and what is known of the loads. The start values are those of the
-    packaged machine on a DC motor of the start values of `DcMotor`."""
+    """Parameters of the machine, of the signal, and what is known of the loads. The start values describe
+    the packaged machine on a DC motor of the start values of `DcMotor`."""
 
     ratio: Value = quantity(
         "1", "gear ratio, motor turns per crank turn", default=50.0, above=0.0, max=1e6, usual=(1.0, 500.0)

@@ -1,6 +1,6 @@
 """The papers' figures in their own axes, and five that the papers lack.
 
-Left organ: full lines, right organ: dashed, as in paper 000. Corrected curves are black; those of the printed
+Left organ: full lines, right organ: dashed, as in paper 000. Corrected curves are black; curves of the printed
 formulas or of the authors' own calculation are orange and thin.
 """
 

@@ -205,7 +205,7 @@ def zeta_range(psi: float, mu: float = MU) -> tuple[float, float]:
     return low, high
 
 
-# The functions of the table, item by item; loads are those of the left organ in parts of its weight.
+# The functions of the table, item by item; loads act on the left organ, in parts of its weight.
 
 
 def fitting_mu(end: str) -> float:

@@ -42,7 +42,7 @@ _STRIDE = 2
 
 @dataclass(frozen=True)
 class TwoBarError:
-    """The loads R_t and R_n by two bars less those of the catenary, in parts of the organ's weight [1], shape
+    """The loads R_t and R_n by two bars less the loads of the catenary, in parts of the organ's weight [1], shape
     (mu, zeta, psi); NaN where one of the two does not hang. `load_t` is R_t of the catenary in the same parts."""
 
     mu: Any

@@ -61,7 +61,7 @@ class ResultPart(NamedTuple):
     """unit of its numbers; empty for a part that is no number, or whose numbers have units of their own"""
     kind: str = ""
     inline: bool = False
-    """whether the parts of its value stand among those of the result"""
+    """whether the parts of its value stand among the parts of the result"""
     titled: bool = False
     """whether its numbers have their descriptions in the data"""
     optional: bool = False
@@ -209,8 +209,8 @@ def _number(x: Any, unit: str, kind: str) -> dict[str, Any]:
 
 
 def documented(of: type, prefix: str = "") -> Iterator[tuple[str, str, str]]:
-    """Name in the data, unit and description of each number and text of a result, with those of the results in it. In
-    a name ``*`` stands for the key of a mapping, and ``#`` for the place in a sequence."""
+    """Name in the data, unit and description of each number and text of a result and of the results in it. In a
+    name ``*`` stands for the key of a mapping, and ``#`` for the place in a sequence."""
     for each in parts(of):
         steps, inner = results_in(_annotated(of, each.attribute))
         own = prefix if each.inline else f"{prefix}{each.name}."

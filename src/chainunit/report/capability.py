@@ -63,7 +63,7 @@ class Capability(StudyCapability):
         return iter(())
 
     def warnings(self, s: Source) -> Iterator[Block]:
-        """Its warnings beside those of the study, to stand at the head of a report."""
+        """Its warnings beside the warnings of the study, to stand at the head of a report."""
         return iter(())
 
     def supplement(self, study: StudyRecord) -> Supplement | None:

@@ -34,7 +34,7 @@ def carry_out(
     **options: Any,
 ) -> None:
     """Run a task in the folder `output`, show its report, and name the files. `errors` is the console of the standard
-    error, for the progress; the options are those of the task.
+    error, for the progress; the task has these options.
 
     Raises
     ------

@@ -107,8 +107,8 @@ class Label:
 
 @dataclass(frozen=True)
 class Field:
-    """A map of `z`, shape (len(y), len(x)), in classes between neighbouring `levels`. `names` are those of the
-    classes; the line at the level `bold` is drawn."""
+    """A map of `z`, shape (len(y), len(x)), in classes between neighbouring `levels`. `names` are the names of
+    the classes; the line at the level `bold` is drawn."""
 
     x: Any
     y: Any

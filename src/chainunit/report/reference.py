@@ -139,7 +139,7 @@ def reference(
 
 
 def _results(contents: Mapping[str, type | None]) -> dict[str, type]:
-    """The declared results by their names: those of the analyses of a study, and those of other commands."""
+    """The declared results by their names: the results of the analyses of a study, and of other commands."""
     returned = ((each.name, get_type_hints(each.find)["return"]) for each in all_analyses())
     found = {name: results_in(hint)[1] for name, hint in returned}
     return {name: of for name, of in (found | dict(contents)).items() if of is not None}

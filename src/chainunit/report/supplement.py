@@ -28,7 +28,7 @@ class Supplement:
     study: StudyRecord
     caption: Line = ()
     links: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    """the joints of links that are drawn otherwise, or in addition to those of the linkage"""
+    """the joints of links that are drawn otherwise, or in addition to the links of the linkage"""
     looks: Mapping[str, str] = field(default_factory=dict)
     names: Mapping[str, str] = field(default_factory=dict)
     """the labels of joints that differ from the names in the linkage"""

@@ -1,5 +1,5 @@
-"""The analyses that a study may have, in the order in which they are made: those of the base, then those of the
-capabilities."""
+"""The analyses that a study may have, in the order in which they are made: first the analyses of the base, then of
+the capabilities."""
 
 from __future__ import annotations
 
@@ -17,5 +17,5 @@ ANALYSES: tuple[type[Analysis], ...] = (TurnAnalysis, GearAnalysis, FeedForwardA
 
 @cache
 def all_analyses() -> tuple[type[Analysis], ...]:
-    """Those of the base and of all capabilities."""
+    """The analyses of the base and of all capabilities."""
     return (*ANALYSES, *(analysis for part in registered() for analysis in part.analyses()))

@@ -98,8 +98,8 @@ class BlockRuns:
     Parameters
     ----------
     rig : of models only; its FMUs are not needed
-    events : those that points may have, each with as many changes as it can have
-    varying : parameters, by full name, in which points differ; those that the system does not have are left out
+    events : the events that points may have, each with as many changes as it can have
+    varying : parameters, by full name, in which points differ; parameters that the system does not have are left out
     start : time of the steady state from which all runs branch [s]; without it each point starts from rest, with feed
         and speed of its own
     states : the states at that time, in the order of the model; by default those of a run from rest

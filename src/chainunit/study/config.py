@@ -367,8 +367,8 @@ def _config(checked: Any, parts: Parts, events: Mapping[str, Event], contents: F
 def _read_sections(
     sections: Mapping[str, FileSection], checked: Any, faults: Faults
 ) -> tuple[dict[str, dict[str, Any]], dict[str, Any]]:
-    """By table, the values that the file gives, and the declared quantities completed by those that it leaves
-    out."""
+    """By table, the values that the file gives, and the declared quantities completed by the quantities that it
+    leaves out."""
     tables: dict[str, dict[str, Any]] = {}
     values = {}
     for name, section in sections.items():

@@ -91,7 +91,7 @@ class Drive:
 
     @cached_property
     def fmu_parameters(self) -> Any:
-        """Parameters of the motor's FMU: those of the motor, with gear and added inertia in the rotor."""
+        """Parameters of the motor's FMU: the parameters of the motor, with gear and added inertia in the rotor."""
         p = self.parameters
         if not (self.added_inertia or self.gear_inertia or self.gear_friction):
             return p

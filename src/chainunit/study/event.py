@@ -172,7 +172,7 @@ class Event(metaclass=EventType):
     def signals(self, normal: Values, at: float, state: Values) -> Signals:
         """Values of the inputs that the event changes, from its begin `at` [s] on.
 
-        `normal` has the values of all inputs in steady running, `state` those of the outputs `reads` at the
+        `normal` has the values of all inputs in steady running, `state` the values of the outputs `reads` at the
         begin.
         """
         raise NotImplementedError
@@ -212,7 +212,7 @@ def on_side(text: str, side: AnySide) -> str:
 
 
 def in_groups(events: Mapping[str, Event], names: Collection[str]) -> list[list[str]]:
-    """The events among `names` in groups: those that the left side has to carry, the right side, both;
+    """The events among `names` in groups: events that the left side has to carry, the right side, both;
     without empty groups."""
     groups = [
         [name for name, event in events.items() if name in names and event.loaded_side == side]

@@ -51,7 +51,7 @@ class FileSection:
     """whether the result has other things of the same names"""
     form: TableForm = field(default_factory=TableForm)
     completed: Callable[[Any, Any], Any] = lambda values, reading: values
-    """gets the values and the `FileReading`; gives the values with those that follow from the rest of the file, or
+    """gets the values and the `FileReading`; gives them with the values that follow from the rest of the file, or
     None where the study does not use the table"""
     entries: Mapping[str, TableList] = field(default_factory=dict)
     """by key, the lists of tables in it"""

@@ -133,7 +133,7 @@ def _key(fault: InputError) -> str:
 def independent(
     further: Collection[InputError], faults: Collection[InputError], parts: Parts
 ) -> list[InputError]:
-    """The refusals of values that do not fit together, without those that depend on a refused value. The
+    """The refusals of values that do not fit together, without refusals that depend on a refused value. The
     remaining ones concern other tables, or two limits that are both right."""
     wrong = set(map(_key, faults))
     tables = {_table(key) for key in wrong}

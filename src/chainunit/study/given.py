@@ -1,4 +1,4 @@
-"""The given values of a study, by the sections of a study file: only those that the study uses."""
+"""The given values of a study, by the sections of a study file: only values that the study uses."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """A linkage over the way of its driver at constant speed, by inverse dynamics: motion, torque, inertia, reactions.
 
-Extremes and means are those of the whole way, not those at the `PLACES` of the curves."""
+Extremes and means are taken over the whole way, not at the `PLACES` of the curves alone."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ class ReportTable(BaseModel):
 
     @property
     def labels(self) -> dict[str, str]:
-        """The entries at the head of the report, by their names; only those that are given."""
+        """The entries at the head of the report, by their names; only entries that are given."""
         entries = {name: getattr(self, name) for name in type(self).model_fields if name != "units"}
         return {name: text for name, text in entries.items() if text}
 

@@ -29,7 +29,7 @@ def conclude(study: StudyRecord) -> None:
         assumed = "Masses, pins, feed and drive are assumed; the papers print none."
     elif config.file.of_example:
         assumed = (
-            "Values that the study file does not name are those of the packaged example, whose masses and drive "
+            "Values that the study file does not name come from the packaged example, whose masses and drive "
             "are assumed."
         )
     elif study.drive.foreign_machine:

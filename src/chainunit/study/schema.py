@@ -90,7 +90,7 @@ class _Schema:
         properties["event"] = {
             "type": "array",
             "description": "events, each followed from steady running, or in a start; a file that has none has "
-            "those of the example",
+            "the events of the example",
             "items": {"anyOf": [_reference(f"event.{name}") for name in TYPES]},
         }
         random = {

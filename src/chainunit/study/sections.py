@@ -151,7 +151,7 @@ CHOICES: Mapping[str, Any] = {
 
 @cache
 def all_choices() -> dict[str, Any]:
-    """The keys before all tables, those of the capabilities included."""
+    """The keys before all tables, with the keys of the capabilities."""
     return dict(CHOICES) | {name: each for part in registered() for name, each in part.choices.items()}
 
 

@@ -156,8 +156,8 @@ class Window:
 
     @cached_property
     def taken_up(self) -> tuple[float, float]:
-        """Mean power [W] that the moving masses take up over the steady turns: those of the machine, and all of them
-        with the motor's shaft. 0 for a run that does not repeat its turns, and where the crank makes none."""
+        """Mean power [W] that the moving masses take up over the steady turns: the masses of the machine, and all
+        masses with the motor's shaft. 0 for a run that does not repeat its turns, and where the crank makes none."""
         if self.phase is not Phase.STEADY or not has_turn(self.drive, self.run):
             return 0.0, 0.0
         time = self.turns["time"].values

@@ -301,10 +301,10 @@ Direct = Mapping[str, Mapping[str, set[str]]]
 
 
 def direct_inputs(component: Component, dependencies: Mapping[str, set[str] | None]) -> dict[str, set[str]]:
-    """By output, the inputs on which it depends directly: those in `dependencies`; or, where this is None, those that
-    follow from the terminals. The component that gives the motion of a shaft owns its inertia, so that angle and
-    speed are states. A load port is given at a point and does not depend on the acceleration. Every other output
-    counts as dependent on all inputs."""
+    """By output, the inputs on which it depends directly: the inputs in `dependencies`; or, where this is None,
+    inputs that follow from the terminals. The component that gives the motion of a shaft owns its inertia, so that
+    angle and speed are states. A load port is given at a point and does not depend on the acceleration. Every other
+    output counts as dependent on all inputs."""
     kinds: dict[str, list[Terminal]] = {FLANGE: [], LOAD: []}
     for terminal in component.terminals.values():
         kinds.setdefault(terminal.kind, []).append(terminal)

@@ -19,7 +19,7 @@ from .result import ChainResult
 from .table import ChainOrgans
 
 CONSTANT = "constant"
-"""Name of the runs of chains at constant speed among those that are judged."""
+"""Name of the runs of chains at constant speed among the judged runs."""
 _TOPICS: Mapping[str, Topic] = {
     **TOPICS,
     "folded through": Topic(

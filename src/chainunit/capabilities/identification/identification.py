@@ -352,4 +352,4 @@ def remarks(machine: IdentifiedMachine) -> Iterator[str]:
         tuned = [f"motor.{name}" for name in CONTROL if f"motor.{name}" not in config.file.given]
         if tuned:
             names = ", ".join(tuned)
-            yield f"{names}: not in the file, and tuned as for a new drive; give those of the real converter"
+            yield f"{names}: not in the file, and tuned as for a new drive; give the values of the real converter"

@@ -35,8 +35,8 @@ class Neighbours:
     """Machines near the best one."""
 
     number: int = quantity("1", "number of machines that were computed")
-    feasible: int = quantity("1", "number of those that meet all limits")
-    better: int = quantity("1", "number of those that meet them and are better")
+    feasible: int = quantity("1", "number of machines that meet all limits")
+    better: int = quantity("1", "number of machines that meet them and are better")
 
 
 def around(search: Search, x: Any) -> Any:

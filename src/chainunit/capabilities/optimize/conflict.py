@@ -1,7 +1,7 @@
 """Limits that no machine meets: each one that is impossible alone, and a smallest set of others, by deletion.
 
 An elastic program gives each limit a slack and makes the sum of the slacks least. Where it stays above 0 from all
-starts, the limits conflict. A limit is taken out for good where the others conflict without it; those that remain
+starts, the limits conflict. A limit is taken out for good where the others conflict without it; the remaining limits
 conflict, and without any one of them the others can be met.
 """
 

@@ -137,7 +137,7 @@ class Kernel:
         reductions: Reductions = (),
     ) -> Any:
         """Results, shape (results, outer, inner), or (results, outer) where they are reduced. `outer` are arguments
-        that are constant over the lanes, shape (1 or outer, entries); `lanes` those that vary, shape (entries,
+        that are constant over the lanes, shape (1 or outer, entries); `lanes` the entries that vary, shape (entries,
         inner)."""
         varying = tuple((kind, row) for kind, x in lanes.items() for row in range(len(x)))
         kernel = native_kernel(equations, varying, reductions)
@@ -180,8 +180,8 @@ class Kernel:
 
     def _directions(self, x: Any) -> tuple[dict[int, Any], Any]:
         """The arguments that are constant over the lanes, and the slopes of the derived numbers; the outer
-        dimension is that of the directions: each free parameter, then the angle. Those of the last machine are
-        kept."""
+        dimension is that of the directions: each free parameter, then the angle. The values of the last machine
+        are kept."""
         if self._last[0] != x.tobytes():
             p, k = self._arguments(x[None, :])
             seeds = np.eye(self.size + 1, self.size + 1 + k.shape[1])

@@ -176,7 +176,7 @@ def _machine(s: b.Source, best: Best) -> Iterator[b.Block]:
     limited: list[tuple[Line, str]] = [(Name(name), f"quantities.{name}") for name in s.result["quantities"]]
     if s.result["least_pull"] is not None:
         limited.append(("web mean pull, least", "least_pull"))
-    # where no machine meets all limits, a column marks those that the nearest one misses
+    # where no machine meets all limits, a column marks the limits that the nearest machine misses
     marks = () if best.met else ("limit",)
     rows = [
         b.TableRow((words, *(s.number(f"{path}.{key}", digits=4) for key in ("today", "best")),

@@ -138,7 +138,7 @@ class AngleProgram:
         return len(self.row_of)
 
     def _compute(self, z: Any) -> None:
-        """Values and slopes of all constraints at a point; those of the last point are kept."""
+        """Values and slopes of all constraints at a point; the values at the last point are kept."""
         if z.tobytes() == self._key:
             return
         space, n = self.space, self.space.n

@@ -77,8 +77,8 @@ class WhyNone:
     """Why no machine meets all limits."""
 
     limits: tuple[str, ...] = part("the limits that conflict")
-    alone: tuple[str, ...] = part("those that are impossible alone")
-    together: tuple[str, ...] = part("those that are impossible together")
+    alone: tuple[str, ...] = part("limits that are impossible alone")
+    together: tuple[str, ...] = part("limits that are impossible together")
     bounds: list[str] = part("the bounds that hold the nearest machine")
     sentences: list[str] = part("the reason in words")
 
@@ -89,9 +89,9 @@ class StartsOfSearch:
 
     text: str = part("the starts in words")
     number: int = quantity("1", "number of starts")
-    moved: int = quantity("1", "number of those that were moved until the machine can be assembled")
-    feasible: int = quantity("1", "number of those that ended at a machine that meets all limits")
-    agree: int = quantity("1", "number of those that reached the best value")
+    moved: int = quantity("1", "number of starts that were moved until the machine can be assembled")
+    feasible: int = quantity("1", "number of starts that ended at a machine that meets all limits")
+    agree: int = quantity("1", "number of starts that reached the best value")
     values: InUnit = part("the values that the feasible ones reached, in rising order")
     effort: Effort = part(inline=True)
 
@@ -190,7 +190,7 @@ def best_tables(best: Best, config: Config, folder: Path) -> dict[str, Any]:
 
 
 def units_of(best: Best, config: Config) -> Units:
-    """The units of the report: those of the study, and W for powers where one is below 100 W and the study does not
+    """The units of the report: the study has them, and W for powers where one is below 100 W and the study does not
     name a unit."""
     powers = [
         abs(x)

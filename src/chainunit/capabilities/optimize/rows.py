@@ -77,7 +77,7 @@ class RequirementRow(Row):
 
 class Columns:
     """The columns that some quantities need, as expressions for a `Kernel`: the columns themselves, and the smooth
-    pieces of those that are a choice."""
+    pieces of the rows that are a choice."""
 
     def __init__(self, machine: Machine) -> None:
         self._machine = machine

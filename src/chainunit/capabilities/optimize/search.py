@@ -263,7 +263,7 @@ class Search:
 
     def starts(self, number: int, seed: int = 0) -> tuple[list[Any], int]:
         """Points that fill the bounds evenly, each moved towards `base` until the machine can be assembled; and the
-        number of those that were moved."""
+        number of points that were moved."""
         points, moved = [], 0
         for y in _sobol(self.space.n, number, self.wishes.seed + seed):
             x = self.space.low + self.space.span * y
@@ -281,8 +281,8 @@ class Search:
         limits: Sequence[TurnLimit] | None = None,
         without: frozenset[str] = frozenset(),
     ) -> Answer:
-        """The machine near `x` with the least objective under the limits, which are by default those of the wishes;
-        or, without an objective, the one that misses the limits by the least sum of shares."""
+        """The machine near `x` with the least objective under the limits, which are by default the limits of the
+        wishes; or, without an objective, the one that misses the limits by the least sum of shares."""
         rows, aux, slacks = self.rows(objective, self.wishes.limits if limits is None else limits, without)
         n, space, lanes = self.space.n, self.space, Lanes()
         cost = np.zeros(n + len(aux))
@@ -311,7 +311,7 @@ class Search:
         return self._answer(objective, slacks, program, point)
 
     def _add_lanes(self, program: AngleProgram, z: Any, lanes: Lanes) -> bool:
-        """Add the angles at which a limit is exceeded between those of the program; whether there are any."""
+        """Add the angles at which a limit is exceeded between the angles of the program; whether there are any."""
         space, more = self.space, False
         x = space.x(z)
         for row in program.rows:

@@ -1,4 +1,4 @@
-"""Overloads at random crank angles and times, and the quantiles of what they do."""
+"""Overloads at random crank angles and times, and the quantiles of their effects."""
 
 from __future__ import annotations
 

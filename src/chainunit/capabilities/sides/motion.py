@@ -19,7 +19,7 @@ _CAPTION = (
     "Blue, full: left side; red, dashed: right side; black: crank bearing O1 and rocker pivot C. An arrow is the "
     "force on the machine part from its support or neighbour: at A1 on the wall, at B on the wall from the web, at "
     "A2 on the web from the rocker; P, dotted, is the processing force on the web. The brown band is the material; "
-    "its width goes with its mass. Joints are those of the simulated run."
+    "its width goes with its mass. Joints move as in the simulated run."
 )
 
 
@@ -45,7 +45,7 @@ def organ_motion(study: StudyRecord) -> Supplement:
             for output, (_, link) in ON_SIDE.items()
             if link in (names.wall, names.web)
         },
-        # their arrows would hide those of the rocker
+        # their arrows would hide the arrows of the rocker
         hidden=("crank_pin", "coupler_pin"),
     )
 

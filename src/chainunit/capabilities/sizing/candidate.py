@@ -127,7 +127,7 @@ class Candidate:
     bound: float | None = None
     """the value of `sizing.inertia_ratio`, where it ended the trials of flywheels"""
     worst_start: bool = False
-    """whether time, class and heat of its start are those of the worst crank angle, not of the angle 0 alone"""
+    """whether time, class and heat of its start belong to the worst crank angle, not to the angle 0 alone"""
     verdict: Standing | None = part("its standing; None until it is judged or ranked", default=None)
     criterion: Criterion | None = part(
         "the criterion by which a candidate that fits stands behind the chosen one", default=None

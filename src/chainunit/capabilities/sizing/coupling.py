@@ -51,7 +51,7 @@ def effects(
 ) -> dict[str, CouplingEffect]:
     """The effect of a coupling with this setting [N m at the crank] in each shock that opens it, by name; it passes
     torque for the `release` time [s], by default the declared one. `runs` are other runs of the shocks without a
-    coupling, from their begin on; by default those of the study."""
+    coupling, from their begin on; by default the runs of the study."""
     drive, release = study.drive, Coupling().release_time if release is None else release
     if runs is None:
         names = peaks_in_events(study, Role.SHOCK)

@@ -186,7 +186,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
             )
     if "order" in section:
         order = "; ".join(f"{i}. {words}" for i, words in enumerate(section["order"], 1))
-        yield b.Text(f"Order of preference among those that fit: {order}.", form="long")
+        yield b.Text(f"Order of preference among drives that fit: {order}.", form="long")
     tables = []
     # a machine without sides has no one-sided feed
     side_keys = () if study.config.machine.model.sides else ("one_sided_share", "torque_peak_one_sided")

@@ -1,4 +1,4 @@
-"""The order of preference of drives: which one a drive engineer takes of those that fit."""
+"""The order of preference of drives: the choice of a drive engineer among drives that fit."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ def poles_rank(poles: float) -> float:
 
 
 def rank(candidates: list[Candidate], larger: float) -> None:
-    """Order the candidates by rank and set their reasons. First come those that fit, by the order of preference,
-    then those whose start alone is too hard for the gear, by the same order, then the others, by their largest
-    utilisation; among those that do not start at all a larger motor comes first. For `larger` see
+    """Order the candidates by rank and set their reasons. First come candidates that fit, by the order of preference,
+    then candidates whose start alone is too hard for the gear, by the same order, then the others, by their largest
+    utilisation; among candidates that do not start at all a larger motor comes first. For `larger` see
     `chainunit.capabilities.sizing.table`."""
     for c in candidates:
         _judge(c)
@@ -49,7 +49,7 @@ def rank(candidates: list[Candidate], larger: float) -> None:
     best = candidates[0]
     if not best.fits:
         best.verdict = Standing.INSUFFICIENT
-        best.reason = f"the nearest of those that do not fit; {best.reason}"
+        best.reason = f"the nearest of the drives that do not fit; {best.reason}"
         return
     for c in ranking[1:]:
         c.criterion = behind[id(c)]
@@ -106,7 +106,7 @@ def _least(left: list[Candidate], value: Callable[[Candidate], float]) -> list[C
 
 
 def _with_margin(left: list[Candidate]) -> list[Candidate]:
-    """Those that keep the margin; where none does, those that use least of their limits."""
+    """The candidates that keep the margin; where none does, the candidates that use least of their limits."""
     return [c for c in left if c.leaves_margin] or _less_used(left)
 
 

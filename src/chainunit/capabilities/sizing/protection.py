@@ -204,7 +204,7 @@ class WayNumbers:
 @dataclass(frozen=True)
 class Alternative:
     """A way with its numbers, the peaks of the overloads in which its coupling opens or slips, by name, and its
-    effects in those that open it."""
+    effects in the overloads that open it."""
 
     way: Way
     numbers: WayNumbers

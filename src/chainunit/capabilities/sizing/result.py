@@ -140,7 +140,7 @@ def drive_protection(
 def _peaks(
     study: StudyRecord, peaks: Mapping[str, float], words: str, opening: Mapping[str, float]
 ) -> dict[str, InUnit]:
-    """The peaks on the coupling, by run, with the `words` on those of the runs that are `opening` it."""
+    """The peaks on the coupling, by run, with the `words` on each run that is among those `opening` it."""
     return {
         name: _torque(peak, f"{study.title_of(name)}: {words if name in opening else 'leaves it shut'}")
         for name, peak in peaks.items()

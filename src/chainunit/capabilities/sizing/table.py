@@ -104,7 +104,7 @@ SIZING_KEYS: Mapping[str, Any] = {
 
 @dataclass(frozen=True)
 class SizingPlan:
-    """The demands on a motor of the catalogue, and the ratios of gears on offer, empty for those of the series."""
+    """The demands on a motor of the catalogue, and the ratios of gears on offer, empty for a series of ratios."""
 
     demands: Sizing
     gear_kind: str

@@ -183,8 +183,8 @@ class Trial:
 
     @cached_property
     def permitted_starts(self) -> float:
-        """Starts per hour that the winding permits; for a motor on the line at most those that the catalogue
-        permits."""
+        """Starts per hour that the winding permits; for a motor on the line at most the number that the
+        catalogue permits."""
         p, plate = self.drive.fmu_parameters, self.motor.nameplate
         warm, cold = (1.0 + p.stator.alpha * (T - T_RATED) for T in (self._demands.temperature, self._ran_at))
         # the runs are short and their winding is as cold as the surroundings; a warm winding has larger
@@ -264,7 +264,7 @@ class Trial:
         if self.drive.follows:
             start = dataclasses.replace(start, limit=1.0 + 1.2 * self.config.run.ramp)
         weaker = min(1.0, plate.frequency / self.frequency)
-        # the limits of a motor that does not start are those that it has at its speed
+        # a motor that does not start has the limits that it has at its speed
         cooling = (
             1.0 if self.start_time is None else self._cooling / self.drive.motor.cooling(MATH, p, plate.speed)
         )

@@ -135,7 +135,7 @@ class SweepSummary:
 
     findings: SweepFindings
     sample: Mapping[str, Any]
-    """parameters and results at the points behind correlations and quantiles, shape (points,), without those that
+    """parameters and results at the points behind correlations and quantiles, shape (points,), without points that
     have a reason"""
     heading: Heading = part(inline=True)
     size: SweepSize = part(inline=True)
@@ -311,7 +311,7 @@ def _nominal(findings: SweepFindings) -> dict[str, float]:
 
 def _organs(findings: SweepFindings) -> list[tuple[SpeedLimit, int]]:
     """The limits of the crank speed for two bars as organs, of the study's machine and feed, each with the number
-    of points beyond it; only those that a point passes, and none where no result depends on the organs."""
+    of points beyond it; only limits that a point passes, and none where no result depends on the organs."""
     config, plan, task = findings.config, findings.plan, findings.task
     if config.machine.in_place:
         return []

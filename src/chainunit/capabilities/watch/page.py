@@ -88,7 +88,7 @@ def _opening(s: b.Source) -> Iterator[b.Block]:
     for name, of in (("signal", "signal"), ("speed", "measured speed")):
         if (s.value(f"noise.{name}") or 0.0) > EXCESS_NOISE:
             louder = f"The noise of the {of} at the begin is {{=noise.{name}:2}} times the stated one (watch.noise)"
-            yield b.Judgement("warning", s.line(f"{louder}: the thresholds are those of the measured noise."))
+            yield b.Judgement("warning", s.line(f"{louder}: the thresholds follow from the measured noise."))
     for each in s.lines("constant_parts"):
         more = ": a sensor that is stuck, a stop or a limit. An alarm in this time may be false."
         yield b.Judgement("warning", line(each, more))

@@ -110,9 +110,9 @@ class MachineErrors:
 class WatchedRecording:
     """A recording with the outputs of the observer at its rows.
 
-    `learned` is the fit over its begin with the tests of its residuals, `parameters` are those of the observer
-    by name, and `uncertainty` is the false imbalance by errors of the machine's parameters: of the feed [kg] and of
-    the forces [N]. With these errors the thresholds are wider by the factors `widening`. `failed` says whether
+    `learned` is the fit over its begin with the tests of its residuals, `parameters` has the parameters of the
+    observer by name, and `uncertainty` is the false imbalance by errors of the machine's parameters: of the feed [kg]
+    and of the forces [N]. With these errors the thresholds are wider by the factors `widening`. `failed` says whether
     the model of the identification did not describe its own recordings.
     """
 

@@ -93,7 +93,7 @@ def _points(link: LinkEntry) -> list[str]:
 
 
 def _orientation(structure: Structure, link: str) -> set[str]:
-    """The links that turn as this one does, as sliding joints hold them, and itself; those of the ground cannot
+    """The links that turn as this one does, as sliding joints hold them, and itself; links of the ground cannot
     turn."""
     return _connected(link, [j.links for j in structure.joints.values() if j.kind == PRISMATIC])
 

@@ -77,8 +77,8 @@ class Line:
         return inertia
 
     def at_motor(self, inertia: Any) -> Any:
-        """An inertia on the shaft behind the line, and those of the parts, at the motor's shaft [kg m2]; a part
-        counts as rigid, and as if its ratio were even."""
+        """An inertia on the shaft behind the line, and the inertias of the parts, at the motor's shaft [kg m2]; a
+        part counts as rigid, and as if its ratio were even."""
         for part in reversed(self.parts):
             inertia = (inertia + part.inertia) / part.ratio**2
         return inertia

@@ -39,7 +39,7 @@ class ShaftFindings(Findings):
     cycles: Mapping[str, Cycles]
 
     def remark(self, study: StudyRecord) -> None:
-        """None: the driveline has its remarks, see `remark`, before those of the findings."""
+        """None: the driveline has its remarks, see `remark`, before the remarks of the findings."""
 
 
 def shaft_findings(study: StudyRecord) -> ShaftFindings:
@@ -66,7 +66,7 @@ class ShaftAnalysis(Analysis):
         try:
             twins = _rigid_runs(study, work)
         except RunError as error:
-            # the values of the error are those of the rigid drive, not of this one
+            # the error has the values of the rigid drive, not of this one
             error.partial = None
             raise
         for name, twin in twins.items():
