@@ -205,13 +205,23 @@ def imported(file: Path, name: str) -> set[str]:
 
 
 @cache
+def test_files() -> dict[str, Path]:
+    """The files of the tests by their names; those of a capability are in a folder of its name."""
+    return {
+        file.stem: file
+        for folder in ("*.py", "capabilities/*/*.py")
+        for file in (ROOT / "tests").glob(folder)
+    }
+
+
+@cache
 def graph() -> dict[str, set[str]]:
     """Which module or test file imports which; a package stands for its ``__init__``."""
     files = {}
     for file in (ROOT / PACKAGE).rglob("*.py"):
         parts = ("chainunit", *file.relative_to(ROOT / PACKAGE).with_suffix("").parts)
         files[".".join(parts)] = file
-    files |= {file.stem: file for file in (ROOT / "tests").glob("*.py")}
+    files |= test_files()
     names = {name.removesuffix(".__init__"): name for name in files}
     return {
         name: {names[other] for other in imported(file, name) if other in names}
@@ -234,9 +244,10 @@ def distances(module: str) -> dict[str, int]:
             if other not in steps and other != "conftest":
                 steps[other] = steps[name] + 1
                 waiting.append(other)
-    found = {f"tests/{name}.py": n for name, n in steps.items() if name.startswith("test_")}
-    named = ROOT / "tests" / f"test_{Path(module).stem}.py"
-    return found | ({f"tests/{named.name}": 0} if named.exists() else {})
+    if (named := f"test_{Path(module).stem}") in test_files():
+        steps[named] = 0
+    files = {name: file.relative_to(ROOT).as_posix() for name, file in test_files().items()}
+    return {files[name]: n for name, n in steps.items() if name.startswith("test_")}
 
 
 # %% [markdown]

@@ -56,6 +56,8 @@ def test_the_list_names_the_folders():
     folders = {path.name for path in (PACKAGE / "capabilities").iterdir() if (path / "__init__.py").exists()}
     assert folders == set(NAMES) and len(NAMES) == len(folders)
     assert [part.name for part in capabilities()] == list(NAMES)
+    own_tests = {path.parent.name for path in (Path(__file__).parent / "capabilities").glob("*/test_*.py")}
+    assert own_tests <= set(NAMES)
     assert len([part for part in capabilities() if part.motor_table]) <= 1
 
 

@@ -21,7 +21,7 @@ from chainunit.recordings.residuals import residual_tests
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 
-FOLDER = Path(__file__).parents[1] / "examples" / "identification"
+FOLDER = Path(__file__).parents[3] / "examples" / "identification"
 TRUTH = json.loads((FOLDER / "truth.json").read_text("utf-8"))
 LOADED = TRUTH["runs"]["loaded"]["feed"]
 LAYOUTS = ChamberForces.parameter_layout, ChamberForces.input_layout

@@ -14,7 +14,7 @@ from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
-GALLERY = Path(__file__).parents[1] / "examples" / "linkages"
+GALLERY = Path(__file__).parents[3] / "examples" / "linkages"
 TURNS, ROWS = 6.0, 250.0
 CASES = {
     "pump_jack": (

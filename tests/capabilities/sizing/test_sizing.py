@@ -349,7 +349,7 @@ def test_motors_that_are_too_weak_by_the_nameplate_are_counted(tmp_path, monkeyp
 
 def test_the_remedy_of_the_rejected_example_works(tmp_path):
     """Its comment says that a soft starter makes a motor fit."""
-    text = (Path(__file__).parents[1] / "examples/motor_rejected.toml").read_text("utf-8")
+    text = (Path(__file__).parents[3] / "examples/motor_rejected.toml").read_text("utf-8")
     assert 'start = "direct"' in text and 'with start = "soft" a motor of 0.55 kW fits' in text
     soft = parse(text.replace('start = "direct"', 'start = "soft"'))
     result = sizing.size(soft, tmp_path, lambda *said: None)

@@ -43,7 +43,7 @@ from chainunit.study.verdict import two_bars
 from chainunit.work.job import CHECKS
 from chainunit.work.store import made_anew
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parents[2]
 NATIVE = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 QUANTITIES = ["peak(crank_torque)", "rms(tau)", "min(margin)", "max(force(pivot))", "installed_power"]
 GRID = """title = "Crank, coupler and speed"

@@ -42,7 +42,7 @@ from chainunit.study.parts import EXAMPLES, example
 from chainunit.study.study_file import toml_text
 from chainunit.study.verdict import ROCKER_GOOD
 
-LINKAGES = Path(__file__).parents[1] / "examples" / "linkages"
+LINKAGES = Path(__file__).parents[3] / "examples" / "linkages"
 TABLE = """
 title = "A lighter drive"
 [optimize]

@@ -39,8 +39,8 @@ from chainunit.study.relay import HEAVIER, start_class
 from chainunit.study.rig import Rig
 from chainunit.study.start_runs import exceeded_for, starts_from_all, time_above
 
-EXAMPLES = Path(__file__).parents[1] / "examples"
-DOCS = Path(__file__).parents[1] / "docs"
+EXAMPLES = Path(__file__).parents[3] / "examples"
+DOCS = Path(__file__).parents[3] / "docs"
 
 
 # -- ratios

@@ -23,7 +23,7 @@ from chainunit.study.drive import Drive
 from chainunit.system import Profile
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
-EXAMPLES = Path(__file__).parents[1] / "examples" / "identification"
+EXAMPLES = Path(__file__).parents[3] / "examples" / "identification"
 TRUTH = json.loads((EXAMPLES / "truth.json").read_text("utf-8"))
 TURN = 2.0 * math.pi / TRUTH["crank_speed"]
 
