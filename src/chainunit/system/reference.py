@@ -102,7 +102,9 @@ class _Equations:
         rates = model.derivatives(casadi_(), p, u, x) if model.state_layout else []
         outputs = model.parts[0].layout.values(model.evaluate(casadi_(), p, u, x)[0])
         self._rates, self._all = (
-            casadi.Function(name, symbols, [casadi.densify(casadi.cse(casadi.vertcat(*map(casadi.SX, rows))))])
+            casadi.Function(
+                name, symbols, [casadi.densify(casadi.cse(casadi.vertcat(*map(casadi.SX, rows))))]
+            )
             for name, rows in (("rates", rates), ("outputs", outputs))
         )
 
