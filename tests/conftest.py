@@ -1,8 +1,9 @@
 """Fixtures that the tests share, and their stages. A run without named files is parallel.
 
-A run without named files and without ``-m`` is the first stage. It leaves out the second, which is marked `second`
-and compares with other programs: their engines, importers, platforms; the pages, the papers, the tables of the
-standard. ``.ci/run`` runs both. A named file runs with all of its tests, except the slow ones.
+A run without named files and without ``-m`` is the first stage. It leaves out the second, which is marked `second`:
+other programs, their engines, importers, platforms, and FMUs of somebody else; processes that are stopped, killed or
+spread; the structure of the package; the pages, the papers, the tables of the standard; and studies whose cases
+the first stage has in parts. ``.ci/run`` runs both. A named file runs with all of its tests, except the slow ones.
 
 An FMU costs a test little: what exports compile is kept by its content, whichever worker, test or process asks, and
 for later runs of the tests, too (see `chainunit.core.native.cache`). Beyond that,

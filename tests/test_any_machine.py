@@ -15,6 +15,8 @@ from chainunit.study.config import parse
 from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
 
+pytestmark = pytest.mark.second
+
 KNIFE = """
 [system]
 machine = "KnifeDrive"

@@ -18,6 +18,8 @@ from chainunit.study.line.shaft_runs import shaft_findings
 from chainunit.study.measures import STARTED
 from chainunit.study.run import run_study
 
+pytestmark = pytest.mark.second
+
 DIP = event_line("dip", turns=1)
 LINE = """
 empty_start = true

@@ -20,6 +20,8 @@ from chainunit.fmu.native import platforms
 from chainunit.fmu.native.export import export
 from chainunit.models import MODELS
 
+pytestmark = pytest.mark.second
+
 COUNTING = """#!/bin/sh
 if [ "$1" != --version ]; then echo called >> "$(dirname "$0")/calls"; fi
 exec {compiler} "$@"

@@ -112,7 +112,9 @@ def test_a_type_checker_sees_the_methods_and_results_of_capabilities(tmp_path):
 def test_the_rest_works_without(name, tmp_path):
     """A study, an export and the schema; a table of the capability is refused as an unknown key."""
     copy = tmp_path / "src" / "chainunit"
-    shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(
+        PACKAGE, copy
+    )  # with the compiled modules, which are valid as long as the dates of the files are
     shutil.rmtree(copy / "capabilities" / name)
     line, file = f'    "{name}",\n', copy / "capabilities" / "__init__.py"
     text = file.read_text("utf-8")

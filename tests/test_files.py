@@ -19,6 +19,8 @@ from chainunit.core import ledger, temporary_folders
 from chainunit.core.errors import InputError, WriteError
 from chainunit.core.files import LOCK, ResultKind, atomic_file, claim, clear, folder
 
+pytestmark = pytest.mark.second
+
 SHORT = """
 event = []
 [run]

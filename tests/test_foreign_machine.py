@@ -38,6 +38,8 @@ from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
 from chainunit.system import CoSimulation, Profile, certify
 
+pytestmark = pytest.mark.second
+
 SCRIPT = Path(__file__).parent / "foreign_machine.py"
 RATIO, SPEED, MASS, PRESSURE, BURST = 25.0, 6.0, 60.0, 3e3, 8e4
 MACHINE_OTHER = {"J": "inertia", "tau_bias": "torque_needed"}

@@ -40,6 +40,8 @@ from chainunit.system import (
 )
 from chainunit.system.graph import FmuComponent
 
+pytestmark = pytest.mark.second
+
 SCRIPT = Path(__file__).parent / "foreign_motor.py"
 OTHER = MappingProxyType({"w": "rotor_speed", "phi": "rotor_angle", "load.J": "inertia_behind"})
 SIGNALS = {"motor.w_ref": Profile(0.0, ((0.0, 0.2, 150.0),))}

@@ -13,6 +13,8 @@ import pytest
 import chainunit
 from chainunit.models import MODELS
 
+pytestmark = pytest.mark.second
+
 DEPENDENCIES = {
     re.match(r"[\w-]+", line)[0].lower()
     for line in metadata.requires("chainunit")

@@ -9,8 +9,11 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
+import pytest
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
+
+pytestmark = pytest.mark.second
 
 ROOT = Path(__file__).parents[1]
 UPWARD: set[tuple[str, str]] = set()

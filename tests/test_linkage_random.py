@@ -17,6 +17,8 @@ from chainunit.core.errors import InputError
 from chainunit.machines.linkages.file import description_of
 from chainunit.machines.linkages.model import machine_of
 
+pytestmark = pytest.mark.second
+
 COUNTS = [50, pytest.param(1000, marks=pytest.mark.slow)]
 FORCES = ("tau", "fx", "fy", "normal", "moment", "load_power")
 

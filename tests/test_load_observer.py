@@ -478,6 +478,7 @@ def test_thresholds_of_the_linear_filter(observer, monkeypatch):
         assert np.all(levels < 1.5 * load_filter.level(MATH, 0.5 * memory, 0.5e-6 * rate))
 
 
+@pytest.mark.second
 @native
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_the_alarm_rises_in_model_exchange_as_in_co_simulation(native_fmus, fmi):

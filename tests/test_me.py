@@ -257,6 +257,7 @@ def test_going_on_branching_and_guards(kind):
         assert float(rest[name][-1]) == pytest.approx(float(whole[name][-1]), abs=1e-5 * size)
 
 
+@pytest.mark.second
 def test_what_cannot_run_is_told(fmus, tmp_path):
     motor = component("DcMotor", fmus["DcMotor"])
     with pytest.raises(

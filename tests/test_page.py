@@ -715,11 +715,13 @@ def test_paths_numbers_and_units():
     assert {unit: unit_text(unit) for unit in units} == units
 
 
+@pytest.mark.second
 def test_factors_of_two_bars_are_not_passed_for_those_of_chains(chains, study):
     words = "of two bars in place of the chains"
     assert words in said_of(chains) and words not in said_of(study)
 
 
+@pytest.mark.second
 def test_chains_stand_beside_two_bars(chains, tmp_path):
     result = json.loads(json.dumps(as_dict(chains)))
     found = result["chain"]
@@ -823,6 +825,7 @@ def test_the_rods_of_chains_move_as_simulated(chains):
                 assert np.max(np.abs(np.hypot(*np.subtract(*places)) - rod)) < 3e-4, (run["name"], ends)
 
 
+@pytest.mark.second
 def test_any_linkage_moves(knife):
     """Also behind the open coupling; links keep their lengths, and the blade stays on its path."""
     moving = pictures(study_motion.motion(knife))

@@ -1,8 +1,12 @@
 """A study reports its progress from the first second on."""
 
+import pytest
+
 from chainunit.fmu import backends
 from chainunit.study.config import parse
 from chainunit.study.run import run_study
+
+pytestmark = pytest.mark.second
 
 SHORT = "event = []\n[run]\ncrank_speed = 3\nramp = 0.3\nsettle_turns = 0\nstep = 2e-3\n"
 

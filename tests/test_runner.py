@@ -115,6 +115,7 @@ def test_local_processes_make_the_same_store(unbroken, tmp_path):
     assert not multiprocessing.active_children()
 
 
+@pytest.mark.second
 def test_a_killed_run_goes_on(tmp_path):
     """SIGKILL of the main process, after some batches."""
     killed, whole = tmp_path / "killed", tmp_path / "whole"

@@ -20,7 +20,7 @@ from chainunit.recordings.shaft import WAVES, MeasuredShaft
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 
-pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
+pytestmark = [pytest.mark.second, pytest.mark.skipif(compiler() is None, reason="no C compiler")]
 CONFIG = parse("")
 TRUTH = {
     "machine.left.material_mass": 41.0,

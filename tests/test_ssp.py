@@ -31,6 +31,8 @@ from chainunit.study.choice import choose
 from chainunit.study.package import export_study, start_of
 from chainunit.system import CoSimulation, System, fmu_component, shaft_joints, ssp
 
+pytestmark = pytest.mark.second
+
 MINE = """
 title = "Mine, with \\u0001 and <marks>"
 [run]

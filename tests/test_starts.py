@@ -115,6 +115,7 @@ def test_no_start_is_permitted_where_running_alone_is_too_hot():
     assert first.reason == "it does not bring the machine up to speed"
 
 
+@pytest.mark.second
 def test_a_study_whose_crank_does_not_turn_ends_with_status_1(tmp_path):
     """Masses of a million kilograms: the crank stands, and that is said as a person writes it."""
     masses = "".join(f"{link} = {{ m = 1e6, I = 1e7 }}\n" for link in ("crank", "coupler", "rocker"))

@@ -273,6 +273,7 @@ cli.main()
 """
 
 
+@pytest.mark.second
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_ctrl_c_keeps_what_was_computed(tmp_path):
     import signal

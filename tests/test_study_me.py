@@ -10,6 +10,8 @@ from chainunit.study import config
 from chainunit.study.line.shaft_runs import shaft_findings
 from chainunit.study.run import run_study
 
+pytestmark = pytest.mark.second
+
 TEXT = """
 simulation = "{simulation}"
 [run]

@@ -14,6 +14,8 @@ from chainunit import ChainUnitMachine
 from chainunit.core import ledger
 from chainunit.papers.two_bar import loads, statement, two_bar_error
 
+pytestmark = pytest.mark.second
+
 
 @pytest.fixture(scope="module")
 def comparison():

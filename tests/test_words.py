@@ -23,6 +23,8 @@ from chainunit.study.config import parse
 from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
 
+pytestmark = pytest.mark.second
+
 UNITS = 'units = { speed = "rev/min", torque = "kN.m", force = "kN", power = "W" }\n'
 SHORT = """
 [run]

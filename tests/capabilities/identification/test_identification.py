@@ -206,6 +206,7 @@ def test_a_known_number_that_is_wrong_is_suspicious(loaded, empty):
     assert own.known + own.change == pytest.approx(0.15, abs=4.0 * own.deviation) and own.deviation < 5e-4
 
 
+@pytest.mark.second
 def test_another_law_of_friction_is_suspicious():
     """Friction that is full at ten times the speed is told from that of the model, with nearly the right speed."""
     law = {"machine.pin.w_smooth": 0.2}

@@ -22,7 +22,7 @@ from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 from chainunit.system import Profile
 
-pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
+pytestmark = [pytest.mark.second, pytest.mark.skipif(compiler() is None, reason="no C compiler")]
 SLOW = pytest.mark.slow
 MACHINE = parse("").machine
 DRIVES = {

@@ -148,6 +148,7 @@ def task_of(folder, runs=RUNS, text=STUDY, cosimulated=True):
     return monte_carlo.RandomTask(config, drive, files, 1.0, cosimulated=cosimulated)
 
 
+@pytest.mark.second
 def test_a_killed_study_goes_on_from_what_it_saved(killed):
     folder, done, message = killed
     assert 0 < done < 4 and f"resumed {16 * (done - 1)} 1" in message
@@ -350,6 +351,7 @@ def test_a_machine_without_the_files_of_the_fmus_makes_the_same_runs(killed, tmp
         np.testing.assert_array_equal(runs[name], wanted[name])
 
 
+@pytest.mark.second
 def test_a_scheduler_is_asked_before_any_run(tmp_path):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))

@@ -95,6 +95,7 @@ def test_a_relay_trips_within_the_times_of_its_class(trip_class):
     assert start_class(hold, np.full(101, 36.0), 5.0) == max(seconds, 10)
 
 
+@pytest.mark.second
 def test_the_relay_that_is_ordered_is_simulated(on_line, monkeypatch):
     """A start from another angle takes a heavier class: then its trips in the events are those of that class."""
     study = dataclasses.replace(on_line, answers=dict(on_line.answers), findings=dict(on_line.findings))

@@ -250,6 +250,7 @@ def test_threads_make_the_same_store(unbroken, in_small_batches, tmp_path):
     assert made.file.name == unbroken.name and content(made.file) == content(unbroken)
 
 
+@pytest.mark.second
 def test_a_killed_sweep_goes_on(unbroken, in_small_batches, tmp_path):
     """SIGKILL after some batches; the store is then that of a sweep that nothing disturbed, byte by byte."""
     text = SPREAD.replace("points = 200", "points = 1280").replace("angles = 90", "angles = 1440")
@@ -288,6 +289,7 @@ def test_a_sweep_grows(unbroken, in_small_batches, tmp_path):
     assert len(digests) == 6
 
 
+@pytest.mark.second
 def test_two_workers_of_a_scheduler(unbroken, in_small_batches, tmp_path):
     """On loopback, in processes that share no file with this one."""
     with socket.socket() as free:
