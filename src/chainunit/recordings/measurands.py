@@ -21,7 +21,8 @@ class Measurand:
 
 _ALL = (
     Measurand("time", "s", "time of the row by the clock of the logger", analog=False),
-    Measurand("motor.i", "A", "current: of the armature, or RMS of a phase of an induction motor"),
+    # of the armature, or RMS of a phase of an induction motor
+    Measurand("motor.i", "A", "current"),
     Measurand("motor.u", "V", "voltage of the armature"),
     Measurand("motor.power", "W", "active power at the terminals of the motor"),
     Measurand("motor.w", "rad/s", "speed of the motor's shaft"),

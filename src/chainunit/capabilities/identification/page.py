@@ -236,12 +236,11 @@ def _figures(s: b.Source, machine: IdentifiedMachine) -> Iterator[b.Block]:
             steady = "angle" in course
             x = course["angle" if steady else "time"]["value"]
             angle = fig.Axis("crank angle", "rad", step=45.0) if steady else fig.Axis("time", "s")
-            words = MEASURANDS[name].description.partition(":")[0]
             panels.append(
                 (
                     fig.Panel(
                         angle,
-                        fig.Axis(words, MEASURANDS[name].unit),
+                        fig.Axis(MEASURANDS[name].description, MEASURANDS[name].unit),
                         (
                             fig.Curve("measured", x, y, 1, marker="o", has_line=False),
                             fig.Curve("simulated", x, simulated, 0),
