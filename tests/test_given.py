@@ -128,7 +128,7 @@ def test_what_no_example_gives_is_at_its_declared_start_value(tmp_path):
     )
     assert origin_of(study, "motor.speed_control.kp") == "tuned"
     (note,) = (str(each) for each in study.notes if each.kind == "assumed")
-    assert "those of the packaged example" in note
+    assert "come from the packaged example" in note
     (packaged,) = (str(each) for each in study_of(load(), tmp_path).notes if each.kind == "assumed")
     assert "the papers print none" in packaged
     # of a machine of somebody else there is no example

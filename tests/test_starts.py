@@ -26,7 +26,7 @@ from chainunit.study.readings import crank_angle
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
 from chainunit.study.start_runs import START_ANGLES
-from chainunit.study.turn import TurnAnalysis
+from chainunit.study.turn import TurnAnalysis, TurnFindings
 from chainunit.study.verdict import shown_speed
 
 LINKAGES = Path(__file__).parents[1] / "examples" / "linkages"
@@ -139,12 +139,11 @@ def test_a_setting_at_the_ram_by_hand():
     """F = T/|ds/dphi|, with the way of a slider-crank in closed form; without limit at the dead centre."""
     machine = machine_of(read_linkage(LINKAGES / "slider_crank_press.toml"))
     speed = 2.0 * math.pi
+    turn = cycle(machine, speed, machine.model.Feed(), 3600)
     study = SimpleNamespace(
         drive=SimpleNamespace(machine=machine),
         config=SimpleNamespace(run=SimpleNamespace(crank_speed=speed)),
-        findings={
-            TurnAnalysis.name: SimpleNamespace(loaded=cycle(machine, speed, machine.model.Feed(), 3600))
-        },
+        findings={TurnAnalysis.name: TurnFindings(turn, turn, None, None, {})},
     )
     (ram,) = rams(study)
     r, rod, offset = 0.08, 0.36, 0.025
