@@ -2,9 +2,10 @@
 # What the tests notice
 #
 # Changes one operator, number or result at a time in a copy of the tree and runs the tests on it: first those close
-# to the changed module by their imports, then the other tests of the fast stage (what `pytest` runs), then the second
-# stage (what `.ci/run` adds). A mutant that no test notices is a gap in the tests; one that the second stage alone
-# notices is what the fast stage leaves to `.ci/run`.
+# to the changed module by their imports. The mutants that these do not notice then meet the other tests of the fast
+# stage (what `pytest` runs), and those left over the second stage (what `.ci/run` adds), all in one tree: a test that
+# fails there is run on each of them alone. A mutant that no test notices is a gap in the tests; one that the second
+# stage alone notices is what the fast stage leaves to `.ci/run`.
 #
 # The mutants are drawn by a seed, as many of each module; the results are lines of a file, so that a run that was
 # stopped goes on where it ended, and a greater `--count` adds to what is there.
@@ -17,6 +18,7 @@ from __future__ import annotations
 
 import argparse
 import ast
+import contextlib
 import copy
 import hashlib
 import json
@@ -205,23 +207,13 @@ def imported(file: Path, name: str) -> set[str]:
 
 
 @cache
-def test_files() -> dict[str, Path]:
-    """The files of the tests by their names; those of a capability are in a folder of its name."""
-    return {
-        file.stem: file
-        for folder in ("*.py", "capabilities/*/*.py")
-        for file in (ROOT / "tests").glob(folder)
-    }
-
-
-@cache
 def graph() -> dict[str, set[str]]:
     """Which module or test file imports which; a package stands for its ``__init__``."""
     files = {}
     for file in (ROOT / PACKAGE).rglob("*.py"):
         parts = ("chainunit", *file.relative_to(ROOT / PACKAGE).with_suffix("").parts)
         files[".".join(parts)] = file
-    files |= test_files()
+    files |= {file.stem: file for file in (ROOT / "tests").rglob("*.py")}
     names = {name.removesuffix(".__init__"): name for name in files}
     return {
         name: {names[other] for other in imported(file, name) if other in names}
@@ -244,10 +236,10 @@ def distances(module: str) -> dict[str, int]:
             if other not in steps and other != "conftest":
                 steps[other] = steps[name] + 1
                 waiting.append(other)
-    if (named := f"test_{Path(module).stem}") in test_files():
-        steps[named] = 0
-    files = {name: file.relative_to(ROOT).as_posix() for name, file in test_files().items()}
-    return {files[name]: n for name, n in steps.items() if name.startswith("test_")}
+    places = {file.stem: file.relative_to(ROOT).as_posix() for file in (ROOT / "tests").rglob("test_*.py")}
+    found = {places[name]: n for name, n in steps.items() if name in places}
+    named = f"test_{Path(module).stem}"
+    return found | ({places[named]: 0} if named in places else {})
 
 
 # %% [markdown]
@@ -314,26 +306,74 @@ class Bench:
         return Outcome(first[1] if first else said.strip().splitlines()[-1][:200], seconds)
 
 
-def judged(bench: Bench, mutant: Mutant, near: list[str], whole: bool) -> dict[str, object]:
-    """Which stage notices a mutant, and by which test."""
-    # that of the copy: the tree itself may change in the hours that this takes
-    source = (bench.tree / PACKAGE / mutant.module).read_bytes()
-    bench.write(mutant.module, source[: mutant.begin] + mutant.after.encode() + source[mutant.end :])
-    runs: list[tuple[str, str, list[str]]] = [("fast", FAST, near)] if near else []
-    if whole:
-        runs += [("fast", FAST, []), ("second", SECOND, [])]
-    elif some := [name for name in near if "mark.second" in (ROOT / name).read_text("utf-8")]:
+def without_overlap(chosen: list[Mutant]) -> list[Mutant]:
+    """Mutants that can stand in one tree: none lies within another."""
+    found: list[Mutant] = []
+    for mutant in sorted(chosen, key=lambda each: (each.module, each.begin, each.end)):
+        if not found or found[-1].module != mutant.module or found[-1].end <= mutant.begin:
+            found.append(mutant)
+    return found
+
+
+@contextlib.contextmanager
+def changed(bench: Bench, chosen: list[Mutant]) -> Iterator[None]:
+    """These mutants in the tree, none of which lies within another."""
+    # the files of the copy: the tree itself may change in the hours that this takes
+    sources = {module: (bench.tree / PACKAGE / module).read_bytes() for module in {m.module for m in chosen}}
+    try:
+        for module, source in sources.items():
+            for mutant in sorted(
+                (m for m in chosen if m.module == module), key=lambda m: m.begin, reverse=True
+            ):
+                source = source[: mutant.begin] + mutant.after.encode() + source[mutant.end :]
+            bench.write(module, source)
+        yield
+    finally:
+        for module, source in sources.items():
+            bench.write(module, source)
+
+
+def judged(bench: Bench, mutant: Mutant, near: list[str]) -> dict[str, object]:
+    """Which stage notices a mutant by the tests near it, and by which test."""
+    runs = [("fast", FAST, near)] if near else []
+    if some := [name for name in near if "mark.second" in (ROOT / name).read_text("utf-8")]:
         runs += [("second", SECOND, some)]
     seconds = 0.0
-    try:
+    with changed(bench, [mutant]):
         for stage, marks, files in runs:
             outcome = bench.run(marks, files, bench.workers if len(files) != 1 else 0)
             seconds += outcome.seconds
             if outcome.failed:
-                return {"stage": stage, "by": outcome.failed, "seconds": round(seconds, 1), "whole": whole}
-    finally:
-        bench.write(mutant.module, source)
-    return {"stage": "none", "by": "", "seconds": round(seconds, 1), "whole": whole}
+                return {"stage": stage, "by": outcome.failed, "seconds": round(seconds, 1)}
+    return {"stage": "none", "by": "", "seconds": round(seconds, 1)}
+
+
+def noticed(bench: Bench, marks: str, left: list[Mutant]) -> Iterator[tuple[Mutant, str]]:
+    """The mutants that a whole stage notices, each with the test that fails. They stand in one tree until no test
+    fails; a test that fails is run on each alone, which tells whom it notices."""
+    while left:
+        together = without_overlap(left)
+        with changed(bench, together):
+            failed = bench.run(marks, [], bench.workers).failed
+        if not failed:
+            left = [mutant for mutant in left if mutant not in together]
+            continue
+        by_it = []
+        for mutant in together:
+            with changed(bench, [mutant]):
+                if bench.run(marks, [failed] if "::" in failed else [], 0).failed:
+                    by_it.append(mutant)
+        if not by_it:
+            # only several of them make it fail
+            by_it = [mutant for mutant in together if _alone(bench, marks, mutant)]
+            left = [mutant for mutant in left if mutant not in together]
+        yield from ((mutant, failed) for mutant in by_it)
+        left = [mutant for mutant in left if mutant not in by_it]
+
+
+def _alone(bench: Bench, marks: str, mutant: Mutant) -> bool:
+    with changed(bench, [mutant]):
+        return bool(bench.run(marks, [], bench.workers).failed)
 
 
 # %% [markdown]
@@ -410,18 +450,31 @@ def main() -> None:
             if sound.failed:
                 sys.exit(f"without a mutant {sound.failed} fails")
             print(f"without a mutant all tests pass, in {sound.seconds:.0f} s", flush=True)
-            for n, mutant in enumerate(chosen, 1):
-                if mutant.key in known and (known[mutant.key]["whole"] or given.near):
-                    continue
-                found = judged(bench, mutant, closest[mutant.module], not given.near)
+
+            def keep(mutant: Mutant, found: dict[str, object], place: str) -> None:
                 row = {"key": mutant.key, **asdict(mutant), **found}
                 known[mutant.key] = row
                 with given.results.open("a", encoding="utf-8") as file:
                     file.write(json.dumps(row) + "\n")
                 print(
-                    f"{n} of {len(chosen)}: {mutant.module}:{mutant.line} {mutant.kind}: "
-                    f"{row['stage']} {row['by']} {row['seconds']} s", flush=True,
+                    f"{place}: {mutant.module}:{mutant.line} {mutant.kind}: {row['stage']} {row['by']} "
+                    f"{row['seconds']} s", flush=True,
                 )  # fmt: skip
+
+            for n, mutant in enumerate(chosen, 1):
+                if mutant.key not in known:
+                    found = judged(bench, mutant, closest[mutant.module])
+                    keep(mutant, found | {"whole": found["stage"] == "fast"}, f"{n} of {len(chosen)}")
+            # what the fast stage notices is settled; the others meet all tests of both stages
+            for stage, marks in () if given.near else (("fast", FAST), ("second", SECOND)):
+                open_ = [m for m in chosen if not (row := known[m.key])["whole"] and (
+                    stage == "fast" or row["stage"] == "none")]  # fmt: skip
+                print(f"{len(open_)} mutants meet the whole {stage} stage", flush=True)
+                for mutant, failed in noticed(bench, marks, open_):
+                    keep(mutant, {"stage": stage, "by": failed, "seconds": 0.0, "whole": True}, stage)
+            for mutant in chosen if not given.near else ():
+                if not (row := known[mutant.key])["whole"]:
+                    keep(mutant, {k: row[k] for k in ("stage", "by", "seconds")} | {"whole": True}, "settled")
     show([known[mutant.key] for mutant in chosen if mutant.key in known])
 
 

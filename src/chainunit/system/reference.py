@@ -112,6 +112,7 @@ class _Equations:
         self._memory = [np.zeros(len(rows)) for rows in (self._outside, self.states, self.states)]
         self._changing = [(n, signal) for n, signal in enumerate(self._outside) if callable(signal)]
         self._memory[0][:] = [0.0 if callable(signal) else signal for signal in self._outside]
+        self._buffer: Any  # its methods take memoryviews, and are declared otherwise
         self._buffer, self._evaluate = self._rates.buffer()
         for n, rows in enumerate(self._memory[:2]):
             self._buffer.set_arg(n, memoryview(rows))

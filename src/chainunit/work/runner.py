@@ -220,7 +220,9 @@ def _on_workers(store: BatchStore, gaps: list[int], workers: int, scheduler: str
             except KilledWorker as error:
                 raise _BatchError(batch, "was lost, as its worker process ended") from error
             except (asyncio.CancelledError, concurrent.futures.CancelledError) as error:
-                raise _BatchError(batch, f"was lost, as the scheduler {scheduler or ''} ended") from error
+                # a worker that held the data of a batch cancels it, too, when it ends
+                ended = f"its worker or the scheduler {scheduler}" if scheduler else "its worker process"
+                raise _BatchError(batch, f"was lost, as {ended} ended") from error
             except InterruptedRunError:
                 raise
             except Exception as error:
