@@ -115,8 +115,8 @@ class _Equations:
         self._buffer: Any  # its methods take memoryviews, and are declared otherwise
         self._buffer, self._evaluate = self._rates.buffer()
         for n, rows in enumerate(self._memory[:2]):
-            self._buffer.set_arg(n, memoryview(rows))
-        self._buffer.set_res(0, memoryview(self._memory[2]))
+            self._buffer.set_arg(n, rows.data)
+        self._buffer.set_res(0, self._memory[2].data)
 
     def _inputs(self, t: Any) -> list[Any]:
         return [at_time(signal, t) for signal in self._outside]
