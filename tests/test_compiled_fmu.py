@@ -262,7 +262,7 @@ def test_a_study_becomes_one_fmu(tmp_path):
     drive = choose(study, tmp_path / "scratch", lambda *progress: None).drive
     # the gains are the tuned ones
     assert start["motor.speed_control.kp"] == drive.fmu_parameters.speed_control.kp
-    exact = monolithic(study_system(study, drive), {}, run["time"], rtol=1e-12)
+    exact = monolithic(study_system(drive, study.operation), {}, run["time"], rtol=1e-12)
     for name in ("motor.w", "machine.tau"):
         np.testing.assert_allclose(run[name], exact[name].values, rtol=1e-7, atol=1e-9)
 
@@ -321,6 +321,6 @@ def test_the_default_experiment_is_that_of_the_study(tmp_path):
     experiment = {k: float(x) for k, x in root.find("DefaultExperiment").items()}
     assert experiment["stepSize"] == 0.5e-3
     assert experiment["stopTime"] == pytest.approx(
-        loaded.steady_begin + loaded.run.turns * loaded.turn, rel=1e-5
+        loaded.operation.steady_begin + loaded.run.turns * loaded.operation.turn, rel=1e-5
     )
     assert root.get("author") == "A. Bauer" and root.get("version") == "C" and root.get("license") is None

@@ -66,12 +66,12 @@ def parse(text):
 def study_of(text):
     given = config.parse(text)
     drive = choose(given, Path(), lambda *_: None).drive
-    return StudyRecord(given, drive, statics(given, drive))
+    return StudyRecord(given, drive, statics(drive, given.operation))
 
 
 def findings(text):
     study = study_of(SYSTEM + ("" if "[driveline]" in text else BARE) + text)
-    return TorsionAnalysis.find(study, Work(Rig(study.config, study.drive, {}), lambda *_: None))
+    return TorsionAnalysis.find(study, Work(Rig(study.config.operation, study.drive, {}), lambda *_: None))
 
 
 def line_of(text):
@@ -539,7 +539,7 @@ damping_ratios = [0.05]
 def test_ranges_of_the_natural_frequency_say_over_what_they_are():
     """The inertia of a chain unit varies over its turn, i23 over that of the shaft; an order meets both."""
     study = study_of(SLOW_LINE)
-    found = TorsionAnalysis.find(study, Work(Rig(study.config, study.drive, {}), lambda *_: None))
+    found = TorsionAnalysis.find(study, Work(Rig(study.config.operation, study.drive, {}), lambda *_: None))
     J = study.statics.normal.outputs.J
     ratio = found.analysis.ratio
     low, high = (
@@ -642,7 +642,9 @@ def test_a_slow_line_is_not_analysed(monkeypatch, speed, made):
     # a table of its own asks for it
     for more in ("", "[torsion]\nspeeds = 2\n"):
         study = study_of(text + more)
-        found = TorsionAnalysis.find(study, Work(Rig(study.config, study.drive, {}), lambda *_: None))
+        found = TorsionAnalysis.find(
+            study, Work(Rig(study.config.operation, study.drive, {}), lambda *_: None)
+        )
         assert (found is not None) == (made or bool(more))
         assert [remark.kind for remark in study.remarks] == [] if found else ["torsion left out"]
 

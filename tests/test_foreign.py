@@ -116,8 +116,8 @@ def test_titles_are_harmless_wherever_they_go():
     values = config.parse(f"title = {toml_text(EVIL)}")
     assert harmless(values.title) and "\n" not in values.title
     assert not re.search(r"(?<!\\)[<>\[\]|`*_]", markdown_text(values.title))
-    drive = Drive(DcMotor, values.motor, values.machine)
-    assert harmless(said_of(StudyRecord(values, drive, statics(values, drive))))
+    drive = Drive(DcMotor, values.drive.motor, values.machine)
+    assert harmless(said_of(StudyRecord(values, drive, statics(drive, values.operation))))
     assert "\\<script\\>" in markdown_text(EVIL)
 
 

@@ -19,7 +19,7 @@ from chainunit.report import blocks
 from chainunit.report.study import report
 from chainunit.study import remarks
 from chainunit.study.catalogue_drive import with_inertia
-from chainunit.study.choice import as_chosen, choose
+from chainunit.study.choice import choose
 from chainunit.study.config import load, parse
 from chainunit.study.given import given_sections
 from chainunit.study.measures import Answers
@@ -36,7 +36,7 @@ KNIFE = example("knife")
 def study_of(config, folder):
     """The study before its first run."""
     choice = choose(config, folder, lambda *_: None)
-    study = StudyRecord(config, choice.drive, statics(config, choice.drive), choice.proposal)
+    study = StudyRecord(config, choice.drive, statics(choice.drive, config.operation), choice.proposal)
     conclude(study)
     return study
 
@@ -48,8 +48,8 @@ def drive_of(study, folder):
 def test_the_motor_is_shown_as_it_is_and_turns_with_gear_and_flywheel(tmp_path):
     """Its FMU has all inertia on its shaft."""
     study = parse(KNIFE.replace("[gear]\n", "[gear]\nJ = 0.003\n"))
-    assert study.gear.J == 0.003 and study.values["flywheel"].J > 0.0
-    drive, plate = drive_of(study, tmp_path), study.plate.model()[1].rotor
+    assert study.drive.gear.J == 0.003 and study.values["flywheel"].J > 0.0
+    drive, plate = drive_of(study, tmp_path), study.drive.plate.model()[1].rotor
     assert (drive.parameters.rotor.J, drive.parameters.rotor.d) == (plate.J, plate.d)
     whole = plate.J + 0.003 + study.values["flywheel"].J
     assert drive.fmu_parameters.rotor.J == drive.rotor_inertia == pytest.approx(whole, rel=1e-12)
@@ -81,7 +81,7 @@ def test_values_of_a_motor_of_the_catalogue_are_the_catalogues(tmp_path):
 def test_the_slip_compensation_that_is_used_is_shown(tmp_path):
     """That of the rated slip; none with a flywheel, against which it works. The file may give either: 0 as well."""
     bare = KNIFE[: KNIFE.index("[flywheel]")] + KNIFE[KNIFE.index("[run]") :]
-    plate = parse(KNIFE).plate.nameplate
+    plate = parse(KNIFE).drive.plate.nameplate
     rated = (plate.synchronous - plate.speed) * plate.poles / (4.0 * math.pi) / plate.torque
     for text, given, used in (
         (KNIFE, None, 0.0),
@@ -93,14 +93,16 @@ def test_the_slip_compensation_that_is_used_is_shown(tmp_path):
         config = parse(f'start = "inverter"\n{text}\n{more}')
         choice = choose(config, tmp_path, lambda *_: None)
         drive = choice.drive
-        study = dataclasses.replace(study_of(config, tmp_path), config=as_chosen(config, choice))
+        study = dataclasses.replace(
+            study_of(config, tmp_path), config=dataclasses.replace(config, drive=choice.tables)
+        )
         result = as_dict(study)
         assert drive.parameters.inverter.slip == pytest.approx(used, rel=1e-12)
         assert result["motor"]["inverter.slip"]["value"] == drive.parameters.inverter.slip
         assert result["starter"]["inverter.slip"]["value"] == drive.parameters.inverter.slip
         assert origin_of(study, "starter.inverter.slip") == ("file" if given else "catalogue")
         # a flywheel that a comparison adds has the setting of a drive with one
-        wheel = with_inertia(config, drive, 0.1)
+        wheel = with_inertia(config.drive, drive, 0.1)
         assert wheel.added_inertia == 0.1 and wheel.parameters.inverter.slip == (used if given else 0.0)
         (note,) = [remark.text for remark in study.remarks if remark.kind == "slip compensation"] or [""]
         assert ("rated slip" in note) == (not given and used > 0.0)

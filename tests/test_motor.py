@@ -15,6 +15,7 @@ from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.speed_control import loop, tune
 from chainunit.study.choice import tune as tune_motor
 from chainunit.study.config import load
+from chainunit.study.cycle import cycle
 from chainunit.study.drive import Drive
 
 LAYOUT = DcMotor.state_layout
@@ -101,7 +102,8 @@ def test_internal_integrator_against_an_error_controlled_solver():
 
 def test_declared_gains_are_the_tuned_ones_of_the_packaged_drive():
     config = load()
-    drive = tune_motor(config, Drive(DcMotor, config.motor, config.machine))
+    turn = cycle(config.machine, config.run.crank_speed, config.feed)
+    drive = tune_motor(Drive(DcMotor, config.drive.motor, config.machine), turn, ())
     tuned = drive.parameters
     declarations = DcMotor.Parameters()
     for name in ("kp", "ki"):

@@ -172,8 +172,8 @@ def test_the_remark_stands_on_terminal_page_and_in_json():
     from chainunit.study.statics import statics
 
     values = config.parse("[machine]\npin = { diameter = 60 }")
-    drive = Drive(DcMotor, values.motor, values.machine)
-    study = StudyRecord(values, drive, statics(values, drive))
+    drive = Drive(DcMotor, values.drive.motor, values.machine)
+    study = StudyRecord(values, drive, statics(drive, values.operation))
     result = as_dict(study)
     message = str(values.file.unusual[0])
     assert result["slips"] == [

@@ -608,7 +608,7 @@ UNSETTLED = LIGHT + "settle_turns = 0\nramp = 0.01\n"
 def test_the_study_waits_until_the_turns_close(tmp_path):
     """The crank still starts in the first turn; the one that is evaluated is a later one."""
     study, _ = ran(UNSETTLED, tmp_path)
-    assert study.steady_begin > study.config.steady_begin + 1.5
+    assert study.steady_begin > study.config.operation.steady_begin + 1.5
     assert study.answers["steady"].cycle_gap < 0.01 and study.answers["steady"].speed_ripple < 0.05
     assert not any(warning.kind == "turns do not close" for warning in study.warnings)
 
@@ -655,7 +655,7 @@ def test_each_overload_has_its_mirror_on_the_other_side():
 
     lopsided = "[feed]\n%s = { material_mass = 30, processing_force = 10 }\n%s = { material_mass = 70 }\n"
     rigs = [
-        Rig(c, Drive(DcMotor, c.motor, c.machine), {})
+        Rig(c.operation, Drive(DcMotor, c.drive.motor, c.machine), {})
         for c in (config.parse(lopsided % sides) for sides in (("left", "right"), ("right", "left")))
     ]
     assert tuple(config.parse("").events) == STANDARD

@@ -20,10 +20,10 @@ from .task import Task, Writer
 
 def _accept(config: Config, *, scheduler: str | None = None, **options: Any) -> None:
     with config.file.refusals():
-        check_files(config)
+        check_files(config.drive, config.file.catalogue, config.machine, config.plans)
     if scheduler is not None:
         for part in registered():
-            part.check_scheduler(config, scheduler)
+            part.check_scheduler(config.plans[part.name], scheduler)
 
 
 def _compute(config: Config, folder: Path, progress: Progress, **options: Any) -> StudyRecord:

@@ -17,7 +17,6 @@ from ..reading.results import as_data
 from ..work.progress import Report
 
 if TYPE_CHECKING:
-    from .config import Config
     from .drive import Drive
     from .record import StudyRecord
     from .rig import Rig
@@ -74,8 +73,9 @@ class Analysis(ABC):
     """whether it comes after all others, also where a run of the study has failed"""
 
     @staticmethod
-    def applies(config: Config, drive: Drive) -> bool:
-        """Whether the system has the parts that the analysis needs; by default every system has them."""
+    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
+        """Whether the system has the parts that the analysis needs, and the study asks for it by the `plans` of the
+        capabilities; by default every study has it."""
         return True
 
     @staticmethod

@@ -3,9 +3,10 @@ the file names."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,129 +14,105 @@ from ..core.errors import InputError, refusal_prefix
 from ..drives.catalogue import check_own
 from ..drives.motor import Motor
 from ..fmu.backends import Backend
+from ..machines.machine import Machine
 from ..system import foreign_component
 from ..work.progress import Report
-from .catalogue_drive import catalogue_drive, gear_with, with_inertia
+from .catalogue_drive import as_chosen, catalogue_drive, with_inertia
 from .config import Config
-from .cycle import cycle
+from .cycle import Cycle, cycle
 from .drive import Drive
+from .drive_tables import DriveTables
+from .operation import Operation
 from .proposal import DriveProposal
 from .registry import parts_of_line, registered
 
 
 @dataclass(frozen=True)
 class Choice:
-    """The drive, with the proposal by which it was chosen."""
+    """The drive of a study, with the proposal by which it was chosen."""
 
     drive: Drive
+    tables: DriveTables
+    """the tables of the study, with the values that follow from the motor of the catalogue"""
+    turn: Cycle
+    """the machine over a turn at constant speed, with the feed of normal running"""
     proposal: DriveProposal | None = None
 
 
 def choose(config: Config, folder: Path, report: Report, backend: Backend | None = None) -> Choice:
     """The drive of a study. A capability that chooses it writes its FMUs to `folder`."""
-    if config.foreign is not None:
-        return Choice(_with_foreign(config))
+    tables, machine, plans = config.drive, config.machine, config.plans
+    turn = cycle(machine, config.run.crank_speed, config.feed)
+    if tables.foreign is not None:
+        return Choice(_with_foreign(tables, machine, plans), tables, turn)
     for part in registered():
         proposal = part.drive(config, folder, report, backend)
         if proposal is not None:
-            return Choice(with_line(config, proposal.drive), proposal=proposal)
-    return Choice(tune(config, with_line(config, _drive_of_file(config))))
-
-
-def _drive_of_file(config: Config) -> Drive:
-    """The drive with the motor whose parameters the file gives, or with the motor of the catalogue that the
-    file names."""
-    if config.plate is not None:
-        turn = cycle(config.machine, config.run.crank_speed, config.feed)
-        drive = catalogue_drive(config, config.plate, turn.crank_torque)
+            drive = _with_line(proposal.drive, plans, turn)
+            return Choice(drive, as_chosen(tables, drive, proposal.gear), turn, proposal)
+    if tables.plate is None:
+        motor, p = tables.motor_type, tables.motor
+        drive = Drive(motor, p, machine, motor.follows(p))
     else:
-        motor, p = config.motor_type, config.motor
-        drive = Drive(motor, p, config.machine, motor.follows(p))
-    added = sum(part.shaft_inertia(config) for part in registered())
-    return with_inertia(config, replace(drive, feed_forward=config.feed_forward), added)
+        drive = catalogue_drive(tables, machine, turn, tables.plate)
+        tables = as_chosen(tables, drive)
+    added = sum(part.shaft_inertia(plans[part.name]) for part in registered())
+    drive = with_inertia(tables, replace(drive, feed_forward=tables.feed_forward), added)
+    return Choice(tune(_with_line(drive, plans, turn), turn, tables.given_gains), tables, turn)
 
 
-def as_chosen(config: Config, choice: Choice) -> Config:
-    """The study with the values that follow from the drive with a motor of the catalogue: the efficiency of the gear
-    by its stages, and boost and slip compensation of the inverter."""
-    if not config.of_catalogue:
-        return config
-    drive, proposal, inverter = choice.drive, choice.proposal, config.starter.inverter
-    if drive.follows:
-        used = drive.parameters.inverter
-        inverter = replace(inverter, boost=used.boost, slip=used.slip)
-    gear = gear_with(config, drive.ratio) if proposal is None else proposal.gear
-    return replace(
-        config,
-        gear=replace(config.gear, efficiency=gear.efficiency),
-        starter=replace(config.starter, inverter=inverter),
-    )
-
-
-def with_parts_beside(config: Config, drive: Drive) -> Drive:
-    """The drive with the parts that capabilities add to its system."""
+def with_parts_beside(choice: Choice, plans: Mapping[str, Any], operation: Operation) -> Drive:
+    """The drive with the parts that capabilities add to its system, by their `plans`."""
+    drive = choice.drive
     for part in registered():
-        drive = part.beside(config, drive)
+        drive = part.beside(plans[part.name], drive, operation, choice.turn)
     return drive
 
 
-def check_files(config: Config) -> None:
-    """Refuse a file that the study names but cannot use.
+def check_files(
+    tables: DriveTables, catalogue: Path | None, machine: Machine, plans: Mapping[str, Any]
+) -> None:
+    """Refuse a file that a study names but cannot use: the `catalogue` of own motors, or a foreign motor.
 
     Raises
     ------
     InputError
-        see `chainunit.drives.catalogue.check_own` and `with_motor`.
+        see `chainunit.drives.catalogue.check_own` and `chainunit.system.foreign_component`; also where the study asks
+        for a quantity that only a motor of this package has.
     """
-    if config.chooses_motor:
+    if tables.is_chosen:
         with refusal_prefix("catalogue = ", "catalogue"):
-            check_own(config.file.catalogue)
-    if config.foreign is not None:
-        _with_foreign(config)
+            check_own(catalogue)
+    if tables.foreign is not None:
+        _with_foreign(tables, machine, plans)
 
 
-def _with_foreign(config: Config) -> Drive:
-    """The drive of a study that names its motor."""
-    assert config.foreign is not None
+def _with_foreign(tables: DriveTables, machine: Machine, plans: Mapping[str, Any]) -> Drive:
+    """The machine with the foreign motor that the tables name, if the motor has all that the study needs."""
+    assert tables.foreign is not None
+    file = tables.foreign.file
     with refusal_prefix("system.motor: ", "system.motor"):
-        return with_motor(config, config.foreign.file, config.foreign.names)
-
-
-def with_motor(config: Config, file: Path, names: Mapping[str, str] | None = None) -> Drive:
-    """The machine of a study, driven by a foreign motor.
-
-    Parameters
-    ----------
-    file : the FMU
-    names : the FMU's names by ours, where they differ; see `chainunit.system.foreign_component`
-
-    Raises
-    ------
-    InputError
-        where the FMU does not fit, or the study asks for a quantity that only a motor of this package has.
-    """
-    motor = foreign_component(file, "motor", names)
-    for part in registered():
-        if words := part.not_with_foreign_motor(config):
-            raise InputError(f"{file}: {words}")
-    if config.feed_forward and "tau_ff" not in motor.connectors:
-        raise InputError(f"{file}: has no input tau_ff in N.m; leave feed_forward out")
+        motor = foreign_component(file, "motor", tables.foreign.names)
+        for part in registered():
+            if words := part.not_with_foreign_motor(plans[part.name]):
+                raise InputError(f"{file}: {words}")
+        if tables.feed_forward and "tau_ff" not in motor.connectors:
+            raise InputError(f"{file}: has no input tau_ff in N.m; leave feed_forward out")
     follows = "w_ref" in motor.connectors
-    return Drive(Motor, None, config.machine, follows, feed_forward=config.feed_forward, foreign=motor)
+    return Drive(Motor, None, machine, follows, feed_forward=tables.feed_forward, foreign=motor)
 
 
-def with_line(config: Config, drive: Drive) -> Drive:
-    """The drive with the parts of the study between motor and machine."""
+def _with_line(drive: Drive, plans: Mapping[str, Any], turn: Cycle) -> Drive:
+    """The drive with the parts of the line, by their `plans`."""
     for part in parts_of_line():
-        placed = part.placed(config, drive)
+        placed = part.placed(plans[part.name], drive, turn)
         drive = drive if placed is None else replace(drive, line=drive.line.behind(placed))
     return drive
 
 
-def tune(config: Config, drive: Drive) -> Drive:
-    """The drive with controller gains that are tuned to its inertia, unless the config gives them."""
-    both = cycle(drive.machine, config.run.crank_speed, config.feed)
-    given_gains = {name.removeprefix("motor.") for name in config.file.given if name.startswith("motor.")}
-    inertia = drive.rotor_inertia + float(np.mean(both.outputs.J))
+def tune(drive: Drive, turn: Cycle, given_gains: Container[str]) -> Drive:
+    """The drive with controller gains that are tuned to its inertia in a `turn` of the machine; the `given_gains`
+    stay as they are."""
+    inertia = drive.rotor_inertia + float(np.mean(turn.inertia_at(drive.ratio)))
     parameters, tuning = drive.motor.tune(drive.parameters, inertia, given_gains)
     return replace(drive, parameters=parameters, tuning=tuning)

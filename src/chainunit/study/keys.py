@@ -187,7 +187,7 @@ def _of_machine(name: str, table: str) -> Iterator[Key]:
 
 
 def _of_motor(name: str) -> Iterator[Key]:
-    return quantity_keys(MOTORS[name].Parameters, _study(motor=name).motor, sources=_OF_MOTORS)
+    return quantity_keys(MOTORS[name].Parameters, _study(motor=name).drive.motor, sources=_OF_MOTORS)
 
 
 def _of_section(name: str, section: FileSection) -> Iterator[Key]:

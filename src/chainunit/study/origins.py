@@ -17,7 +17,7 @@ def origin_of(study: StudyRecord, name: str) -> str:
     config, (section, _, parameter) = study.config, name.partition(".")
     if name in _CHOSEN and study.proposal is not None and _of(config, name) == "declared":
         return study.proposal.name
-    if name == SLIP and config.start == "inverter" and _of(config, name) == "declared":
+    if name == SLIP and config.drive.start == "inverter" and _of(config, name) == "declared":
         return "catalogue"
     if section == "motor" and (tuning := study.drive.tuning) and parameter in tuning.parameters:
         return "file" if name in config.file.given else "tuned"
@@ -25,7 +25,7 @@ def origin_of(study: StudyRecord, name: str) -> str:
         return "file"
     if section == "machine" and parameter in LENGTHS and "ratios.rho" in config.file.of_example:
         return "example"
-    if config.of_catalogue and (name == "machine.ratio" or section == "motor"):
+    if config.drive.of_catalogue and (name == "machine.ratio" or section == "motor"):
         name_in_file = _name_in_file(study, parameter)
         if not name_in_file:
             return "catalogue" if study.proposal is None else study.proposal.name
@@ -50,7 +50,7 @@ def _name_in_file(study: StudyRecord, parameter: str) -> str:
     group = parameter.partition(".")[0]
     if parameter == "inverter.on":
         return "start"
-    if parameter == "inverter.slip" and config.start == "inverter" and SLIP not in config.file.given:
+    if parameter == "inverter.slip" and config.drive.start == "inverter" and SLIP not in config.file.given:
         return ""
     if group in ("soft_start", "inverter"):
         return f"starter.{parameter}"

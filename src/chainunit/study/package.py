@@ -27,20 +27,21 @@ from ..system.ssp import export
 from .choice import choose, with_parts_beside
 from .config import Config
 from .drive import Drive
+from .operation import Operation
 from .registry import parts_of_line
 
 
-def study_system(config: Config, drive: Drive) -> System:
+def study_system(drive: Drive, operation: Operation) -> System:
     """Machine, line and motor of a study, from rest. The speed reference is the crank speed at the motor
     from the start on; feed and processing forces are those of normal running. With feed-forward, the system
     has the second machine that the control uses."""
-    start = drive.loads(config.feed) if drive.foreign_machine else {}
+    start = drive.loads(operation.feed) if drive.foreign_machine else {}
     if "w_ref" in drive.graph.components["motor"].connectors:
-        start["motor.w_ref"] = config.run.crank_speed * drive.ratio
+        start["motor.w_ref"] = operation.crank_speed * drive.ratio
     for name, machine in (("machine", drive.driven_machine), ("model", drive.machine)):
         if name in drive.graph.components and not drive.foreign_machine:
             # a connected input needs no start value, but an FMU that runs alone needs one
-            values = _machine(config, machine.model, machine)
+            values = _machine(operation, machine.model, machine)
             start |= {f"{name}.{variable}": x for variable, x in values.items()}
     return replace(drive.graph, start=start)
 
@@ -72,7 +73,7 @@ def start_of(
         if not _is_of(model, drive):
             raise InputError(f"the study's machine is {drive.driven_machine.model.name}, not {model.name}")
         own = drive.simulated_machine if issubclass(model, ChainedModel) else drive.driven_machine
-        return _machine(config, model, own)
+        return _machine(config.operation, model, own)
     if drive.motor is not model:
         title = drive.graph.components["motor"].title
         raise InputError(f"the study's motor is {title}, not {model.name}")
@@ -144,7 +145,7 @@ def whole_system(
         where no motor is found.
     """
     drive = _drive(config, backend, report)
-    system = study_system(config, drive)
+    system = study_system(drive, config.operation)
     machine = system.components["machine"]
     name = machine.model.name if isinstance(machine, ModelComponent) else machine.title
     labels = {key: printable(config.file.labels.get(key, ""), 1000) for key in ("author", "revision")}
@@ -153,14 +154,14 @@ def whole_system(
         f"{name}System",
         config.title,
         about=About(author=labels["author"], version=labels["revision"]),
-        experiment={"step": config.run.step, "stop": _running(config)},
+        experiment={"step": config.run.step, "stop": _running(config.operation)},
     )
     return part.model, part.start | input_starts(system, part.model)
 
 
-def _running(config: Config) -> float:
+def _running(operation: Operation) -> float:
     """The time of start-up and steady running [s]."""
-    return config.steady_begin + config.run.turns * config.turn
+    return operation.steady_begin + operation.run.turns * operation.turn
 
 
 def left_out(config: Config) -> str:
@@ -199,12 +200,12 @@ def _is_of(model: type[Model], drive: Drive) -> bool:
     return model is own or chains or model is own.direct()
 
 
-def _machine(config: Config, model: type[Model], machine: Machine) -> dict[str, float]:
+def _machine(operation: Operation, model: type[Model], machine: Machine) -> dict[str, float]:
     """Start values of the machine with its feed and gear, at the speed of the study."""
-    speed = config.run.crank_speed * machine.ratio
+    speed = operation.crank_speed * machine.ratio
     direct = issubclass(model, DirectMachine)
     turning = {"w_start": speed} if direct else {"phi": 0.0, "w": speed, "a": 0.0}
-    return machine.by_name | Layout(type(config.feed)).by_name(config.feed) | turning
+    return machine.by_name | Layout(type(operation.feed)).by_name(operation.feed) | turning
 
 
 def _drive(config: Config, backend: Backend | None, report: Callable[[str], None]) -> Drive:
@@ -212,7 +213,7 @@ def _drive(config: Config, backend: Backend | None, report: Callable[[str], None
         choice = choose(config, folder, lambda what, done, todo: report(what), backend)
     if choice.proposal is not None and choice.proposal.insufficient:
         raise RunError(f"[{choice.proposal.name}]: {choice.proposal.answer}")
-    return with_parts_beside(config, choice.drive)
+    return with_parts_beside(choice, config.plans, config.operation)
 
 
 def export_study(
@@ -233,11 +234,11 @@ def export_study(
     """
     drive = _drive(config, backend, report)
     return export(
-        study_system(config, drive),
+        study_system(drive, config.operation),
         file,
         name="ChainUnitDrive",
         description=config.title,
-        stop=_running(config),
+        stop=_running(config.operation),
         step=config.run.step,
         backend=backend,
         report=report,

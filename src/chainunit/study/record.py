@@ -182,12 +182,12 @@ class StudyRecord:
     @property
     def steady_begin(self) -> float:
         """Time from which running counts as steady [s]."""
-        return self.config.steady_begin if self.started is None else self.started.steady_from
+        return self.config.operation.steady_begin if self.started is None else self.started.steady_from
 
     @property
     def plate(self) -> CatalogueMotor | None:
         """The motor of the catalogue that the file names or that was chosen, if it is one."""
-        return self.config.plate if self.proposal is None else self.proposal.motor
+        return self.config.drive.plate if self.proposal is None else self.proposal.motor
 
     @property
     def insufficient(self) -> str:

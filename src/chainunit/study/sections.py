@@ -200,7 +200,7 @@ SECTIONS: Mapping[str, FileSection] = {
         Transmission,
         default=KINDS["gear"],
         title="Gear",
-        is_used=lambda config: config.of_catalogue,
+        is_used=lambda config: config.drive.of_catalogue,
         follows={
             "ratio": "the one that gives the crank its speed under the mean load; with [sizing] the nearest on offer",
             "efficiency": "98 % a stage of a helical gear, 70 % of a worm gear, 95 % of a V-belt; see "
@@ -210,7 +210,7 @@ SECTIONS: Mapping[str, FileSection] = {
     "starter": FileSection(
         Starter,
         title="Starter",
-        is_used=lambda config: config.of_catalogue and config.start != "direct",
+        is_used=lambda config: config.drive.of_catalogue and config.drive.start != "direct",
         follows={
             "inverter.boost": "5 %; with [sizing] the least of 5, 10 and 15 % with which the machine starts",
             "inverter.slip": "that of the rated slip of the motor; none with a flywheel, against which it works",

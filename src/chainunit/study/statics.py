@@ -9,11 +9,11 @@ import numpy as np
 
 from ..core.errors import InputError
 from ..drives.speed_control import Loop
-from .config import Config
 from .cycle import Cycle, cycle, no_feed
 from .drive import Drive
 from .line.shaft import LineModes, line_modes
 from .one_sided import one_sided_feeds
+from .operation import Operation
 
 
 @dataclass(frozen=True)
@@ -33,26 +33,31 @@ class DriveStatics:
         return next(iter(self.cycles.values()))
 
 
-def statics(config: Config, drive: Drive) -> DriveStatics:
-    """All results of a study that need no co-simulation.
+def statics(drive: Drive, operation: Operation, turn: Cycle | None = None) -> DriveStatics:
+    """All results of a study that need no co-simulation. The `turn` of the machine in normal running is that of any
+    gear, where it is known.
 
     Raises
     ------
     InputError
         where the communication step is too long for the driveline.
     """
-    machine, feed, w = drive.machine, config.feed, config.run.crank_speed
+    machine, feed = drive.machine, operation.feed
+    turn = turn or cycle(machine, operation.crank_speed, feed)
     feeds = (
         one_sided_feeds(feed)
         if machine.model.sides
         else {"normal running": feed, "without feed": no_feed(feed)}
     )
-    cycles = {name: cycle(machine, w, each) for name, each in feeds.items()}
-    normal = next(iter(cycles.values())).outputs
+    cycles = {
+        name: turn if each is feed and turn.ratio == machine.ratio else cycle(machine, turn.crank_speed, each)
+        for name, each in feeds.items()
+    }
+    inertia = turn.inertia_at(machine.ratio)
     return DriveStatics(
         cycles=cycles,
-        loops={} if drive.foreign else _loops(drive, normal.J),
-        modes=None if drive.line.part("driveline") is None else _modes(config, drive, normal.J),
+        loops={} if drive.foreign else _loops(drive, inertia),
+        modes=None if drive.line.part("driveline") is None else _modes(drive, inertia, operation.run.step),
     )
 
 
@@ -73,12 +78,12 @@ def _loops(drive: Drive, inertia: Any) -> dict[str, Loop]:
     return {name: loop for name, loop in loops.items() if loop is not None}
 
 
-def _modes(config: Config, drive: Drive, inertia: Any) -> LineModes:
-    """The natural frequencies of the line; a communication step that is too long for them is refused."""
+def _modes(drive: Drive, inertia: Any, step: float) -> LineModes:
+    """The natural frequencies of the line; a communication step [s] that is too long for them is refused."""
     line = line_modes(drive, inertia)
-    if config.run.step > line.step_longest:
+    if step > line.step_longest:
         raise InputError(
-            f"run.step = {config.run.step:g} s: the driveline swings at {line.k_largest:.4g} rad/s; must be <= "
+            f"run.step = {step:g} s: the driveline swings at {line.k_largest:.4g} rad/s; must be <= "
             f"{line.step_longest:.3g} s"
         )
     return line

@@ -324,7 +324,7 @@ def remarks(machine: IdentifiedMachine) -> Iterator[str]:
     runs, config = machine.problem.runs, machine.config
     columns = {name for run in runs for name in run.recording.columns}
     if (
-        issubclass(config.motor_type, InductionMotor)
+        issubclass(config.drive.motor_type, InductionMotor)
         and "motor.i" in columns
         and "motor.power" not in columns
     ):
@@ -348,7 +348,7 @@ def remarks(machine: IdentifiedMachine) -> Iterator[str]:
                 "columns, and machines that are alike in both halves of a turn may be taken for each other"
             )
     has_motor = bool(columns & set(OF_TERMINALS))
-    if has_motor and config.motor is not None and config.motor_type.follows(config.motor):
+    if has_motor and config.drive.motor is not None and config.drive.motor_type.follows(config.drive.motor):
         tuned = [f"motor.{name}" for name in CONTROL if f"motor.{name}" not in config.file.given]
         if tuned:
             names = ", ".join(tuned)

@@ -3,7 +3,8 @@ remarks."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +12,6 @@ from ...core.errors import InputError
 from ...drives.cardan import ORDERS, frequency_band
 from ...reading.results import part, result
 from ...study.analysis import Analysis, Findings, Work
-from ...study.config import Config
 from ...study.drive import Drive
 from ...study.line.shaft import two_masses
 from ...study.line.shaft_runs import shaft_findings
@@ -37,7 +37,7 @@ class TorsionAnalysis(Analysis):
     name = "torsion"
 
     @staticmethod
-    def applies(config: Config, drive: Drive) -> bool:
+    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
         """Whether the driveline turns, so that its torsion is analysed."""
         return drive.line.part("driveline") is not None
 

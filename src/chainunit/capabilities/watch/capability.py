@@ -13,9 +13,11 @@ from ...study.analysis import Analysis
 from ...study.capability import Estimates, FileReference
 from ...study.conditions import given
 from ...study.config import Config
+from ...study.cycle import Cycle
 from ...study.drive import Drive
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
+from ...study.operation import Operation
 from ...study.rules import MOTOR_FMU, Rule, has_sides
 from .observer_table import ObserverTable
 from .reading import WatchPlan, read_watch
@@ -99,12 +101,11 @@ class WatchCapability(Capability):
                         key=table,
                     )
 
-    def beside(self, config: Config, drive: Drive) -> Drive:
+    def beside(self, plan: WatchPlans, drive: Drive, operation: Operation, turn: Cycle) -> Drive:
         """The drive with its load observer."""
         from .observation import with_observer
 
-        plans: WatchPlans = config.plans[self.name]
-        return drive if plans.observer is None else with_observer(config, plans.observer, drive)
+        return drive if plan.observer is None else with_observer(drive, plan.observer, operation.feed, turn)
 
     def take_estimates(self, config: Config, estimates: Estimates, tables: dict[str, Any]) -> None:
         """The recording is watched with the errors of the estimates, and the observer knows the false imbalance that

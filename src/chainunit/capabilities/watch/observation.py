@@ -14,7 +14,7 @@ from ...machines.load_observer import LoadObserver
 from ...study.arrays import rms
 from ...study.capability import Estimates
 from ...study.config import Config
-from ...study.cycle import cycle
+from ...study.cycle import Cycle
 from ...study.drive import Drive
 from ...system import ModelComponent
 from .false_loads import false_loads
@@ -28,14 +28,13 @@ FORCE_CHANGE, FORCE_FLUCTUATION = 0.01, 0.005
 """Change of a processing force in a second that is followed, and its natural fluctuation, in parts of an overload."""
 
 
-def with_observer(config: Config, table: ObserverTable, drive: Drive) -> Drive:
-    """The drive with a load observer by that `table`."""
-    p, speed = drive.fmu_parameters, config.run.crank_speed * drive.ratio
-    turn = cycle(drive.machine, config.run.crank_speed, config.feed)
+def with_observer(drive: Drive, table: ObserverTable, feed: Any, turn: Cycle) -> Drive:
+    """The drive with a load observer by that `table`, for a machine with this `feed` and `turn` in normal running."""
+    p, speed = drive.fmu_parameters, turn.crank_speed * drive.ratio
     torque = np.asarray(turn.crank_torque) / drive.ratio + p.rotor.d * speed
     signals = terminal_signals(drive.motor, p, speed, float(np.mean(torque)))
     values = drive.machine.by_name | {"rotor.J": p.rotor.J, "rotor.d": p.rotor.d}
-    values |= weights(signals) | tuning(table, config.feed, speed, rms(torque))
+    values |= weights(signals) | tuning(table, feed, speed, rms(torque))
     component = ModelComponent(LoadObserver, LoadObserver.parameter_layout.from_names(values))
     wires = {"phi": "phi", "w": "w", **signals.outputs}
     return replace(drive, observer=component, observed=wires)
