@@ -38,7 +38,7 @@ MEASURES = ("crank_torque_peak", "motor_torque_peak", "current_peak", "rocker_to
 def task_of(runs: int, folder: Path) -> monte_carlo.RandomTask:
     """The packaged study; its FMUs are written into the folder."""
     config = parse(STUDY.format(runs=runs))
-    drive = Drive(DcMotor, config.drive.motor, config.machine)
+    drive = Drive(DcMotor, config.motor.parameters, config.machine)
     files, _ = export_drive(drive, folder)
     return monte_carlo.RandomTask(config.plans["random_overloads"], Rig(config.operation, drive, files), 6.7)
 

@@ -177,7 +177,7 @@ def test_a_heavy_machine_is_waited_for_until_it_has_its_speed(tmp_path):
     warnings = {each.kind: each for each in study.warnings}
     assert not {"fed before speed", "speed drifts"} & set(warnings)
     # as long as that no rotor may be locked
-    long, locked = warnings["motor start"].quantities, study.config.drive.plate.nameplate.locked_time
+    long, locked = warnings["motor start"].quantities, study.config.plate.nameplate.locked_time
     worst = max(each.start_time for each in study.findings["starts"].starts)
     assert long["value"][0] == max(start.start_time, worst) > 2.0 * locked and long["limit"][0] == locked
     assert worst == pytest.approx(start.start_time, rel=0.01)

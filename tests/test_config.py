@@ -42,7 +42,7 @@ def test_the_packaged_example_is_the_packaged_machine():
 
 def test_a_file_is_laid_over_the_example():
     assert parse("").machine.p == load().machine.p
-    assert parse("").drive.motor == load().drive.motor and parse("").run == load().run
+    assert parse("").motor == load().motor and parse("").run == load().run
     mine = parse("[machine]\nz = 0.9\ncrank = { m = 10 }\n[feed]\nleft = { material_mass = 5 }")
     assert (mine.machine.p.ratio, mine.machine.p.z, mine.machine.p.crank.m, mine.machine.p.crank.I) == (
         50,
@@ -96,7 +96,7 @@ def test_units(text, section, name, value):
 
 
 def test_temperatures():
-    assert pytest.approx(293.15) == parse('[motor]\nambient = { T = "20 degC" }').drive.motor.ambient.T
+    assert pytest.approx(293.15) == parse('[motor]\nambient = { T = "20 degC" }').motor.parameters.ambient.T
 
 
 @pytest.mark.parametrize(

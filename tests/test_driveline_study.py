@@ -13,6 +13,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from records import record_of
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
@@ -39,9 +40,7 @@ from chainunit.study.drive_fmus import export_drive, with_files
 from chainunit.study.line import shaft_runs
 from chainunit.study.line.placed import Line
 from chainunit.study.line.shaft import UNEVEN, remedies, two_masses
-from chainunit.study.record import StudyRecord
 from chainunit.study.rig import Rig
-from chainunit.study.statics import statics
 from chainunit.system import CoSimulation
 
 SYSTEM = '[system]\nmachine = "Accelerator"\n'
@@ -66,7 +65,7 @@ def parse(text):
 def study_of(text):
     given = config.parse(text)
     drive = choose(given, Path(), lambda *_: None).drive
-    return StudyRecord(given, drive, statics(drive, given.operation))
+    return record_of(given, drive)
 
 
 def findings(text):

@@ -90,7 +90,7 @@ def test_refusals(text, line):
 
 def rig_of(text=""):
     values = config.parse(text)
-    return Rig(values.operation, Drive(DcMotor, values.drive.motor, values.machine), {})
+    return Rig(values.operation, Drive(DcMotor, values.motor.parameters, values.machine), {})
 
 
 def at(signal, t):
@@ -270,9 +270,7 @@ def uneven():
     """The rig of the compiled system."""
     values = config.parse(UNEVEN)
     bars = cycle(values.machine, values.run.crank_speed, values.feed)
-    return Rig(
-        values.operation, catalogue_drive(values.drive, values.machine, bars, values.drive.plate), None
-    )
+    return Rig(values.operation, catalogue_drive(values.drive, values.machine, bars, values.plate), None)
 
 
 def test_an_event_begins_at_its_angle_however_uneven_the_turn_is():
@@ -280,7 +278,7 @@ def test_an_event_begins_at_its_angle_however_uneven_the_turn_is():
     rig = uneven()
     operation, events = rig.operation, list(config.parse(UNEVEN).events.values())
     with rig.from_rest() as simulation:
-        run = start_up(rig, simulation, operation.stop, lambda time: None, {}).run
+        run = start_up(rig, simulation, lambda time: None, {}).run
         saved, angle = simulation.save(), float(crank_angle(rig.drive, run)[-1])
         turns = only_whole_turns(rig.drive, run.sel(time=slice(saved - 1.1 * operation.turn, None)), 1)
         speed = 2.0 * math.pi / np.ptp(turns["time"].values)

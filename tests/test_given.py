@@ -9,6 +9,7 @@ import math
 from functools import partial
 
 import pytest
+from records import record_of
 from test_foreign_machine import MACHINE, SCRIPT
 from test_foreign_machine import STUDY as PUMP
 from test_foreign_system import build
@@ -25,10 +26,8 @@ from chainunit.study.given import given_sections
 from chainunit.study.measures import Answers
 from chainunit.study.origins import origin_of
 from chainunit.study.parts import example
-from chainunit.study.record import StudyRecord
 from chainunit.study.remarks import conclude
 from chainunit.study.result import as_dict
-from chainunit.study.statics import statics
 
 KNIFE = example("knife")
 
@@ -36,7 +35,7 @@ KNIFE = example("knife")
 def study_of(config, folder):
     """The study before its first run."""
     choice = choose(config, folder, lambda *_: None)
-    study = StudyRecord(config, choice.drive, statics(choice.drive, config.operation), choice.proposal)
+    study = record_of(config, choice.drive, choice.proposal)
     conclude(study)
     return study
 
@@ -49,7 +48,7 @@ def test_the_motor_is_shown_as_it_is_and_turns_with_gear_and_flywheel(tmp_path):
     """Its FMU has all inertia on its shaft."""
     study = parse(KNIFE.replace("[gear]\n", "[gear]\nJ = 0.003\n"))
     assert study.drive.gear.J == 0.003 and study.values["flywheel"].J > 0.0
-    drive, plate = drive_of(study, tmp_path), study.drive.plate.model()[1].rotor
+    drive, plate = drive_of(study, tmp_path), study.plate.model()[1].rotor
     assert (drive.parameters.rotor.J, drive.parameters.rotor.d) == (plate.J, plate.d)
     whole = plate.J + 0.003 + study.values["flywheel"].J
     assert drive.fmu_parameters.rotor.J == drive.rotor_inertia == pytest.approx(whole, rel=1e-12)
@@ -81,7 +80,7 @@ def test_values_of_a_motor_of_the_catalogue_are_the_catalogues(tmp_path):
 def test_the_slip_compensation_that_is_used_is_shown(tmp_path):
     """That of the rated slip; none with a flywheel, against which it works. The file may give either: 0 as well."""
     bare = KNIFE[: KNIFE.index("[flywheel]")] + KNIFE[KNIFE.index("[run]") :]
-    plate = parse(KNIFE).drive.plate.nameplate
+    plate = parse(KNIFE).plate.nameplate
     rated = (plate.synchronous - plate.speed) * plate.poles / (4.0 * math.pi) / plate.torque
     for text, given, used in (
         (KNIFE, None, 0.0),

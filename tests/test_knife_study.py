@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from records import record_of
 from reports import said_of, write
 from scipy.integrate import solve_ivp
 
@@ -34,11 +35,9 @@ from chainunit.study.limits import given_motor
 from chainunit.study.measures import read_answers
 from chainunit.study.parts import example
 from chainunit.study.readings import only_whole_turns
-from chainunit.study.record import StudyRecord
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
 from chainunit.study.start_up import start_up
-from chainunit.study.statics import statics
 from chainunit.study.stored import cutting_power
 from chainunit.study.turn import TurnAnalysis
 from chainunit.study.window import Phase, Window
@@ -59,7 +58,7 @@ def bare(text=""):
     """A study before its runs, with what needs none."""
     config = parse(HEAD + text)
     drive = choose(config, Path(), lambda *_: None).drive
-    study = StudyRecord(config, drive, statics(drive, config.operation))
+    study = record_of(config, drive)
     rig = Rig(config.operation, drive, {})
     for analysis in (TurnAnalysis, BladeAnalysis):
         study.findings[analysis.name] = analysis.find(study, Work(rig, lambda *_: None))
@@ -104,7 +103,7 @@ def at_speed(rig, flywheel, **changes):
 def steady_turns(rig):
     """The steady turns of a rig, and their answers."""
     with rig.from_rest() as simulation:
-        started = start_up(rig, simulation, rig.operation.stop, lambda time: None, {})
+        started = start_up(rig, simulation, lambda time: None, {})
     turns = only_whole_turns(
         rig.drive, started.run.sel(time=slice(started.steady_from, None)), rig.operation.run.turns
     )
@@ -274,7 +273,7 @@ def test_the_flywheels(done):
     ripple = number(by[1].speed_ripple, "1", "percent")
     assert f"The speed fluctuates by {ripple} with the study's flywheel" in said["fluctuation"]
     # rated current is passed by the light flywheels alone
-    rated = study.config.drive.plate.nameplate.rated_current
+    rated = study.config.plate.nameplate.rated_current
     hot = next(remark for remark in study.warnings if remark.kind == "rated current")
     assert len(hot.quantities) - len([q for q in ("rated",) if q in hot.quantities]) == sum(
         a.current_rms > rated for a in by
@@ -410,7 +409,7 @@ def judged(study, answers):
     a = FlywheelAnswers(**answers)
     checks = given_motor(
         study.drive,
-        study.config.drive.plate,
+        study.config.plate,
         study.config.permitted_temperature[1],
         a.winding_temperature,
         a.current_rms,
@@ -448,9 +447,9 @@ def judged(study, answers):
 def test_a_flywheel_is_recommended_where_it_keeps_every_limit(current, start, mean, heavier, hot, ending):
     """The limits of its motor: rated current, permitted temperature, and the time its rotor may be locked."""
     study = bare()
-    plate = study.config.drive.plate.nameplate
+    plate = study.config.plate.nameplate
     assert plate.locked_time == 13.0 and study.config.run.winding_temperature == 393.15
-    assert 8.0 < study.config.drive.plate.nameplate.torque < 20.0
+    assert 8.0 < study.config.plate.nameplate.torque < 20.0
     sound = {v.name: 0.001 for v in Layout(FlywheelAnswers).variables}
     sizes = (1.0, 0.049, current, start, hot), (2.0, 0.03, heavier, 6.0, 350.0)
     least, heavy = (
@@ -491,9 +490,9 @@ def test_words_for_a_slow_start_and_a_poor_run():
 def test_a_motor_without_a_nameplate_has_the_limit_of_its_winding_alone():
     config = parse('event = []\n[system]\nmachine = "KnifeDrive"\nmotor = "DcMotor"\n')
     drive = choose(config, Path(), lambda *_: None).drive
-    assert set(
-        given_motor(drive, config.drive.plate, config.permitted_temperature[1], 400.0, 50.0, 30.0)
-    ) == {"temperature"}
+    assert set(given_motor(drive, config.plate, config.permitted_temperature[1], 400.0, 50.0, 30.0)) == {
+        "temperature"
+    }
 
 
 @pytest.mark.parametrize(
@@ -577,5 +576,5 @@ def test_the_blade_follows_from_the_declaration_and_not_from_the_machine(monkeyp
         chosen = parse(f'[system]\nmachine = "{machine.name}"')
         drive = Drive(chosen.motor_type, chosen.motor, chosen.machine)
         assert BladeAnalysis.applies(drive, chosen.plans) == machine.cuts
-        drawn = motion(StudyRecord(chosen, drive, statics(drive, chosen.operation)))
+        drawn = motion(record_of(chosen, drive))
         assert ("edge" in [link.name for link in drawn.links]) == machine.cuts

@@ -53,7 +53,7 @@ def studied(text, folder):
 def test_a_motor_that_burns_in_steady_running_is_no_good(tmp_path):
     """It keeps the speed of a load that comes and goes, with 129 % of its rated current and no reserve of torque."""
     study, verdict, warnings = studied(KNIFE, tmp_path)
-    steady, plate = study.answers["steady"], study.config.drive.plate.nameplate
+    steady, plate = study.answers["steady"], study.config.plate.nameplate
     assert study.reaches and steady.current_share > 1.2 and steady.winding_temperature > 450.0
     assert verdict["holds"] == "false" and "keeps the crank" in verdict["text"]
     assert "its winding becomes too hot in steady running" in verdict["text"]

@@ -72,7 +72,7 @@ SCRIPT = """
 
     if __name__ == "__main__":
         config = parse(Path("study.toml").read_text())
-        drive = Drive(DcMotor, config.drive.motor, config.machine)
+        drive = Drive(DcMotor, config.motor.parameters, config.machine)
         files, _ = export_drive(drive, Path("."))
         plan, rig = config.plans["random_overloads"], Rig(config.operation, drive, files)
         task = monte_carlo.RandomTask(plan, rig, 1.0, cosimulated=True)
@@ -146,7 +146,7 @@ def killed(tmp_path_factory):
 
 def task_of(folder, runs=RUNS, text=STUDY, cosimulated=True):
     config = parse(text.format(runs=runs))
-    drive = Drive(DcMotor, config.drive.motor, config.machine)
+    drive = Drive(DcMotor, config.motor.parameters, config.machine)
     files = {name: folder / f"{part.model.name}.fmu" for name, part in drive.graph.components.items()}
     return random_task(config, drive, files, 1.0, cosimulated=cosimulated)
 
@@ -170,7 +170,7 @@ def point(task, drawn):
 
 def task_by(config):
     """The task of a study without FMUs."""
-    return random_task(config, Drive(DcMotor, config.drive.motor, config.machine), {}, 1.0)
+    return random_task(config, Drive(DcMotor, config.motor.parameters, config.machine), {}, 1.0)
 
 
 def test_a_killed_study_goes_on_from_what_it_saved(killed):

@@ -20,6 +20,7 @@ from chainunit.drives.terminal_signals import terminal_signals
 from chainunit.machines.load_observer import FARTHEST, Inputs, rotor_torque
 from chainunit.study import config
 from chainunit.study.choice import choose, with_parts_beside
+from chainunit.study.cycle import cycle
 from chainunit.study.drive_fmus import with_files
 from chainunit.study.package import export_study, study_system
 from chainunit.study.rig import Rig
@@ -48,7 +49,11 @@ TEXT = f"[observer]\n[coupling]\ntrip_torque = {TRIP}\n{RUN}{EVENTS}"
 
 def drive_of(text, folder):
     values = config.parse(text)
-    return with_parts_beside(choose(values, folder, lambda *_: None), values.plans, values.operation)
+    drive, turn = (
+        choose(values, folder, lambda *_: None).drive,
+        cycle(values.machine, values.run.crank_speed, values.feed),
+    )
+    return with_parts_beside(drive, values.plans, values.feed, turn)
 
 
 @pytest.fixture(scope="module")

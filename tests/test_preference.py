@@ -31,7 +31,7 @@ from chainunit.drives.gear_ratios import (
 from chainunit.drives.gearing import START_FACTOR, ordered_torque
 from chainunit.reading.results import as_data
 from chainunit.reading.text import number
-from chainunit.study.catalogue_drive import as_chosen, gear_with
+from chainunit.study.catalogue_drive import gear_with
 from chainunit.study.config import parse
 from chainunit.study.limits import Check
 from chainunit.study.relay import HEAVIER, start_class
@@ -509,7 +509,7 @@ def test_an_inverter_takes_the_next_ratio_before_a_larger_motor(tmp_path, monkey
     notes = " ".join(result.notes)
     assert "needs a voltage boost of 5 %" in notes and "electronic motor protection" in notes
     assert number(best.trial.inverter_current, "A") in notes and "relay of" not in notes
-    chosen = as_chosen(config.drive, best.drive, result.proposal(config.drive).gear)
+    chosen = result.proposal(config.drive).tables
     assert chosen.gear.efficiency == pytest.approx(0.98**3) and chosen.starter.inverter.boost == 0.05
 
 

@@ -24,7 +24,7 @@ from chainunit.machines.chain_unit import Feed
 from chainunit.reading.results import as_data
 from chainunit.report import study as study_report
 from chainunit.study.cycle import cycle
-from chainunit.study.one_sided import alone, overload_factors
+from chainunit.study.load_cases import alone, overload_factors
 from chainunit.study.readings import only_whole_turns, turns_made
 
 SHORT = """
@@ -655,7 +655,7 @@ def test_each_overload_has_its_mirror_on_the_other_side():
 
     lopsided = "[feed]\n%s = { material_mass = 30, processing_force = 10 }\n%s = { material_mass = 70 }\n"
     rigs = [
-        Rig(c.operation, Drive(DcMotor, c.drive.motor, c.machine), {})
+        Rig(c.operation, Drive(DcMotor, c.motor.parameters, c.machine), {})
         for c in (config.parse(lopsided % sides) for sides in (("left", "right"), ("right", "left")))
     ]
     assert tuple(config.parse("").events) == STANDARD

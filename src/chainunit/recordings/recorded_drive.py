@@ -25,7 +25,7 @@ def drive_of(config: Config, recordings: Mapping[str, Recording]) -> Drive:
         where the recordings have signals of the motor, and the study has no data of it.
     """
     of_motor = sorted({name for each in recordings.values() for name in each.columns if name in OF_TERMINALS})
-    if of_motor and not (config.file.gives("motor") or config.drive.plate is not None):
+    if of_motor and not (config.file.gives("motor") or config.plate is not None):
         raise InputError(
             f"motor: is missing, and the recordings have {', '.join(of_motor)}; add [motor] with its data, or "
             "system.motor with a motor of the catalogue",

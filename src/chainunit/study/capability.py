@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from .drive import Drive
     from .event_table import RandomEvent
     from .file_reading import FileReading
-    from .operation import Operation
     from .proposal import DriveProposal
     from .record import StudyRecord
     from .rig import Rig
@@ -143,9 +142,9 @@ class StudyCapability:
         """The reason and the remedy where its plan needs a motor of this package; empty where it does not."""
         return ""
 
-    def beside(self, plan: Any, drive: Drive, operation: Operation, turn: Cycle) -> Drive:
-        """The drive with the parts of the system that the capability adds beside the line; `turn` is that of the
-        machine in normal running."""
+    def beside(self, plan: Any, drive: Drive, feed: Any, turn: Cycle) -> Drive:
+        """The drive with the parts of the system that the capability adds beside the line; `feed` and `turn`
+        are those of the machine in normal running."""
         return drive
 
     def check_scheduler(self, plan: Any, scheduler: str) -> None:

@@ -118,16 +118,16 @@ def with_inertia(tables: DriveTables, drive: Drive, added: float) -> Drive:
     peak of the load, where the inertia has to slow down to give its energy: with an added one there is none, unless
     the file gives it."""
     drive = replace(drive, added_inertia=added)
-    if not added or tables.start != "inverter" or not tables.of_catalogue or SLIP in tables.given:
+    if not added or tables.start != "inverter" or drive.rated_current is None or SLIP in tables.given:
         return drive
     inverter = replace(drive.parameters.inverter, slip=0.0)
     return replace(drive, parameters=replace(drive.parameters, inverter=inverter))
 
 
-def as_chosen(tables: DriveTables, drive: Drive, gear: Transmission | None = None) -> DriveTables:
+def as_used(tables: DriveTables, drive: Drive, offer: GearOffer = HELICAL) -> DriveTables:
     """The tables with the values that follow from the drive with a motor of the catalogue: the efficiency of its
-    `gear`, by default that of `gear_with`, and boost and slip compensation of the inverter."""
-    efficiency = (gear or gear_with(tables, drive.ratio)).efficiency
+    gear, which is of the `offer`, and boost and slip compensation of the inverter."""
+    efficiency = gear_with(tables, drive.ratio, offer).efficiency
     inverter = tables.starter.inverter
     if drive.follows:
         used = drive.parameters.inverter

@@ -11,6 +11,7 @@ from typing import Any
 
 from ..core.errors import Faults, GeometryError, InputError, each_refusal, refusal_prefix
 from ..core.quantities import Layout, variables
+from ..drives.catalogue import CatalogueMotor
 from ..machines.admissible import causes
 from ..machines.api import machine_of, ratios
 from ..machines.machine import Machine
@@ -35,13 +36,13 @@ from .file_reading import FileReading
 from .file_section import FileSection
 from .first_checks import check_values, independent, missing_recordings, plate_of, without
 from .foreign_machine import ForeignMachine, ForeignModel
+from .motor_sources import ForeignMotor, MotorSource, NamedMotor, OwnMotor
 from .operation import Operation
-from .parts import Parts, beside, example, over_example, with_linkage
+from .parts import Parts, beside, example, motor_is_left, over_example, with_linkage
 from .registry import registered
 from .run_checks import endless, loads_beyond
 from .sections import (
     Coupling,
-    ForeignMotor,
     Ratios,
     Run,
     all_choices,
@@ -92,6 +93,8 @@ class Config:
     machine: Machine
     feed: Any
     """loads in normal running, as the machine declares them"""
+    motor: MotorSource | None
+    """None where a capability chooses the motor"""
     drive: DriveTables
     run: Run
     events: Mapping[str, Event]
@@ -128,6 +131,16 @@ class Config:
             if (permitted := part.permitted_temperature(self.plans[part.name])) is not None:
                 return permitted[0], permitted[1]
         return "run.winding_temperature", float(self.run.winding_temperature)
+
+    @property
+    def plate(self) -> CatalogueMotor | None:
+        """The motor of the catalogue that the file names, if it names one."""
+        return None if self.motor is None else self.motor.plate
+
+    @property
+    def of_catalogue(self) -> bool:
+        """Whether the motor is one of the catalogue."""
+        return self.motor is None or self.plate is not None
 
     def table(self, name: str) -> Any:
         """The values of a table; None for an optional table that the file does not
@@ -294,16 +307,10 @@ def _config(checked: Any, parts: Parts, events: Mapping[str, Event], contents: F
     config = Config(
         title=checked.title,
         machine=machine,
+        motor=_motor(data, parts, checked, values["motor"], plate, source),
         drive=DriveTables(
-            motor_type=parts.motor,
-            motor=values["motor"] if parts.gives_motor else None,
-            plate=plate,
-            foreign=ForeignMotor(beside(parts.file, source), given_values(checked.system.motor_names))
-            if parts.file
-            else None,
             feed_forward=checked.feed_forward,
             start=checked.start,
-            is_chosen=any(of_study.get(part.motor_table) is not None for part in registered()),
             given=contents.given,
             **{name: of_study[name] for name in _OF_DRIVE},
         ),
@@ -316,13 +323,26 @@ def _config(checked: Any, parts: Parts, events: Mapping[str, Event], contents: F
         plans=plans,
         **{name: of_study[name] for name in _OWN_TABLES},
     )
-    foreign_motor = config.drive.foreign is not None
-    faults.add(loads_beyond(machine.model, config.feed, events, plans, foreign_motor=foreign_motor))
+    known_motor = not parts.file
+    faults.add(loads_beyond(machine.model, config.feed, events, plans, known_motor=known_motor))
     for capability in registered():
         faults.add(capability.faults(config))
     faults.add(endless(config.operation, events, plans))
     faults.refuse()
     return config
+
+
+def _motor(
+    tables: Mapping[str, Any], parts: Parts, checked: Any, own: Any, plate: CatalogueMotor | None, source: str
+) -> MotorSource | None:
+    """The motor of a file, `own` parameters or one that it names; None where a capability chooses it."""
+    if motor_is_left(tables):
+        return None
+    if parts.file:
+        return ForeignMotor(beside(parts.file, source), given_values(checked.system.motor_names))
+    if plate is not None:
+        return NamedMotor(plate)
+    return OwnMotor(parts.motor, own)
 
 
 def _read_sections(

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ..core.quantities import Layout
 from ..machines.machine import Machine
 
 
@@ -57,9 +56,3 @@ def needed_inertia(swing: float, speed: float, fluctuation: float, there: float 
     = dE/(fluctuation w^2).
     """
     return max(0.0, swing / (fluctuation * speed * speed) - there)
-
-
-def no_feed(feed: Any) -> Any:
-    """A feed of the same kind without material; a quantity that cannot be zero has its start value."""
-    layout = Layout(type(feed))
-    return layout.instance([0.0 if v.quantity.admits(0.0) else v.quantity.start for v in layout.variables])

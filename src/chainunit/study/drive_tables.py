@@ -1,43 +1,25 @@
-"""The drive as a study file asks for it: its motor, gear, starter and control."""
+"""The tables of a drive in a study file: its gear, its starter, and its control."""
 
 from __future__ import annotations
 
 from collections.abc import Set
 from dataclasses import dataclass, field
-from typing import Any
 
-from ..drives.catalogue import CatalogueMotor
 from ..drives.gearing import Transmission
-from ..drives.motor import Motor
-from .sections import ForeignMotor, Starter
+from .sections import Starter
 
 
 @dataclass(frozen=True)
 class DriveTables:
-    """The tables and keys of a study file that state its drive."""
+    """The tables and keys of a study file that state the drive beside its motor."""
 
-    motor_type: type[Motor]
-    """model of the motor; `Motor` itself if the motor is a foreign FMU"""
-    motor: Any
-    """parameters of the motor, where the file gives them"""
-    plate: CatalogueMotor | None
-    """the motor, where the file names one of the catalogue"""
-    foreign: ForeignMotor | None
-    """the motor, if it is a foreign FMU; `motor` then has no meaning"""
     feed_forward: bool
     gear: Transmission
     start: str
     """one of `chainunit.study.sections.STARTS`"""
     starter: Starter
-    is_chosen: bool
-    """whether a capability chooses the motor of the catalogue"""
     given: Set[str] = field(compare=False)
-    """names of all values that the file sets, such as "gear.ratio" """
-
-    @property
-    def of_catalogue(self) -> bool:
-        """Whether the motor is one of the catalogue."""
-        return self.plate is not None or self.is_chosen
+    """names of all values that the file sets, such as "gear.ratio\""""
 
     @property
     def soft_time(self) -> float:

@@ -69,9 +69,7 @@ def given_sections(study: StudyRecord) -> list[GivenSection]:
     config = study.config
     sections = [
         GivenSection("", "Study", None, _of_study(config.file)),
-        GivenSection(
-            "system", "System", None, _system(config.file.choices, is_chosen=config.drive.is_chosen)
-        ),
+        GivenSection("system", "System", None, _system(config.file.choices, is_chosen=config.motor is None)),
         GivenSection("machine", "Machine", study.drive.machine.p),
         GivenSection("feed", "Feed in normal running", config.feed),
         *(

@@ -75,7 +75,7 @@ def motor_limits(study: StudyRecord) -> dict[str, Check]:
         time = None if others is None or time is None else max(time, others)
     config, permitted = study.config, study.config.permitted_temperature[1]
     return given_motor(
-        study.drive, config.drive.plate, permitted, steady.winding_temperature, steady.current_rms, time
+        study.drive, config.plate, permitted, steady.winding_temperature, steady.current_rms, time
     )
 
 

@@ -24,6 +24,7 @@ from ..reading.text import CHOICES as UNITS
 from .config import Config, parse
 from .event import TYPES, Event
 from .file_section import FileSection
+from .motor_sources import OwnMotor
 from .parts import ReportTable
 from .sections import Ratios, SystemTable, all_choices, all_sections
 
@@ -187,7 +188,9 @@ def _of_machine(name: str, table: str) -> Iterator[Key]:
 
 
 def _of_motor(name: str) -> Iterator[Key]:
-    return quantity_keys(MOTORS[name].Parameters, _study(motor=name).drive.motor, sources=_OF_MOTORS)
+    motor = _study(motor=name).motor
+    values = motor.parameters if isinstance(motor, OwnMotor) else None
+    return quantity_keys(MOTORS[name].Parameters, values, sources=_OF_MOTORS)
 
 
 def _of_section(name: str, section: FileSection) -> Iterator[Key]:

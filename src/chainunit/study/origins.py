@@ -25,7 +25,7 @@ def origin_of(study: StudyRecord, name: str) -> str:
         return "file"
     if section == "machine" and parameter in LENGTHS and "ratios.rho" in config.file.of_example:
         return "example"
-    if config.drive.of_catalogue and (name == "machine.ratio" or section == "motor"):
+    if config.of_catalogue and (name == "machine.ratio" or section == "motor"):
         name_in_file = _name_in_file(study, parameter)
         if not name_in_file:
             return "catalogue" if study.proposal is None else study.proposal.name

@@ -24,8 +24,9 @@ from ..reading.tables import file_text, toml
 from ..system import ModelComponent, System, compiled
 from ..system.compiled import input_starts
 from ..system.ssp import export
-from .choice import choose, with_parts_beside
+from .choice import choose_for, with_parts_beside
 from .config import Config
+from .cycle import cycle
 from .drive import Drive
 from .operation import Operation
 from .registry import parts_of_line
@@ -210,10 +211,11 @@ def _machine(operation: Operation, model: type[Model], machine: Machine) -> dict
 
 def _drive(config: Config, backend: Backend | None, report: Callable[[str], None]) -> Drive:
     with scratch() as folder:
-        choice = choose(config, folder, lambda what, done, todo: report(what), backend)
+        turn = cycle(config.machine, config.run.crank_speed, config.feed)
+        choice = choose_for(turn, config, folder, lambda what, done, todo: report(what), backend)
     if choice.proposal is not None and choice.proposal.insufficient:
         raise RunError(f"[{choice.proposal.name}]: {choice.proposal.answer}")
-    return with_parts_beside(choice, config.plans, config.operation)
+    return with_parts_beside(choice.drive, config.plans, config.feed, turn)
 
 
 def export_study(

@@ -187,7 +187,7 @@ class StudyRecord:
     @property
     def plate(self) -> CatalogueMotor | None:
         """The motor of the catalogue that the file names or that was chosen, if it is one."""
-        return self.config.drive.plate if self.proposal is None else self.proposal.motor
+        return self.config.plate if self.proposal is None else self.proposal.motor
 
     @property
     def insufficient(self) -> str:

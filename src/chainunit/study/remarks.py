@@ -90,9 +90,9 @@ def _left_out(study: StudyRecord) -> Iterator[str]:
         return
     if coupling is not None and "coupling.trip_torque" not in config.file.given:
         yield f"coupling.trip_torque ({number(coupling.trip_torque, 'N.m', full=False)})"
-    if config.drive.plate is not None and "system.motor" in config.file.of_example:
-        yield f"the motor ({config.drive.plate.designation})"
-    elif study.proposal is None and config.drive.foreign is None:
+    if config.plate is not None and "system.motor" in config.file.of_example:
+        yield f"the motor ({config.plate.designation})"
+    elif study.proposal is None and study.drive.foreign is None:
         values = study.drive.motor.parameter_layout.by_name(study.drive.parameters)
         units = {v.name: v.unit for v in study.drive.motor.parameter_layout.variables}
         names = [name for name in _RATING if f"motor.{name}" in config.file.of_example]

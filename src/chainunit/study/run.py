@@ -22,11 +22,12 @@ from . import verdict
 from .analyses import all_analyses
 from .analysis import Work
 from .bearings import pin_loads
-from .choice import choose, with_parts_beside
+from .choice import choose_for, with_parts_beside
 from .config import Config
 from .drive_fmus import export_coasting, export_drive
 from .event import Event
 from .event_torques import from_event_on
+from .load_cases import turns_by_load
 from .measures import read_answers, read_measure
 from .pulls import least_pulls
 from .readings import crank_angle
@@ -71,16 +72,18 @@ def run_study(
         save its state.
     """
     with shown_in(config.units):
-        choice = choose(config, folder / "fmu", report, backend)
+        turns = turns_by_load(config.machine, config.run.crank_speed, config.feed)
+        turn = next(iter(turns.values()))
+        choice = choose_for(turn, config, folder / "fmu", report, backend)
         config = replace(config, drive=choice.tables)
-        drive, operation = with_parts_beside(choice, config.plans, config.operation), config.operation
+        drive = with_parts_beside(choice.drive, config.plans, config.feed, turn)
         if check and drive.foreign_titles:
             titles = " and ".join(drive.foreign_titles)
             raise InputError(f"--check: the equations of {titles} are not known; leave --check out")
-        study = StudyRecord(config, drive, statics(drive, operation, choice.turn), choice.proposal)
+        study = StudyRecord(config, drive, statics(drive, turns, config.run.step), choice.proposal)
         if choice.proposal is not None:
             study.findings[choice.proposal.name] = choice.proposal.findings
-        unmade = Rig(operation, drive, {})
+        unmade = Rig(config.operation, drive, {})
         for part in registered():
             part.check_runs(config.plans[part.name], unmade)
         _analyse(study, Work(unmade, report), needs_runs=False)
@@ -91,7 +94,7 @@ def run_study(
                 "No C compiler was found: the FMUs run in Python. With one the runs take about a tenth of the time: "
                 "install gcc or clang, or the compiler that comes with pip install 'chainunit[cross]'.",
             )
-        runner = Runner(study, Rig(operation, drive, files), report)
+        runner = Runner(study, Rig(config.operation, drive, files), report)
         with _ending(study):
             runner.run(check, lambda: export_coasting(drive, folder / "fmu", backend))
             work = Work(runner.rig, report, folder, scheduler, runner.stop)
@@ -213,7 +216,7 @@ class Runner:
         """
         study, rig, config = self.study, self.rig, self.study.config
         progress = self._progress("start-up and steady running", 0.0)
-        study.started = start_up(rig, simulation, self.stop, progress, rig.guards)
+        study.started = start_up(rig, simulation, progress, rig.guards)
         run, self.stop = study.started.run, study.started.stop
         self.rig = rig = study.started.rig
         self._certify("start_up", run)
@@ -265,8 +268,8 @@ class Runner:
         return transient
 
     def _loaded_start(self, event: Event, before: float, check: bool) -> None:
+        progress = self._progress(event.title, before)
         with self.rig.from_rest(event) as simulation:
-            progress = self._progress(event.title, before)
             run = simulation.run(self.stop, self.rig.step, progress, guards=self.rig.guards)
             transient = Transient(event, 0.0, run, self.rig.event_signals(event, 0.0, {}), {})
             self._close(simulation, transient, self.stop, Phase.LOADED_START)

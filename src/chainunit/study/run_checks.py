@@ -27,10 +27,10 @@ def loads_beyond(
     events: Mapping[str, Event],
     plans: Mapping[str, Any],
     *,
-    foreign_motor: bool,
+    known_motor: bool,
 ) -> Iterator[InputError]:
     """Refusals of loads that are beyond any machine together: all on one side, and at the height of each event. A
-    foreign motor may have any input."""
+    motor that is not a `known_motor` may have any input."""
     for v in Layout(SideLoads).variables if model.sides else ():
         most = getattr(feed.left, v.name) + getattr(feed.right, v.name)
         if not v.quantity.admits(most):
@@ -54,7 +54,7 @@ def loads_beyond(
         if not needed <= set(inputs):
             part = beside.get(where)
             asked = part is None or part.longest_run(plans[part.name])
-            if asked and not foreign_motor and not needed <= {*inputs, *of_motors}:
+            if asked and known_motor and not needed <= {*inputs, *of_motors}:
                 near = "".join(near_name(name, Layout(model.Feed).names) for name in needed)
                 yield InputError(
                     f"{where}: the {model.name} has no input {' or '.join(sorted(needed))}{near}; "

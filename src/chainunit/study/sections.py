@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from functools import cache
-from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, create_model
@@ -184,15 +182,6 @@ SystemTable = create_model(
 variables whose names differ from ours."""
 
 
-@dataclasses.dataclass(frozen=True)
-class ForeignMotor:
-    """A motor that is a foreign FMU."""
-
-    file: Path
-    names: Mapping[str, str]
-    """the FMU's names by ours, where they differ"""
-
-
 SECTIONS: Mapping[str, FileSection] = {
     "run": FileSection(Run, title="Run"),
     "coupling": FileSection(Coupling, optional=True, title="Safety coupling"),
@@ -200,7 +189,7 @@ SECTIONS: Mapping[str, FileSection] = {
         Transmission,
         default=KINDS["gear"],
         title="Gear",
-        is_used=lambda config: config.drive.of_catalogue,
+        is_used=lambda config: config.of_catalogue,
         follows={
             "ratio": "the one that gives the crank its speed under the mean load; with [sizing] the nearest on offer",
             "efficiency": "98 % a stage of a helical gear, 70 % of a worm gear, 95 % of a V-belt; see "
@@ -210,7 +199,7 @@ SECTIONS: Mapping[str, FileSection] = {
     "starter": FileSection(
         Starter,
         title="Starter",
-        is_used=lambda config: config.drive.of_catalogue and config.drive.start != "direct",
+        is_used=lambda config: config.of_catalogue and config.drive.start != "direct",
         follows={
             "inverter.boost": "5 %; with [sizing] the least of 5, 10 and 15 % with which the machine starts",
             "inverter.slip": "that of the rated slip of the motor; none with a flywheel, against which it works",

@@ -62,12 +62,10 @@ def _start_empty(
     return run, rig
 
 
-def start_up(
-    rig: Rig, simulation: Simulation, stop: float, progress: Progress, guards: Mapping[str, float]
-) -> StartUp:
-    """Start-up and steady running to the time `stop` [s], or longer, see `_missing`; a machine that
+def start_up(rig: Rig, simulation: Simulation, progress: Progress, guards: Mapping[str, float]) -> StartUp:
+    """Start-up and steady running to the time at which it should end, or longer, see `_missing`; a machine that
     starts empty runs so long after it is fed."""
-    pieces, steady_from = list[xr.Dataset](), rig.operation.steady_begin
+    pieces, steady_from, stop = list[xr.Dataset](), rig.operation.steady_begin, rig.operation.stop
     if rig.operation.empty_start:
         run, rig = _start_empty(rig, simulation, progress, guards)
         pieces = [run]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -9,18 +10,16 @@ import numpy as np
 
 from ..core.errors import InputError
 from ..drives.speed_control import Loop
-from .cycle import Cycle, cycle, no_feed
+from .cycle import Cycle
 from .drive import Drive
 from .line.shaft import LineModes, line_modes
-from .one_sided import one_sided_feeds
-from .operation import Operation
 
 
 @dataclass(frozen=True)
 class DriveStatics:
     """Results on a machine and its drive that need no run."""
 
-    cycles: dict[str, Cycle]
+    cycles: Mapping[str, Cycle]
     """turns at constant speed, by load case"""
     loops: dict[str, Loop] = field(default_factory=dict)
     """the linearised speed loop of a controlled motor, by the inertia that is used (mean, least, largest)"""
@@ -33,31 +32,19 @@ class DriveStatics:
         return next(iter(self.cycles.values()))
 
 
-def statics(drive: Drive, operation: Operation, turn: Cycle | None = None) -> DriveStatics:
-    """All results of a study that need no co-simulation. The `turn` of the machine in normal running is that of any
-    gear, where it is known.
+def statics(drive: Drive, turns: Mapping[str, Cycle], step: float) -> DriveStatics:
+    """All results of a study that need no co-simulation, with the `turns` of its machine by load case.
 
     Raises
     ------
     InputError
-        where the communication step is too long for the driveline.
+        where the communication `step` [s] is too long for the driveline.
     """
-    machine, feed = drive.machine, operation.feed
-    turn = turn or cycle(machine, operation.crank_speed, feed)
-    feeds = (
-        one_sided_feeds(feed)
-        if machine.model.sides
-        else {"normal running": feed, "without feed": no_feed(feed)}
-    )
-    cycles = {
-        name: turn if each is feed and turn.ratio == machine.ratio else cycle(machine, turn.crank_speed, each)
-        for name, each in feeds.items()
-    }
-    inertia = turn.inertia_at(machine.ratio)
+    inertia = next(iter(turns.values())).inertia_at(drive.ratio)
     return DriveStatics(
-        cycles=cycles,
+        cycles=turns,
         loops={} if drive.foreign else _loops(drive, inertia),
-        modes=None if drive.line.part("driveline") is None else _modes(drive, inertia, operation.run.step),
+        modes=None if drive.line.part("driveline") is None else _modes(drive, inertia, step),
     )
 
 

@@ -17,7 +17,6 @@ from ...reading.results import derived, part, result
 from ...reading.text import number
 from ...study.analysis import Analysis, Findings, Work
 from ...study.catalogue_drive import with_inertia
-from ...study.choice import tune
 from ...study.cycle import needed_inertia
 from ...study.drive import Drive
 from ...study.limits import given_motor
@@ -167,12 +166,13 @@ def _run(study: StudyRecord, rig: Rig, findings: FlywheelFindings, flywheel: flo
     """The start-up and steady running of the study with another flywheel [kg m2], without its safety coupling."""
     tables, operation = study.config.drive, rig.operation
     turned = with_inertia(tables, replace(study.drive, observer=None), flywheel)
-    drive = tune(turned, study.statics.normal, tables.given_gains)
+    assert study.config.motor is not None
+    drive, _ = study.config.motor.completed(turned, tables, study.statics.normal)
     findings.is_retuned = findings.is_retuned or drive.parameters != turned.parameters
     sides = drive.machine.loaded_sides(operation.feed)
     rig = replace(rig, drive=drive, fed_from=None)
     with rig.from_rest() as simulation:
-        started = start_up(rig, simulation, operation.stop, lambda time: None, {})
+        started = start_up(rig, simulation, lambda time: None, {})
     run = started.run
     residual = worst_residual(rig.residuals(run))
     turns = whole_turns(drive, run.sel(time=slice(started.steady_from, None)), operation.run.turns)
@@ -210,7 +210,7 @@ def _wheel(
     answers = FlywheelAnswers(**values)
     checks = given_motor(
         drive,
-        study.config.drive.plate,
+        study.config.plate,
         study.config.permitted_temperature[1],
         answers.winding_temperature,
         answers.current_rms,
@@ -344,7 +344,7 @@ _TROUBLES = (
 def _on_wheels(findings: FlywheelFindings, study: StudyRecord) -> None:
     """A warning for each kind of trouble, with all flywheels that have it; the study itself warns for its own
     flywheel."""
-    plate = study.config.drive.plate
+    plate = study.config.plate
     too_small = plate is not None and findings.mean_torque > plate.nameplate.torque
     remedy = "a larger motor" if too_small else "a larger motor or flywheel"
     if plate is not None and too_small:
@@ -478,7 +478,7 @@ def _on_least(findings: FlywheelFindings, least: Wheel, study: StudyRecord) -> N
     }
     items = {name: part for name, part in parts.items() if part[1][0] is not None}
     text += f". {beside} {', '.join(words for words, _ in items.values())}."
-    plate = study.config.drive.plate
+    plate = study.config.plate
     too_small = plate is not None and findings.mean_torque > plate.nameplate.torque
     if excesses := [*least.excesses, *(["mean torque"] if too_small else [])]:
         fit = None if too_small else next((w for _, w, _ in findings.rows if findings.permits(w)), None)

@@ -37,7 +37,7 @@ _HEADS = {
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The table and the figure of the flywheels."""
     findings: FlywheelFindings = study.findings["flywheels"]
-    if study.config.drive.plate is not None:
+    if study.config.plate is not None:
         nameplate = ", ".join(f"{{motor.rated_{name}}}" for name in ("power", "speed", "torque", "current"))
         yield b.Text(s.line(f"Motor: {{motor.title}}, rated {nameplate}; ratio {{machine.ratio:4}}."))
     if findings.wheels:
@@ -76,7 +76,7 @@ def _table(s: b.Source, findings: FlywheelFindings) -> b.Table:
 
 
 def _figure(study: StudyRecord, findings: FlywheelFindings, running: list[Wheel]) -> fig.Figure:
-    drive, plate = study.drive, study.config.drive.plate
+    drive, plate = study.drive, study.config.plate
     # at most as many flywheels as there are distinct looks of a line, from the least to the largest
     some = [running[round(k)] for k in np.linspace(0, len(running) - 1, min(len(running), len(LINES)))]
     speed, torque, current = (

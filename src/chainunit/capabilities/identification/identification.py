@@ -30,6 +30,7 @@ from ...recordings.unknown import Unknown
 from ...study.arrays import rms
 from ...study.config import Config
 from ...study.drive import Drive
+from ...study.motor_sources import OwnMotor
 from ...system import Profile
 from ...work.progress import Report, quiet
 from .information import Combination, Information, information
@@ -321,10 +322,11 @@ def _sensors(
 
 def remarks(machine: IdentifiedMachine) -> Iterator[str]:
     """Sentences on data that are missing or assumed."""
-    runs, config = machine.problem.runs, machine.config
+    runs, motor = machine.problem.runs, machine.config.motor
     columns = {name for run in runs for name in run.recording.columns}
     if (
-        issubclass(config.drive.motor_type, InductionMotor)
+        motor is not None
+        and issubclass(motor.kind, InductionMotor)
         and "motor.i" in columns
         and "motor.power" not in columns
     ):
@@ -348,8 +350,9 @@ def remarks(machine: IdentifiedMachine) -> Iterator[str]:
                 "columns, and machines that are alike in both halves of a turn may be taken for each other"
             )
     has_motor = bool(columns & set(OF_TERMINALS))
-    if has_motor and config.drive.motor is not None and config.drive.motor_type.follows(config.drive.motor):
-        tuned = [f"motor.{name}" for name in CONTROL if f"motor.{name}" not in config.file.given]
+    if has_motor and isinstance(motor, OwnMotor) and motor.kind.follows(motor.parameters):
+        given = machine.config.file.given
+        tuned = [f"motor.{name}" for name in CONTROL if f"motor.{name}" not in given]
         if tuned:
             names = ", ".join(tuned)
             yield f"{names}: not in the file, and tuned as for a new drive; give those of the real converter"

@@ -16,7 +16,7 @@ from ...study.analysis import Analysis, Findings, Work
 from ...study.arrays import peak
 from ...study.cycle import cycle
 from ...study.drive import Drive
-from ...study.one_sided import OverloadFactors, cycle_alone, overload_factors
+from ...study.load_cases import OverloadFactors, cycle_alone, overload_factors
 from ...study.organ_limits import slack_and_mode
 from ...study.record import StudyRecord
 

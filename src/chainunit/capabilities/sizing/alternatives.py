@@ -253,7 +253,7 @@ def _runs(study: StudyRecord, rig: Rig, of: PeakOf) -> tuple[float, dict[str, xr
     duty: list[tuple[str, xr.Dataset]] = []
     shocks: dict[str, xr.Dataset] = {}
     with rig.from_rest() as simulation:
-        started = start_up(rig, simulation, operation.stop, lambda time: None, {})
+        started = start_up(rig, simulation, lambda time: None, {})
         rig = started.rig
         steady = started.run.sel(time=slice(started.steady_from, None))
         begin = simulation.save()

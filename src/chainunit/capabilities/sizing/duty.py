@@ -16,7 +16,7 @@ from ...fmu.backends import Backend
 from ...machines.chain_unit import SIDES, SideName
 from ...reading.results import derived, part, result
 from ...study.cycle import Cycle, cycle, energy_swing, needed_inertia
-from ...study.one_sided import all_on_one
+from ...study.load_cases import all_on_one
 from ...study.quantiles import HIGH
 from ...study.registry import registered
 from .table import Sizing

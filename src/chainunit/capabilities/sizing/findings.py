@@ -7,7 +7,7 @@ from typing import Any
 
 from ...reading.results import GIVEN, derived, part, result
 from ...study.analysis import Analysis, Findings, Work
-from ...study.catalogue_drive import gear_with
+from ...study.catalogue_drive import as_used
 from ...study.coupling import remark_on_rams
 from ...study.drive import Drive
 from ...study.drive_tables import DriveTables
@@ -133,7 +133,7 @@ class SizingFindings(Findings):
             self,
             best.drive,
             best.motor,
-            gear_with(tables, best.drive.ratio, self.plan.offer),
+            as_used(tables, best.drive, self.plan.offer),
             "Which motor, gear and flywheel does {noun} need? Its crank turns at {=run.crank_speed:4}.",
             self.answer,
             insufficient="" if fits else INSUFFICIENT,

@@ -59,9 +59,10 @@ class TorsionAnalysis(Analysis):
                 k_least=(modes.k_least, "rad/s", "frequency"),
             )
             return None
-        line = two_masses(drive, float(np.mean(turn.outputs.J)))
-        inertia = float(np.min(turn.outputs.J)), float(np.max(turn.outputs.J))
-        bands = [frequency_band(two_masses(drive, J)) for J in inertia]
+        inertia = turn.inertia_at(drive.ratio)
+        line = two_masses(drive, float(np.mean(inertia)))
+        ends = float(np.min(inertia)), float(np.max(inertia))
+        bands = [frequency_band(two_masses(drive, J)) for J in ends]
         span = min(band.least for band in bands), max(band.largest for band in bands)
         slowest = SLOWEST * span[1]
         if plan.table.slowest * speed < slowest:

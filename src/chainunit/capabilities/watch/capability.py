@@ -17,7 +17,6 @@ from ...study.cycle import Cycle
 from ...study.drive import Drive
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
-from ...study.operation import Operation
 from ...study.rules import MOTOR_FMU, Rule, has_sides
 from .observer_table import ObserverTable
 from .reading import WatchPlan, read_watch
@@ -101,11 +100,11 @@ class WatchCapability(Capability):
                         key=table,
                     )
 
-    def beside(self, plan: WatchPlans, drive: Drive, operation: Operation, turn: Cycle) -> Drive:
+    def beside(self, plan: WatchPlans, drive: Drive, feed: Any, turn: Cycle) -> Drive:
         """The drive with its load observer."""
         from .observation import with_observer
 
-        return drive if plan.observer is None else with_observer(drive, plan.observer, operation.feed, turn)
+        return drive if plan.observer is None else with_observer(drive, plan.observer, feed, turn)
 
     def take_estimates(self, config: Config, estimates: Estimates, tables: dict[str, Any]) -> None:
         """The recording is watched with the errors of the estimates, and the observer knows the false imbalance that

@@ -24,7 +24,7 @@ class PartOfLine(StudyCapability):
     def placed(self, plan: Any, drive: Drive, turn: Cycle) -> PlacedPart | None:
         """The part of a study behind the parts that the `drive` has already, by its `plan`; None where the study has
         none. `turn` is that of the machine in normal running."""
-        raise NotImplementedError
+        return None
 
     def remark(self, study: StudyRecord) -> None:
         """Add to the study the remarks on the part."""
