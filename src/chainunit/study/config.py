@@ -37,7 +37,7 @@ from .file_section import FileSection
 from .first_checks import check_values, independent, missing_recordings, plate_of, without
 from .foreign_machine import ForeignMachine, ForeignModel
 from .motor_sources import ForeignMotor, MotorSource, NamedMotor, OwnMotor
-from .operation import Operation
+from .operation import OperatingConditions
 from .parts import Parts, beside, example, motor_is_left, over_example, with_linkage
 from .registry import registered
 from .run_checks import endless, loads_beyond
@@ -117,9 +117,9 @@ class Config:
         return dataclasses.replace(self, file=dataclasses.replace(self.file, **changes))
 
     @cached_property
-    def operation(self) -> Operation:
+    def operation(self) -> OperatingConditions:
         """What the runs of the drive have in common."""
-        return Operation(
+        return OperatingConditions(
             self.run, self.feed, self.empty_start, self.drive.soft_time, self.coupling, self.simulation
         )
 

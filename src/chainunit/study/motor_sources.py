@@ -27,9 +27,9 @@ from .registry import registered
 class MotorSource(ABC):
     """A motor as the study file states it."""
 
-    kind: type[Motor] = Motor
+    kind: type[Motor]
     """its model"""
-    plate: CatalogueMotor | None = None
+    plate: CatalogueMotor | None
     """the motor of the catalogue, if it is one"""
 
     def check(self, tables: DriveTables, plans: Mapping[str, Any]) -> None:
@@ -58,6 +58,7 @@ class OwnMotor(MotorSource):
 
     kind: type[Motor]
     parameters: Any
+    plate: None = None
 
     def drive(self, tables: DriveTables, machine: Machine, turn: Cycle, added: float) -> Drive:
         """See `MotorSource`."""
@@ -95,6 +96,8 @@ class ForeignMotor(MotorSource):
     file: Path
     names: Mapping[str, str]
     """the FMU's names by ours, where they differ"""
+    kind: type[Motor] = Motor
+    plate: None = None
 
     @cached_property
     def component(self) -> FmuComponent:

@@ -10,7 +10,7 @@ from .sections import Coupling, Run
 
 
 @dataclass(frozen=True)
-class Operation:
+class OperatingConditions:
     """What the runs of a drive have in common."""
 
     run: Run

@@ -28,11 +28,11 @@ from .choice import choose_for, with_parts_beside
 from .config import Config
 from .cycle import cycle
 from .drive import Drive
-from .operation import Operation
+from .operation import OperatingConditions
 from .registry import parts_of_line
 
 
-def study_system(drive: Drive, operation: Operation) -> System:
+def study_system(drive: Drive, operation: OperatingConditions) -> System:
     """Machine, line and motor of a study, from rest. The speed reference is the crank speed at the motor
     from the start on; feed and processing forces are those of normal running. With feed-forward, the system
     has the second machine that the control uses."""
@@ -160,7 +160,7 @@ def whole_system(
     return part.model, part.start | input_starts(system, part.model)
 
 
-def _running(operation: Operation) -> float:
+def _running(operation: OperatingConditions) -> float:
     """The time of start-up and steady running [s]."""
     return operation.steady_begin + operation.run.turns * operation.turn
 
@@ -201,7 +201,7 @@ def _is_of(model: type[Model], drive: Drive) -> bool:
     return model is own or chains or model is own.direct()
 
 
-def _machine(operation: Operation, model: type[Model], machine: Machine) -> dict[str, float]:
+def _machine(operation: OperatingConditions, model: type[Model], machine: Machine) -> dict[str, float]:
     """Start values of the machine with its feed and gear, at the speed of the study."""
     speed = operation.crank_speed * machine.ratio
     direct = issubclass(model, DirectMachine)

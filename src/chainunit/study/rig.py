@@ -25,7 +25,7 @@ from .drive import Drive
 from .drive_fmus import with_files
 from .event import Event, OverTime, Signals, Values
 from .load_cases import no_feed
-from .operation import Operation
+from .operation import OperatingConditions
 from .readings import machine_series
 
 FEED_RISE = 0.1
@@ -37,7 +37,7 @@ class Rig:
     """A drive as the FMUs of `files` in its `operation`; or, with a `twin`, the drive
     whose system that function has changed, so that a part is left out."""
 
-    operation: Operation
+    operation: OperatingConditions
     drive: Drive
     files: Mapping[str, Path] | None
     """by component; None for the compiled system, which needs no FMUs"""

@@ -14,7 +14,7 @@ from ..mechanism.models import MachineModel
 from ..system.signals import Profile
 from .event import Event
 from .event_table import inputs_of
-from .operation import Operation
+from .operation import OperatingConditions
 from .registry import registered
 
 MOST_STEPS = 1e6
@@ -87,7 +87,7 @@ def loads_beyond(
 
 
 def endless(
-    operation: Operation, events: Mapping[str, Event], plans: Mapping[str, Any]
+    operation: OperatingConditions, events: Mapping[str, Event], plans: Mapping[str, Any]
 ) -> Iterator[InputError]:
     """The refusal of a study that would never end."""
     run, turn = operation.run, operation.turn

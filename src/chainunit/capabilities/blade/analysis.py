@@ -18,7 +18,7 @@ from ...reading.text import number
 from ...study.analysis import Analysis, Findings, Work
 from ...study.cycle import Cycle, cycle
 from ...study.drive import Drive
-from ...study.operation import Operation
+from ...study.operation import OperatingConditions
 from ...study.record import StudyRecord
 from ...study.turn import EVERY, POINTS
 
@@ -147,7 +147,7 @@ class BladeAnalysis(Analysis):
         return BladeFindings(turn, stack, _numbers(turn, stack, config.operation))
 
 
-def _numbers(turn: Cycle, stack: Stack, operation: Operation) -> Cutting:
+def _numbers(turn: Cycle, stack: Stack, operation: OperatingConditions) -> Cutting:
     blade, time = turn.outputs.blade, operation.turn
     against = -(blade.cut_fx * blade.vx + blade.cut_fy * blade.vy)
     work = float(np.mean(against)) * time

@@ -30,7 +30,7 @@ from ...study.event import AnySide, Event
 from ...study.event_table import RandomEvent
 from ...study.limits import limit_reached
 from ...study.measures import MEASURES, read_measure, same_measure
-from ...study.operation import Operation
+from ...study.operation import OperatingConditions
 from ...study.quantiles import CONFIDENCE, quantile, runs_needed, share
 from ...study.readings import crank_angle
 from ...study.record import StudyRecord
@@ -218,7 +218,7 @@ class Draw:
     """trip torque at the crank [N m]; infinite without a coupling"""
 
 
-def draw(plan: RandomPlan, operation: Operation, number: int) -> Draw:
+def draw(plan: RandomPlan, operation: OperatingConditions, number: int) -> Draw:
     """The event of the run with that number. It is the same in every process, and in whatever order the runs
     are made."""
     event, coupling = plan.event, operation.coupling

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ...machines.machine import Machine
 from ...study.drive_tables import DriveTables
 from ...study.event import Event
-from ...study.operation import Operation
+from ...study.operation import OperatingConditions
 from .table import SizingPlan
 
 
@@ -19,6 +19,6 @@ class SizingTask:
     plan: SizingPlan
     tables: DriveTables
     machine: Machine
-    operation: Operation
+    operation: OperatingConditions
     events: Mapping[str, Event]
     """the events of the study, of which those that bring all feed to one side count"""
