@@ -23,7 +23,7 @@ from chainunit.fmu.native.export import export
 from chainunit.machines.load_observer import LoadObserver
 from chainunit.study import config
 from chainunit.study.choice import choose
-from chainunit.study.package import left_out, study_system, whole_system
+from chainunit.study.package import drive_to_export, left_out, study_system, whole_system
 from chainunit.system import (
     CoSimulation,
     Jump,
@@ -269,9 +269,10 @@ def test_a_study_becomes_one_fmu(tmp_path):
 
 def test_what_an_exported_study_leaves_out():
     events = "[coupling]\n[[event]]\ntype = 'jam'\nside = 'left'\n"
-    assert left_out(config.parse(STUDY)) == ""
+    bare, full = config.parse(STUDY), config.parse(STUDY + events)
+    assert left_out(bare.operation, bare.given_events) == ""
     words = "Not in it: the safety coupling; the events jam_left. Its loads are those of normal running."
-    assert left_out(config.parse(STUDY + events)) == words
+    assert left_out(full.operation, full.given_events) == words
 
 
 @pytest.mark.parametrize(
@@ -316,7 +317,7 @@ def test_the_default_experiment_is_that_of_the_study(tmp_path):
     """The motors' own of 1 s at 20 us is none for a drive that starts up in seconds."""
     text = "[driveline]\n[run]\nstep = 0.5e-3\n[report]\nauthor = 'A. Bauer'\nrevision = 'C'\n"
     loaded = config.parse(text)
-    model, start = whole_system(loaded, backend="python")
+    model, start = whole_system(drive_to_export(loaded), loaded.operation, loaded.title, loaded.file.labels)
     root = model_description(Interface(model, start), "", {}, "9.9")
     experiment = {k: float(x) for k, x in root.find("DefaultExperiment").items()}
     assert experiment["stepSize"] == 0.5e-3

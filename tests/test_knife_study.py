@@ -574,7 +574,7 @@ def test_the_blade_follows_from_the_declaration_and_not_from_the_machine(monkeyp
 
     for machine in (OtherKnife, Pusher):
         chosen = parse(f'[system]\nmachine = "{machine.name}"')
-        drive = Drive(chosen.motor_type, chosen.motor, chosen.machine)
+        drive = Drive(chosen.motor.kind, chosen.motor.parameters, chosen.machine)
         assert BladeAnalysis.applies(drive, chosen.plans) == machine.cuts
         drawn = motion(record_of(chosen, drive))
         assert ("edge" in [link.name for link in drawn.links]) == machine.cuts

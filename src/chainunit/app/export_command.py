@@ -86,7 +86,7 @@ def export(
             report=status.update,
         )
     print(f"{file}: {model.name}, {made}")
-    if whole and loaded and (words := left_out(loaded)):
+    if whole and loaded and (words := left_out(loaded.operation, loaded.given_events)):
         print(words)
 
 
@@ -106,7 +106,7 @@ def export_ssp(
     with terminal_console(stderr=True).status("exporting") as status:
         made = export_study(loaded, output, backend=backend.value if backend else None, report=status.update)
     print(f"{output}: {made}")
-    if words := left_out(loaded):
+    if words := left_out(loaded.operation, loaded.given_events):
         print(words)
 
 

@@ -6,9 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from ..core.errors import refusal_prefix
-from ..drives.catalogue import check_own
 from ..models import MODELS
+from ..study.choice import check_motor
 from ..study.config import Config
 from ..study.record import LOAD_CYCLE, SPEED_MISSED, StudyRecord
 from ..study.registry import registered
@@ -21,11 +20,7 @@ from .task import Task, Writer
 
 def _accept(config: Config, *, scheduler: str | None = None, **options: Any) -> None:
     with config.file.refusals():
-        if config.motor is None:
-            with refusal_prefix("catalogue = ", "catalogue"):
-                check_own(config.file.catalogue)
-        else:
-            config.motor.check(config.drive, config.plans)
+        check_motor(config.motor, config.drive, config.plans, config.file.catalogue)
     if scheduler is not None:
         for part in registered():
             part.check_scheduler(config.plans[part.name], scheduler)

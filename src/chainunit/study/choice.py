@@ -8,12 +8,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from ..core.errors import refusal_prefix
+from ..core.temporary_folders import scratch
+from ..drives.catalogue import check_own
 from ..fmu.backends import Backend
-from ..work.progress import Report
+from ..work.progress import Report, quiet
 from .config import Config
 from .cycle import Cycle, cycle
 from .drive import Drive
 from .drive_tables import DriveTables
+from .motor_sources import MotorSource
 from .proposal import DriveProposal
 from .registry import parts_of_line, registered
 
@@ -28,10 +32,16 @@ class Choice:
     proposal: DriveProposal | None = None
 
 
-def choose(config: Config, folder: Path, report: Report, backend: Backend | None = None) -> Choice:
+def choose(config: Config, folder: Path, report: Report = quiet, backend: Backend | None = None) -> Choice:
     """The drive of a study. A capability that chooses it writes its FMUs to `folder`."""
     turn = cycle(config.machine, config.run.crank_speed, config.feed)
     return choose_for(turn, config, folder, report, backend)
+
+
+def drive_of(config: Config) -> Drive:
+    """The drive of a study, without the FMUs of a choice."""
+    with scratch() as folder:
+        return choose(config, folder).drive
 
 
 def choose_for(
@@ -40,7 +50,8 @@ def choose_for(
     """The drive of a study, as `choose`, whose machine makes this `turn` in normal running."""
     tables, plans, source = config.drive, config.plans, config.motor
     if source is None:
-        proposal = proposed_drive(config, folder, report, backend)
+        proposals = (part.drive(config, folder, report, backend) for part in registered())
+        proposal: DriveProposal = next(each for each in proposals if each is not None)
         return Choice(_with_line(proposal.drive, plans, turn), proposal.tables, proposal)
     source.check(tables, plans)
     added = sum(part.shaft_inertia(plans[part.name]) for part in registered())
@@ -48,10 +59,22 @@ def choose_for(
     return Choice(*source.completed(drive, tables, turn))
 
 
-def proposed_drive(config: Config, folder: Path, report: Report, backend: Backend | None) -> DriveProposal:
-    """The drive that a capability chooses."""
-    proposals = (part.drive(config, folder, report, backend) for part in registered())
-    return next(each for each in proposals if each is not None)
+def check_motor(
+    motor: MotorSource | None, tables: DriveTables, plans: Mapping[str, Any], own_motors: Path | None
+) -> None:
+    """Refuse files of a study that it cannot use: that of its motor or, where a capability chooses the motor, the
+    catalogue of own motors.
+
+    Raises
+    ------
+    InputError
+        see `MotorSource.check` and `chainunit.drives.catalogue.check_own`.
+    """
+    if motor is not None:
+        motor.check(tables, plans)
+        return
+    with refusal_prefix("catalogue = ", "catalogue"):
+        check_own(own_motors)
 
 
 def _with_line(drive: Drive, plans: Mapping[str, Any], turn: Cycle) -> Drive:

@@ -138,6 +138,16 @@ class Config:
         return None if self.motor is None else self.motor.plate
 
     @property
+    def given_events(self) -> list[str]:
+        """Names of the events that the file gives itself."""
+        return list(self.events) if self.file.gives("event") else []
+
+    @property
+    def knows_motor(self) -> bool:
+        """Whether the file has the data of the motor."""
+        return self.file.gives("motor") or self.plate is not None
+
+    @property
     def of_catalogue(self) -> bool:
         """Whether the motor is one of the catalogue."""
         return self.motor is None or self.plate is not None

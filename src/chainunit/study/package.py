@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -47,24 +47,14 @@ def study_system(drive: Drive, operation: OperatingConditions) -> System:
     return replace(drive.graph, start=start)
 
 
-def start_of(
-    config: Config,
-    model: type[Model],
-    *,
-    backend: Backend | None = None,
-    report: Callable[[str], None] = lambda what: None,
-) -> dict[str, float]:
-    """Start values of the parameters and inputs of the `model`, by name, with the values of the study: with
-    tuned gains, or with the motor and the ratio that are chosen.
+def start_of(drive: Drive, operation: OperatingConditions, model: type[Model]) -> dict[str, float]:
+    """Start values of the parameters and inputs of the `model`, by name, with those of the drive of a study.
 
     Raises
     ------
     InputError
         where the study has another motor or machine, or lacks the part of the line.
-    RunError
-        where no motor is found.
     """
-    drive = _drive(config, backend, report)
     for kind in parts_of_line():
         if model is kind.model:
             if (part := drive.line.part(kind.name)) is None:
@@ -74,7 +64,7 @@ def start_of(
         if not _is_of(model, drive):
             raise InputError(f"the study's machine is {drive.driven_machine.model.name}, not {model.name}")
         own = drive.simulated_machine if issubclass(model, ChainedModel) else drive.driven_machine
-        return _machine(config.operation, model, own)
+        return _machine(operation, model, own)
     if drive.motor is not model:
         title = drive.graph.components["motor"].title
         raise InputError(f"the study's motor is {title}, not {model.name}")
@@ -118,9 +108,10 @@ def model_and_start(
         where no motor is found.
     """
     if config and is_study_file(name):
-        return whole_system(config, backend=backend, report=report)
+        drive = drive_to_export(config, backend, report)
+        return whole_system(drive, config.operation, config.title, config.file.labels)
     model = model_named(name, direct)
-    start = start_of(config, model, backend=backend, report=report) if config else {}
+    start = start_of(drive_to_export(config, backend, report), config.operation, model) if config else {}
     if name == "ChainUnitFlexible":
         if rods is None:
             machine = config and config.machine.simulated
@@ -130,32 +121,26 @@ def model_and_start(
 
 
 def whole_system(
-    config: Config,
-    *,
-    backend: Backend | None = None,
-    report: Callable[[str], None] = lambda what: None,
+    drive: Drive, operation: OperatingConditions, title: str, labels: Mapping[str, str]
 ) -> tuple[type[Model], dict[str, float]]:
-    """The one model of the whole system of a study, and its start values by name: parameters, the speed reference and
-    the loads of normal running. Where the file leaves the motor open it is chosen first.
+    """The one model of the whole system of a study with that title and the `labels` of its report, and its start
+    values by name: parameters, the speed reference and the loads of normal running.
 
     Raises
     ------
     InputError
         where motor or machine is a foreign FMU.
-    RunError
-        where no motor is found.
     """
-    drive = _drive(config, backend, report)
-    system = study_system(drive, config.operation)
+    system = study_system(drive, operation)
     machine = system.components["machine"]
     name = machine.model.name if isinstance(machine, ModelComponent) else machine.title
-    labels = {key: printable(config.file.labels.get(key, ""), 1000) for key in ("author", "revision")}
+    author, revision = (printable(labels.get(key, ""), 1000) for key in ("author", "revision"))
     part = compiled(
         system,
         f"{name}System",
-        config.title,
-        about=About(author=labels["author"], version=labels["revision"]),
-        experiment={"step": config.run.step, "stop": _running(config.operation)},
+        title,
+        about=About(author=author, version=revision),
+        experiment={"step": operation.run.step, "stop": _running(operation)},
     )
     return part.model, part.start | input_starts(system, part.model)
 
@@ -165,12 +150,13 @@ def _running(operation: OperatingConditions) -> float:
     return operation.steady_begin + operation.run.turns * operation.turn
 
 
-def left_out(config: Config) -> str:
-    """A sentence on the parts of a study that its exported system does not have; empty where there are none."""
-    names = ["the safety coupling"] if config.coupling is not None else []
-    if config.file.gives("event"):
-        names.append(f"the events {', '.join(config.events)}")
-    if config.empty_start:
+def left_out(operation: OperatingConditions, events: Iterable[str]) -> str:
+    """A sentence on the parts of a study that its exported system does not have, among them the `events` of its
+    file by name; empty where there are none."""
+    names = ["the safety coupling"] if operation.coupling is not None else []
+    if listed := ", ".join(events):
+        names.append(f"the events {listed}")
+    if operation.empty_start:
         names.append("the feed that comes once the machine runs")
     if not names:
         return ""
@@ -209,7 +195,17 @@ def _machine(operation: OperatingConditions, model: type[Model], machine: Machin
     return machine.by_name | Layout(type(operation.feed)).by_name(operation.feed) | turning
 
 
-def _drive(config: Config, backend: Backend | None, report: Callable[[str], None]) -> Drive:
+def drive_to_export(
+    config: Config, backend: Backend | None = None, report: Callable[[str], None] = lambda what: None
+) -> Drive:
+    """The drive of a study with the parts beside it: with tuned gains, or with the motor and the ratio that are
+    chosen.
+
+    Raises
+    ------
+    RunError
+        where no motor is found.
+    """
     with scratch() as folder:
         turn = cycle(config.machine, config.run.crank_speed, config.feed)
         choice = choose_for(turn, config, folder, lambda what, done, todo: report(what), backend)
@@ -234,7 +230,7 @@ def export_study(
     InputError, RunError
         see `chainunit.system.ssp.export`; also where no motor is found, or the motor is a foreign FMU.
     """
-    drive = _drive(config, backend, report)
+    drive = drive_to_export(config, backend, report)
     return export(
         study_system(drive, config.operation),
         file,

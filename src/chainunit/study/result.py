@@ -52,7 +52,7 @@ def as_dict(study: StudyRecord) -> dict[str, Any]:
 def _as_dict(study: StudyRecord) -> dict[str, Any]:
     config = study.config
     return {
-        **as_data(Heading.of(config)),
+        **as_data(Heading.of(config.title, config.file)),
         "status": f"failed: {study.failure}" if study.failure else "complete",
         "failure": str(study.failure) if study.failure else None,
         "verdict": {"model": _on_model(study), "motor": motor_verdict(study)},

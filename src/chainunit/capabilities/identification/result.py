@@ -47,7 +47,7 @@ def _as_dict(machine: IdentifiedMachine) -> dict[str, Any]:
     estimates, start = machine.estimates, machine.information_at_start
     determined = sum(each.is_determined for each in estimates.values())
     return {
-        **as_data(Heading.of(config)),
+        **as_data(Heading.of(config.title, config.file)),
         "is_described": machine.is_described,
         "status": "complete" if machine.is_described else "the model does not describe the recordings",
         "sought": entry(float(len(estimates)), "1"),

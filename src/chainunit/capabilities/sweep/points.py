@@ -24,7 +24,7 @@ from ...core.system_description import reference
 from ...machines.machine import Machine
 from ...reading.results import InUnit
 from ...study.block_runs import BlockRuns, Cause
-from ...study.choice import choose
+from ...study.choice import drive_of
 from ...study.config import Config
 from ...study.cycle_quantities import CycleQuantity, cycle_quantity, evaluate
 from ...study.event import Event
@@ -231,7 +231,7 @@ def task_of(config: Config) -> SweepTask:
             "(chainunit keys sweep.parameter)",
             "sweep.parameter",
         )
-    drive = choose(config, Path(), lambda *said: None).drive
+    drive = drive_of(config)
     rig = event = None
     if plan.measures:
         rig, event = Rig(config.operation, drive, {}), config.events[plan.event]

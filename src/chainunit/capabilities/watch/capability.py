@@ -114,7 +114,7 @@ class WatchCapability(Capability):
         if "watch" in tables:
             tables["watch"]["identification"] = estimates.file
         if "observer" in tables:
-            imbalance = false_imbalance_of(config, estimates)
+            imbalance = false_imbalance_of(config.machine, config.feed, config.run.crank_speed, estimates)
             tables["observer"] |= {name: float(f"{x:.4g}") for name, x in imbalance.items()}
 
     def analyses(self) -> Iterable[type[Analysis]]:

@@ -11,9 +11,9 @@ import numpy as np
 from ...core.quantities import Layout
 from ...drives.terminal_signals import TerminalSignals, terminal_signals
 from ...machines.load_observer import LoadObserver
+from ...machines.machine import Machine
 from ...study.arrays import rms
 from ...study.capability import Estimates
-from ...study.config import Config
 from ...study.cycle import Cycle
 from ...study.drive import Drive
 from ...system import ModelComponent
@@ -92,14 +92,17 @@ def tuning(table: ObserverTable, feed: Any, speed: float, torque: float) -> dict
     }
 
 
-def false_imbalance_of(config: Config, estimates: Estimates) -> dict[str, float]:
-    """The keys of the table [observer] with the false imbalance of an observer of the estimated machine."""
+def false_imbalance_of(
+    machine: Machine, usual: Any, crank_speed: float, estimates: Estimates
+) -> dict[str, float]:
+    """The keys of the table [observer] with the false imbalance of an observer of the estimated machine, with the
+    `usual` feed at that speed of the crank [rad/s]."""
     values = estimates.values
     loads = {name.removeprefix("feed."): x for name, x in values.items() if name.startswith("feed.")}
-    feed = Layout(type(config.feed)).from_names(loads, config.feed)
+    feed = Layout(type(usual)).from_names(loads, usual)
     own = {name.removeprefix("machine."): x for name, x in values.items()}
-    known = config.machine.by_name | own | usual_loads(feed)
-    return false_imbalance(known, list(own), estimates.covariance, config.run.crank_speed)
+    known = machine.by_name | own | usual_loads(feed)
+    return false_imbalance(known, list(own), estimates.covariance, crank_speed)
 
 
 def false_imbalance(

@@ -29,7 +29,7 @@ def _as_dict(watched: WatchedRecording) -> dict[str, Any]:
     config, plan, recording = watched.config, watched.plan, watched.recording
     p = watched.parameters
     return {
-        **as_data(Heading.of(config)),
+        **as_data(Heading.of(config.title, config.file)),
         "file": str(plan.file),
         "columns": list(recording.columns),
         "duration": entry(float(recording.time[-1] - recording.time[0]), "s"),
