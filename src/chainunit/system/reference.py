@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.integrate import solve_ivp
+from scipy.integrate import DOP853
 
 from ..core.engines import MATH, casadi_
 from ..core.errors import RunError
@@ -67,15 +67,16 @@ def monolithic(
         def rates(t: float, x: Any, behind: float = behind) -> Any:
             return equations.rates(max(t, behind), x)
 
-        solution = solve_ivp(
-            rates, (low, high), x, method="DOP853", rtol=rtol, atol=equations.tolerances(rtol), dense_output=True
-        )  # fmt: skip
-        if not solution.success:
-            raise RunError(f"monolithic reference: {solution.message}")
-        here = (times >= low) & (times <= high)
-        if here.any():
-            states[:, here] = solution.sol(times[here])
-        x = solution.y[:, -1]
+        solver = DOP853(rates, low, x, high, rtol=rtol, atol=equations.tolerances(rtol))
+        states[:, times == low] = np.reshape(x, (-1, 1))
+        while solver.status == "running":
+            if message := solver.step():
+                raise RunError(f"monolithic reference: {message}")
+            # only where a row lies in the step: the interpolation costs three evaluations
+            first, end = np.searchsorted(times, (solver.t_old, solver.t), side="right")
+            if first < end:
+                states[:, first:end] = solver.dense_output()(times[first:end])
+        x = solver.y
     return equations.dataset(times, states)
 
 
@@ -101,16 +102,30 @@ class _Equations:
         rates = model.derivatives(casadi_(), p, u, x) if model.state_layout else []
         outputs = model.parts[0].layout.values(model.evaluate(casadi_(), p, u, x)[0])
         self._rates, self._all = (
-            casadi.Function(name, symbols, [casadi.cse(casadi.vertcat(*map(casadi.SX, rows)))])
+            casadi.Function(name, symbols, [casadi.densify(casadi.cse(casadi.vertcat(*map(casadi.SX, rows))))])
             for name, rows in (("rates", rates), ("outputs", outputs))
         )
+
+        # the function reads and writes these arrays: its call with arrays of the caller costs four times as much
+        self._memory = [np.zeros(len(rows)) for rows in (self._outside, self.states, self.states)]
+        self._changing = [(n, signal) for n, signal in enumerate(self._outside) if callable(signal)]
+        self._memory[0][:] = [0.0 if callable(signal) else signal for signal in self._outside]
+        self._buffer, self._evaluate = self._rates.buffer()
+        for n, rows in enumerate(self._memory[:2]):
+            self._buffer.set_arg(n, memoryview(rows))
+        self._buffer.set_res(0, memoryview(self._memory[2]))
 
     def _inputs(self, t: Any) -> list[Any]:
         return [at_time(signal, t) for signal in self._outside]
 
     def rates(self, t: float, x: Any) -> Any:
         """Derivatives of all states."""
-        return self._rates(self._inputs(t), x).full().ravel()
+        u, states, rates = self._memory
+        for n, signal in self._changing:
+            u[n] = signal(t)
+        states[:] = x
+        self._evaluate()
+        return rates.copy()
 
     def tolerances(self, rtol: float) -> list[float]:
         """The absolute tolerance of each state."""
