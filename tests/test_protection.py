@@ -410,7 +410,9 @@ def test_an_inverter_as_a_way_is_tried_with_more_boost(on_line, monkeypatch):
     rig = Rig(on_line.config.operation, on_line.drive, None)
     found = coupling_alternatives._inverter(on_line, rig, sizing_of(on_line).setting)
     assert tried == [({0.05}, 5), ({0.10}, 5), ({0.15}, 5)] and found.numbers.boost == 0.15
-    given = on_line.config.with_file(given=on_line.config.file.given | {"starter.inverter.boost"})
+    tables = on_line.config.drive
+    tables = dataclasses.replace(tables, given=tables.given | {"starter.inverter.boost"})
+    given = dataclasses.replace(on_line.config, drive=tables)
     tried.clear()
     none = coupling_alternatives._inverter(
         dataclasses.replace(on_line, config=given), rig, sizing_of(on_line).setting

@@ -134,7 +134,7 @@ def trial_of(config, time, heat):
         xr.Dataset({"motor.heat": ("time", x)}, {"time": t})
         for t, x in ((time, heat), (time[-1] + np.linspace(0.0, 4.0, 401), np.full(401, 400.0)))
     )
-    drive = Drive(DcMotor, config.motor.parameters, config.machine)
+    drive = Drive(DcMotor, DcMotor.Parameters(), config.machine)
     return Trial(task_of(config), catalogue()[0], drive, None, start, steady, (), {})
 
 
@@ -522,7 +522,7 @@ def test_the_peak_torque_is_that_of_the_feed_that_moves_too(tmp_path, monkeypatc
 
 def test_the_shift_of_the_feed_keeps_its_mass():
     config = parse(HEAVY)
-    rig = Rig(config.operation, Drive(DcMotor, config.motor.parameters, config.machine), {})
+    rig = Rig(config.operation, Drive(DcMotor, DcMotor.Parameters(), config.machine), {})
     signals = rig.event_signals(one_sided_event(config.events, "left"), 2.0, {})
     left, right = (signals[f"machine.{side}.material_mass"] for side in ("left", "right"))
     assert isinstance(left, Profile)
