@@ -150,7 +150,7 @@ def drive(kind: str, wrong: str = "") -> Drive:
         machine = ChainUnitOfChains(machine.p)
     if kind == "im":
         return Drive(InductionMotor, induction, machine)
-    return Drive(DcMotor, config.motor, machine)
+    return Drive(DcMotor, config.motor.parameters, machine)
 
 
 @lru_cache(maxsize=16)

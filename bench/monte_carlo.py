@@ -27,6 +27,7 @@ from chainunit.drives.dc_motor import DcMotor
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 from chainunit.study.drive_fmus import export_drive
+from chainunit.study.rig import Rig
 from chainunit.system.instance import Fmu, Instance
 
 STUDY = "[monte_carlo]\nruns = {runs}\nduration = 2\n[coupling]\ntrip_torque = 1000\n"
@@ -37,9 +38,9 @@ MEASURES = ("crank_torque_peak", "motor_torque_peak", "current_peak", "rocker_to
 def task_of(runs: int, folder: Path) -> monte_carlo.RandomTask:
     """The packaged study; its FMUs are written into the folder."""
     config = parse(STUDY.format(runs=runs))
-    drive = Drive(DcMotor, config.motor, config.machine)
+    drive = Drive(DcMotor, config.motor.parameters, config.machine)
     files, _ = export_drive(drive, folder)
-    return monte_carlo.RandomTask(config, drive, files, 6.7)
+    return monte_carlo.RandomTask(config.plans["random_overloads"], Rig(config.operation, drive, files), 6.7)
 
 
 def timed(task: monte_carlo.RandomTask, folder: Path) -> tuple[monte_carlo.MonteCarloResult, float]:
@@ -58,7 +59,9 @@ def timed(task: monte_carlo.RandomTask, folder: Path) -> tuple[monte_carlo.Monte
 def loop_alone(task: monte_carlo.RandomTask, runs: int = 256) -> float:
     """Seconds a run of the native loop, without what Python does before and after it."""
     block = task.block()
-    points = [monte_carlo.point(block.rig, monte_carlo.draw(task.config, k)) for k in range(runs)]
+    plan, operation = task.plan, task.rig.operation
+    drawn = [monte_carlo.draw(plan, operation, k) for k in range(runs)]
+    points = [monte_carlo.point(block.rig, each, plan.table.duration) for each in drawn]
     spent = 0.0
     real = block.loop.run
 

@@ -72,7 +72,7 @@ def test_it_goes_on_as_the_same_machine(organ, more, trip, tmp_path, monkeypatch
     start = model.start_from({"phi0": float(run["machine.phi0"][-1]), "w0": w})
     p = model.parameter_layout.from_names(coasting_parameters(study.drive) | start)
     loads = study.drive.loads(study.config.feed)
-    rig = Rig(study.config, study.drive, {})
+    rig = Rig(study.config.operation, study.drive, {})
     (event,) = Runner(study, rig, print).events
     jam = rig.event_signals(event, study.event["jam_left"], {})
     times = coasting["time"].values

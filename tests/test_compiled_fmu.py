@@ -23,7 +23,7 @@ from chainunit.fmu.native.export import export
 from chainunit.machines.load_observer import LoadObserver
 from chainunit.study import config
 from chainunit.study.choice import choose
-from chainunit.study.package import left_out, study_system, whole_system
+from chainunit.study.package import drive_to_export, left_out, study_system, whole_system
 from chainunit.system import (
     CoSimulation,
     Jump,
@@ -262,16 +262,17 @@ def test_a_study_becomes_one_fmu(tmp_path):
     drive = choose(study, tmp_path / "scratch", lambda *progress: None).drive
     # the gains are the tuned ones
     assert start["motor.speed_control.kp"] == drive.fmu_parameters.speed_control.kp
-    exact = monolithic(study_system(study, drive), {}, run["time"], rtol=1e-12)
+    exact = monolithic(study_system(drive, study.operation), {}, run["time"], rtol=1e-12)
     for name in ("motor.w", "machine.tau"):
         np.testing.assert_allclose(run[name], exact[name].values, rtol=1e-7, atol=1e-9)
 
 
 def test_what_an_exported_study_leaves_out():
     events = "[coupling]\n[[event]]\ntype = 'jam'\nside = 'left'\n"
-    assert left_out(config.parse(STUDY)) == ""
+    bare, full = config.parse(STUDY), config.parse(STUDY + events)
+    assert left_out(bare.operation, bare.given_events) == ""
     words = "Not in it: the safety coupling; the events jam_left. Its loads are those of normal running."
-    assert left_out(config.parse(STUDY + events)) == words
+    assert left_out(full.operation, full.given_events) == words
 
 
 @pytest.mark.parametrize(
@@ -316,11 +317,11 @@ def test_the_default_experiment_is_that_of_the_study(tmp_path):
     """The motors' own of 1 s at 20 us is none for a drive that starts up in seconds."""
     text = "[driveline]\n[run]\nstep = 0.5e-3\n[report]\nauthor = 'A. Bauer'\nrevision = 'C'\n"
     loaded = config.parse(text)
-    model, start = whole_system(loaded, backend="python")
+    model, start = whole_system(drive_to_export(loaded), loaded.operation, loaded.title, loaded.file.labels)
     root = model_description(Interface(model, start), "", {}, "9.9")
     experiment = {k: float(x) for k, x in root.find("DefaultExperiment").items()}
     assert experiment["stepSize"] == 0.5e-3
     assert experiment["stopTime"] == pytest.approx(
-        loaded.steady_begin + loaded.run.turns * loaded.turn, rel=1e-5
+        loaded.operation.steady_begin + loaded.run.turns * loaded.operation.turn, rel=1e-5
     )
     assert root.get("author") == "A. Bauer" and root.get("version") == "C" and root.get("license") is None

@@ -96,7 +96,7 @@ def test_units(text, section, name, value):
 
 
 def test_temperatures():
-    assert pytest.approx(293.15) == parse('[motor]\nambient = { T = "20 degC" }').motor.ambient.T
+    assert pytest.approx(293.15) == parse('[motor]\nambient = { T = "20 degC" }').motor.parameters.ambient.T
 
 
 @pytest.mark.parametrize(

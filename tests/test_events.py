@@ -18,6 +18,7 @@ from chainunit.study.catalogue_drive import catalogue_drive
 from chainunit.study.cycle import cycle
 from chainunit.study.drive import Drive
 from chainunit.study.event import TYPES, Event, Role, Timing, angle_of_begin, in_groups
+from chainunit.study.events import one_sided_event
 from chainunit.study.readings import crank_angle, only_whole_turns
 from chainunit.study.result import as_dict
 from chainunit.study.rig import Rig
@@ -89,7 +90,7 @@ def test_refusals(text, line):
 
 def rig_of(text=""):
     values = config.parse(text)
-    return Rig(values, Drive(DcMotor, values.motor, values.machine), {})
+    return Rig(values.operation, Drive(DcMotor, values.motor.parameters, values.machine), {})
 
 
 def at(signal, t):
@@ -108,8 +109,8 @@ def test_what_lumps_and_jams_do_over_time():
             assert at(signal, begin + t) == pytest.approx(force, abs=1e-6)
     assert at(signal, 1.0 + 2.4 + 0.1) == 50.0
     # the last lump is gone after 1.9 s; a turn more is followed
-    assert lumps.on("right", p).follow(0.1) == pytest.approx(2.0)
-    assert lumps.on("right", p).follow(10.0) == pytest.approx(21.0)
+    assert lumps.on("right", p).time_followed(0.1) == pytest.approx(2.0)
+    assert lumps.on("right", p).time_followed(10.0) == pytest.approx(21.0)
     jam = TYPES["jam"]
     assert set(Layout(jam.Parameters).names) < set(Layout(lumps.Parameters).names)
 
@@ -122,11 +123,13 @@ def test_an_event_is_followed_to_its_end_and_a_turn_more(kind):
     event = of.on("left" if of.has_side else "", of.Parameters(turns=1.0, **longer))
     normal = dict.fromkeys(event.inputs(event.side), 50.0)
     signals = event.signals(normal, 0.0, dict.fromkeys(event.reads, 0.1)).values()
-    end = event.follow(turn) - turn
+    end = event.time_followed(turn) - turn
     assert end >= (7.0 if longer else 0.0)
     for signal in signals:
         assert at(signal, end + 1e-9) == at(signal, end + 100.0)
-    assert of.on(event.side, of.Parameters(turns=200.0, **longer)).follow(turn) == pytest.approx(200.1 * turn)
+    assert of.on(event.side, of.Parameters(turns=200.0, **longer)).time_followed(turn) == pytest.approx(
+        200.1 * turn
+    )
 
 
 def test_an_overload_is_on_top_of_the_load():
@@ -168,7 +171,7 @@ def test_what_the_system_lacks_is_left_out():
     dip = TYPES["dip"].on()
     rig = rig_of()
     assert not rig.takes(dip)
-    line = Rig(rig.config, Drive(InductionMotor, InductionMotor.Parameters(), rig.config.machine), {})
+    line = Rig(rig.operation, Drive(InductionMotor, InductionMotor.Parameters(), rig.drive.machine), {})
     assert line.takes(dip)
     (signal,) = line.event_signals(dip, 2.0, {}).values()
     assert isinstance(signal, Profile)
@@ -216,9 +219,9 @@ def test_random_overloads_that_the_drive_has_no_input_for_are_refused(tmp_path):
 
 def test_sizing_takes_the_studys_own_one_sided_feed():
     text = event_line("feed_right", shift=0.7)
-    assert config.parse(text).one_sided("right").p.shift == 0.7
-    assert config.parse(text).one_sided("left").p.shift == 0.3
-    assert config.parse("").one_sided("left") == config.load().events["feed_left"]
+    assert one_sided_event(config.parse(text).events, "right").p.shift == 0.7
+    assert one_sided_event(config.parse(text).events, "left").p.shift == 0.3
+    assert one_sided_event(config.parse("").events, "left") == config.load().events["feed_left"]
 
 
 def test_two_of_a_kind_run_beside_each_other(tmp_path):
@@ -267,19 +270,18 @@ def uneven():
     """The rig of the compiled system."""
     values = config.parse(UNEVEN)
     bars = cycle(values.machine, values.run.crank_speed, values.feed)
-    return Rig(values, catalogue_drive(values, values.plate, bars.crank_torque), None)
+    return Rig(values.operation, catalogue_drive(values.drive, values.machine, bars, values.plate), None)
 
 
 def test_an_event_begins_at_its_angle_however_uneven_the_turn_is():
     """An induction motor without a flywheel: at the mean speed the crank would be elsewhere."""
     rig = uneven()
-    values = rig.config
+    operation, events = rig.operation, list(config.parse(UNEVEN).events.values())
     with rig.from_rest() as simulation:
-        run = start_up(rig, simulation, values.stop, lambda time: None, {}).run
+        run = start_up(rig, simulation, lambda time: None, {}).run
         saved, angle = simulation.save(), float(crank_angle(rig.drive, run)[-1])
-        turns = only_whole_turns(rig.drive, run.sel(time=slice(saved - 1.1 * values.turn, None)), 1)
+        turns = only_whole_turns(rig.drive, run.sel(time=slice(saved - 1.1 * operation.turn, None)), 1)
         speed = 2.0 * math.pi / np.ptp(turns["time"].values)
-        events = list(values.events.values())
         errors, of_mean_speed = [], []
         for event, lead in zip(events, lead_times(rig, simulation, events, angle, speed), strict=True):
             branch = follow(rig, simulation, event, saved + lead, saved + lead + 0.5).run
@@ -303,7 +305,7 @@ def test_an_event_begins_at_its_angle_however_uneven_the_turn_is():
 
 def test_an_event_does_not_wait_for_a_crank_that_hardly_turns():
     rig = uneven()
-    half = 0.5 * rig.config.run.crank_speed
+    half = 0.5 * rig.operation.crank_speed
     assert (
         longest_lead(rig, math.pi, 0.0)
         == longest_lead(rig, math.pi, half)
@@ -313,7 +315,7 @@ def test_an_event_does_not_wait_for_a_crank_that_hardly_turns():
         # at rest, and soon after: no angle is passed in so short a time
         simulation.run(0.001, 0.001)
         simulation.save()
-        (lead,) = lead_times(rig, simulation, list(rig.config.events.values())[:1], 0.0, 1e4)
+        (lead,) = lead_times(rig, simulation, list(config.parse(UNEVEN).events.values())[:1], 0.0, 1e4)
     assert lead == pytest.approx(longest_lead(rig, math.pi, 1e4))
 
 

@@ -13,6 +13,7 @@ from chainunit.fmu.companion_files import companion_files
 from chainunit.fmu.description import Interface
 from chainunit.fmu.native.export import export
 from chainunit.models import MODELS
+from chainunit.study.choice import drive_of
 from chainunit.study.config import load
 from chainunit.study.package import start_of
 from chainunit.system import ModelComponent, System, monolithic, shaft_joints
@@ -63,7 +64,7 @@ def test_an_fmu_starts_as_the_packaged_study_or_says_where_not():
         model = MODELS[name]
         variables = (*model.parameter_layout.variables, *model.input_layout.variables)
         declared = {v.name: v.quantity.start for v in variables}
-        given = start_of(config, model)
+        given = start_of(drive_of(config), config.operation, model)
         different = {key for key, value in given.items() if declared[key] != pytest.approx(value, rel=1e-7)}
         forces = {f"{side}.processing_force" for side in ("left", "right")}
         assert different <= {"ratio", "w", "w_start", *forces}, different

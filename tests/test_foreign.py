@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+from records import record_of
 from reports import said_of
 
 from chainunit.core.errors import InputError, RunError, printable, shown
@@ -110,14 +111,12 @@ def test_titles_are_harmless_wherever_they_go():
     from chainunit.drives.dc_motor import DcMotor
     from chainunit.report.markdown import markdown_text
     from chainunit.study.drive import Drive
-    from chainunit.study.record import StudyRecord
-    from chainunit.study.statics import statics
 
     values = config.parse(f"title = {toml_text(EVIL)}")
     assert harmless(values.title) and "\n" not in values.title
     assert not re.search(r"(?<!\\)[<>\[\]|`*_]", markdown_text(values.title))
-    drive = Drive(DcMotor, values.motor, values.machine)
-    assert harmless(said_of(StudyRecord(values, drive, statics(values, drive))))
+    drive = Drive(DcMotor, values.motor.parameters, values.machine)
+    assert harmless(said_of(record_of(values, drive)))
     assert "\\<script\\>" in markdown_text(EVIL)
 
 

@@ -17,13 +17,13 @@ import pytest
 from command import chainunit
 from fmpy.ssp.ssd import read_ssd
 from scipy.integrate import solve_ivp
+from sizings import sized_by
 from test_foreign_system import OTHER as MOTOR_OTHER
 from test_foreign_system import OTHER_NAMES, build
 from test_ssp import TOOLS, connections
 from test_ssp import run as run_in
 
 from chainunit import InputError, Study
-from chainunit.capabilities.sizing.search import size
 from chainunit.core.quantities import Value, declaration, quantity
 from chainunit.reading.text import number as text_of
 from chainunit.study import config
@@ -251,7 +251,7 @@ def test_the_step_is_of_second_order(folder):
             parse(at, f"{STUDY}{MACHINE}motor = 'ForeignMotor.fmu'\n{OTHER_NAMES}"), at, None
         ).drive
         files, _ = export_drive(drive, at)
-        rig = Rig(parse(at, STUDY + MACHINE), drive, files)
+        rig = Rig(parse(at, STUDY + MACHINE).operation, drive, files)
         w_ref = Profile(0.0, ((0.0, 0.3, SPEED * RATIO),))
         exact = together(0.6, w_ref, lambda t: PRESSURE)
         for step in (0.004, 0.002):
@@ -314,7 +314,7 @@ def test_sizing_finds_a_motor_for_it(folder):
 
 def test_sizing_does_without_its_torque(tmp_path):
     build(tmp_path, left_out=("tau",), script=SCRIPT)
-    result = size(parse(tmp_path, SIZED), tmp_path, lambda *said: None)
+    result = sized_by(parse(tmp_path, SIZED), tmp_path)
     compare_with_pump(result.best)
 
 
@@ -394,7 +394,7 @@ def test_a_package_holds_their_files_as_they_are(tool, folder, tmp_path):
     drive = choose(study, tmp_path, None).drive
     files, _ = export_drive(drive, tmp_path)
     with CoSimulation(
-        replace(with_files(drive, files), start=study_system(study, drive).start)
+        replace(with_files(drive, files), start=study_system(drive, study.operation).start)
     ) as simulation:
         reference = simulation.run(0.3, 1e-3)["motor.w"].values[1:]
     assert np.max(np.abs(got[:, 0] - reference)) < 2e-4 * np.max(reference)

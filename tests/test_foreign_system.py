@@ -22,7 +22,7 @@ from chainunit.core.model import Terminal
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.motor import Motor
 from chainunit.study import config, run
-from chainunit.study.choice import with_motor
+from chainunit.study.choice import choose
 from chainunit.study.drive import Drive
 from chainunit.study.drive_fmus import export_drive, with_files
 from chainunit.study.readings import crank_motion, crank_torque, largest_torque, pull_out_torque
@@ -553,12 +553,15 @@ def test_a_reference_in_another_unit_is_refused(file, tmp_path):
 
 
 def test_a_study_that_asks_for_more_is_refused(file):
+    def chosen(text):
+        choose(config.parse(text + f'[system]\nmotor = "{file}"\n'), file.parent, lambda *said: None)
+
     with pytest.raises(InputError, match=r"ForeignMotor\.fmu: the inertia of its rotor is not known; leave"):
-        with_motor(config.parse(STUDY + "[driveline]\nJ4 = 2\n"), file)
+        chosen(STUDY + "[driveline]\nJ4 = 2\n")
     with pytest.raises(
         InputError, match=r"ForeignMotor\.fmu: has no input tau_ff in N\.m; leave feed_forward out"
     ):
-        with_motor(config.parse("feed_forward = true\n" + STUDY), file)
+        chosen("feed_forward = true\n" + STUDY)
 
 
 def test_no_twin_without_a_rotor(file, machine, fmus):

@@ -9,6 +9,7 @@ import math
 from functools import partial
 
 import pytest
+from records import record_of
 from test_foreign_machine import MACHINE, SCRIPT
 from test_foreign_machine import STUDY as PUMP
 from test_foreign_system import build
@@ -19,16 +20,14 @@ from chainunit.report import blocks
 from chainunit.report.study import report
 from chainunit.study import remarks
 from chainunit.study.catalogue_drive import with_inertia
-from chainunit.study.choice import as_chosen, choose
+from chainunit.study.choice import choose
 from chainunit.study.config import load, parse
 from chainunit.study.given import given_sections
 from chainunit.study.measures import Answers
 from chainunit.study.origins import origin_of
 from chainunit.study.parts import example
-from chainunit.study.record import StudyRecord
 from chainunit.study.remarks import conclude
 from chainunit.study.result import as_dict
-from chainunit.study.statics import statics
 
 KNIFE = example("knife")
 
@@ -36,7 +35,7 @@ KNIFE = example("knife")
 def study_of(config, folder):
     """The study before its first run."""
     choice = choose(config, folder, lambda *_: None)
-    study = StudyRecord(config, choice.drive, statics(config, choice.drive), choice.proposal)
+    study = record_of(config, choice.drive, choice.proposal)
     conclude(study)
     return study
 
@@ -48,7 +47,7 @@ def drive_of(study, folder):
 def test_the_motor_is_shown_as_it_is_and_turns_with_gear_and_flywheel(tmp_path):
     """Its FMU has all inertia on its shaft."""
     study = parse(KNIFE.replace("[gear]\n", "[gear]\nJ = 0.003\n"))
-    assert study.gear.J == 0.003 and study.values["flywheel"].J > 0.0
+    assert study.drive.gear.J == 0.003 and study.values["flywheel"].J > 0.0
     drive, plate = drive_of(study, tmp_path), study.plate.model()[1].rotor
     assert (drive.parameters.rotor.J, drive.parameters.rotor.d) == (plate.J, plate.d)
     whole = plate.J + 0.003 + study.values["flywheel"].J
@@ -93,14 +92,16 @@ def test_the_slip_compensation_that_is_used_is_shown(tmp_path):
         config = parse(f'start = "inverter"\n{text}\n{more}')
         choice = choose(config, tmp_path, lambda *_: None)
         drive = choice.drive
-        study = dataclasses.replace(study_of(config, tmp_path), config=as_chosen(config, choice))
+        study = dataclasses.replace(
+            study_of(config, tmp_path), config=dataclasses.replace(config, drive=choice.tables)
+        )
         result = as_dict(study)
         assert drive.parameters.inverter.slip == pytest.approx(used, rel=1e-12)
         assert result["motor"]["inverter.slip"]["value"] == drive.parameters.inverter.slip
         assert result["starter"]["inverter.slip"]["value"] == drive.parameters.inverter.slip
         assert origin_of(study, "starter.inverter.slip") == ("file" if given else "catalogue")
         # a flywheel that a comparison adds has the setting of a drive with one
-        wheel = with_inertia(config, drive, 0.1)
+        wheel = with_inertia(config.drive, drive, 0.1)
         assert wheel.added_inertia == 0.1 and wheel.parameters.inverter.slip == (used if given else 0.0)
         (note,) = [remark.text for remark in study.remarks if remark.kind == "slip compensation"] or [""]
         assert ("rated slip" in note) == (not given and used > 0.0)

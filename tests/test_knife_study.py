@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from records import record_of
 from reports import said_of, write
 from scipy.integrate import solve_ivp
 
@@ -34,11 +35,9 @@ from chainunit.study.limits import given_motor
 from chainunit.study.measures import read_answers
 from chainunit.study.parts import example
 from chainunit.study.readings import only_whole_turns
-from chainunit.study.record import StudyRecord
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
 from chainunit.study.start_up import start_up
-from chainunit.study.statics import statics
 from chainunit.study.stored import cutting_power
 from chainunit.study.turn import TurnAnalysis
 from chainunit.study.window import Phase, Window
@@ -59,8 +58,8 @@ def bare(text=""):
     """A study before its runs, with what needs none."""
     config = parse(HEAD + text)
     drive = choose(config, Path(), lambda *_: None).drive
-    study = StudyRecord(config, drive, statics(config, drive))
-    rig = Rig(config, drive, {})
+    study = record_of(config, drive)
+    rig = Rig(config.operation, drive, {})
     for analysis in (TurnAnalysis, BladeAnalysis):
         study.findings[analysis.name] = analysis.find(study, Work(rig, lambda *_: None))
     return study
@@ -86,13 +85,13 @@ def rig(done):
     study = bare("[run]\nsettle_turns = 4\nturns = 4\n[flywheel]\nJ = 0.8\ncompare = []")
     folder = done[1] / "fmu"
     files = {"machine": folder / "KnifeDrive.fmu", "motor": folder / "InductionMotor.fmu"}
-    return study, Rig(study.config, study.drive, files)
+    return study, Rig(study.config.operation, study.drive, files)
 
 
 def at_speed(rig, flywheel, **changes):
     """The rig with that flywheel, at its speed from the start on."""
     drive = dataclasses.replace(rig.drive, added_inertia=flywheel)
-    speed = rig.config.run.crank_speed * drive.ratio
+    speed = rig.operation.crank_speed * drive.ratio
     return dataclasses.replace(
         rig,
         drive=dataclasses.replace(
@@ -104,11 +103,11 @@ def at_speed(rig, flywheel, **changes):
 def steady_turns(rig):
     """The steady turns of a rig, and their answers."""
     with rig.from_rest() as simulation:
-        started = start_up(rig, simulation, rig.config.stop, lambda time: None, {})
+        started = start_up(rig, simulation, lambda time: None, {})
     turns = only_whole_turns(
-        rig.drive, started.run.sel(time=slice(started.steady_from, None)), rig.config.run.turns
+        rig.drive, started.run.sel(time=slice(started.steady_from, None)), rig.operation.run.turns
     )
-    return turns, read_answers(Window(Phase.STEADY, turns, rig.drive, (), rig.config.run.crank_speed))
+    return turns, read_answers(Window(Phase.STEADY, turns, rig.drive, (), rig.operation.crank_speed))
 
 
 # a turn at constant speed
@@ -173,8 +172,8 @@ def test_pins_have_their_peaks_where_they_say():
 def test_fluctuation_by_hand_with_a_large_flywheel(rig):
     """Where the flywheel is so heavy that the motor's torque hardly varies, the hand formula is right."""
     study, rig = rig
-    run = dataclasses.replace(rig.config.run, settle_turns=15.0, turns=1.0)
-    heavy = at_speed(dataclasses.replace(rig, config=dataclasses.replace(rig.config, run=run)), 30.0)
+    run = dataclasses.replace(rig.operation.run, settle_turns=15.0, turns=1.0)
+    heavy = at_speed(dataclasses.replace(rig, operation=dataclasses.replace(rig.operation, run=run)), 30.0)
     _, answers = steady_turns(heavy)
     turn, cut = turn_and_cut(study)
     w, ratio = answers.speed_mean, rig.drive.ratio
@@ -203,7 +202,7 @@ def test_cutting_against_the_static_torque_of_the_motor(rig):
         air = steady(MATH, p, w).air_gap_tau - p.rotor.d * w
         return [w, (air - table(phi, torque)) / (p.rotor.J + table(phi, inertia))]
 
-    turn = study.config.turn
+    turn = study.config.operation.turn
     times = np.linspace(4.0 * turn, 5.0 * turn, 1001)
     start = [0.0, study.config.run.crank_speed * ratio]
     w = solve_ivp(rate, (0.0, times[-1]), start, rtol=1e-6, t_eval=times, max_step=2e-3).y[1]
@@ -408,7 +407,14 @@ def test_no_flywheel_is_needed_where_the_motor_alone_keeps_the_fluctuation():
 def judged(study, answers):
     """A flywheel with these answers, and the limits of the study's motor."""
     a = FlywheelAnswers(**answers)
-    checks = given_motor(study.config, study.drive, a.winding_temperature, a.current_rms, a.start_time)
+    checks = given_motor(
+        study.drive,
+        study.config.plate,
+        study.config.permitted_temperature[1],
+        a.winding_temperature,
+        a.current_rms,
+        a.start_time,
+    )
     return Wheel(a, None, checks)
 
 
@@ -484,7 +490,9 @@ def test_words_for_a_slow_start_and_a_poor_run():
 def test_a_motor_without_a_nameplate_has_the_limit_of_its_winding_alone():
     config = parse('event = []\n[system]\nmachine = "KnifeDrive"\nmotor = "DcMotor"\n')
     drive = choose(config, Path(), lambda *_: None).drive
-    assert set(given_motor(config, drive, 400.0, 50.0, 30.0)) == {"temperature"}
+    assert set(given_motor(drive, config.plate, config.permitted_temperature[1], 400.0, 50.0, 30.0)) == {
+        "temperature"
+    }
 
 
 @pytest.mark.parametrize(
@@ -566,7 +574,7 @@ def test_the_blade_follows_from_the_declaration_and_not_from_the_machine(monkeyp
 
     for machine in (OtherKnife, Pusher):
         chosen = parse(f'[system]\nmachine = "{machine.name}"')
-        drive = Drive(chosen.motor_type, chosen.motor, chosen.machine)
-        assert BladeAnalysis.applies(chosen, drive) == machine.cuts
-        drawn = motion(StudyRecord(chosen, drive, statics(chosen, drive)))
+        drive = Drive(chosen.motor.kind, chosen.motor.parameters, chosen.machine)
+        assert BladeAnalysis.applies(drive, chosen.plans) == machine.cuts
+        drawn = motion(record_of(chosen, drive))
         assert ("edge" in [link.name for link in drawn.links]) == machine.cuts

@@ -70,6 +70,53 @@ def test_no_two_classes_share_a_name():
     assert own <= set(places)
 
 
+DOORS = {
+    # the reader
+    "study.study_file": {"changed_tables"},
+    # the registry: capabilities have their hooks in the folder's own module, or in `capability`
+    "study.capability": {"faults", "drive", "take_estimates"},
+    # the run of a study, from Python and as a task
+    "study.choice": {"choose", "choose_for", "drive_of"},
+    "study.run": {"run_study"},
+    "report.study_task": {"_accept", "_compute", "_fmus"},
+    "app.studies": {"_take"},
+    # the export of a study, and the tasks of the capabilities
+    "study.package": {"drive_to_export", "export_study", "model_and_start"},
+    "capabilities.identification.identification": {"identify"},
+    "capabilities.optimize.page": {"_accept", "_compute"},
+    "capabilities.sweep.page": {"_compute"},
+    "capabilities.sweep.points": {"run_sweep", "task_of"},
+    "capabilities.watch.watch": {"watch"},
+}
+"""By module, the functions that take the whole configuration of a study; all others take what they use of it."""
+
+
+def test_few_functions_take_the_whole_configuration():
+    """A function that takes a `Config`, by its annotation or by its name, is one of the doors. The records of a run
+    hold the configuration for their reports."""
+    found: dict[str, set[str]] = {}
+    for file in sorted(HOUSE.PACKAGE.rglob("*.py")):
+        module = ".".join(file.relative_to(HOUSE.PACKAGE).with_suffix("").parts).removesuffix(".__init__")
+        for node in ast.walk(ast.parse(file.read_text("utf-8"))):
+            if isinstance(node, ast.FunctionDef) and any(map(_is_whole, _arguments(node))):
+                found.setdefault(module, set()).add(node.name)
+    hooks = DOORS["study.capability"]
+    own = {name for name in found if re.fullmatch(r"capabilities\.\w+(\.capability)?", name)}
+    assert all(found[name] <= hooks for name in own), {name: found[name] for name in own}
+    assert {name: taken for name, taken in found.items() if name not in own} == DOORS
+
+
+def _arguments(node):
+    of = node.args
+    return [*of.posonlyargs, *of.args, *of.kwonlyargs]
+
+
+def _is_whole(argument):
+    """Whether an argument is a `Config`; the commands name the path of a study file config, too."""
+    words = "" if argument.annotation is None else ast.unparse(argument.annotation)
+    return bool(re.search(r"\bConfig\b", words)) or (argument.arg == "config" and words in ("", "Any"))
+
+
 def test_the_scan_sees_every_way_of_importing(tmp_path, monkeypatch):
     """Relative and absolute, of a module and from one, inside a function, and from the package itself."""
     package = tmp_path / "chainunit"

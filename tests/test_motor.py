@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,9 +14,8 @@ from chainunit.core.errors import InputError
 from chainunit.core.integrators import rk4
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.speed_control import loop, tune
-from chainunit.study.choice import tune as tune_motor
+from chainunit.study.choice import choose
 from chainunit.study.config import load
-from chainunit.study.drive import Drive
 
 LAYOUT = DcMotor.state_layout
 
@@ -101,7 +101,7 @@ def test_internal_integrator_against_an_error_controlled_solver():
 
 def test_declared_gains_are_the_tuned_ones_of_the_packaged_drive():
     config = load()
-    drive = tune_motor(config, Drive(DcMotor, config.motor, config.machine))
+    drive = choose(config, Path(), lambda *said: None).drive
     tuned = drive.parameters
     declarations = DcMotor.Parameters()
     for name in ("kp", "ki"):

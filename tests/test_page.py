@@ -368,7 +368,10 @@ def test_the_moving_machine_is_the_simulated_one(study, written):
 def test_steady_running_begins_where_the_study_takes_it(study):
     """A soft starter that ramps for longer than the reference moves the mark and the still picture, too."""
     soft = SoftStart(voltage=0.5, time=0.7)
-    config = dataclasses.replace(study.config, start="soft", starter=Starter(soft_start=soft))
+    config = dataclasses.replace(
+        study.config,
+        drive=dataclasses.replace(study.config.drive, start="soft", starter=Starter(soft_start=soft)),
+    )
     slow = dataclasses.replace(study, config=config, started=None)
     start_up = next(each for each in study_report.report(slow).figures if each.name == "time-start-up")
     (mark,) = page_figures.figure(start_up, DEFAULT_UNITS).layout.annotations

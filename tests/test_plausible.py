@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 from machines import random_machine
+from records import record_of
 from reports import page_of, said_of
 
 from chainunit.core.errors import InputError
@@ -167,13 +168,11 @@ def test_what_is_refused_for_a_slip_says_so(text, told):
 
 def test_the_remark_stands_on_terminal_page_and_in_json():
     from chainunit.study.drive import Drive
-    from chainunit.study.record import StudyRecord
     from chainunit.study.result import as_dict
-    from chainunit.study.statics import statics
 
     values = config.parse("[machine]\npin = { diameter = 60 }")
-    drive = Drive(DcMotor, values.motor, values.machine)
-    study = StudyRecord(values, drive, statics(values, drive))
+    drive = Drive(DcMotor, values.motor.parameters, values.machine)
+    study = record_of(values, drive)
     result = as_dict(study)
     message = str(values.file.unusual[0])
     assert result["slips"] == [

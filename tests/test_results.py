@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from records import record_of
 
 from chainunit.capabilities.blade.analysis import BladeAnalysis
 from chainunit.core.quantities import Value, declaration, group, quantity
@@ -17,9 +18,7 @@ from chainunit.study import parts
 from chainunit.study.analysis import Work
 from chainunit.study.choice import choose
 from chainunit.study.config import parse
-from chainunit.study.record import StudyRecord
 from chainunit.study.rig import Rig
-from chainunit.study.statics import statics
 from chainunit.study.turn import TurnAnalysis
 
 
@@ -132,6 +131,7 @@ def test_the_data_of_an_analysis_have_the_documented_names(analysis):
     config = parse(parts.example("knife"))
     drive = choose(config, Path(), lambda *_: None).drive
     found = analysis.find(
-        StudyRecord(config, drive, statics(config, drive)), Work(Rig(config, drive, {}), print)
+        record_of(config, drive),
+        Work(Rig(config.operation, drive, {}), print),
     )
     assert set(as_data(found)) == {name.split(".")[0] for name, _, _ in documented(type(found))}

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from records import record_of
 
 from chainunit.reading.results import as_data
 from chainunit.study.analysis import Work
@@ -17,11 +18,9 @@ from chainunit.study.cycle import cycle
 from chainunit.study.gear_loss import GearAnalysis
 from chainunit.study.measures import read_measure
 from chainunit.study.readings import only_whole_turns, shaft_power
-from chainunit.study.record import StudyRecord
 from chainunit.study.remarks import _on_steady_running
 from chainunit.study.rig import Rig
 from chainunit.study.start_up import StartUp, start_up
-from chainunit.study.statics import statics
 from chainunit.study.stored import energy_behind, energy_gap, energy_held
 from chainunit.study.window import CLOSED, DRIFT, STORED, Phase, Window, drift, end_gap, is_settled
 
@@ -58,20 +57,20 @@ def mill():
     """The rig, the turn right after the start, the turn that a study evaluates, and one that is four turns later."""
     config = parse(MILL)
     bars = cycle(config.machine, config.run.crank_speed, config.feed)
-    drive = catalogue_drive(config, config.plate, bars.crank_torque)
+    drive = catalogue_drive(config.drive, config.machine, bars, config.plate)
     drive = replace(drive, added_inertia=config.values["flywheel"].J)
-    rig = Rig(config, drive, None)
+    rig = Rig(config.operation, drive, None)
     with rig.from_rest() as simulation:
-        start = start_up(rig, simulation, config.stop, lambda time: None, {})
-        later = simulation.run(simulation.time + 4.2 * config.turn, rig.step)
+        start = start_up(rig, simulation, lambda time: None, {})
+        later = simulation.run(simulation.time + 4.2 * config.operation.turn, rig.step)
     first = only_whole_turns(drive, start.run.sel(time=slice(9.5, None)), 1)
     told = only_whole_turns(drive, start.run.sel(time=slice(start.steady_from, None)), 1)
-    last = later.sel(time=slice(later["time"][-1].item() - 1.1 * config.turn, None))
+    last = later.sel(time=slice(later["time"][-1].item() - 1.1 * config.operation.turn, None))
     return rig, first, told, only_whole_turns(drive, last, 1)
 
 
 def window(rig, turns, phase=Phase.STEADY):
-    return Window(phase, turns, rig.drive, ("left", "right"), rig.config.run.crank_speed)
+    return Window(phase, turns, rig.drive, ("left", "right"), rig.operation.crank_speed)
 
 
 def test_a_turn_counts_as_steady_once_its_flywheel_takes_up_little_energy(mill):
@@ -119,7 +118,7 @@ def test_the_energy_that_is_held_grows_by_the_power_that_comes_in(mill):
 
 def test_a_turn_that_never_settles_is_told_with_its_energy(mill):
     rig, first, told, _ = mill
-    study = StudyRecord(rig.config, rig.drive, statics(rig.config, rig.drive))
+    study = record_of(parse(MILL), rig.drive)
     study.runs["start_up"] = first
 
     def remarks(turns):
@@ -139,8 +138,8 @@ def test_a_turn_that_never_settles_is_told_with_its_energy(mill):
 def test_the_loss_of_the_gear_stands_beside_the_net_power(mill):
     """By the turn at constant speed: the teeth lose their share of |power|, which is five times the net power."""
     rig, _, told, _ = mill
-    study = StudyRecord(rig.config, rig.drive, statics(rig.config, rig.drive))
-    assert GearAnalysis.applies(rig.config, rig.drive)
+    study = record_of(parse(MILL), rig.drive)
+    assert GearAnalysis.applies(rig.drive, {})
     assert GearAnalysis.find(study, Work(rig, lambda *_: None)) is None  # no steady running yet
     study.runs["start_up"], study.started = told, StartUp(told, float(told["time"][0]), 0.0, rig)
     study.answers["steady"] = SimpleNamespace(power_mean=read_measure("power_mean", window(rig, told)))

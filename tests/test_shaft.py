@@ -346,15 +346,15 @@ def test_a_step_that_is_too_long_for_the_shaft_is_refused(tmp_path):
 
 def test_export_of_the_studys_line(tmp_path):
     loaded = config.parse(SHORT + LINE)
-    assert start_of(loaded, MODELS["ChamberForces"])["ratio"] == 1.0
-    start = start_of(loaded, MODELS["CardanDriveline"])
+    drive = choose(loaded, tmp_path).drive
+    assert start_of(drive, loaded.operation, MODELS["ChamberForces"])["ratio"] == 1.0
+    start = start_of(drive, loaded.operation, MODELS["CardanDriveline"])
     assert (
         start["ratio"] == 25.0 and start["d2"] == 20.0 and start["alpha2"] == pytest.approx(np.radians(8.0))
     )
     with pytest.raises(InputError, match=r"the study has no \[driveline\]"):
-        start_of(config.parse(SHORT), MODELS["CardanDriveline"])
+        start_of(choose(config.parse(SHORT), tmp_path).drive, loaded.operation, MODELS["CardanDriveline"])
     message = export_study(loaded, tmp_path / "x.ssp", backend="python")
     assert "driveline (CardanDriveline)" in message
-    drive = choose(loaded, tmp_path, lambda *_: None).drive
     assert ("driveline.driven.w", "machine.w") in drive.graph.connections
     assert ("driveline.tau_bias", "motor.load.tau_bias") in drive.graph.connections

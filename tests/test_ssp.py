@@ -148,10 +148,11 @@ def test_connectors_are_the_fmus_variables(package, tmp_path):
 
 def test_parameter_sets_and_fmus_hold_the_studys_values(package, tmp_path):
     loaded = config.parse(MINE)
-    motor = choose(loaded, tmp_path, lambda *_: None).drive.parameters
-    assert motor.limit.i == 3.9 and motor.speed_control.kp != loaded.motor.speed_control.kp
+    drive = choose(loaded, tmp_path).drive
+    motor = drive.parameters
+    assert motor.limit.i == 3.9 and motor.speed_control.kp != loaded.motor.parameters.speed_control.kp
     start = {
-        "machine": start_of(loaded, MODELS["ChamberForces"]),
+        "machine": start_of(drive, loaded.operation, MODELS["ChamberForces"]),
         "motor": MODELS["DcMotor"].parameter_layout.by_name(motor) | {"w_ref": 2.4 * 50.0},
     }
     with zipfile.ZipFile(package) as archive:

@@ -69,7 +69,7 @@ def test_a_start_from_an_angle_by_the_compiled_system(pump):
     worst, drive = pump.findings["starts"].worst, pump.drive
     p = dataclasses.replace(drive.parameters, phi_start=worst.angle * drive.ratio)
     turned = dataclasses.replace(drive, parameters=p)
-    with Rig(pump.config, turned, None).from_rest() as simulation:
+    with Rig(pump.config.operation, turned, None).from_rest() as simulation:
         run = simulation.run(worst.start_time + 0.25, 1e-3)
     assert float(crank_angle(drive, run)[0]) == pytest.approx(worst.angle)
     inertia, rotor = run["machine.J"].values, drive.fmu_parameters.rotor
@@ -88,13 +88,13 @@ def test_the_gear_has_a_limit_of_its_own_in_a_start(pump, factor, passed):
     limit = 1.2 * pump.answers["steady"].crank_torque_peak
     text = f"torque_limit = {limit}\nstart_factor = {factor}\n"
     given = config.parse(PUMP + text)
-    assert given.gear.start_limit == pytest.approx(factor * limit)
-    found = dataclasses.replace(pump.findings["starts"], limit=given.gear.start_limit)
+    assert given.drive.gear.start_limit == pytest.approx(factor * limit)
+    found = dataclasses.replace(pump.findings["starts"], limit=given.drive.gear.start_limit)
     said = SimpleNamespace(config=given, warn=lambda kind, text, *runs, **parts: kinds.append((kind, parts)))
     kinds: list[tuple[str, dict]] = []
     found.remark(said)
     assert [kind for kind, _ in kinds] == (["start at gear"] if passed else [])
-    assert not passed or kinds[0][1]["limit"] == (given.gear.start_limit, "N.m")
+    assert not passed or kinds[0][1]["limit"] == (given.drive.gear.start_limit, "N.m")
 
 
 def test_no_start_is_permitted_where_running_alone_is_too_hot():

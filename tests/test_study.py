@@ -24,7 +24,7 @@ from chainunit.machines.chain_unit import Feed
 from chainunit.reading.results import as_data
 from chainunit.report import study as study_report
 from chainunit.study.cycle import cycle
-from chainunit.study.one_sided import alone, overload_factors
+from chainunit.study.load_cases import alone, overload_factors
 from chainunit.study.readings import only_whole_turns, turns_made
 
 SHORT = """
@@ -609,7 +609,7 @@ UNSETTLED = LIGHT + "settle_turns = 0\nramp = 0.01\n"
 def test_the_study_waits_until_the_turns_close(tmp_path):
     """The crank still starts in the first turn; the one that is evaluated is a later one."""
     study, _ = ran(UNSETTLED, tmp_path)
-    assert study.steady_begin > study.config.steady_begin + 1.5
+    assert study.steady_begin > study.config.operation.steady_begin + 1.5
     assert study.answers["steady"].cycle_gap < 0.01 and study.answers["steady"].speed_ripple < 0.05
     assert not any(warning.kind == "turns do not close" for warning in study.warnings)
 
@@ -656,7 +656,7 @@ def test_each_overload_has_its_mirror_on_the_other_side():
 
     lopsided = "[feed]\n%s = { material_mass = 30, processing_force = 10 }\n%s = { material_mass = 70 }\n"
     rigs = [
-        Rig(c, Drive(DcMotor, c.motor, c.machine), {})
+        Rig(c.operation, Drive(DcMotor, c.motor.parameters, c.machine), {})
         for c in (config.parse(lopsided % sides) for sides in (("left", "right"), ("right", "left")))
     ]
     assert tuple(config.parse("").events) == STANDARD

@@ -23,7 +23,7 @@ def with_line():
     values = config.load()
     line = CardanDriveline.parameter_layout.from_names({"ratio": 25.0, "J4": 2.0})
     part = PlacedPart("driveline", CardanDriveline, line, line.ratio, line.J4)
-    return Drive(DcMotor, values.motor, values.machine, feed_forward=True, line=Line((part,)))
+    return Drive(DcMotor, values.motor.parameters, values.machine, feed_forward=True, line=Line((part,)))
 
 
 def test_connections_follow_from_the_joints():

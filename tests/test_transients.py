@@ -23,7 +23,7 @@ STEP, STOP = 1e-3, 1.2
 
 def drive_of(text=""):
     config = parse(text)
-    return Drive(DcMotor, config.motor, config.machine), config
+    return Drive(DcMotor, config.motor.parameters, config.machine), config
 
 
 def events(drive, force, at=0.7):

@@ -24,7 +24,7 @@ from chainunit.system import Profile
 
 folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent
 config = parse("")
-drive = Drive(DcMotor, config.motor, config.machine)
+drive = Drive(DcMotor, config.motor.parameters, config.machine)
 speed = 3.0  # of the crank, rad/s
 
 # %% [markdown]

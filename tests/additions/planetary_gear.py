@@ -149,14 +149,16 @@ class PlanetaryPart(PartOfLine):
             "planetary", given("sizing"), "sizing does not know its stiffness; leave out one of the two"
         )
 
-    def placed(self, config, drive):
+    def plan(self, reading):
+        return reading.values[self.name] if self.name in reading.data else None
+
+    def placed(self, plan, drive, turn):
         from chainunit.study.line.placed import PlacedPart
 
-        table = config.values[self.name]
-        if table is None:
+        if plan is None:
             return None
-        p = Parameters(**Layout(PlanetaryTable).by_name(table))
-        return PlacedPart(self.name, self.model, p, table.ratio, table.J_carrier)
+        p = Parameters(**Layout(PlanetaryTable).by_name(plan))
+        return PlacedPart(self.name, self.model, p, plan.ratio, plan.J_carrier)
 
 
 PART = PlanetaryPart()

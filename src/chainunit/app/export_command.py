@@ -88,7 +88,7 @@ def export(
             progress=status.update,
         )
     print(f"{file}: {model.name}, {made}")
-    if whole and loaded and (words := left_out(loaded)):
+    if whole and loaded and (words := left_out(loaded.operation, loaded.given_events)):
         print(words)
 
 
@@ -110,7 +110,7 @@ def export_ssp(
             loaded, output, backend=backend.value if backend else None, progress=status.update
         )
     print(f"{output}: {made}")
-    if words := left_out(loaded):
+    if words := left_out(loaded.operation, loaded.given_events):
         print(words)
 
 

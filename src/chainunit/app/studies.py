@@ -206,7 +206,7 @@ class Study(StudyMethods):
         config = self.config
         with shown_in(config.units):
             speed = number(config.run.crank_speed, "rad/s", "speed")
-        motor = "a motor that sizing chooses" if config.chooses_motor else config.file.choices["system.motor"]
+        motor = "a motor that sizing chooses" if config.motor is None else config.file.choices["system.motor"]
         changes = f" with {self._changed}" if self._changes else ""
         machine = config.file.choices["system.machine"]
         return (

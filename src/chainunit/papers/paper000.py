@@ -18,7 +18,7 @@ from ..core.engines import MATH
 from ..machines.api import EMPTY, ChainUnitMachine
 from ..machines.chain_unit import Feed
 from ..machines.crank_rocker import half_width_range
-from ..study.one_sided import overload_factors
+from ..study.load_cases import overload_factors
 from .table import PICK
 
 RHO, LAM, MU, ZETA = 0.1, 2.0 / 3.0, 0.6, 0.5

@@ -5,34 +5,28 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 
 from ..core.errors import InputError
-from ..core.temporary_folders import scratch
-from ..study.choice import choose
-from ..study.config import Config
 from ..study.drive import Drive
-from ..work.progress import quiet
 from .measurands import OF_TERMINALS
 from .plant import AnyPlant, Plant
 from .recording import Recording
 from .shaft import MEASURED, MeasuredShaft
 
 
-def drive_of(config: Config, recordings: Mapping[str, Recording]) -> Drive:
-    """The drive of the study, tuned where the file does not give the gains of its control.
+def check_motor_is_known(recordings: Mapping[str, Recording], *, is_known: bool) -> None:
+    """Refuse recordings with signals of a motor that the study does not know.
 
     Raises
     ------
     InputError
-        where the recordings have signals of the motor, and the study has no data of it.
+        with these signals.
     """
     of_motor = sorted({name for each in recordings.values() for name in each.columns if name in OF_TERMINALS})
-    if of_motor and not (config.file.gives("motor") or config.plate is not None):
+    if of_motor and not is_known:
         raise InputError(
             f"motor: is missing, and the recordings have {', '.join(of_motor)}; add [motor] with its data, or "
             "system.motor with a motor of the catalogue",
             "motor",
         )
-    with scratch() as folder:
-        return choose(config, folder, quiet).drive
 
 
 def is_of_shaft(columns: Collection[str]) -> bool:

@@ -30,7 +30,7 @@ _LOADS = "; a dotted one is a force of the loads"
 def motion(study: StudyRecord) -> Animation:
     """The animation of every run, at about 60 pictures per second of machine time, more where the crank is fast."""
     machine = study.drive.machine
-    turn = study.config.turn
+    turn = study.config.operation.turn
     interval = min(1.0 / _PER_SECOND, turn / _PER_TURN)
     spans = (float(np.ptp(run["time"].values)) for run in study.runs.values())
     interval = max(interval, sum(spans) / MOST)

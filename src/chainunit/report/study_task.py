@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..models import MODELS
-from ..study.choice import check_files
+from ..study.choice import check_motor
 from ..study.config import Config
 from ..study.record import LOAD_CYCLE, SPEED_MISSED, StudyRecord
 from ..study.registry import registered
@@ -21,10 +21,10 @@ from .task import Task, Writer
 
 def _accept(config: Config, *, scheduler: str | None = None, **options: Any) -> None:
     with config.file.refusals():
-        check_files(config)
+        check_motor(config.motor, config.drive, config.plans, config.file.catalogue)
     if scheduler is not None:
         for part in registered():
-            part.check_scheduler(config, scheduler)
+            part.check_scheduler(config.plans[part.name], scheduler)
 
 
 def _compute(config: Config, folder: Path, progress: TaskProgress, **options: Any) -> StudyRecord:

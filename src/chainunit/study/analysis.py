@@ -11,13 +11,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..work.progress import TaskProgress
 from .record import Findings as Findings
 
 if TYPE_CHECKING:
-    from .config import Config
     from .drive import Drive
     from .record import StudyRecord
     from .rig import Rig
@@ -52,8 +51,9 @@ class Analysis(ABC):
     """whether it comes after all others, also where a run of the study has failed"""
 
     @staticmethod
-    def applies(config: Config, drive: Drive) -> bool:
-        """Whether the system has the parts that the analysis needs; by default every system has them."""
+    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
+        """Whether the system has the parts that the analysis needs, and the study asks for it by the `plans` of the
+        capabilities; by default every study has it."""
         return True
 
     @staticmethod

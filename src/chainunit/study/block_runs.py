@@ -300,16 +300,16 @@ class BlockRuns:
         """The start from rest until running should be steady."""
         signals, rest, stops = [], [], []
         for point in points:
-            config = point.rig.config
-            fed_from = config.steady_begin if config.empty_start else None
+            operation = point.rig.operation
+            fed_from = operation.steady_begin if operation.empty_start else None
             over_time = replace(point.rig, fed_from=fed_from).signals(ramp=True)
             # the rate of the reference, which a feed-forward takes, is no profile
             from_rest = {full: x if is_evaluated(x) else 0.0 for full, x in over_time.items()}
             begin = self._inputs | {full: at_time(x, 0.0) for full, x in from_rest.items()}
             signals.append(from_rest)
             rest.append(self.system.start(begin, {name: point.values[name] for name in self._varying}))
-            turns = config.run.settle_turns * (2.0 if config.empty_start else 1.0)
-            stops.append(config.ramp_end + turns * config.turn)
+            turns = operation.run.settle_turns * (2.0 if operation.empty_start else 1.0)
+            stops.append(operation.ramp_end + turns * operation.turn)
         step = max(stops) / _ROWS_OF_START
         return self._run(points, np.array(rest, float).T, 0.0, stops, signals, step=step)
 
@@ -326,7 +326,7 @@ class BlockRuns:
             if not waiting:
                 break
             some = [points[k] for k in waiting]
-            stops = [(point.rig.config.run.turns + 0.1) * point.rig.config.turn for point in some]
+            stops = [(point.rig.operation.run.turns + 0.1) * point.rig.operation.turn for point in some]
             runs = self._run(some, states[:, waiting], 0.0, stops)
             states[:, waiting] = runs.states
             for place, k in enumerate(waiting):
@@ -364,7 +364,7 @@ def _fault(runs: Runs, k: int) -> RunFault | None:
 
 def _turns(point: RunPoint, run: xr.Dataset) -> xr.Dataset:
     """The whole turns of a point in steady running."""
-    return whole_turns(point.rig.drive, run, point.rig.config.run.turns)
+    return whole_turns(point.rig.drive, run, point.rig.operation.run.turns)
 
 
 def _settles(point: RunPoint, run: xr.Dataset) -> bool:

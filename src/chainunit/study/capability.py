@@ -54,7 +54,8 @@ class Estimates:
 
 
 class StudyCapability:
-    """A capability; each method has a default for a capability that has no such thing."""
+    """A capability; each method has a default for a capability that has no such thing. The argument `plan` is what
+    its method `plan` gave for the study."""
 
     name: ClassVar[str]
     """name of its folder, and of its plan in `Config.plans`"""
@@ -94,18 +95,24 @@ class StudyCapability:
         return machine
 
     def turns(
-        self, config: Config, feeds: Iterable[Any], folder: Path, backend: Backend | None
+        self,
+        values: Mapping[str, Any],
+        machine: Machine,
+        crank_speed: float,
+        feeds: Iterable[Any],
+        folder: Path,
+        backend: Backend | None,
     ) -> list[Cycle] | None:
-        """Turns of the machine at constant speed with each of the `feeds`, where its other model is run for them. The
-        FMU is written to `folder`. None where `cycle` gives the turn."""
+        """Turns of the machine at constant speed with each of the `feeds`, where its other model is run for them;
+        the tables have these `values`. The FMU is written to `folder`. None where `cycle` gives the turn."""
         return None
 
     def faults(self, config: Config) -> Iterable[InputError]:
         """Refusals of a plan that does not fit the rest of the study."""
         return ()
 
-    def unused_values(self, config: Config) -> Iterable[str]:
-        """Names of the values of its tables that have no meaning in a study."""
+    def unused_values(self, machine: Machine) -> Iterable[str]:
+        """Names of the values of its tables that have no meaning for that machine."""
         return ()
 
     def drive(
@@ -115,31 +122,32 @@ class StudyCapability:
         `folder`."""
         return None
 
-    def permitted_temperature(self, config: Config) -> tuple[str, float] | None:
+    def permitted_temperature(self, plan: Any) -> tuple[str, float] | None:
         """Permitted temperature of the winding of the motor that it chooses [K], after its name in the study file."""
         return None
 
-    def random_events(self, config: Config) -> Mapping[str, RandomEvent]:
+    def random_events(self, plan: Any) -> Mapping[str, RandomEvent]:
         """By the key that states it, the events with ranges that its runs have."""
         return {}
 
-    def longest_run(self, config: Config) -> float:
+    def longest_run(self, plan: Any) -> float:
         """Time of the longest of its runs [s]."""
         return 0.0
 
-    def shaft_inertia(self, config: Config) -> float:
+    def shaft_inertia(self, plan: Any) -> float:
         """Inertia that it adds to the motor's shaft [kg m2]."""
         return 0.0
 
-    def not_with_foreign_motor(self, config: Config) -> str:
+    def not_with_foreign_motor(self, plan: Any) -> str:
         """The reason and the remedy where its plan needs a motor of this package; empty where it does not."""
         return ""
 
-    def beside(self, config: Config, drive: Drive) -> Drive:
-        """The drive with the parts of the system that the capability adds beside the line."""
+    def beside(self, plan: Any, drive: Drive, feed: Any, turn: Cycle) -> Drive:
+        """The drive with the parts of the system that the capability adds beside the line; the machine has this
+        `feed` and `turn` in normal running."""
         return drive
 
-    def check_scheduler(self, config: Config, scheduler: str) -> None:
+    def check_scheduler(self, plan: Any, scheduler: str) -> None:
         """Refuse the address of a scheduler whose workers have nothing to do, or that does not answer.
 
         Raises
@@ -148,7 +156,7 @@ class StudyCapability:
             see `chainunit.work.runner.check_scheduler`.
         """
 
-    def check_runs(self, config: Config, rig: Rig) -> None:
+    def check_runs(self, plan: Any, rig: Rig) -> None:
         """Refuse runs that the drive cannot make, before any is made.
 
         Raises

@@ -3,9 +3,8 @@ gear."""
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,8 +15,10 @@ from ..drives.gear_ratios import typical_efficiency
 from ..drives.gearing import Transmission, motor_side
 from ..drives.induction_motor import Inverter
 from ..drives.nameplate import Nameplate
-from .config import Config
+from ..machines.machine import Machine
+from .cycle import Cycle
 from .drive import Drive
+from .drive_tables import DriveTables
 
 SLIP = "starter.inverter.slip"
 """Key of the slip compensation."""
@@ -37,9 +38,10 @@ HELICAL = GearOffer()
 
 
 def catalogue_drive(
-    config: Config,
+    tables: DriveTables,
+    machine: Machine,
+    turn: Cycle,
     motor: CatalogueMotor,
-    crank_torque: Any,
     ambient: float | None = None,
     gear_ratio: float | None = None,
     offer: GearOffer = HELICAL,
@@ -48,8 +50,8 @@ def catalogue_drive(
 
     Parameters
     ----------
-    crank_torque : crank torque over a turn at that speed [N m], shape (points,), or (turns, points) for
-        chains
+    tables : gear and starter of the study
+    turn : the machine at that speed; many turns for chains
     ambient : temperature of the surroundings [K]; by default that of the motor's declaration
     gear_ratio : the ratio, where it is chosen already
     offer : the gears from which that of the drive is taken
@@ -59,65 +61,79 @@ def catalogue_drive(
     InputError
         where no circuit meets the motor's nameplate.
     """
-    plate, w = motor.nameplate, config.run.crank_speed
+    plate, w, crank_torque = motor.nameplate, turn.crank_speed, turn.crank_torque
     model, p = motor.model()
     synchronous, rated_speed, rated_torque = plate.synchronous, plate.speed, plate.torque
-    follows = config.start == "inverter"
-    if gear_ratio is None and "gear.ratio" in config.file.given:
-        gear_ratio = config.gear.ratio
+    follows = tables.start == "inverter"
+    if gear_ratio is None and "gear.ratio" in tables.given:
+        gear_ratio = tables.gear.ratio
     ratio = rated_speed / w if gear_ratio is None else gear_ratio
-    speed, drag = rated_speed, config.gear.d
+    speed, drag = rated_speed, tables.gear.d
     for _ in range(3):
-        shaft = motor_side(numpy_(), gear_with(config, ratio, offer), crank_torque, speed)
+        shaft = motor_side(numpy_(), gear_with(tables, ratio, offer), crank_torque, speed)
         mean = float(np.mean(shaft))
         # the slip is proportional to the torque; the reference of an inverter has the speed of the crank
         speed = rated_speed if follows else synchronous - (synchronous - rated_speed) * mean / rated_torque
         if gear_ratio is None:
             ratio = speed / w
         drag = (mean - float(np.mean(crank_torque)) / ratio) / speed
-    p = with_starter(p, plate, config)
+    p = with_starter(tables, p, plate)
     if ambient is not None:
-        p = dataclasses.replace(p, ambient=dataclasses.replace(p.ambient, T=ambient))
-    machine = config.machine.replace({"ratio": ratio})
+        p = replace(p, ambient=replace(p.ambient, T=ambient))
     return Drive(
         model,
         p,
-        machine,
+        machine.replace({"ratio": ratio}),
         follows,
         rated_current=plate.rated_current,
-        gear_inertia=config.gear.J,
+        gear_inertia=tables.gear.J,
         gear_friction=drag,
     )
 
 
-def gear_with(config: Config, ratio: float, offer: GearOffer = HELICAL) -> Transmission:
+def gear_with(tables: DriveTables, ratio: float, offer: GearOffer = HELICAL) -> Transmission:
     """The gear of a study with that ratio; its efficiency is the typical one of its kind and stages, unless the file
     gives one."""
-    gear, given = config.gear, config.file.given
+    gear, given = tables.gear, tables.given
     if "gear.efficiency" in given:
-        return dataclasses.replace(gear, ratio=ratio)
+        return replace(gear, ratio=ratio)
     is_made = "gear.ratio" in given or offer.is_made
-    return dataclasses.replace(gear, ratio=ratio, efficiency=typical_efficiency(offer.kind, ratio, is_made))
+    return replace(gear, ratio=ratio, efficiency=typical_efficiency(offer.kind, ratio, is_made))
 
 
-def with_starter(p: Any, plate: Nameplate, config: Config) -> Any:
+def with_starter(tables: DriveTables, p: Any, plate: Nameplate) -> Any:
     """The parameters `p` of a motor that starts on line, with the starter of the study. An inverter compensates the
     rated slip of the motor, unless the file gives its compensation."""
-    control = dataclasses.asdict(config.starter.inverter)
-    follows = config.start == "inverter"
-    if follows and SLIP not in config.file.given:
+    control = asdict(tables.starter.inverter)
+    follows = tables.start == "inverter"
+    if follows and SLIP not in tables.given:
         slip_hz = (plate.synchronous - plate.speed) * plate.poles / (4.0 * math.pi)
         control["slip"] = slip_hz / plate.torque
-    soft = config.starter.soft_start if config.start == "soft" else p.soft_start
-    return dataclasses.replace(p, soft_start=soft, inverter=Inverter(on=float(follows), **control))
+    soft = tables.starter.soft_start if tables.start == "soft" else p.soft_start
+    return replace(p, soft_start=soft, inverter=Inverter(on=float(follows), **control))
 
 
-def with_inertia(config: Config, drive: Drive, added: float) -> Drive:
+def with_inertia(tables: DriveTables, drive: Drive, added: float) -> Drive:
     """The drive with that inertia added to the motor's shaft [kg m2]. Slip compensation raises the frequency in each
     peak of the load, where the inertia has to slow down to give its energy: with an added one there is none, unless
     the file gives it."""
-    drive = dataclasses.replace(drive, added_inertia=added)
-    if not added or config.start != "inverter" or not config.of_catalogue or SLIP in config.file.given:
+    drive = replace(drive, added_inertia=added)
+    if not added or tables.start != "inverter" or drive.rated_current is None or SLIP in tables.given:
         return drive
-    inverter = dataclasses.replace(drive.parameters.inverter, slip=0.0)
-    return dataclasses.replace(drive, parameters=dataclasses.replace(drive.parameters, inverter=inverter))
+    inverter = replace(drive.parameters.inverter, slip=0.0)
+    return replace(drive, parameters=replace(drive.parameters, inverter=inverter))
+
+
+def as_used(tables: DriveTables, drive: Drive, offer: GearOffer = HELICAL) -> DriveTables:
+    """The tables with the values that follow from the drive with a motor of the catalogue: the efficiency of its
+    gear, which is of the `offer`, and boost and slip compensation of the inverter."""
+    efficiency = gear_with(tables, drive.ratio, offer).efficiency
+    inverter = tables.starter.inverter
+    if drive.follows:
+        used = drive.parameters.inverter
+        inverter = replace(inverter, boost=used.boost, slip=used.slip)
+    return replace(
+        tables,
+        gear=replace(tables.gear, efficiency=efficiency),
+        starter=replace(tables.starter, inverter=inverter),
+    )

@@ -6,136 +6,90 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
-import numpy as np
-
-from ..core.errors import InputError, refusal_prefix
+from ..core.errors import refusal_prefix
+from ..core.temporary_folders import scratch
 from ..drives.catalogue import check_own
-from ..drives.motor import Motor
 from ..fmu.backends import Backend
-from ..system import foreign_component
-from ..work.progress import TaskProgress
-from .catalogue_drive import catalogue_drive, gear_with, with_inertia
+from ..work.progress import TaskProgress, quiet
 from .config import Config
-from .cycle import cycle
+from .cycle import Cycle, cycle
 from .drive import Drive
+from .drive_tables import DriveTables
+from .motor_sources import MotorSource
 from .proposal import DriveProposal
 from .registry import parts_of_line, registered
 
 
 @dataclass(frozen=True)
 class Choice:
-    """The drive, with the proposal by which it was chosen."""
+    """The drive of a study, with the proposal by which it was chosen."""
 
     drive: Drive
+    tables: DriveTables
+    """the tables of the study, with the values that follow from the motor of the catalogue"""
     proposal: DriveProposal | None = None
 
 
-def choose(config: Config, folder: Path, progress: TaskProgress, backend: Backend | None = None) -> Choice:
+def choose(
+    config: Config, folder: Path, progress: TaskProgress = quiet, backend: Backend | None = None
+) -> Choice:
     """The drive of a study. A capability that chooses it writes its FMUs to `folder`."""
-    if config.foreign is not None:
-        return Choice(_with_foreign(config))
-    for part in registered():
-        proposal = part.drive(config, folder, progress, backend)
-        if proposal is not None:
-            return Choice(with_line(config, proposal.drive), proposal=proposal)
-    return Choice(tune(config, with_line(config, _drive_of_file(config))))
+    turn = cycle(config.machine, config.run.crank_speed, config.feed)
+    return choose_for(turn, config, folder, progress, backend)
 
 
-def _drive_of_file(config: Config) -> Drive:
-    """The drive with the motor whose parameters the file gives, or with the motor of the catalogue that the
-    file names."""
-    if config.plate is not None:
-        turn = cycle(config.machine, config.run.crank_speed, config.feed)
-        drive = catalogue_drive(config, config.plate, turn.crank_torque)
-    else:
-        motor, p = config.motor_type, config.motor
-        drive = Drive(motor, p, config.machine, motor.follows(p))
-    added = sum(part.shaft_inertia(config) for part in registered())
-    return with_inertia(config, replace(drive, feed_forward=config.feed_forward), added)
+def drive_of(config: Config) -> Drive:
+    """The drive of a study, without the FMUs of a choice."""
+    with scratch() as folder:
+        return choose(config, folder).drive
 
 
-def as_chosen(config: Config, choice: Choice) -> Config:
-    """The study with the values that follow from the drive with a motor of the catalogue: the efficiency of the gear
-    by its stages, and boost and slip compensation of the inverter."""
-    if not config.of_catalogue:
-        return config
-    drive, proposal, inverter = choice.drive, choice.proposal, config.starter.inverter
-    if drive.follows:
-        used = drive.parameters.inverter
-        inverter = replace(inverter, boost=used.boost, slip=used.slip)
-    gear = gear_with(config, drive.ratio) if proposal is None else proposal.gear
-    return replace(
-        config,
-        gear=replace(config.gear, efficiency=gear.efficiency),
-        starter=replace(config.starter, inverter=inverter),
-    )
+def choose_for(
+    turn: Cycle, config: Config, folder: Path, progress: TaskProgress, backend: Backend | None = None
+) -> Choice:
+    """The drive of a study, as `choose`, whose machine makes this `turn` in normal running."""
+    tables, plans, source = config.drive, config.plans, config.motor
+    if source is None:
+        proposals = (part.drive(config, folder, progress, backend) for part in registered())
+        proposal: DriveProposal = next(each for each in proposals if each is not None)
+        return Choice(_with_line(proposal.drive, plans, turn), proposal.tables, proposal)
+    source.check(tables, plans)
+    added = sum(part.shaft_inertia(plans[part.name]) for part in registered())
+    drive = _with_line(source.drive(tables, config.machine, turn, added), plans, turn)
+    return Choice(*source.completed(drive, tables, turn))
 
 
-def with_parts_beside(config: Config, drive: Drive) -> Drive:
-    """The drive with the parts that capabilities add to its system."""
-    for part in registered():
-        drive = part.beside(config, drive)
-    return drive
-
-
-def check_files(config: Config) -> None:
-    """Refuse a file that the study names but cannot use.
+def check_motor(
+    motor: MotorSource | None, tables: DriveTables, plans: Mapping[str, Any], own_motors: Path | None
+) -> None:
+    """Refuse files of a study that it cannot use: that of its motor or, where a capability chooses the motor, the
+    catalogue of own motors.
 
     Raises
     ------
     InputError
-        see `chainunit.drives.catalogue.check_own` and `with_motor`.
+        see `MotorSource.check` and `chainunit.drives.catalogue.check_own`.
     """
-    if config.chooses_motor:
-        with refusal_prefix("catalogue = ", "catalogue"):
-            check_own(config.file.catalogue)
-    if config.foreign is not None:
-        _with_foreign(config)
+    if motor is not None:
+        motor.check(tables, plans)
+        return
+    with refusal_prefix("catalogue = ", "catalogue"):
+        check_own(own_motors)
 
 
-def _with_foreign(config: Config) -> Drive:
-    """The drive of a study that names its motor."""
-    assert config.foreign is not None
-    with refusal_prefix("system.motor: ", "system.motor"):
-        return with_motor(config, config.foreign.file, config.foreign.names)
-
-
-def with_motor(config: Config, file: Path, names: Mapping[str, str] | None = None) -> Drive:
-    """The machine of a study, driven by a foreign motor.
-
-    Parameters
-    ----------
-    file : the FMU
-    names : the FMU's names by ours, where they differ; see `chainunit.system.foreign_component`
-
-    Raises
-    ------
-    InputError
-        where the FMU does not fit, or the study asks for a quantity that only a motor of this package has.
-    """
-    motor = foreign_component(file, "motor", names)
-    for part in registered():
-        if words := part.not_with_foreign_motor(config):
-            raise InputError(f"{file}: {words}")
-    if config.feed_forward and "tau_ff" not in motor.connectors:
-        raise InputError(f"{file}: has no input tau_ff in N.m; leave feed_forward out")
-    follows = "w_ref" in motor.connectors
-    return Drive(Motor, None, config.machine, follows, feed_forward=config.feed_forward, foreign=motor)
-
-
-def with_line(config: Config, drive: Drive) -> Drive:
-    """The drive with the parts of the study between motor and machine."""
+def _with_line(drive: Drive, plans: Mapping[str, Any], turn: Cycle) -> Drive:
+    """The drive with the parts of the line, by their `plans`."""
     for part in parts_of_line():
-        placed = part.placed(config, drive)
+        placed = part.placed(plans[part.name], drive, turn)
         drive = drive if placed is None else replace(drive, line=drive.line.behind(placed))
     return drive
 
 
-def tune(config: Config, drive: Drive) -> Drive:
-    """The drive with controller gains that are tuned to its inertia, unless the config gives them."""
-    both = cycle(drive.machine, config.run.crank_speed, config.feed)
-    given_gains = {name.removeprefix("motor.") for name in config.file.given if name.startswith("motor.")}
-    inertia = drive.rotor_inertia + float(np.mean(both.outputs.J))
-    parameters, tuning = drive.motor.tune(drive.parameters, inertia, given_gains)
-    return replace(drive, parameters=parameters, tuning=tuning)
+def with_parts_beside(drive: Drive, plans: Mapping[str, Any], feed: Any, turn: Cycle) -> Drive:
+    """The drive with the parts that capabilities add to its system, by their `plans`, for a machine with this
+    `feed` and this `turn` in normal running."""
+    for part in registered():
+        drive = part.beside(plans[part.name], drive, feed, turn)
+    return drive

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, nullcontext
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from ..core.errors import Faults, GeometryError, InputError, each_refusal, refusal_prefix
 from ..core.quantities import Layout, variables
 from ..drives.catalogue import CatalogueMotor
-from ..drives.gearing import Transmission
-from ..drives.motor import Motor
 from ..machines.admissible import causes
 from ..machines.api import machine_of, ratios
-from ..machines.chain_unit import SideName
 from ..machines.machine import Machine
 from ..mechanism.models import MachineModel
 from ..reading.tables import (
@@ -32,22 +29,22 @@ from ..reading.tables import (
 from ..reading.text import DEFAULT_UNITS, Units, chosen_units
 from ..reading.toml_lines import lines_of
 from .checks import check_order
+from .drive_tables import DriveTables
 from .event import Event
 from .event_table import read_events
-from .events import OneSidedFeed
 from .file_reading import FileReading
 from .file_section import FileSection
 from .first_checks import check_values, independent, missing_recordings, plate_of, without
 from .foreign_machine import ForeignMachine, ForeignModel
-from .parts import Parts, beside, example, over_example, with_linkage
+from .motor_sources import ForeignMotor, MotorSource, NamedMotor, OwnMotor
+from .operation import OperatingConditions
+from .parts import Parts, beside, example, motor_is_left, over_example, with_linkage
 from .registry import registered
 from .run_checks import endless, loads_beyond
 from .sections import (
     Coupling,
-    ForeignMotor,
     Ratios,
     Run,
-    Starter,
     all_choices,
 )
 
@@ -96,25 +93,16 @@ class Config:
     machine: Machine
     feed: Any
     """loads in normal running, as the machine declares them"""
-    motor_type: type[Motor]
-    """model of the motor; `Motor` itself if the motor is a foreign FMU"""
-    motor: Any
-    """parameters of the motor, where the file gives them"""
+    motor: MotorSource | None
+    """None where a capability chooses the motor"""
+    drive: DriveTables
     run: Run
     events: Mapping[str, Event]
     coupling: Coupling | None
-    feed_forward: bool
     empty_start: bool
     """whether the feed comes once the machine runs"""
-    plate: CatalogueMotor | None
-    """the motor, where the file names one of the catalogue"""
-    gear: Transmission
-    start: str
-    starter: Starter
     simulation: str
     """one of `SIMULATIONS`"""
-    foreign: ForeignMotor | None
-    """the motor, if it is a foreign FMU; `motor` then has no meaning"""
     file: FileContents
     units: Units = dataclasses.field(default_factory=lambda: DEFAULT_UNITS)
     """units in which the report shows numbers"""
@@ -128,60 +116,48 @@ class Config:
         """The study with other facts on its file, by the names of `FileContents`."""
         return dataclasses.replace(self, file=dataclasses.replace(self.file, **changes))
 
-    @property
-    def turn(self) -> float:
-        """Time of a turn of the crank at the requested speed [s]."""
-        return float(2.0 * math.pi / self.run.crank_speed)
-
-    @property
-    def ramp_end(self) -> float:
-        """Time at which the ramp of the reference or of the soft starter ends [s]."""
-        soft = self.starter.soft_start.time if self.start == "soft" else 0.0
-        return float(max(self.run.ramp, soft))
-
-    @property
-    def steady_begin(self) -> float:
-        """Time from which running counts as steady [s]: `run.settle_turns` after the start, or later, after
-        an empty machine is fed."""
-        return float(self.ramp_end + self.run.settle_turns * self.turn)
-
-    @property
-    def stop(self) -> float:
-        """End of the run of start-up and steady running [s], if the motor settles at once."""
-        return float(self.steady_begin + (self.run.turns + 0.1) * self.turn)
+    @cached_property
+    def operation(self) -> OperatingConditions:
+        """What the runs of the drive have in common."""
+        return OperatingConditions(
+            self.run, self.feed, self.empty_start, self.drive.soft_time, self.coupling, self.simulation
+        )
 
     @property
     def permitted_temperature(self) -> tuple[str, float]:
         """Permitted temperature of the winding if the steady turns go on for ever [K], after its name in the
         study file."""
         for part in registered():
-            if (permitted := part.permitted_temperature(self)) is not None:
+            if (permitted := part.permitted_temperature(self.plans[part.name])) is not None:
                 return permitted[0], permitted[1]
         return "run.winding_temperature", float(self.run.winding_temperature)
 
     @property
-    def of_catalogue(self) -> bool:
-        """Whether the motor is one of the catalogue."""
-        return self.plate is not None or self.chooses_motor
+    def plate(self) -> CatalogueMotor | None:
+        """The motor of the catalogue that the file names, if it names one."""
+        return None if self.motor is None else self.motor.plate
 
     @property
-    def chooses_motor(self) -> bool:
-        """Whether a capability chooses the motor of the catalogue."""
-        return any(self.values.get(part.motor_table) is not None for part in registered())
+    def given_events(self) -> list[str]:
+        """Names of the events that the file gives itself."""
+        return list(self.events) if self.file.gives("event") else []
+
+    @property
+    def knows_motor(self) -> bool:
+        """Whether the file has the data of the motor."""
+        return self.file.gives("motor") or self.plate is not None
+
+    @property
+    def of_catalogue(self) -> bool:
+        """Whether the motor is one of the catalogue."""
+        return self.motor is None or self.plate is not None
 
     def table(self, name: str) -> Any:
         """The values of a table; None for an optional table that the file does not
         have."""
+        if name in _OF_DRIVE:
+            return getattr(self.drive, name)
         return getattr(self, name) if name in _OWN_TABLES else self.values[name]
-
-    def one_sided(self, side: SideName) -> Event:
-        """The event of all feed on that side: that of the study, if it has one, else that of the example."""
-        of_study = (
-            event
-            for event in self.events.values()
-            if (event.kind, event.side) == (OneSidedFeed.kind, side) and event.empties
-        )
-        return next(of_study, OneSidedFeed.on(side))
 
 
 def load(file: Path | None = None) -> Config:
@@ -299,8 +275,10 @@ def _with_hints(fault: InputError, unusual: Iterable[UnusualValue]) -> InputErro
 
 _OF_PARTS = ("machine", "ratios", "motor")
 """Tables whose values follow from others, too: `Config` has them as machine and motor."""
-_OWN_TABLES = ("feed", "run", "coupling", "gear", "starter")
+_OWN_TABLES = ("feed", "run", "coupling")
 """Tables whose values are fields of a `Config`."""
+_OF_DRIVE = ("gear", "starter")
+"""Tables whose values are fields of `Config.drive`."""
 
 
 def _config(checked: Any, parts: Parts, events: Mapping[str, Event], contents: FileContents) -> Config:
@@ -339,29 +317,42 @@ def _config(checked: Any, parts: Parts, events: Mapping[str, Event], contents: F
     config = Config(
         title=checked.title,
         machine=machine,
-        motor_type=parts.motor,
-        motor=values["motor"] if parts.gives_motor else None,
-        plate=plate,
+        motor=_motor(data, parts, checked, values["motor"], plate, source),
+        drive=DriveTables(
+            feed_forward=checked.feed_forward,
+            start=checked.start,
+            given=contents.given,
+            **{name: of_study[name] for name in _OF_DRIVE},
+        ),
         events=events,
-        feed_forward=checked.feed_forward,
         empty_start=checked.empty_start,
-        start=checked.start,
         simulation=checked.simulation,
-        foreign=ForeignMotor(beside(parts.file, source), given_values(checked.system.motor_names))
-        if parts.file
-        else None,
         file=dataclasses.replace(contents, catalogue=own_motors),
         units=chosen_units(checked.report.units),
-        values={name: x for name, x in of_study.items() if name not in _OWN_TABLES},
+        values={name: x for name, x in of_study.items() if name not in (*_OWN_TABLES, *_OF_DRIVE)},
         plans=plans,
         **{name: of_study[name] for name in _OWN_TABLES},
     )
-    faults.add(loads_beyond(config))
+    known_motor = not parts.file
+    faults.add(loads_beyond(machine.model, config.feed, events, plans, known_motor=known_motor))
     for capability in registered():
         faults.add(capability.faults(config))
-    faults.add(endless(config))
+    faults.add(endless(config.operation, events, plans))
     faults.refuse()
     return config
+
+
+def _motor(
+    tables: Mapping[str, Any], parts: Parts, checked: Any, own: Any, plate: CatalogueMotor | None, source: str
+) -> MotorSource | None:
+    """The motor of a file, `own` parameters or one that it names; None where a capability chooses it."""
+    if motor_is_left(tables):
+        return None
+    if parts.file:
+        return ForeignMotor(beside(parts.file, source), given_values(checked.system.motor_names))
+    if plate is not None:
+        return NamedMotor(plate)
+    return OwnMotor(parts.motor, own)
 
 
 def _read_sections(

@@ -8,19 +8,27 @@ from typing import Any
 
 import numpy as np
 
-from ..core.quantities import Layout
 from ..machines.machine import Machine
 
 
 @dataclass(frozen=True)
 class Cycle:
-    """Outputs of the machine over `angle`, the crank angle [rad], shape (points,)."""
+    """Outputs of the machine over `angle`, the crank angle [rad], shape (points,); those of chains have the shape
+    (turns, points)."""
 
     angle: Any
     crank_torque: Any
     """[N m]"""
     outputs: Any
     """outputs as the machine declares them; only `tau` and `J` for chains"""
+    crank_speed: float
+    """[rad/s]"""
+    ratio: float
+    """turns of the shaft to which the outputs `tau` and `J` belong per turn of the crank"""
+
+    def inertia_at(self, ratio: float) -> Any:
+        """The inertia of the machine [kg m2] at a shaft that makes `ratio` turns per turn of the crank."""
+        return self.outputs.J * (self.ratio / ratio) ** 2
 
 
 def cycle(machine: Machine, crank_speed: float, feed: Any, points: int = 720) -> Cycle:
@@ -28,7 +36,7 @@ def cycle(machine: Machine, crank_speed: float, feed: Any, points: int = 720) ->
     angle = np.linspace(0.0, 2.0 * math.pi, points, endpoint=False)
     ratio = machine.ratio
     out = machine.outputs(angle * ratio, crank_speed * ratio, 0.0, feed)
-    return Cycle(angle, out.tau * ratio, out)
+    return Cycle(angle, out.tau * ratio, out, crank_speed, ratio)
 
 
 def energy_swing(torque: Any) -> float:
@@ -48,9 +56,3 @@ def needed_inertia(swing: float, speed: float, fluctuation: float, there: float 
     = dE/(fluctuation w^2).
     """
     return max(0.0, swing / (fluctuation * speed * speed) - there)
-
-
-def no_feed(feed: Any) -> Any:
-    """A feed of the same kind without material; a quantity that cannot be zero has its start value."""
-    layout = Layout(type(feed))
-    return layout.instance([0.0 if v.quantity.admits(0.0) else v.quantity.start for v in layout.variables])

@@ -177,7 +177,7 @@ class Event(metaclass=EventType):
         """
         raise NotImplementedError
 
-    def follow(self, turn: float) -> float:
+    def time_followed(self, turn: float) -> float:
         """Time for which the machine is followed from the begin of the event on [s]: the requested turns, and
         at least one turn after the last change. A turn of the crank takes `turn` [s]."""
         # a little longer than requested, so that a dip in speed does not cost a whole turn

@@ -10,7 +10,7 @@ from functools import cache
 from typing import Any, ClassVar
 
 from ..core.quantities import Value, declaration, quantity
-from ..machines.chain_unit import other
+from ..machines.chain_unit import SideName, other
 from ..reading.text import number
 from ..system.signals import Profile
 from .event import AnySide, Event, EventType, Role, Signals, Timing, Values, on_side
@@ -169,6 +169,16 @@ class OneSidedFeed(Event):
         }
 
 
+def one_sided_event(events: Mapping[str, Event], side: SideName) -> Event:
+    """The event of all feed on that side: the one among the `events` of a study, else that of the example."""
+    own = (
+        event
+        for event in events.values()
+        if (event.kind, event.side) == (OneSidedFeed.kind, side) and event.empties
+    )
+    return next(own, OneSidedFeed.on(side))
+
+
 class LoadedStart(OneSidedFeed):
     """A start with all feed on one side."""
 
@@ -185,7 +195,7 @@ class LoadedStart(OneSidedFeed):
         """The feed on one side from rest on."""
         return dict(self.ends(normal))
 
-    def follow(self, turn: float) -> float:
+    def time_followed(self, turn: float) -> float:
         """As long as the start-up."""
         return 0.0
 

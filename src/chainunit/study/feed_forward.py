@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from ..reading.results import part, result
 from .analysis import Analysis, Findings, Work
-from .config import Config
 from .drive import Drive
 from .measures import read_measure
 from .record import StudyRecord
@@ -40,7 +42,7 @@ class FeedForwardAnalysis(Analysis):
     needs_runs = True
 
     @staticmethod
-    def applies(config: Config, drive: Drive) -> bool:
+    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
         """Whether the control has feed-forward."""
         return drive.feed_forward
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
 from ..core.quantities import Value, declaration, quantity
 from ..reading.results import part, result
 from ..reading.text import number
 from .analysis import Analysis, Findings, Work
-from .config import Config
 from .drive import Drive
 from .readings import shaft_power
 from .record import StudyRecord
@@ -73,7 +75,7 @@ class GearAnalysis(Analysis):
     needs_runs = True
 
     @staticmethod
-    def applies(config: Config, drive: Drive) -> bool:
+    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
         """Whether the drive has a gear with a loss."""
         return drive.gear_friction > 0.0
 
@@ -83,7 +85,7 @@ class GearAnalysis(Analysis):
         that lasts."""
         if STEADY not in study.answers:
             return None
-        drive, gear = study.drive, study.config.gear
+        drive, gear = study.drive, study.config.drive.gear
         window = study.window(Phase.STEADY, study.steady)
         squared = window.mean(lambda drive, run: run[drive.motor_speed].values ** 2)
         total, net = drive.gear_friction * squared, study.answers[STEADY].power_mean

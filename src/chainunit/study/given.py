@@ -9,7 +9,7 @@ from typing import Any
 from ..core.quantities import variables
 from ..reading.results import as_data
 from ..reading.text import entry
-from .config import Config
+from .config import FileContents
 from .record import StudyRecord
 from .registry import registered
 from .rules import all_rules
@@ -68,8 +68,8 @@ def given_sections(study: StudyRecord) -> list[GivenSection]:
     """All given values of a study; with them the study can be repeated."""
     config = study.config
     sections = [
-        GivenSection("", "Study", None, _of_study(config)),
-        GivenSection("system", "System", None, _system(config)),
+        GivenSection("", "Study", None, _of_study(config.file)),
+        GivenSection("system", "System", None, _system(config.file.choices, is_chosen=config.motor is None)),
         GivenSection("machine", "Machine", study.drive.machine.p),
         GivenSection("feed", "Feed in normal running", config.feed),
         *(
@@ -84,26 +84,27 @@ def given_sections(study: StudyRecord) -> list[GivenSection]:
     return [section for section in sections if section.values is not None or section.choices]
 
 
-def _of_study(config: Config) -> dict[str, Any]:
+def _of_study(file: FileContents) -> dict[str, Any]:
     # a key that a file of this kind may not have is not used either
-    refused = {rule.key for rule in all_rules() if rule.refused is None and rule.on.holds(config.file.tables)}
+    refused = {rule.key for rule in all_rules() if rule.refused is None and rule.on.holds(file.tables)}
     used = all_choices().keys() - refused
-    return {name: x for name, x in config.file.choices.items() if name in used and x != ""}
+    return {name: x for name, x in file.choices.items() if name in used and x != ""}
 
 
-def _system(config: Config) -> dict[str, Any]:
-    """Names of machine and motor, and the names of our variables in their FMUs."""
-    choices = {
-        name.removeprefix("system."): x
-        for name, x in config.file.choices.items()
-        if name.startswith("system.")
-    }
-    return {name: x for name, x in choices.items() if x and (name != "motor" or not config.chooses_motor)}
+def _system(choices: Mapping[str, Any], *, is_chosen: bool) -> dict[str, Any]:
+    """Names of machine and motor, and the names of our variables in their FMUs; without the motor where it
+    `is_chosen`."""
+    own = {name.removeprefix("system."): x for name, x in choices.items() if name.startswith("system.")}
+    return {name: x for name, x in own.items() if x and (name != "motor" or not is_chosen)}
 
 
 def _tables(study: StudyRecord) -> Iterator[GivenSection]:
     config = study.config
-    randoms = {key: each for part in registered() for key, each in part.random_events(config).items()}
+    randoms = {
+        key: each
+        for part in registered()
+        for key, each in part.random_events(config.plans[part.name]).items()
+    }
     for name, section in all_sections().items():
         values = config.table(name)
         is_idle = section.with_findings and name not in study.findings

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from .. import __version__
 from ..reading.results import part, result
-from .config import Config
+from .config import FileContents
 
 
 @result
@@ -19,6 +19,6 @@ class Heading:
     report: Mapping[str, str] = part("labels of the report")
 
     @classmethod
-    def of(cls, config: Config) -> Heading:
-        """The heading of a result of this study."""
-        return cls(__version__, config.title, config.file.source, config.file.labels)
+    def of(cls, title: str, file: FileContents) -> Heading:
+        """The heading of a result of a study with that title and file."""
+        return cls(__version__, title, file.source, file.labels)

@@ -75,7 +75,10 @@ def motor_limits(study: StudyRecord) -> dict[str, Check]:
         # the worst crank angle counts
         others = longest_of(found.starts)
         time = None if others is None or time is None else max(time, others)
-    return given_motor(study.config, study.drive, steady.winding_temperature, steady.current_rms, time)
+    config, permitted = study.config, study.config.permitted_temperature[1]
+    return given_motor(
+        study.drive, config.plate, permitted, steady.winding_temperature, steady.current_rms, time
+    )
 
 
 _EXCESSES = {

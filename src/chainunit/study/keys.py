@@ -24,6 +24,7 @@ from ..reading.text import CHOICES as UNITS
 from .config import Config, parse
 from .event import TYPES, Event
 from .file_section import FileSection
+from .motor_sources import OwnMotor
 from .parts import ReportTable
 from .sections import Ratios, SystemTable, all_choices, all_sections
 
@@ -122,7 +123,10 @@ def key_tables() -> tuple[KeyTable, ...]:
         KeyTable(
             "",
             "Study",
-            (Key("title", "title of the study", sort="text"), *_of_fields(all_choices(), _study())),
+            (
+                Key("title", "title of the study", sort="text"),
+                *_of_fields(all_choices(), _study().file.choices),
+            ),
         ),
         KeyTable("system", "Machine and motor", tuple(_of_system())),
         *(
@@ -187,7 +191,9 @@ def _of_machine(name: str, table: str) -> Iterator[Key]:
 
 
 def _of_motor(name: str) -> Iterator[Key]:
-    return quantity_keys(MOTORS[name].Parameters, _study(motor=name).motor, sources=_OF_MOTORS)
+    motor = _study(motor=name).motor
+    values = motor.parameters if isinstance(motor, OwnMotor) else None
+    return quantity_keys(MOTORS[name].Parameters, values, sources=_OF_MOTORS)
 
 
 def _of_section(name: str, section: FileSection) -> Iterator[Key]:
@@ -255,10 +261,10 @@ def _of_entry(entry: TableList) -> Iterator[Key]:
         yield from quantity_keys(entry.declared, entry.declared(), sources=entry.follows)
 
 
-def _of_fields(fields: Mapping[str, Any], config: Config | None = None) -> Iterator[Key]:
-    """Keys that are no quantities, from their pydantic fields."""
+def _of_fields(fields: Mapping[str, Any], values: Mapping[str, Any] | None = None) -> Iterator[Key]:
+    """Keys that are no quantities, from their pydantic fields, with these `values` or their defaults."""
     for name, (annotation, field) in fields.items():
-        yield _of_field(name, annotation, field, config.file.choices.get(name) if config else field.default)
+        yield _of_field(name, annotation, field, field.default if values is None else values.get(name))
 
 
 def _of_field(name: str, annotation: Any, field: FieldInfo, value: Any) -> Key:

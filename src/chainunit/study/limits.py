@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterable
 
 from ..core.descriptions import USUAL_DRIVER
+from ..drives.catalogue import CatalogueMotor
 from ..drives.nameplate import Nameplate
 from ..reading.results import OWN, derived, part, result
 from ..reading.text import MOST_PERCENT, number
-from .config import Config
 from .drive import Drive
 from .window import BURNT
 
@@ -110,13 +110,20 @@ def reaches(speed: float, requested: float) -> bool:
 
 
 def given_motor(
-    config: Config, drive: Drive, temperature: float | None, current: float | None, start: float | None
+    drive: Drive,
+    plate: CatalogueMotor | None,
+    permitted: float,
+    temperature: float | None,
+    current: float | None,
+    start: float | None,
 ) -> dict[str, Check]:
     """The limits of the motor that a study gives, by name. A foreign motor has none; a motor without a
     nameplate has only that of the winding.
 
     Parameters
     ----------
+    plate : the motor of the catalogue, where the file names one
+    permitted : permitted temperature of the winding [K]
     temperature : final temperature of the winding if steady running goes on for ever [K]
     current : RMS current of steady running [A]
     start : time of the start [s]; a start by an inverter has no limit
@@ -125,12 +132,10 @@ def given_motor(
         return {}
     checks = {}
     if temperature is not None:
-        _, highest = config.permitted_temperature
-        checks["temperature"] = heating(temperature, drive.fmu_parameters.ambient.T, highest)
-    if config.plate is not None:
-        plate = config.plate.nameplate
+        checks["temperature"] = heating(temperature, drive.fmu_parameters.ambient.T, permitted)
+    if plate is not None:
         if current is not None:
-            checks["current"] = lasting_current(current, plate)
+            checks["current"] = lasting_current(current, plate.nameplate)
         if not drive.follows:
-            checks["start"] = starting(start, plate)
+            checks["start"] = starting(start, plate.nameplate)
     return checks

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .catalogue_drive import SLIP
-from .config import Config
+from .config import FileContents
 from .parts import LENGTHS
 from .record import StudyRecord
 
@@ -15,9 +15,9 @@ def origin_of(study: StudyRecord, name: str) -> str:
     """The origin of the value of a quantity, by its name in a study file ("motor.rotor.J"): "file", "example",
     "tuned", "catalogue" (by the motor that the file names), the name of a proposal, or "declared"."""
     config, (section, _, parameter) = study.config, name.partition(".")
-    if name in _CHOSEN and study.proposal is not None and _of(config, name) == "declared":
+    if name in _CHOSEN and study.proposal is not None and _of(config.file, name) == "declared":
         return study.proposal.name
-    if name == SLIP and config.start == "inverter" and _of(config, name) == "declared":
+    if name == SLIP and config.drive.start == "inverter" and _of(config.file, name) == "declared":
         return "catalogue"
     if section == "motor" and (tuning := study.drive.tuning) and parameter in tuning.parameters:
         return "file" if name in config.file.given else "tuned"
@@ -30,14 +30,14 @@ def origin_of(study: StudyRecord, name: str) -> str:
         if not name_in_file:
             return "catalogue" if study.proposal is None else study.proposal.name
         name = name_in_file
-    return _of(config, name)
+    return _of(config.file, name)
 
 
-def _of(config: Config, name: str) -> str:
+def _of(file: FileContents, name: str) -> str:
     """The origin of a value that only the study file or the example can give."""
-    if name in config.file.given:
+    if name in file.given:
         return "file"
-    return "example" if name in config.file.of_example else "declared"
+    return "example" if name in file.of_example else "declared"
 
 
 def _name_in_file(study: StudyRecord, parameter: str) -> str:
@@ -46,11 +46,11 @@ def _name_in_file(study: StudyRecord, parameter: str) -> str:
     if proposal is not None and parameter in proposal.keys:
         return proposal.keys[parameter]
     if parameter == "ratio":
-        return "gear.ratio" if _of(config, "gear.ratio") != "declared" else ""
+        return "gear.ratio" if _of(config.file, "gear.ratio") != "declared" else ""
     group = parameter.partition(".")[0]
     if parameter == "inverter.on":
         return "start"
-    if parameter == "inverter.slip" and config.start == "inverter" and SLIP not in config.file.given:
+    if parameter == "inverter.slip" and config.drive.start == "inverter" and SLIP not in config.file.given:
         return ""
     if group in ("soft_start", "inverter"):
         return f"starter.{parameter}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,45 +24,37 @@ from ..reading.tables import file_text, toml
 from ..system import ModelComponent, System, compiled
 from ..system.compiled import input_starts
 from ..system.ssp import export
-from .choice import choose, with_parts_beside
+from .choice import choose_for, with_parts_beside
 from .config import Config
+from .cycle import cycle
 from .drive import Drive
+from .operation import OperatingConditions
 from .registry import parts_of_line
 
 
-def study_system(config: Config, drive: Drive) -> System:
+def study_system(drive: Drive, operation: OperatingConditions) -> System:
     """Machine, line and motor of a study, from rest. The speed reference is the crank speed at the motor
     from the start on; feed and processing forces are those of normal running. With feed-forward, the system
     has the second machine that the control uses."""
-    start = drive.loads(config.feed) if drive.foreign_machine else {}
+    start = drive.loads(operation.feed) if drive.foreign_machine else {}
     if "w_ref" in drive.graph.components["motor"].connectors:
-        start["motor.w_ref"] = config.run.crank_speed * drive.ratio
+        start["motor.w_ref"] = operation.crank_speed * drive.ratio
     for name, machine in (("machine", drive.driven_machine), ("model", drive.machine)):
         if name in drive.graph.components and not drive.foreign_machine:
             # a connected input needs no start value, but an FMU that runs alone needs one
-            values = _machine(config, machine.model, machine)
+            values = _machine(operation, machine.model, machine)
             start |= {f"{name}.{variable}": x for variable, x in values.items()}
     return replace(drive.graph, start=start)
 
 
-def start_of(
-    config: Config,
-    model: type[Model],
-    *,
-    backend: Backend | None = None,
-    progress: Callable[[str], None] = lambda what: None,
-) -> dict[str, float]:
-    """Start values of the parameters and inputs of the `model`, by name, with the values of the study: with
-    tuned gains, or with the motor and the ratio that are chosen.
+def start_of(drive: Drive, operation: OperatingConditions, model: type[Model]) -> dict[str, float]:
+    """Start values of the parameters and inputs of the `model`, by name, with the values of the drive of a study.
 
     Raises
     ------
     InputError
         where the study has another motor or machine, or lacks the part of the line.
-    RunError
-        where no motor is found.
     """
-    drive = _drive(config, backend, progress)
     for kind in parts_of_line():
         if model is kind.model:
             if (part := drive.line.part(kind.name)) is None:
@@ -72,7 +64,7 @@ def start_of(
         if not _is_of(model, drive):
             raise InputError(f"the study's machine is {drive.driven_machine.model.name}, not {model.name}")
         own = drive.simulated_machine if issubclass(model, ChainedModel) else drive.driven_machine
-        return _machine(config, model, own)
+        return _machine(operation, model, own)
     if drive.motor is not model:
         title = drive.graph.components["motor"].title
         raise InputError(f"the study's motor is {title}, not {model.name}")
@@ -116,9 +108,10 @@ def model_and_start(
         where no motor is found.
     """
     if config and is_study_file(name):
-        return whole_system(config, backend=backend, progress=progress)
+        drive = drive_to_export(config, backend, progress)
+        return whole_system(drive, config.operation, config.title, config.file.labels)
     model = model_named(name, direct)
-    start = start_of(config, model, backend=backend, progress=progress) if config else {}
+    start = start_of(drive_to_export(config, backend, progress), config.operation, model) if config else {}
     if name == "ChainUnitFlexible":
         if rods is None:
             machine = config and config.machine.simulated
@@ -128,47 +121,42 @@ def model_and_start(
 
 
 def whole_system(
-    config: Config,
-    *,
-    backend: Backend | None = None,
-    progress: Callable[[str], None] = lambda what: None,
+    drive: Drive, operation: OperatingConditions, title: str, labels: Mapping[str, str]
 ) -> tuple[type[Model], dict[str, float]]:
-    """The one model of the whole system of a study, and its start values by name: parameters, the speed reference and
-    the loads of normal running. Where the file leaves the motor open it is chosen first.
+    """The one model of the whole system of a study with that title and the `labels` of its report, and its start
+    values by name: parameters, the speed reference and the loads of normal running.
 
     Raises
     ------
     InputError
         where motor or machine is a foreign FMU.
-    RunError
-        where no motor is found.
     """
-    drive = _drive(config, backend, progress)
-    system = study_system(config, drive)
+    system = study_system(drive, operation)
     machine = system.components["machine"]
     name = machine.model.name if isinstance(machine, ModelComponent) else machine.title
-    labels = {key: printable(config.file.labels.get(key, ""), 1000) for key in ("author", "revision")}
+    author, revision = (printable(labels.get(key, ""), 1000) for key in ("author", "revision"))
     part = compiled(
         system,
         f"{name}System",
-        config.title,
-        about=About(author=labels["author"], version=labels["revision"]),
-        experiment={"step": config.run.step, "stop": _running(config)},
+        title,
+        about=About(author=author, version=revision),
+        experiment={"step": operation.run.step, "stop": _running(operation)},
     )
     return part.model, part.start | input_starts(system, part.model)
 
 
-def _running(config: Config) -> float:
+def _running(operation: OperatingConditions) -> float:
     """The time of start-up and steady running [s]."""
-    return config.steady_begin + config.run.turns * config.turn
+    return operation.steady_begin + operation.run.turns * operation.turn
 
 
-def left_out(config: Config) -> str:
-    """A sentence on the parts of a study that its exported system does not have; empty where there are none."""
-    names = ["the safety coupling"] if config.coupling is not None else []
-    if config.file.gives("event"):
-        names.append(f"the events {', '.join(config.events)}")
-    if config.empty_start:
+def left_out(operation: OperatingConditions, events: Iterable[str]) -> str:
+    """A sentence on the parts of a study that its exported system does not have, among them the `events` of its
+    file by name; empty where there are none."""
+    names = ["the safety coupling"] if operation.coupling is not None else []
+    if listed := ", ".join(events):
+        names.append(f"the events {listed}")
+    if operation.empty_start:
         names.append("the feed that comes once the machine runs")
     if not names:
         return ""
@@ -199,20 +187,31 @@ def _is_of(model: type[Model], drive: Drive) -> bool:
     return model is own or chains or model is own.direct()
 
 
-def _machine(config: Config, model: type[Model], machine: Machine) -> dict[str, float]:
+def _machine(operation: OperatingConditions, model: type[Model], machine: Machine) -> dict[str, float]:
     """Start values of the machine with its feed and gear, at the speed of the study."""
-    speed = config.run.crank_speed * machine.ratio
+    speed = operation.crank_speed * machine.ratio
     direct = issubclass(model, DirectMachine)
     turning = {"w_start": speed} if direct else {"phi": 0.0, "w": speed, "a": 0.0}
-    return machine.by_name | Layout(type(config.feed)).by_name(config.feed) | turning
+    return machine.by_name | Layout(type(operation.feed)).by_name(operation.feed) | turning
 
 
-def _drive(config: Config, backend: Backend | None, progress: Callable[[str], None]) -> Drive:
+def drive_to_export(
+    config: Config, backend: Backend | None = None, progress: Callable[[str], None] = lambda what: None
+) -> Drive:
+    """The drive of a study with the parts beside it: with tuned gains, or with the motor and the ratio that are
+    chosen.
+
+    Raises
+    ------
+    RunError
+        where no motor is found.
+    """
     with scratch() as folder:
-        choice = choose(config, folder, lambda what, done, todo: progress(what), backend)
+        turn = cycle(config.machine, config.run.crank_speed, config.feed)
+        choice = choose_for(turn, config, folder, lambda what, done, todo: progress(what), backend)
     if choice.proposal is not None and choice.proposal.insufficient:
         raise RunError(f"[{choice.proposal.name}]: {choice.proposal.answer}")
-    return with_parts_beside(config, choice.drive)
+    return with_parts_beside(choice.drive, config.plans, config.feed, turn)
 
 
 def export_study(
@@ -231,13 +230,13 @@ def export_study(
     InputError, RunError
         see `chainunit.system.ssp.export`; also where no motor is found, or the motor is a foreign FMU.
     """
-    drive = _drive(config, backend, progress)
+    drive = drive_to_export(config, backend, progress)
     return export(
-        study_system(config, drive),
+        study_system(drive, config.operation),
         file,
         name="ChainUnitDrive",
         description=config.title,
-        stop=_running(config),
+        stop=_running(config.operation),
         step=config.run.step,
         backend=backend,
         progress=progress,

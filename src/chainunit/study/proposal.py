@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..drives.catalogue import CatalogueMotor
-from ..drives.gearing import Transmission
 from .drive import Drive
+from .drive_tables import DriveTables
 from .torques import DutyPeak
 
 
@@ -22,7 +22,8 @@ class DriveProposal:
     """the `Findings` of the choice; their remarks come before those on the runs"""
     drive: Drive
     motor: CatalogueMotor
-    gear: Transmission
+    tables: DriveTables
+    """the tables of the study, with the values that follow from the drive"""
     question: str
     """the question that it answers about the machine {noun}"""
     answer: str

@@ -183,7 +183,7 @@ class StudyRecord:
     @property
     def steady_begin(self) -> float:
         """Time from which running counts as steady [s]."""
-        return self.config.steady_begin if self.started is None else self.started.steady_from
+        return self.config.operation.steady_begin if self.started is None else self.started.steady_from
 
     @property
     def plate(self) -> CatalogueMotor | None:

@@ -92,7 +92,7 @@ def _left_out(study: StudyRecord) -> Iterator[str]:
         yield f"coupling.trip_torque ({number(coupling.trip_torque, 'N.m', full=False)})"
     if config.plate is not None and "system.motor" in config.file.of_example:
         yield f"the motor ({config.plate.designation})"
-    elif study.proposal is None and config.foreign is None:
+    elif study.proposal is None and study.drive.foreign is None:
         values = study.drive.motor.parameter_layout.by_name(study.drive.parameters)
         units = {v.name: v.unit for v in study.drive.motor.parameter_layout.variables}
         names = [name for name in _RATING if f"motor.{name}" in config.file.of_example]
@@ -277,7 +277,7 @@ _HAPPENINGS = {
 
 def _on_runs(study: StudyRecord) -> None:
     """A remark for each kind of happening in the runs, with all runs in which it occurred."""
-    limits: dict[str, Amount] = {"gear passed": (study.config.gear.torque_limit, "N.m")}
+    limits: dict[str, Amount] = {"gear passed": (study.config.drive.gear.torque_limit, "N.m")}
     if (largest := study.drive.motor.current_limit(study.motor)) is not None:
         limits["current limit"] = largest, "A"
     happenings = [(name, *each) for name in study.answers for each in _happenings(study, name)]
@@ -307,7 +307,7 @@ def _happenings(study: StudyRecord, name: str) -> Iterator[tuple[str, str, dict[
     if largest is not None and answers.current_peak > 0.999 * largest:
         yield "current limit", "", {}
     peak = peaks_in_events(study).get(name, 0.0)
-    if "gear.torque_limit" in config.file.given and peak > config.gear.torque_limit:
+    if "gear.torque_limit" in config.file.given and peak > config.drive.gear.torque_limit:
         yield "gear passed", number(peak, "N.m"), {"torque": (peak, "N.m")}
     if answers.stall_time is not None:
         late = answers.stall_time > 10.0 * config.run.step
@@ -329,7 +329,7 @@ def _on_inverter(study: StudyRecord) -> None:
     """Note the runs with a current that an inverter can hardly give; its own limit is not in the model of the
     motor."""
     rated_current = study.drive.rated_current
-    if rated_current is None or study.config.start != "inverter":
+    if rated_current is None or study.config.drive.start != "inverter":
         return
     if SLIP not in study.config.file.given:
         slip = study.drive.parameters.inverter.slip
@@ -341,7 +341,7 @@ def _on_inverter(study: StudyRecord) -> None:
             "The inverter compensates the rated slip of the motor by {slip} (starter.inverter.slip)."
         )
         study.note("slip compensation", compensated if slip else without, slip=(slip, "Hz/(N.m)"))
-    limit = study.config.starter.overload
+    limit = study.config.drive.starter.overload
     ordered = study.proposal and study.proposal.inverter_current
     rated_current, whose = (
         (ordered, "to be ordered") if ordered else (rated_current, "with the rated current of the motor")

@@ -111,7 +111,7 @@ def as_dict(study: StudyRecord) -> dict[str, Any]:
 def _data(study: StudyRecord) -> StudyData:
     drive, failure = study.drive, study.failure
     return StudyData(
-        heading=Heading.of(study.config),
+        heading=Heading.of(study.config.title, study.config.file),
         status=f"failed: {failure}" if failure else "complete",
         failure=str(failure) if failure else None,
         verdict=Verdicts(study.verdict, motor_verdict(study)),

@@ -21,11 +21,11 @@ from ..system import (
     certify,
     without,
 )
-from .config import Config
-from .cycle import no_feed
 from .drive import Drive
 from .drive_fmus import with_files
 from .event import Event, OverTime, Signals, Values
+from .load_cases import no_feed
+from .operation import OperatingConditions
 from .readings import machine_series
 
 FEED_RISE = 0.1
@@ -34,10 +34,10 @@ FEED_RISE = 0.1
 
 @dataclass(frozen=True)
 class Rig:
-    """A drive as the FMUs of `files`, with the loads and the speed of the study; or, with a `twin`, the drive
+    """A drive as the FMUs of `files` in its `operation`; or, with a `twin`, the drive
     whose system that function has changed, so that a part is left out."""
 
-    config: Config
+    operation: OperatingConditions
     drive: Drive
     files: Mapping[str, Path] | None
     """by component; None for the compiled system, which needs no FMUs"""
@@ -48,7 +48,7 @@ class Rig:
     @property
     def step(self) -> float:
         """Communication step [s]."""
-        return float(self.config.run.step)
+        return float(self.operation.run.step)
 
     def _twin(self, system: System) -> System:
         return system if self.twin is None else self.twin(system)
@@ -72,7 +72,7 @@ class Rig:
     @property
     def guards(self) -> dict[str, float]:
         """The variable on the motor's shaft at which a safety coupling opens, with its limit."""
-        coupling = self.config.coupling
+        coupling = self.operation.coupling
         return {self.drive.motor_torque: coupling.trip_torque / self.drive.ratio} if coupling else {}
 
     @cached_property
@@ -84,7 +84,7 @@ class Rig:
             for c in self.graph.components[name].connectors.values()
             if c.causality == "input"
         }
-        for full, value in self.drive.loads(self.config.feed).items():
+        for full, value in self.drive.loads(self.operation.feed).items():
             instance, _, name = full.partition(".")
             if instance == "machine":
                 inputs[name] = full, value
@@ -104,10 +104,10 @@ class Rig:
     def signals(self, changes: Mapping[str, OverTime] | None = None, *, ramp: bool = False) -> Signals:
         """Loads of normal running, or the `changes` in their place, and the speed reference, with `ramp` from
         rest."""
-        run = self.config.run
-        loads = self.drive.loads(self.config.feed)
-        if ramp and self.config.empty_start:
-            empty = self.drive.loads(no_feed(self.config.feed))
+        run = self.operation.run
+        loads = self.drive.loads(self.operation.feed)
+        if ramp and self.operation.empty_start:
+            empty = self.drive.loads(no_feed(self.operation.feed))
             loads = {full: self._coming(empty[full], value) for full, value in loads.items()}
         signals = {
             **loads,
@@ -127,7 +127,7 @@ class Rig:
         """A load of a machine that starts empty, over time."""
         if self.fed_from is None:
             return empty
-        return Profile(empty, ((self.fed_from, FEED_RISE * self.config.turn, value),))
+        return Profile(empty, ((self.fed_from, FEED_RISE * self.operation.turn, value),))
 
     def from_rest(self, event: Event | None = None) -> Simulation:
         """The simulation from rest on, with the `event` of a start, if one is given."""
@@ -144,7 +144,7 @@ class Rig:
         """
         if self.files is None:
             return CompiledSimulation(system, signals, begin)
-        if self.config.simulation == "cs":
+        if self.operation.simulation == "cs":
             return CoSimulation(system, signals, begin)
         with refusal_prefix('simulation = "me": '):
             return ModelExchange(system, signals, begin)

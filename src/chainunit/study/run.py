@@ -22,11 +22,12 @@ from . import verdict
 from .analyses import all_analyses
 from .analysis import Work
 from .bearings import pin_loads
-from .choice import as_chosen, choose, with_parts_beside
+from .choice import choose_for, with_parts_beside
 from .config import Config
 from .drive_fmus import export_coasting, export_drive
 from .event import Event
 from .event_torques import from_event_on
+from .load_cases import turns_by_load
 from .measures import read_answers, read_measure
 from .pulls import least_pulls
 from .readings import crank_angle
@@ -71,18 +72,20 @@ def run_study(
         save its state.
     """
     with shown_in(config.units):
-        choice = choose(config, folder / "fmu", progress, backend)
-        config = as_chosen(config, choice)
-        drive = with_parts_beside(config, choice.drive)
+        turns = turns_by_load(config.machine, config.run.crank_speed, config.feed)
+        turn = next(iter(turns.values()))
+        choice = choose_for(turn, config, folder / "fmu", progress, backend)
+        config = replace(config, drive=choice.tables)
+        drive = with_parts_beside(choice.drive, config.plans, config.feed, turn)
         if check and drive.foreign_titles:
             titles = " and ".join(drive.foreign_titles)
             raise InputError(f"--check: the equations of {titles} are not known; leave --check out")
-        study = StudyRecord(config, drive, statics(config, drive), choice.proposal)
+        study = StudyRecord(config, drive, statics(drive, turns, config.run.step), choice.proposal)
         if choice.proposal is not None:
             study.findings[choice.proposal.name] = choice.proposal.findings
-        unmade = Rig(config, drive, {})
+        unmade = Rig(config.operation, drive, {})
         for part in registered():
-            part.check_runs(config, unmade)
+            part.check_runs(config.plans[part.name], unmade)
         _analyse(study, Work(unmade, progress), needs_runs=False)
         files, study.fmus = export_drive(
             drive, folder / "fmu", backend, lambda what: progress(what, 0.0, 1.0)
@@ -93,7 +96,7 @@ def run_study(
                 "No C compiler was found: the FMUs run in Python. With one the runs take about a tenth of the time: "
                 "install gcc or clang, or the compiler that comes with pip install 'chainunit[cross]'.",
             )
-        runner = Runner(study, Rig(config, drive, files), progress)
+        runner = Runner(study, Rig(config.operation, drive, files), progress)
         with _ending(study):
             runner.run(check, lambda: export_coasting(drive, folder / "fmu", backend))
             work = Work(runner.rig, progress, folder, scheduler, runner.stop)
@@ -125,7 +128,7 @@ def _analyse(study: StudyRecord, work: Work, *, needs_runs: bool, at_end: bool =
     """Make every analysis for which the system has the parts."""
     for analysis in all_analyses():
         is_due = (analysis.needs_runs, analysis.at_end) == (needs_runs, at_end)
-        if is_due and analysis.applies(study.config, study.drive):
+        if is_due and analysis.applies(study.drive, study.config.plans):
             findings = analysis.find(study, work)
             if findings is not None:
                 study.findings[analysis.name] = findings
@@ -155,13 +158,14 @@ class Runner:
     def __init__(self, study: StudyRecord, rig: Rig, progress: TaskProgress) -> None:
         config = study.config
         self.study, self.rig, self.progress = study, rig, progress
-        self.stop = config.stop
+        operation = rig.operation
+        self.stop = operation.stop
         """time to which the start-up is run [s]; later where the motor takes longer to settle"""
         taken = [event for event in config.events.values() if rig.takes(event)]
         self.events = [event for event in taken if not event.from_rest]
         self.starts = [event for event in taken if event.from_rest]
         self.total = self.stop * (1 + len(self.starts))
-        self.total += sum(config.turn + event.follow(config.turn) for event in self.events)
+        self.total += sum(operation.turn + event.time_followed(operation.turn) for event in self.events)
         self._coasting: Path | None = None
 
     def run(self, check: bool, coasting: Callable[[], Path | None]) -> None:
@@ -178,7 +182,7 @@ class Runner:
             leads = lead_times(self.rig, simulation, self.events, angle, speed)
             for event, lead in zip(self.events, leads, strict=True):
                 transients.append(self._event(simulation, event, begin + lead, progress))
-                progress += lead + event.follow(self.study.config.turn)
+                progress += lead + event.time_followed(self.rig.operation.turn)
             for transient in transients:
                 self._assumption(simulation, transient, progress)
         if check:
@@ -214,7 +218,7 @@ class Runner:
         """
         study, rig, config = self.study, self.rig, self.study.config
         progress = self._progress("start-up and steady running", 0.0)
-        study.started = start_up(rig, simulation, self.stop, progress, rig.guards)
+        study.started = start_up(rig, simulation, progress, rig.guards)
         run, self.stop = study.started.run, study.started.stop
         self.rig = rig = study.started.rig
         self._certify("start_up", run)
@@ -259,15 +263,15 @@ class Runner:
             study.relay_class = max(study.relay_class, study.proposal.start_class)
 
     def _event(self, simulation: Simulation, event: Event, begin: float, before: float) -> Transient:
-        stop = begin + event.follow(self.study.config.turn)
+        stop = begin + event.time_followed(self.rig.operation.turn)
         progress = self._progress(event.title, before)
         transient = follow(self.rig, simulation, event, begin, stop, progress, self.rig.guards)
         self._close(simulation, transient, stop, Phase.EVENT)
         return transient
 
     def _loaded_start(self, event: Event, before: float, check: bool) -> None:
+        progress = self._progress(event.title, before)
         with self.rig.from_rest(event) as simulation:
-            progress = self._progress(event.title, before)
             run = simulation.run(self.stop, self.rig.step, progress, guards=self.rig.guards)
             transient = Transient(event, 0.0, run, self.rig.event_signals(event, 0.0, {}), {})
             self._close(simulation, transient, self.stop, Phase.LOADED_START)
@@ -331,7 +335,7 @@ class Runner:
         answers = self.study.answers[event.name]
         peaks = {name: [] if self.rig.guards else [getattr(answers, f"{name}_peak")] for name in _PEAKS}
         for variant in (*variants, event) if self.rig.guards else variants:
-            stop = begin + event.follow(self.study.config.turn)
+            stop = begin + event.time_followed(self.rig.operation.turn)
             run = follow(self.rig, simulation, variant, begin, stop).run.sel(time=slice(begin, None))
             window = self.study.window(Phase.EVENT, run, begin)
             for name in _PEAKS:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from ..core.errors import InputError, near_name
@@ -10,18 +10,27 @@ from ..core.messages import unit_behind
 from ..core.quantities import Layout
 from ..drives.motors import MOTORS
 from ..machines.chain_unit import SideLoads
+from ..mechanism.models import MachineModel
 from ..system.signals import Profile
+from .event import Event
 from .event_table import inputs_of
+from .operation import OperatingConditions
 from .registry import registered
 
 MOST_STEPS = 1e6
 """Most steps of a study."""
 
 
-def loads_beyond(config: Any) -> Iterator[InputError]:
-    """Refusals of loads of a `Config` that are beyond any machine together: all on one side, and at the height of
-    each event."""
-    feed, model = config.feed, config.machine.model
+def loads_beyond(
+    model: type[MachineModel],
+    feed: Any,
+    events: Mapping[str, Event],
+    plans: Mapping[str, Any],
+    *,
+    known_motor: bool,
+) -> Iterator[InputError]:
+    """Refusals of loads that are beyond any machine together: all on one side, and at the height of each event. A
+    motor that is not a `known_motor` may have any input."""
     for v in Layout(SideLoads).variables if model.sides else ():
         most = getattr(feed.left, v.name) + getattr(feed.right, v.name)
         if not v.quantity.admits(most):
@@ -33,22 +42,19 @@ def loads_beyond(config: Any) -> Iterator[InputError]:
             )
     inputs = {v.name: v for v in model.input_layout.variables}
     normal = {name: v.quantity.start or 0.0 for name, v in inputs.items()} | Layout(model.Feed).by_name(feed)
-    hardest = [
-        (f"event.{name}", f"event.{k}", event) for k, (name, event) in enumerate(config.events.items(), 1)
-    ]
-    beside = {key: part for part in registered() for key in part.random_events(config)}
+    hardest = [(f"event.{name}", f"event.{k}", event) for k, (name, event) in enumerate(events.items(), 1)]
+    randoms = [(part, part.random_events(plans[part.name])) for part in registered()]
+    beside = {key: part for part, own in randoms for key in own}
     hardest += [
-        (key, key, event)
-        for part in registered()
-        for key, random in part.random_events(config).items()
-        for event in random.hardest()
+        (key, key, event) for _, own in randoms for key, random in own.items() for event in random.hardest()
     ]
     of_motors = {name for motor in MOTORS.values() for name in motor.input_layout.names}
     for where, key, event in hardest:
         needed = set(event.inputs(event.side))
         if not needed <= set(inputs):
-            asked = where not in beside or beside[where].longest_run(config)
-            if asked and config.foreign is None and not needed <= {*inputs, *of_motors}:
+            part = beside.get(where)
+            asked = part is None or part.longest_run(plans[part.name])
+            if asked and known_motor and not needed <= {*inputs, *of_motors}:
                 near = "".join(near_name(name, Layout(model.Feed).names) for name in needed)
                 yield InputError(
                     f"{where}: the {model.name} has no input {' or '.join(sorted(needed))}{near}; "
@@ -80,12 +86,14 @@ def loads_beyond(config: Any) -> Iterator[InputError]:
                 )
 
 
-def endless(config: Any) -> Iterator[InputError]:
-    """The refusal of a study, a `Config`, that would never end."""
-    run, turn = config.run, config.turn
-    seconds = config.steady_begin + run.turns * turn
-    seconds += sum(event.follow(turn) + 2.0 * turn for event in config.events.values())
-    steps = max(seconds, *(part.longest_run(config) for part in registered())) / run.step
+def endless(
+    operation: OperatingConditions, events: Mapping[str, Event], plans: Mapping[str, Any]
+) -> Iterator[InputError]:
+    """The refusal of a study that would never end."""
+    run, turn = operation.run, operation.turn
+    seconds = operation.steady_begin + run.turns * turn
+    seconds += sum(event.time_followed(turn) + 2.0 * turn for event in events.values())
+    steps = max(seconds, *(part.longest_run(plans[part.name]) for part in registered())) / run.step
     if not steps <= MOST_STEPS:
         yield InputError(
             f"run.step = {run.step:g} s: the study would take {steps:.2g} steps, more than {MOST_STEPS:.0e}; "

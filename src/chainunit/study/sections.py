@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from functools import cache
-from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, create_model
@@ -186,15 +184,6 @@ SystemTable = create_model(
 variables whose names differ from ours."""
 
 
-@dataclasses.dataclass(frozen=True)
-class ForeignMotor:
-    """A motor that is a foreign FMU."""
-
-    file: Path
-    names: Mapping[str, str]
-    """the FMU's names by ours, where they differ"""
-
-
 SECTIONS: Mapping[str, FileSection] = {
     "run": FileSection(Run, title="Run"),
     "coupling": FileSection(Coupling, optional=True, title="Safety coupling"),
@@ -212,7 +201,7 @@ SECTIONS: Mapping[str, FileSection] = {
     "starter": FileSection(
         Starter,
         title="Starter",
-        is_used=lambda config: config.of_catalogue and config.start != "direct",
+        is_used=lambda config: config.of_catalogue and config.drive.start != "direct",
         follows={
             "inverter.boost": "5 %; with [sizing] the least of 5, 10 and 15 % with which the machine starts",
             "inverter.slip": "that of the rated slip of the motor; none with a flywheel, against which it works",

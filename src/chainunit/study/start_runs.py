@@ -11,7 +11,6 @@ import numpy as np
 
 from ..core.quantities import Value, declaration, quantity
 from .arrays import peak
-from .config import Config
 from .event import Event
 from .measures import STARTED, time_to_start
 from .relay import start_class
@@ -65,7 +64,7 @@ def start_from(
     is None where the crank comes to no lasting speed by then, by the rule of `time_to_start`."""
     rig = from_angle(rig, angle)
     name, ratio = rig.drive.crank_output("w")
-    goal = STARTED * rig.config.run.crank_speed * ratio
+    goal = STARTED * rig.operation.crank_speed * ratio
     step = min(rig.step, _STEP)
     with rig.from_rest(event) as simulation:
         run = simulation.run(longest, step, guards={name: goal})
@@ -75,8 +74,8 @@ def start_from(
         else:
             # it may have settled at another speed: then it has started, as in the start-up of a study
             time, speed = run["time"].values, run[name].values / ratio
-            final = float(np.mean(speed[time >= time[-1] - rig.config.turn]))
-            reached = time_to_start(time, speed, final, rig.config.run.crank_speed)
+            final = float(np.mean(speed[time >= time[-1] - rig.operation.turn]))
+            reached = time_to_start(time, speed, final, rig.operation.crank_speed)
     time, current = run["time"].values, np.abs(run[f"motor.{rig.drive.motor.current}"].values)
     relay, rated = None, rig.drive.rated_current
     if reached is not None and rated is not None and not rig.drive.follows:
@@ -114,10 +113,10 @@ def time_above(time: np.ndarray, current: np.ndarray, level: float) -> float:
     return float(np.sum(np.diff(time)[0.5 * (current[1:] + current[:-1]) > level]))
 
 
-def longest_start(config: Config, start_time: float) -> float:
-    """Time after which a start counts as failed [s], where that from the first angle takes `start_time` [s]."""
-    voltage = config.starter.soft_start.time if config.start == "soft" else 0.0
-    return float(max(config.ramp_end, voltage, 3.0 * start_time) + 1.0)
+def longest_start(ramp_end: float, start_time: float) -> float:
+    """Time after which a start counts as failed [s], where the ramp ends at `ramp_end` [s] and the start from the
+    first angle takes `start_time` [s]."""
+    return float(max(ramp_end, 3.0 * start_time) + 1.0)
 
 
 def starts_from_all(

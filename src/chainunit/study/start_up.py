@@ -45,10 +45,10 @@ def _start_empty(
     from then on."""
     # behind a shaft line the crank is not where the motor is
     name, ratio = rig.drive.crank_output("w")
-    goal = STARTED * rig.config.run.crank_speed * ratio
+    goal = STARTED * rig.operation.crank_speed * ratio
     speed_limit = {**guards, name: goal}
-    longest, piece = rig.config.ramp_end + _LONGEST_RISE, max(rig.config.turn, 1.0)
-    stop = rig.config.ramp_end + _LONGEST_START
+    longest, piece = rig.operation.ramp_end + _LONGEST_RISE, max(rig.operation.turn, 1.0)
+    stop = rig.operation.ramp_end + _LONGEST_START
     run = simulation.run(stop, rig.step, progress, guards=speed_limit)
     while stop - 0.5 * rig.step <= simulation.time < longest:
         speed = float(run[name][-1])
@@ -62,29 +62,27 @@ def _start_empty(
     return run, rig
 
 
-def start_up(
-    rig: Rig, simulation: Simulation, stop: float, progress: Progress, guards: Mapping[str, float]
-) -> StartUp:
-    """Start-up and steady running to the time `stop` [s], or longer, see `_missing`; a machine that
+def start_up(rig: Rig, simulation: Simulation, progress: Progress, guards: Mapping[str, float]) -> StartUp:
+    """Start-up and steady running to the time at which it should end, or longer, see `_missing`; a machine that
     starts empty runs so long after it is fed."""
-    pieces, steady_from = list[xr.Dataset](), rig.config.steady_begin
-    if rig.config.empty_start:
+    pieces, steady_from, stop = list[xr.Dataset](), rig.operation.steady_begin, rig.operation.stop
+    if rig.operation.empty_start:
         run, rig = _start_empty(rig, simulation, progress, guards)
         pieces = [run]
         # a motor that follows a ramp is not steady before its end
-        feed_time = max(simulation.time, rig.config.ramp_end) if rig.drive.follows else simulation.time
-        later = feed_time - rig.config.ramp_end
+        feed_time = max(simulation.time, rig.operation.ramp_end) if rig.drive.follows else simulation.time
+        later = feed_time - rig.operation.ramp_end
         stop, steady_from = stop + later, steady_from + later
         if any(abs(float(run[name][-1])) >= limit for name, limit in guards.items()):
             return StartUp(run, steady_from, stop, rig)
-    longest = stop + max(PATIENCE * rig.config.turn, _SETTLES)
+    longest = stop + max(PATIENCE * rig.operation.turn, _SETTLES)
     run = join([*pieces, simulation.run(stop, rig.step, progress, guards=guards)])
     while stop - 0.5 * rig.step <= simulation.time < longest:
         lack, steady_from = _missing(rig, run, steady_from)
         if lack is None:
             break
         # at most at the requested speed; the next round finds the turns that are still missing then
-        stop = min(longest, stop + max(lack * rig.config.turn, rig.step))
+        stop = min(longest, stop + max(lack * rig.operation.turn, rig.step))
         run = join([run, simulation.run(stop, rig.step, progress, guards=guards)])
     return StartUp(run, steady_from, stop, rig)
 
@@ -93,7 +91,7 @@ def _missing(rig: Rig, run: xr.Dataset, steady_from: float) -> tuple[float | Non
     """The number of turns that are still missing for the evaluation, as the crank turns too slowly or the motor
     has not settled, or None where none is missing; and the time from which running is steady [s], a turn later
     if the motor has not settled."""
-    turns_asked = rig.config.run.turns
+    turns_asked = rig.operation.run.turns
     since = run.sel(time=slice(steady_from, None))
     turns = only_whole_turns(rig.drive, since, turns_asked)
     if turns is not None and turns_made(rig.drive, turns) > turns_asked - 0.5:

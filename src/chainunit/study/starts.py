@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 from ..core.quantities import quantity
@@ -10,7 +11,6 @@ from ..drives.gearing import START_FACTOR
 from ..reading.results import derived, part, result
 from ..reading.text import number
 from .analysis import Analysis, Findings, Work
-from .config import Config
 from .drive import Drive
 from .event_torques import running_peak, running_words
 from .record import StudyRecord
@@ -51,7 +51,7 @@ class StartFindings(Findings):
     def remark(self, study: StudyRecord) -> None:
         """Warn of a start that the gear does not carry, or that puts much more on it than running does, and of angles
         from which the motor does not start."""
-        worst, start = self.worst, _STARTERS[study.config.start]
+        worst, start = self.worst, _STARTERS[study.config.drive.start]
         numbers: dict[str, Any] = {
             "torque": (worst.gear_torque, "N.m"),
             "running": (self.running, "N.m"),
@@ -66,7 +66,7 @@ class StartFindings(Findings):
                 "start_up",
                 start=start,
                 limit=(self.limit, "N.m"),
-                remedy=SOFTER[study.config.start],
+                remedy=SOFTER[study.config.drive.start],
                 **numbers,
             )
         elif math.isinf(self.limit) and worst.gear_torque > START_FACTOR * self.running:
@@ -80,7 +80,7 @@ class StartFindings(Findings):
                 start=start,
                 large=f"{START_FACTOR:g}",
                 running_in=running_words(study, self.running_in),
-                remedy=SOFTER[study.config.start],
+                remedy=SOFTER[study.config.drive.start],
                 **numbers,
             )
         if self.stuck:
@@ -89,7 +89,9 @@ class StartFindings(Findings):
                 "The motor does not bring the crank to its speed from {where}: take a larger motor{ramp}.",
                 "start_up",
                 where=" and ".join(number(each.angle, "rad") for each in self.stuck),
-                ramp=", or a higher voltage of the soft starter" if study.config.start == "soft" else "",
+                ramp=", or a higher voltage of the soft starter"
+                if study.config.drive.start == "soft"
+                else "",
             )
 
 
@@ -107,18 +109,18 @@ class StartAnalysis(Analysis):
     needs_runs = True
 
     @staticmethod
-    def applies(config: Config, drive: Drive) -> bool:
+    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
         """Where the motor is of the catalogue; a machine that never repeats a turn takes too long."""
-        return config.of_catalogue and not drive.simulated_machine.model.never_repeats
+        return drive.rated_current is not None and not drive.simulated_machine.model.never_repeats
 
     @staticmethod
     def find(study: StudyRecord, work: Work) -> StartFindings | None:
         """The starts; None where the motor does not start at all."""
-        config = study.config
         if study.start is None or study.start.start_time is None:
             return None
         work.progress("starts from other crank angles", 1.0, 1.0)
-        starts = starts_from_all(work.rig, longest_start(config, study.start.start_time))
-        limit = config.gear.start_limit if "gear.torque_limit" in config.file.given else math.inf
+        starts = starts_from_all(work.rig, longest_start(work.rig.operation.ramp_end, study.start.start_time))
+        tables = study.config.drive
+        limit = tables.gear.start_limit if "gear.torque_limit" in tables.given else math.inf
         running = running_peak(study, at_gear)
         return StartFindings(tuple(starts), running.torque, limit, running.run)

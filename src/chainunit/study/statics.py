@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -9,18 +10,16 @@ import numpy as np
 
 from ..core.errors import InputError
 from ..drives.speed_control import Loop
-from .config import Config
-from .cycle import Cycle, cycle, no_feed
+from .cycle import Cycle
 from .drive import Drive
 from .line.shaft import LineModes, line_modes
-from .one_sided import one_sided_feeds
 
 
 @dataclass(frozen=True)
 class DriveStatics:
     """Results on a machine and its drive that need no run."""
 
-    cycles: dict[str, Cycle]
+    cycles: Mapping[str, Cycle]
     """turns at constant speed, by load case"""
     loops: dict[str, Loop] = field(default_factory=dict)
     """the linearised speed loop of a controlled motor, by the inertia that is used (mean, least, largest)"""
@@ -33,26 +32,19 @@ class DriveStatics:
         return next(iter(self.cycles.values()))
 
 
-def statics(config: Config, drive: Drive) -> DriveStatics:
-    """All results of a study that need no co-simulation.
+def statics(drive: Drive, turns: Mapping[str, Cycle], step: float) -> DriveStatics:
+    """All results of a study that need no co-simulation, with the `turns` of its machine by load case.
 
     Raises
     ------
     InputError
-        where the communication step is too long for the driveline.
+        where the communication `step` [s] is too long for the driveline.
     """
-    machine, feed, w = drive.machine, config.feed, config.run.crank_speed
-    feeds = (
-        one_sided_feeds(feed)
-        if machine.model.sides
-        else {"normal running": feed, "without feed": no_feed(feed)}
-    )
-    cycles = {name: cycle(machine, w, each) for name, each in feeds.items()}
-    normal = next(iter(cycles.values())).outputs
+    inertia = next(iter(turns.values())).inertia_at(drive.ratio)
     return DriveStatics(
-        cycles=cycles,
-        loops={} if drive.foreign else _loops(drive, normal.J),
-        modes=None if drive.line.part("driveline") is None else _modes(config, drive, normal.J),
+        cycles=turns,
+        loops={} if drive.foreign else _loops(drive, inertia),
+        modes=None if drive.line.part("driveline") is None else _modes(drive, inertia, step),
     )
 
 
@@ -73,12 +65,12 @@ def _loops(drive: Drive, inertia: Any) -> dict[str, Loop]:
     return {name: loop for name, loop in loops.items() if loop is not None}
 
 
-def _modes(config: Config, drive: Drive, inertia: Any) -> LineModes:
-    """The natural frequencies of the line; a communication step that is too long for them is refused."""
+def _modes(drive: Drive, inertia: Any, step: float) -> LineModes:
+    """The natural frequencies of the line; a communication step [s] that is too long for them is refused."""
     line = line_modes(drive, inertia)
-    if config.run.step > line.step_longest:
+    if step > line.step_longest:
         raise InputError(
-            f"run.step = {config.run.step:g} s: the driveline swings at {line.k_largest:.4g} rad/s; must be <= "
+            f"run.step = {step:g} s: the driveline swings at {line.k_largest:.4g} rad/s; must be <= "
             f"{line.step_longest:.3g} s"
         )
     return line

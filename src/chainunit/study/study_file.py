@@ -12,6 +12,7 @@ from datetime import date, time
 from pathlib import Path
 from typing import Any
 
+from ..mechanism.models import MachineModel
 from .config import Config
 from .parts import LENGTHS
 from .registry import registered
@@ -31,7 +32,7 @@ def changed_tables(config: Config, values: Mapping[str, float], title: str, fold
         own = config.machine.by_name
         written = {f"machine.{name}": own[name] for name in LENGTHS} | written
         tables.pop("ratios", None)
-    for name, value in sorted(written.items(), key=lambda item: _place(config, item[0])):
+    for name, value in sorted(written.items(), key=lambda item: _place(config.machine.model, item[0])):
         *above, last = name.split(".")
         inner = tables
         for part in above:
@@ -48,9 +49,9 @@ def changed_tables(config: Config, values: Mapping[str, float], title: str, fold
     return tables
 
 
-def _place(config: Config, name: str) -> int:
+def _place(model: type[MachineModel], name: str) -> int:
     """The place of a parameter of the machine in its declaration; others stay behind them."""
-    names = config.machine.model.parameter_layout.names
+    names = model.parameter_layout.names
     own = name.removeprefix("machine.")
     return names.index(own) if own in names else len(names)
 

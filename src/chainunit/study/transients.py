@@ -58,7 +58,7 @@ def lead_times(
 def longest_lead(rig: Rig, ahead: float, speed: float) -> float:
     """Time in which a crank of the mean `speed` [rad/s] passes the angle `ahead` [rad], however uneven its turn
     is [s]. An event does not wait longer, as the crank may hardly turn."""
-    return float(_UNEVEN * ahead / max(speed, 0.5 * rig.config.run.crank_speed))
+    return float(_UNEVEN * ahead / max(speed, 0.5 * rig.operation.crank_speed))
 
 
 def follow(
@@ -99,7 +99,7 @@ def coast(rig: Rig, transient: Transient, run: xr.Dataset, stop: float, file: Pa
     start = model.start_from({k: float(x[-1]) for k, x in machine_series(run).items()})
     p = model.parameter_layout.from_names(coasting_parameters(rig.drive) | start)
     alone = System({"machine": ModelComponent(model, p, file)})
-    loads = rig.drive.loads(rig.config.feed) | transient.signals
+    loads = rig.drive.loads(rig.operation.feed) | transient.signals
     loads = {full: x for full, x in loads.items() if full.startswith("machine.")}
     with rig.simulation(alone, {**loads, "machine.tau": 0.0}, begin) as simulation:
         return simulation.run(max(stop, begin) + 1.0, rig.step)

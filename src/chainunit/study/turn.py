@@ -11,7 +11,8 @@ from ..core.quantities import Value, declaration, quantity
 from ..reading.results import derived, part, result
 from .analysis import Analysis, Findings, Work
 from .arrays import peak
-from .cycle import Cycle, cycle, energy_swing, no_feed
+from .cycle import Cycle, cycle, energy_swing
+from .load_cases import no_feed
 from .record import StudyRecord
 
 POINTS = 3600
@@ -99,8 +100,8 @@ class TurnAnalysis(Analysis):
                 torque_peak=peak(loaded.crank_torque),
                 torque_peak_free=peak(free.crank_torque),
                 torque_mean=float(np.mean(loaded.crank_torque)),
-                lost=_lost_energy(loaded, config.turn),
-                lost_free=_lost_energy(free, config.turn),
+                lost=_lost_energy(loaded, config.operation.turn),
+                lost_free=_lost_energy(free, config.operation.turn),
                 energy_swing=energy_swing(loaded.crank_torque),
                 inertia_least=float(np.min(inertia)),
                 inertia_largest=float(np.max(inertia)),

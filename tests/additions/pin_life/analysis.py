@@ -4,6 +4,7 @@ pin in steady running. A pin that swings makes the turns that its way to and fro
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,6 @@ from chainunit.core.quantities import Value, declaration, quantity
 from chainunit.reading.results import part, result
 from chainunit.study.analysis import Analysis, Findings, Work
 from chainunit.study.bearings import mean_load
-from chainunit.study.config import Config
 from chainunit.study.drive import Drive
 from chainunit.study.readings import machine_series
 from chainunit.study.record import StudyRecord
@@ -69,9 +69,9 @@ class PinLifeAnalysis(Analysis):
     needs_runs = True
 
     @staticmethod
-    def applies(config: Config, drive: Drive) -> bool:
+    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
         """Whether the study names a pin."""
-        return config.plans["pin_life"] is not None
+        return plans["pin_life"] is not None
 
     @staticmethod
     def find(study: StudyRecord, work: Work) -> PinLife:

@@ -59,7 +59,7 @@ SENSORS = {"motor.i": Sensor(offset=0.2, gain=0.01), "motor.u": Sensor(resolutio
 
 def drive_of(**parameters):
     config = parse("")
-    return Drive(DcMotor, config.motor, config.machine.replace(parameters))
+    return Drive(DcMotor, config.motor.parameters, config.machine.replace(parameters))
 
 
 def recorded(empty=False, seed=4, **more):

@@ -327,9 +327,9 @@ def test_a_motor_beside_the_torque_of_the_crank(tmp_path):
     write(tmp_path, "loaded.csv.gz", heads={}, measured=(*MOTOR, "crank.tau"))
     (tmp_path / "mine.toml").write_text(FILE, "utf-8")
     config = study_files.load(tmp_path / "mine.toml")
-    plan = identification.plan_of(config)
+    plan = identification.plan_of(config.plans)
     recordings = identification.read_runs(plan.runs)
-    problem = identification._problem(config, plan, identification.drive_of(config, recordings), recordings)
+    problem = identification._problem(config.feed, plan, identification.drive_of(config), recordings)
     assert problem.runs[0].values["motor.w_ref"] == 150.0
     identification.inspect_runs(problem, 1)
 

@@ -64,7 +64,9 @@ def test_the_hidden_machine_is_identified():
         RecordedRun(name, read_recording(FOLDER / f"{name}.csv.gz"), speed, reference | known)
         for name, known in (("loaded", {}), ("empty", none))
     ]
-    plant = Plant(Drive(DcMotor, config.motor, config.machine), list(sensors), [u.name for u in sought])
+    plant = Plant(
+        Drive(DcMotor, config.motor.parameters, config.machine), list(sensors), [u.name for u in sought]
+    )
     best = fit(Problem(plant, runs, sought, sensors))
     for u, found, deviation in zip(sought, best.z, best.deviations, strict=False):
         name = u.name.removeprefix("machine.")

@@ -26,7 +26,7 @@ pytestmark = [pytest.mark.second, pytest.mark.skipif(compiler() is None, reason=
 SLOW = pytest.mark.slow
 MACHINE = parse("").machine
 DRIVES = {
-    "dc": Drive(DcMotor, parse("").motor, MACHINE),
+    "dc": Drive(DcMotor, parse("").motor.parameters, MACHINE),
     "im": Drive(InductionMotor, InductionMotor.Parameters(), MACHINE),
 }
 TRUTH = {

@@ -21,7 +21,7 @@ from chainunit.capabilities.optimize.best import find_best, machine_at
 from chainunit.capabilities.optimize.conflict import Conflict, nearest
 from chainunit.capabilities.optimize.extremes import TurnValues, grid
 from chainunit.capabilities.optimize.kernel import Kernel, pieces, symbols_of
-from chainunit.capabilities.optimize.page import optimum_report
+from chainunit.capabilities.optimize.page import OptimizedStudy
 from chainunit.capabilities.optimize.program import AngleProgram
 from chainunit.capabilities.optimize.requirements import Requirements
 from chainunit.capabilities.optimize.result import best_machine, units_of
@@ -38,6 +38,7 @@ from chainunit.reading.results import as_data
 from chainunit.report.terminal import plain
 from chainunit.study import config as study_files
 from chainunit.study.cycle_quantities import cycle_quantity, evaluate
+from chainunit.study.heading import Heading
 from chainunit.study.parts import EXAMPLES, example
 from chainunit.study.study_file import toml_text
 from chainunit.study.verdict import ROCKER_GOOD
@@ -65,7 +66,7 @@ def wishes(text=TABLE, **changes):
     for before, after in changes.items():
         assert before in text
         text = text.replace(before, after)
-    return wishes_of(study_files.parse(text))
+    return wishes_of(study_files.parse(text).plans)
 
 
 # -- the functions and their derivatives
@@ -311,7 +312,7 @@ def test_each_impossible_wish_is_named():
         assert before in text
         text = text.replace(before, after)
     config = study_files.parse(text)
-    own = find_best(wishes_of(config))
+    own = find_best(wishes_of(config.plans))
     assert set(own.conflict.alone) == {"range(rocker.psi)", "max(force(crank_bearing))"}
     assert not own.conflict.together
     # each alone comes as near as it comes without the other
@@ -322,7 +323,7 @@ def test_each_impossible_wish_is_named():
             answer, met = nearest(search, search.starts(1)[0], others | {"slack_free_speed", "clearance"})
             value = search.value(limit.quantity, answer.x)
             assert not met and own.conflict.alone[limit.name] == pytest.approx(value, rel=1e-4)
-    page = optimum_report(own, config)
+    page = OptimizedStudy(config, own).report
     assert page.title == "A lighter drive: no machine found" and page.status == "no machine found"
     shown = " ".join(plain(page).split())
     assert (
@@ -356,9 +357,11 @@ def test_small_powers_are_in_watts(best):
         found={**best.found, **values},
         today={**best.today, **values},
     )
-    assert units_of(own, study_files.parse(TABLE))["power"] == ("W",)
+    plain_file = study_files.parse(TABLE)
+    assert units_of(own, plain_file.file.tables, plain_file.units)["power"] == ("W",)
     chosen = study_files.parse(f'{TABLE}[report.units]\npower = "kW"\n')
-    assert units_of(own, chosen)["power"] == units_of(best, chosen)["power"] == ("kW",)
+    for found in (own, best):
+        assert units_of(found, chosen.file.tables, chosen.units)["power"] == ("kW",)
 
 
 def test_two_wishes_that_conflict():
@@ -404,10 +407,10 @@ def test_a_linkage_file(press):
     config = study_files.parse(
         press.replace("[optimize.free]", "[optimize.free]\nratio = { min = 10, max = 60 }")
     )
-    own = find_best(wishes_of(config))
+    own = find_best(wishes_of(config.plans))
     assert own.idle == {"ratio": (10.0, 60.0)} and own.wishes.names == ("r", "l", "offset")
     assert own.machine.ratio == own.wishes.machine.ratio
-    page = optimum_report(own, config)
+    page = OptimizedStudy(config, own).report
     assert "ratio has no effect on rms(crank_torque) and the limits: it keeps its value of today." in plain(
         page
     )
@@ -440,7 +443,7 @@ def test_two_objectives(press):
         assert [search.value(q, point.x) for q in objectives] == pytest.approx(point.values, rel=1e-9)
         assert search.value(own.wishes.limits[1].quantity, point.x) >= 0.15 * (1.0 - 1e-6)
     assert own.neighbours.better == 0
-    page = optimum_report(own, study_files.parse(text))
+    page = OptimizedStudy(study_files.parse(text), own).report
     words = plain(page)
     assert (
         "meet all limits and have no more max(force(A)), and 0 of these are better in rms(crank_torque)"
@@ -610,7 +613,7 @@ def test_the_command(tmp_path, best):
     value = evaluate(written.machine, [q], 3.0, written.feed, engine="numpy")[q.name]
     assert float(value) == pytest.approx(best.answer.value, rel=1e-4)
     # its tables are those of the study, so that the search may go on from there
-    assert wishes_of(written).free == best.wishes.free
+    assert wishes_of(written.plans).free == best.wishes.free
     page = (folder / "report.html").read_text("utf-8")
     for name in ("r", "crank.m", "peak(crank_torque)"):
         assert f'<th scope="row"><span class="as-is">{name}</span></th>' in page
@@ -677,14 +680,14 @@ def test_a_speed_beyond_the_limit_of_the_organs_is_told(best):
     """The limit of the best machine, not that of today's."""
     config = study_files.parse(TABLE)
     feed, answer = best.wishes.feed, best.machine
-    (organ,) = as_data(best_machine(best, config))["organs"]
+    (organ,) = as_data(best_machine(best, Heading.of(config.title, config.file)))["organs"]
     limit = ROCKER_GOOD * answer.chain_modes(feed.left, feed.right).frequency[0]
     assert (
         organ["topic"] == "rocker torque" and organ["limit"]["value"] == pytest.approx(limit) and limit < 3.0
     )
-    assert "the limit of the best machine is" in plain(optimum_report(best, config))
+    assert "the limit of the best machine is" in plain(OptimizedStudy(config, best).report)
     slow = _with(best, wishes=_with(best.wishes, crank_speed=0.9 * limit))
-    assert best_machine(slow, config).organs == []
+    assert best_machine(slow, Heading.of(config.title, config.file)).organs == []
 
 
 def test_in_python(best):

@@ -39,6 +39,7 @@ from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 from chainunit.study.drive_fmus import export_drive, with_files
 from chainunit.study.quantiles import Estimate
+from chainunit.study.rig import Rig
 from chainunit.system import CoSimulation, monolithic
 from chainunit.work.job import CHECKS
 
@@ -67,12 +68,14 @@ SCRIPT = """
     from chainunit.study import quantiles
     from chainunit.study.drive import Drive
     from chainunit.study.drive_fmus import export_drive
+    from chainunit.study.rig import Rig
 
     if __name__ == "__main__":
         config = parse(Path("study.toml").read_text())
-        drive = Drive(DcMotor, config.motor, config.machine)
+        drive = Drive(DcMotor, config.motor.parameters, config.machine)
         files, _ = export_drive(drive, Path("."))
-        task = monte_carlo.RandomTask(config, drive, files, 1.0, cosimulated=True)
+        plan, rig = config.plans["random_overloads"], Rig(config.operation, drive, files)
+        task = monte_carlo.RandomTask(plan, rig, 1.0, cosimulated=True)
         result = monte_carlo.run(task, Path("."), lambda what, done, todo: print(done, todo, flush=True), workers=2)
         print("resumed", result.earlier_runs, result.damaged_batches, flush=True)
 """
@@ -143,9 +146,31 @@ def killed(tmp_path_factory):
 
 def task_of(folder, runs=RUNS, text=STUDY, cosimulated=True):
     config = parse(text.format(runs=runs))
-    drive = Drive(DcMotor, config.motor, config.machine)
+    drive = Drive(DcMotor, config.motor.parameters, config.machine)
     files = {name: folder / f"{part.model.name}.fmu" for name, part in drive.graph.components.items()}
-    return monte_carlo.RandomTask(config, drive, files, 1.0, cosimulated=cosimulated)
+    return random_task(config, drive, files, 1.0, cosimulated=cosimulated)
+
+
+def random_task(config, drive, files, steady, **options):
+    rig = Rig(config.operation, drive, files)
+    return monte_carlo.RandomTask(config.plans["random_overloads"], rig, steady, **options)
+
+
+def with_rig(task, **changes):
+    return dataclasses.replace(task, rig=dataclasses.replace(task.rig, **changes))
+
+
+def draw(task, number):
+    return monte_carlo.draw(task.plan, task.rig.operation, number)
+
+
+def point(task, drawn):
+    return monte_carlo.point(task.rig, drawn, task.plan.table.duration)
+
+
+def task_by(config):
+    """The task of a study without FMUs."""
+    return random_task(config, Drive(DcMotor, config.motor.parameters, config.machine), {}, 1.0)
 
 
 @pytest.mark.second
@@ -166,19 +191,19 @@ def branches(task, simulation, *drawn):
     """The runs with these events from the saved state of a simulation."""
     system = EventSimulation.__new__(EventSimulation)
     system.rig, system._start, system._simulation = task.rig, task.steady, simulation
-    return list(system.runs([monte_carlo.point(system.rig, each) for each in drawn]))
+    return list(system.runs([point(task, each) for each in drawn]))
 
 
 def test_a_run_is_what_its_number_says(killed):
     """Run again here, in this process, in another order."""
     task, results = task_of(killed[0]), opened(killed[0]).dataset
-    config, drive = task.config, task.drive
-    signals = {**drive.loads(config.feed), **drive.reference(config.run.crank_speed, config.run.ramp)}
+    drive, run = task.rig.drive, task.rig.operation.run
+    signals = {**drive.loads(task.rig.operation.feed), **drive.reference(run.crank_speed, run.ramp)}
     with CoSimulation(with_files(drive, task.files), signals) as simulation:
-        simulation.run(1.0, config.run.step)
+        simulation.run(1.0, run.step)
         simulation.save()
         for number in (7, 3, 20):
-            drawn, run = monte_carlo.draw(config, number), results.isel(run=number)
+            drawn, run = draw(task, number), results.isel(run=number)
             (branch,) = branches(task, simulation, drawn)
             got = monte_carlo.Layout(monte_carlo.Sample).by_name(monte_carlo.sample(task, drawn, branch))
             assert ("none", "left", "right")[int(run["side"])] == drawn.event.side
@@ -251,9 +276,9 @@ def test_the_lump_comes_on_the_side_of_its_number(number):
         STUDY.format(runs=10)
         + "[feed]\nleft = { processing_force = 100 }\nright = { processing_force = 700 }\n"
     )
-    task = monte_carlo.RandomTask(config, Drive(DcMotor, config.motor, config.machine), {}, 1.0)
-    drawn, simulation = monte_carlo.draw(config, number), Still()
-    assert drawn == monte_carlo.draw(parse(STUDY.format(runs=99)), number)
+    task = task_by(config)
+    drawn, simulation = draw(task, number), Still()
+    assert drawn == draw(task_by(parse(STUDY.format(runs=99))), number)
     (branch,) = branches(task, simulation, drawn)
     assert str(branch.fault) == "seen"
     feed, lump = {"left": 100.0, "right": 700.0}, drawn.event.p
@@ -267,16 +292,16 @@ def test_the_lump_comes_on_the_side_of_its_number(number):
 
 
 def test_lumps_come_on_both_sides_alike_often_and_by_the_seed():
-    config = parse(STUDY.format(runs=10))
-    drawn = [monte_carlo.draw(config, k) for k in range(2000)]
+    task = task_by(parse(STUDY.format(runs=10)))
+    drawn = [draw(task, k) for k in range(2000)]
     left = [d.event for d in drawn if d.event.side == "left"]
     assert abs(len(left) - 1000) < 4.0 * math.sqrt(500.0)
     # the side does not depend on how hard the lump is
     assert abs(sum(event.p.force for event in left) / len(left) - 6500.0) < 4.0 * 5000.0 / math.sqrt(
         12.0 * len(left)
     )
-    other = parse(STUDY.format(runs=10).replace("[monte_carlo]", "[monte_carlo]\nseed = 2"))
-    sides = [monte_carlo.draw(other, k).event.side for k in range(50)]
+    other = task_by(parse(STUDY.format(runs=10).replace("[monte_carlo]", "[monte_carlo]\nseed = 2")))
+    sides = [draw(other, k).event.side for k in range(50)]
     assert [d.event.side for d in drawn[:50]] != sides
 
 
@@ -294,8 +319,8 @@ def test_what_the_numbers_depend_on_is_in_the_name(killed):
     digest = task.digest()
     assert opened(folder).file.name == f"monte_carlo_{digest}.zarr"
     for other in (
-        dataclasses.replace(task, drive=dataclasses.replace(task.drive, feed_forward=True)),
-        dataclasses.replace(task, config=dataclasses.replace(task.config, simulation="me")),
+        with_rig(task, drive=dataclasses.replace(task.rig.drive, feed_forward=True)),
+        with_rig(task, operation=dataclasses.replace(task.rig.operation, simulation="me")),
         task_of(folder, text=STUDY.replace("scatter = 0.2", "scatter = 0.3")),
     ):
         assert other.digest() != digest
@@ -305,7 +330,7 @@ def test_what_the_numbers_depend_on_is_in_the_name(killed):
 def test_a_run_that_fails_is_a_result(killed, tmp_path, monkeypatch):
     """Its numbers are missing, its event and the reason are kept, and the runs after it are the same."""
     task, good = task_of(killed[0], runs=5), block_runs.follow
-    third = task.steady + monte_carlo.draw(task.config, 2).offset
+    third = task.steady + draw(task, 2).offset
 
     def fails(rig, simulation, event, begin, *rest, **more):
         if begin == third:
@@ -340,7 +365,7 @@ def test_a_machine_without_the_files_of_the_fmus_makes_the_same_runs(killed, tmp
     """A parcel that has come over a wire holds all that a run needs."""
     parcel = monte_carlo.Parcel.of(task_of(killed[0]))
     nowhere = dict.fromkeys(parcel.content, tmp_path / "nowhere.fmu")
-    away = dataclasses.replace(parcel, task=dataclasses.replace(parcel.task, files=nowhere))
+    away = dataclasses.replace(parcel, task=with_rig(parcel.task, files=nowhere))
     try:
         runs = monte_carlo.make_runs(pickle.loads(pickle.dumps(away)), 17, 19)
     finally:
@@ -431,7 +456,7 @@ def test_question_and_answer_tell_of_random_overloads(tmp_path):
 def test_runs_of_the_fmus_are_told_as_such(key, words, monkeypatch):
     """Those that the study asks for, and those that it makes as there is no C compiler."""
     config = parse(f'simulation = "{key}"\n' + STUDY.format(runs=4))
-    task = monte_carlo.RandomTask(config, Drive(DcMotor, config.motor, config.machine), {}, 1.0)
+    task = task_by(config)
     assert dataclasses.replace(task, cosimulated=True).method == key
     monkeypatch.setattr(monte_carlo, "compiler", lambda: None)
     # without quantiles there is no table, and the line stands alone
@@ -454,7 +479,7 @@ def compiled_task(text, folder=None, runs=6):
     config = parse(text.format(runs=runs).replace("step = 0.004", "step = 0.001"))
     drive = choose(config, Path("fmu"), lambda *said: None).drive
     files = export_drive(drive, folder)[0] if folder else {}
-    return monte_carlo.RandomTask(config, drive, files, 1.2)
+    return random_task(config, drive, files, 1.2)
 
 
 @needs_compiler
@@ -464,8 +489,8 @@ def compiled_task(text, folder=None, runs=6):
 def test_the_compiled_system_agrees_with_the_co_simulation(text, tmp_path):
     """To the error of the coupling; the same runs trip, at the same row."""
     task = compiled_task(text, tmp_path)
-    drawn = [monte_carlo.draw(task.config, number) for number in range(4)]
-    points = [monte_carlo.point(task.rig, each) for each in drawn]
+    drawn = [draw(task, number) for number in range(4)]
+    points = [point(task, each) for each in drawn]
     reference = EventSimulation(dataclasses.replace(task, cosimulated=True).rig, task.steady)
     try:
         wanted = list(reference.runs(points))
@@ -488,7 +513,7 @@ def test_the_compiled_system_agrees_with_the_co_simulation(text, tmp_path):
     ids="bars blocked induction chains empty".split(),
 )
 def test_a_compiled_start_is_the_monolithic_solution(text, fed_from, monkeypatch):
-    task = dataclasses.replace(compiled_task(text), fed_from=fed_from)
+    task = with_rig(compiled_task(text), fed_from=fed_from)
     block, rig = task.block(), task.rig
     reference = monolithic(rig.graph, rig.signals(ramp=True), np.linspace(0.0, task.steady, 25))
     monkeypatch.delattr(block_runs, "monolithic")
@@ -512,10 +537,11 @@ def test_a_feed_forward_starts_by_the_monolithic_solution():
 @needs_compiler
 def test_a_start_that_leaves_all_bounds_is_told():
     task = compiled_task(STUDY)
-    feed = dataclasses.replace(task.config.feed.left, processing_force=1e300)
-    config = dataclasses.replace(task.config, feed=dataclasses.replace(task.config.feed, left=feed))
+    operation = task.rig.operation
+    left = dataclasses.replace(operation.feed.left, processing_force=1e300)
+    operation = dataclasses.replace(operation, feed=dataclasses.replace(operation.feed, left=left))
     with pytest.raises(RunError, match=r"^at t = \S+ s: the states left all bounds$"):
-        monte_carlo.Parcel.of(dataclasses.replace(task, config=config))
+        monte_carlo.Parcel.of(with_rig(task, operation=operation))
 
 
 @needs_compiler
@@ -549,7 +575,7 @@ def test_runs_on_the_compiled_system_do_not_depend_on_their_batch(tmp_path):
         stored = result.dataset[name].values
         assert name == "failed" or np.array_equal(both, stored, equal_nan=True), name
     # the event of a run is that of its number, whatever computes it
-    drawn = [monte_carlo.draw(task.config, k).values["force"] for k in range(30)]
+    drawn = [draw(task, k).values["force"] for k in range(30)]
     np.testing.assert_array_equal(result.dataset["drawn_force"], drawn)
     assert task.digest() != dataclasses.replace(task, cosimulated=True).digest()
 
@@ -557,8 +583,8 @@ def test_runs_on_the_compiled_system_do_not_depend_on_their_batch(tmp_path):
 @needs_compiler
 def test_a_wild_run_on_the_compiled_system_fails_alone():
     task = compiled_task(STUDY)
-    block, drawn = task.block(), [monte_carlo.draw(task.config, k) for k in range(3)]
-    points = [monte_carlo.point(task.rig, each) for each in drawn]
+    block, drawn = task.block(), [draw(task, k) for k in range(3)]
+    points = [point(task, each) for each in drawn]
     wild = dataclasses.replace(points[1].event, p=dataclasses.replace(points[1].event.p, force=1e300))
     runs = list(block.runs([points[0], dataclasses.replace(points[1], event=wild), points[2]]))
     assert [run.fault is None for run in runs] == [True, False, True]

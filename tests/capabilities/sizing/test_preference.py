@@ -10,10 +10,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from event_tables import HEAVY_MACHINE, demanding
+from sizings import duty_by, sized_by, trials_of
 
 from chainunit.capabilities.sizing import search as sizing
 from chainunit.capabilities.sizing.candidate import Candidate, Criterion, Standing, TrialResult
-from chainunit.capabilities.sizing.duty import duty_of
 from chainunit.capabilities.sizing.inverter import inverter_needs, least_boost, misses_by_a_hair
 from chainunit.capabilities.sizing.motor_trials import MotorTrials
 from chainunit.capabilities.sizing.preference import ORDER, poles_rank, rank
@@ -32,7 +32,6 @@ from chainunit.drives.gearing import START_FACTOR, ordered_torque
 from chainunit.reading.results import as_data
 from chainunit.reading.text import number
 from chainunit.study.catalogue_drive import gear_with
-from chainunit.study.choice import Choice, as_chosen
 from chainunit.study.config import parse
 from chainunit.study.limits import Check
 from chainunit.study.relay import HEAVIER, start_class
@@ -333,11 +332,15 @@ def test_the_page_states_the_order():
 # -- the keys
 
 
+def evenly_loaded(config):
+    turn = SimpleNamespace(crank_torque=np.full(10, 60.0), crank_speed=config.run.crank_speed)
+    return SimpleNamespace(normal=turn)
+
+
 def proposed(more, motor="IE3 4-pole 1.1 kW, 90S", start="direct"):
     config = parse(f'start = "{start}"\n{HEAVY_MACHINE}{more}')
     plate = next(m for m in catalogue() if m.designation == motor)
-    turn = SimpleNamespace(crank_torque=np.full(10, 60.0))
-    return config, MotorTrials(config, SimpleNamespace(normal=turn)).candidate(plate)
+    return config, trials_of(config, evenly_loaded(config)).candidate(plate)
 
 
 def test_a_file_chooses_the_ratios():
@@ -354,18 +357,20 @@ def test_a_file_chooses_the_ratios():
 def test_the_kind_of_gear_has_its_efficiency_and_its_unit():
     config, c = proposed('[sizing]\ngear_kind = "worm"\n')
     assert (
-        gear_with(config, c.drive.ratio, config.plans["sizing"].offer).efficiency == 0.7
+        gear_with(config.drive, c.drive.ratio, config.plans["sizing"].offer).efficiency == 0.7
         and c.unit.title == "worm gear"
     )
     config, _ = proposed('[sizing]\ngear_kind = "worm"\n[gear]\nefficiency = "80 %"\n')
-    assert gear_with(config, 50.0, config.plans["sizing"].offer).efficiency == 0.8
+    assert gear_with(config.drive, 50.0, config.plans["sizing"].offer).efficiency == 0.8
     config, c = proposed("[sizing]\n")
-    assert gear_with(config, c.drive.ratio, config.plans["sizing"].offer).efficiency == pytest.approx(0.98**3)
+    assert gear_with(config.drive, c.drive.ratio, config.plans["sizing"].offer).efficiency == pytest.approx(
+        0.98**3
+    )
     assert c.unit.title == "three-stage helical gear"
 
 
 def test_a_heavy_start_and_a_second_gear_are_named():
-    trials = MotorTrials(parse(f"{HEAVY_MACHINE}[sizing]\n"), SimpleNamespace())
+    trials = trials_of(parse(f"{HEAVY_MACHINE}[sizing]\n"), SimpleNamespace())
     assert [*sizing._needs(made("a"), trials)] == []
     (relay,) = sizing._needs(made("a", start_class=20), trials)
     assert relay == "The start takes an overload relay of class 20; one of class 10 may trip in it."
@@ -374,7 +379,7 @@ def test_a_heavy_start_and_a_second_gear_are_named():
     (gear,) = sizing._needs(made("a", unit=None), trials)
     assert gear.endswith("takes two gear units: a three-stage helical gear ends at about 250.")
     # a ratio that the file gives takes two only beyond all that makers have in one unit, and the reason is told
-    given = dataclasses.replace(trials, config=parse(f"{HEAVY_MACHINE}[sizing]\n[gear]\nratio = 400\n"))
+    given = trials_of(parse(f"{HEAVY_MACHINE}[sizing]\n[gear]\nratio = 400\n"), SimpleNamespace())
     (gear,) = sizing._needs(made("a", unit=gear_unit("helical", 400.0, is_given=True)), given)
     assert gear.endswith("a three-stage helical gear even of makers with large ratios ends at about 350.")
     assert [*sizing._needs(made("a", unit=gear_unit("helical", 300.0, is_given=True)), given)] == []
@@ -391,14 +396,14 @@ def sized(name, tmp_path, monkeypatch, *designations, more="", **demands):
     text = (EXAMPLES / f"{name}.toml").read_text("utf-8")
     config = parse(f"{text}\n{more}", str(EXAMPLES / f"{name}.toml"))
     config = demanding(config, **demands)
-    return config, sizing.size(config, tmp_path, lambda *said: None)
+    return config, sized_by(config, tmp_path)
 
 
 def check_order(config, first, name, tmp_path, monkeypatch, *motors):
     """A study with the gear that is ordered chooses the same motor, ratio and flywheel, and so it does with a gear
     that the start takes nearly wholly."""
     best = first.chosen_candidate
-    start = max(each.gear_torque for each in starts_from_all(Rig(config, best.drive, None), 3.0))
+    start = max(each.gear_torque for each in starts_from_all(Rig(config.operation, best.drive, None), 3.0))
     order = ordered_torque(max(best.trial.duty.torque, start / START_FACTOR), 0.1)
     for torque in (order, 0.92 * order):
         more = f"[gear]\ntorque_limit = {torque}\n"
@@ -423,7 +428,7 @@ def test_the_heavy_mill_gets_the_motor_without_a_flywheel(tmp_path, monkeypatch)
     assert (best.drive.ratio, best.series) == (100.0, "R20")
     assert best.use <= 0.9
     # its start is that from the worst angle, which takes longer than that from 0 deg
-    starts = starts_from_all(Rig(config, best.drive, None), 2.0)
+    starts = starts_from_all(Rig(config.operation, best.drive, None), 2.0)
     slowest = max(start.start_time for start in starts)
     assert best.worst_start and best.checks["start"].value == pytest.approx(slowest, rel=0.02)
     # the smaller one fits, too, and the result has the trade
@@ -447,7 +452,7 @@ def test_the_beam_pump_gets_four_poles_and_one_gear(tmp_path, monkeypatch):
     assert (six.criterion, two.criterion) == (Criterion.POLES, Criterion.GEAR)
     assert all(c.fits for c in result.candidates) and result.trade is None
     # the start of the chosen one is that from the worst of the crank angles
-    starts = starts_from_all(Rig(config, best.drive, None), 3.0)
+    starts = starts_from_all(Rig(config.operation, best.drive, None), 3.0)
     slowest = max(start.start_time for start in starts)
     assert best.worst_start and not six.worst_start
     assert best.checks["start"].value == pytest.approx(slowest, rel=0.02)
@@ -467,8 +472,8 @@ def test_a_gear_that_the_start_alone_breaks_asks_for_a_soft_start(tmp_path, monk
     # the soft start, computed by itself
     text = (EXAMPLES / "beam_pump.toml").read_text("utf-8")
     config = parse(f'start = "soft"\n{text}', str(EXAMPLES / "beam_pump.toml"))
-    drive = MotorTrials(config, result.duty).candidate(best.motor).drive
-    hardest = max(each.gear_torque for each in starts_from_all(Rig(config, drive, None), 3.0))
+    drive = trials_of(config, result.duty).candidate(best.motor).drive
+    hardest = max(each.gear_torque for each in starts_from_all(Rig(config.operation, drive, None), 3.0))
     words = f'with start = "soft" it fits, and puts {number(hardest, "N.m")} on the gear in a start'
     assert words in result.answer
     _, result = sized("beam_pump", tmp_path, monkeypatch, *motors, more=gear.format(25e3))
@@ -485,12 +490,12 @@ def test_an_inverter_takes_the_next_ratio_before_a_larger_motor(tmp_path, monkey
     file = EXAMPLES / "beam_pump.toml"
     config = parse(f'start = "inverter"\n{file.read_text("utf-8")}', str(file))
     config = demanding(config, candidates=2.0)
-    result = sizing.size(config, tmp_path, lambda *said: None)
+    result = sized_by(config, tmp_path)
     best = result.best
     assert result.chosen_candidate is best and best.motor.designation == "IE3 4-pole 11 kW, 160M"
     assert (best.drive.ratio, best.series) == (185.0, "R80") and best.use <= 0.9
-    bare = MotorTrials(config, duty_of(config, tmp_path, None)).candidate(best.motor)
-    MotorTrials(config, result.duty).judged(bare)
+    bare = trials_of(config, duty_by(config, tmp_path)).candidate(best.motor)
+    trials_of(config, result.duty).judged(bare)
     assert bare.drive.ratio == 180.0 and misses_by_a_hair(bare) and 0.9 < bare.sizes["rms_torque"] < 0.95
     # the inverter: boost, current, and no class of a relay
     rated = best.motor.nameplate.rated_current
@@ -504,7 +509,7 @@ def test_an_inverter_takes_the_next_ratio_before_a_larger_motor(tmp_path, monkey
     notes = " ".join(result.notes)
     assert "needs a voltage boost of 5 %" in notes and "electronic motor protection" in notes
     assert number(best.trial.inverter_current, "A") in notes and "relay of" not in notes
-    chosen = as_chosen(config, Choice(best.drive, proposal=result.proposal(config)))
+    chosen = result.proposal(config.drive).tables
     assert chosen.gear.efficiency == pytest.approx(0.98**3) and chosen.starter.inverter.boost == 0.05
 
 
@@ -543,7 +548,7 @@ def test_the_least_boost_with_which_it_starts_is_taken():
     (boost, _) = inverter_needs(least_boost(c, judged(0.12), False), 1.5, False)
     assert boost.startswith("The inverter needs a voltage boost of 15 % ") and "with less" in boost
     given, c = proposed("[starter.inverter]\nboost = 0.08\n[sizing]\n", start="inverter")
-    is_given = MotorTrials(given, SimpleNamespace()).has_given_boost
+    is_given = trials_of(given, SimpleNamespace()).has_given_boost
     assert is_given and least_boost(c, judged(0.3), is_given).drive.parameters.inverter.boost == 0.08
 
 
@@ -559,8 +564,8 @@ def test_a_motor_that_fails_from_the_worst_angle_makes_room_for_the_next(monkeyp
     monkeypatch.setattr(MotorTrials, "judged", judged)
     monkeypatch.setattr(MotorTrials, "with_flywheel", judged)
     config, _ = proposed("[sizing]\ncandidates = 1\n")
-    duty = SimpleNamespace(normal=SimpleNamespace(crank_torque=np.full(10, 60.0)))
-    best, *others = sizing._search(MotorTrials(config, duty), motors, lambda *said: None)
+    duty = evenly_loaded(config)
+    best, *others = sizing._search(trials_of(config, duty), motors, lambda *said: None)
     assert best.motor is motors[2] and best.fits and best.worst_start
     assert sorted(c.power for c in others) == [m.nameplate.power for m in motors[:2]] and not any(
         c.fits for c in others
@@ -597,7 +602,7 @@ def pressed(tmp_path, monkeypatch, more="", *designations):
     motors = [m for m in catalogue() if m.designation in designations]
     monkeypatch.setattr(sizing, "catalogue", lambda extra: motors)
     folder = EXAMPLES / "linkages"
-    return sizing.size(parse(PRESS + more, str(folder / "press.toml")), tmp_path, lambda *said: None)
+    return sized_by(parse(PRESS + more, str(folder / "press.toml")), tmp_path)
 
 
 def test_a_motor_that_stalls_in_the_peak_runs_with_a_flywheel(tmp_path, monkeypatch):
@@ -612,7 +617,7 @@ def test_a_motor_that_stalls_in_the_peak_runs_with_a_flywheel(tmp_path, monkeypa
     )
     # the drive runs as its checks say, with its gear and its flywheel, in a run of its own
     config = parse(PRESS, str(EXAMPLES / "linkages" / "press.toml"))
-    rig = Rig(config, best.drive, None)
+    rig = Rig(config.operation, best.drive, None)
     with rig.from_rest() as simulation:
         simulation.run(8.0, rig.step)
         run = simulation.run(10.0, rig.step)
@@ -629,7 +634,7 @@ def test_a_motor_that_stalls_without_a_flywheel_is_told_so(tmp_path, monkeypatch
     (c,) = result.candidates
     assert result.chosen_candidate is None
     bare = dataclasses.replace(c, drive=dataclasses.replace(c.drive, added_inertia=0.0))
-    MotorTrials(parse(PRESS, str(EXAMPLES / "linkages" / "press.toml")), result.duty).judged(bare)
+    trials_of(parse(PRESS, str(EXAMPLES / "linkages" / "press.toml")), result.duty).judged(bare)
     rank(alone := [bare], 2.0)
     assert "without a flywheel it stalls at 2" in alone[0].reason and "deg" in alone[0].reason
     assert c.reason.endswith("and no flywheel that sizing.inertia_ratio = 2 permits carries it through")
@@ -667,7 +672,7 @@ def test_the_next_motor_without_a_flywheel_is_found_below_a_gear_that_the_larges
     monkeypatch.setattr(MotorTrials, "candidate", bare)
     monkeypatch.setattr(MotorTrials, "with_least_boost", judged)
     small = made("small", 550.0, flywheel=0.5)
-    found = sizing._without_flywheel(MotorTrials(config, SimpleNamespace()), motors, [small])
+    found = sizing._without_flywheel(trials_of(config, SimpleNamespace()), motors, [small])
     assert found.power == 2200.0 and len(tried) <= 4
 
 
@@ -684,7 +689,7 @@ def test_the_next_motor_without_a_flywheel_gets_its_boost(monkeypatch):
         return c
 
     monkeypatch.setattr(MotorTrials, "judged", judged)
-    duty = SimpleNamespace(normal=SimpleNamespace(crank_torque=np.full(10, 60.0)))
-    found = sizing._without_flywheel(MotorTrials(config, duty), motors, [small])
+    duty = evenly_loaded(config)
+    found = sizing._without_flywheel(trials_of(config, duty), motors, [small])
     larger = [m for m in motors if m.nameplate.power > small.power]
     assert found.motor is larger[0] and found.drive.parameters.inverter.boost == 0.1

@@ -40,6 +40,7 @@ from chainunit.study.analysis import Analysis, Work
 from chainunit.study.bearings import hardest_run, mean_load
 from chainunit.study.drive import Drive
 from chainunit.study.drive_fmus import coasting_model, coasting_parameters
+from chainunit.study.events import one_sided_event
 from chainunit.study.gear_loss import GearAnalysis
 from chainunit.study.judgement import motor_verdict
 from chainunit.study.measures import read_answers, stall
@@ -134,7 +135,7 @@ def test_the_relay_that_is_ordered_is_simulated(on_line, monkeypatch):
     later = {name: study.answers[name].thermal_trip_time for name in light}
     study.relay_class, study.answers = 10, dict(on_line.answers)
     monkeypatch.setattr(run, "all_analyses", lambda: (Starts, Reader))
-    run._analyse(study, Work(Rig(study.config, study.drive, {}), lambda *_: None), needs_runs=True)
+    run._analyse(study, Work(Rig(study.config.operation, study.drive, {}), lambda *_: None), needs_runs=True)
     assert seen == [(30, later)]
     protection = as_dict(study)["sizing"]["protection"]
     assert protection["relay_class"]["value"] == "class 30"
@@ -158,7 +159,9 @@ def test_a_motor_is_not_judged_by_turns_that_are_not_steady(on_line):
         findings={},
         remarks=[],
     )
-    window = early.window(Phase.STEADY, on_line.runs["start_up"].sel(time=slice(0.05, on_line.config.turn)))
+    window = early.window(
+        Phase.STEADY, on_line.runs["start_up"].sel(time=slice(0.05, on_line.config.operation.turn))
+    )
     assert not window.lasts and on_line.window(Phase.STEADY, on_line.steady).lasts
     early.runs = {**on_line.runs, "start_up": window.run}
     early.answers["steady"] = read_answers(window)
@@ -331,13 +334,15 @@ def test_a_drive_whose_start_is_harder_than_its_shocks_has_no_coupling(on_line):
     # without a coupling the gear carries the whole overload, with one what passes it; a gear for it is ordered
     block = float(np.max(np.abs(crank_torque(on_line.drive, on_line.runs["blocked"]))))
     assert gear["overload"]["value"] == pytest.approx(block, rel=1e-3)
-    quick = dataclasses.replace(on_line.config.gear, start_factor=1.0)
+    quick = dataclasses.replace(on_line.config.drive.gear, start_factor=1.0)
     given = on_line.config.file.given | {"gear.start_factor"}
     light = dataclasses.replace(on_line.findings["starts"].worst, gear_torque=1.0)
     gentle = dataclasses.replace(on_line.findings["starts"], starts=(light,))
     own = dataclasses.replace(
         on_line,
-        config=dataclasses.replace(on_line.config, gear=quick).with_file(given=given),
+        config=dataclasses.replace(
+            on_line.config, drive=dataclasses.replace(on_line.config.drive, gear=quick, given=given)
+        ).with_file(given=given),
         findings=on_line.findings | {"starts": gentle},
     )
     ordered = as_dict(own)["sizing"]["gear"]
@@ -398,10 +403,12 @@ def test_an_inverter_as_a_way_is_tried_with_more_boost(on_line, monkeypatch):
 
     monkeypatch.setattr(coupling_alternatives, "_gentlest", gentlest)
     monkeypatch.setattr(coupling_alternatives, "_runs", lambda study, rig, of: (1.0, {}))
-    rig = Rig(on_line.config, on_line.drive, None)
+    rig = Rig(on_line.config.operation, on_line.drive, None)
     found = coupling_alternatives._inverter(on_line, rig, sizing_of(on_line).setting)
     assert tried == [({0.05}, 5), ({0.10}, 5), ({0.15}, 5)] and found.numbers.boost == 0.15
-    given = on_line.config.with_file(given=on_line.config.file.given | {"starter.inverter.boost"})
+    tables = on_line.config.drive
+    tables = dataclasses.replace(tables, given=tables.given | {"starter.inverter.boost"})
+    given = dataclasses.replace(on_line.config, drive=tables)
     tried.clear()
     none = coupling_alternatives._inverter(
         dataclasses.replace(on_line, config=given), rig, sizing_of(on_line).setting
@@ -461,8 +468,13 @@ def test_the_sentence_on_a_coupling_names_both_shafts_and_its_effect(on_line):
     release, gear = _in_time(on_line, over)
     assert release.numbers.release_time == 0.002 and gear.numbers.gear == 1100.0
     # as long as its release time the gear carries what it may
-    limit = dataclasses.replace(on_line.config.gear, torque_limit=900.0)
-    study = dataclasses.replace(on_line, config=dataclasses.replace(on_line.config, gear=limit))
+    limit = dataclasses.replace(on_line.config.drive.gear, torque_limit=900.0)
+    study = dataclasses.replace(
+        on_line,
+        config=dataclasses.replace(
+            on_line.config, drive=dataclasses.replace(on_line.config.drive, gear=limit)
+        ),
+    )
     effect = effects(study, over.least)["blocked"]
     assert effect.without > effect.goal == 900.0 and effect.release > 0.0
     assert effects(study, over.least, release=effect.release)["blocked"].with_coupling <= 900.0
@@ -473,7 +485,7 @@ def test_a_coupling_before_the_flywheel_carries_each_start_and_one_sided_feed(on
     """Its torque in starts from eight angles and with all feed on either side, against single runs by hand."""
     drive = dataclasses.replace(on_line.drive, added_inertia=2.0 * on_line.drive.parameters.rotor.J)
     study = dataclasses.replace(on_line, config=dataclasses.replace(on_line.config, events={}))
-    rig = Rig(study.config, drive, None)
+    rig = Rig(study.config.operation, drive, None)
     way = _before_flywheel(study, rig, sizing_of(on_line).setting)
     hardest = max(on_line.findings["starts"].starts, key=lambda start: start.coupling_torque)
     with from_angle(rig, hardest.angle).from_rest() as simulation:
@@ -481,11 +493,13 @@ def test_a_coupling_before_the_flywheel_carries_each_start_and_one_sided_feed(on
     rotor, w, a = drive.parameters.rotor, run["motor.w"].values, run["motor.a"].values
     by_hand = np.max(np.abs(run["motor.air_gap_tau"].values - rotor.d * w - rotor.J * a)) * drive.ratio
     assert way.numbers.start >= 0.999 * by_hand
-    feed = study.config.one_sided("right")
+    feed = one_sided_event(study.config.events, "right")
     with rig.from_rest() as simulation:
         simulation.run(4.0, 2e-3)
         begin = simulation.save()
-        moved = follow(rig, simulation, feed, begin, begin + feed.p.shift + 2.0 * study.config.turn).run
+        moved = follow(
+            rig, simulation, feed, begin, begin + feed.p.shift + 2.0 * study.config.operation.turn
+        ).run
     steady = on_motor_side(drive, run.sel(time=slice(0.6, None)))
     assert way.numbers.running == pytest.approx(on_motor_side(drive, moved), rel=0.02)
     assert way.numbers.running > 1.1 * steady
@@ -567,7 +581,7 @@ def test_a_slip_clutch_slips_for_as_long_as_two_shafts_apart(on_line):
 def test_the_energy_of_a_start_with_a_slip_clutch(on_line):
     """The motor's energy is the heat of the slip, and the energy that the machine stores and loses."""
     setting = sizing_of(on_line).setting.least_in_running
-    rig = Rig(on_line.config, on_line.drive, None)
+    rig = Rig(on_line.config.operation, on_line.drive, None)
     slowest = max(on_line.findings["starts"].starts, key=lambda start: start.start_time)
     run = slip_run(rig, slowest, setting)
     time = run["time"].values

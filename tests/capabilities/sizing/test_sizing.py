@@ -12,13 +12,14 @@ import numpy as np
 import pytest
 import xarray as xr
 from event_tables import HEAVY_MACHINE, demanding, event_line
+from sizings import duty_by, sized_by, task_of, trials_of
 from systems import component
 from typer.testing import CliRunner
 
 from chainunit.capabilities.sizing import motor_trials
 from chainunit.capabilities.sizing import search as sizing
 from chainunit.capabilities.sizing.candidate import Criterion, Standing, TrialResult
-from chainunit.capabilities.sizing.duty import duty_of, rms
+from chainunit.capabilities.sizing.duty import rms
 from chainunit.capabilities.sizing.motor_trials import MotorTrials, torque_evening_inertia
 from chainunit.capabilities.sizing.trial import Trial, permitted_starts, try_motor
 from chainunit.core.engines import MATH
@@ -34,6 +35,7 @@ from chainunit.study.config import parse
 from chainunit.study.cycle import cycle, energy_swing, needed_inertia
 from chainunit.study.drive import Drive
 from chainunit.study.drive_fmus import export_drive, with_files
+from chainunit.study.events import one_sided_event
 from chainunit.study.limits import Check
 from chainunit.study.measures import time_to_start
 from chainunit.study.rig import Rig
@@ -132,8 +134,8 @@ def trial_of(config, time, heat):
         xr.Dataset({"motor.heat": ("time", x)}, {"time": t})
         for t, x in ((time, heat), (time[-1] + np.linspace(0.0, 4.0, 401), np.full(401, 400.0)))
     )
-    drive = Drive(DcMotor, config.motor, config.machine)
-    return Trial(config, catalogue()[0], drive, None, start, steady, (), {})
+    drive = Drive(DcMotor, DcMotor.Parameters(), config.machine)
+    return Trial(task_of(config), catalogue()[0], drive, None, start, steady, (), {})
 
 
 @pytest.mark.parametrize("window", [3.0, 9.0])
@@ -176,8 +178,9 @@ def wheel_of(monkeypatch, wanted, inertia, sizes):
     numbers.torque_peak_one_sided = None
     plate = SimpleNamespace(torque=10.0, synchronous=105.0, speed=100.0)
     bare = sizing.Candidate(SimpleNamespace(nameplate=plate), Wheeled())
-    config = SimpleNamespace(run=SimpleNamespace(crank_speed=2.0), start="direct")
-    return MotorTrials(config, SimpleNamespace(numbers=numbers)).with_flywheel(bare), trials
+    tables = SimpleNamespace(start="direct")
+    task = SimpleNamespace(operation=SimpleNamespace(crank_speed=2.0), tables=tables)
+    return MotorTrials(task, SimpleNamespace(numbers=numbers)).with_flywheel(bare), trials
 
 
 def test_the_inertia_that_evens_the_torque():
@@ -239,7 +242,7 @@ poles_most = 4
 
 @pytest.fixture(scope="module")
 def sized(tmp_path_factory):
-    return sizing.size(parse(HEAVY), tmp_path_factory.mktemp("sized"), lambda *said: None)
+    return sized_by(parse(HEAVY), tmp_path_factory.mktemp("sized"))
 
 
 def test_the_smallest_that_fits_is_chosen_and_the_others_are_told_why(sized):
@@ -275,8 +278,8 @@ def test_peaks_are_of_both_sides(sized, tmp_path):
 
     best = sized.chosen_candidate
     files, _ = export_drive(best.drive, tmp_path)
-    rig = Rig(config, best.drive, files)
-    signals = rig.signals(rig.event_signals(config.one_sided("right"), 2.0, {}))
+    rig = Rig(config.operation, best.drive, files)
+    signals = rig.signals(rig.event_signals(one_sided_event(config.events, "right"), 2.0, {}))
     with CoSimulation(with_files(best.drive, files), signals) as simulation:
         simulation.run(6.0, config.run.step)
         loaded = simulation.run(6.0 + 2.0 * math.pi / config.run.crank_speed, config.run.step)
@@ -289,9 +292,9 @@ def test_peaks_are_of_both_sides(sized, tmp_path):
 def test_the_crank_turns_as_asked(sized, tmp_path, series, tolerance):
     """With the exact ratio; with a preferred one nearly."""
     config = parse(f'{HEAVY}ratio_series = "{series}"\n')
-    drive = MotorTrials(config, sized.duty).candidate(sized.chosen_candidate.motor).drive
+    drive = trials_of(config, sized.duty).candidate(sized.chosen_candidate.motor).drive
     files, _ = export_drive(drive, tmp_path)
-    with Rig(config, drive, files).from_rest() as simulation:
+    with Rig(config.operation, drive, files).from_rest() as simulation:
         simulation.run(8.0, 1e-3)
         run = simulation.run(8.0 + 4.0 * math.pi / 3.0, 1e-3)
     assert float(run["motor.w"].mean()) / drive.ratio == pytest.approx(3.0, rel=tolerance)
@@ -305,7 +308,7 @@ def one_candidate(more, **asked):
 def test_a_fixed_ratio_is_kept_and_must_give_the_speed(tmp_path, monkeypatch):
     """With 62 in place of 52 the crank turns a sixth too slowly."""
     monkeypatch.setattr(sizing, "catalogue", lambda extra: small(1))
-    result = sizing.size(one_candidate("[gear]\nratio = 62\n", fluctuation=0.5), tmp_path, lambda *said: None)
+    result = sized_by(one_candidate("[gear]\nratio = 62\n", fluctuation=0.5), tmp_path)
     (c,) = result.candidates
     assert c.drive.ratio == 62.0 and c.verdict is Standing.INSUFFICIENT and result.chosen_candidate is None
     assert c.checks["crank_speed"].value == pytest.approx(1.0 - 52.0 / 62.0, abs=0.02)
@@ -319,7 +322,7 @@ def small(number, skipped=0):
 
 def test_without_a_fit_the_whole_catalogue_is_tried_and_the_nearest_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr(sizing, "catalogue", lambda extra: small(4))
-    outcome = sizing.size(
+    outcome = sized_by(
         one_candidate("[gear]\ntorque_limit = 150\n", fluctuation=0.5), tmp_path, lambda *said: None
     )
     assert outcome.chosen_candidate is None and len(outcome.candidates) == outcome.motors == 4
@@ -341,7 +344,7 @@ def test_motors_that_are_too_weak_by_the_nameplate_are_counted(tmp_path, monkeyp
         for power in (20.0, 40.0)
     ]
     monkeypatch.setattr(sizing, "catalogue", lambda extra: [*weak, *small(3)])
-    result = sizing.size(one_candidate("[gear]\ntorque_limit = 150\n"), tmp_path, lambda *said: None)
+    result = sized_by(one_candidate("[gear]\ntorque_limit = 150\n"), tmp_path)
     assert (len(result.candidates), result.motors, result.weak) == (3, 5, 2)
     assert "3 of 5 were tried, 2 are too weak by the nameplate" in result.answer
     assert as_data(result)["weak"]["value"] == 2
@@ -352,7 +355,7 @@ def test_the_remedy_of_the_rejected_example_works(tmp_path):
     text = (Path(__file__).parents[3] / "examples/motor_rejected.toml").read_text("utf-8")
     assert 'start = "direct"' in text and 'with start = "soft" a motor of 0.55 kW fits' in text
     soft = parse(text.replace('start = "direct"', 'start = "soft"'))
-    result = sizing.size(soft, tmp_path, lambda *said: None)
+    result = sized_by(soft, tmp_path)
     assert result.chosen_candidate is not None and result.chosen_candidate.motor.nameplate.power == 550.0
     assert all(u <= 1.0 for u in result.chosen_candidate.sizes.values())
 
@@ -361,7 +364,7 @@ def test_sizing_climbs_until_one_fits(tmp_path, monkeypatch):
     """One is asked for; the smaller ones get too hot with so many starts, and the largest are spared."""
     monkeypatch.setattr(sizing, "catalogue", lambda extra: small(8))
     config = one_candidate("", starts_per_hour=700.0, fluctuation=0.9)
-    result = sizing.size(config, tmp_path, lambda *said: None)
+    result = sized_by(config, tmp_path)
     assert result.chosen_candidate is not None and 1 < len(result.candidates) < result.motors
     others = [c for c in result.candidates if c is not result.chosen_candidate]
     assert result.chosen_candidate.keeps_margin and not any(c.keeps_margin for c in others)
@@ -372,7 +375,7 @@ def test_a_limit_of_the_inertia_ratio_is_for_who_asks_for_it(tmp_path, monkeypat
     monkeypatch.setattr(sizing, "catalogue", lambda extra: small(1, 1))
 
     def found(more):
-        return sizing.size(one_candidate(more, fluctuation=0.5), tmp_path, lambda *said: None)
+        return sized_by(one_candidate(more, fluctuation=0.5), tmp_path)
 
     assert "inertia" not in found("").best.checks
     assert as_data(found(""))["asked"]["inertia_ratio"]["value"] is None
@@ -384,7 +387,7 @@ def test_a_limit_of_the_inertia_ratio_is_for_who_asks_for_it(tmp_path, monkeypat
 
 def test_poles_that_no_motor_has_are_refused(tmp_path):
     with pytest.raises(InputError, match=r"sizing\.poles_least = 8"):
-        sizing.size(one_candidate("", poles_least=8.0, poles_most=12.0), tmp_path, lambda *said: None)
+        sized_by(one_candidate("", poles_least=8.0, poles_most=12.0), tmp_path)
 
 
 def test_ratios_with_which_no_motor_keeps_the_speed_are_refused_before_any_run(tmp_path):
@@ -397,10 +400,10 @@ def test_ratios_with_which_no_motor_keeps_the_speed_are_refused_before_any_run(t
     with pytest.raises(InputError, match=r"sizing\.ratios = \[\]: must have at least one value"):
         parse(f"{HEAVY}ratios = []\n")
     with pytest.raises(InputError, match=r"about 50 \(4 poles\) is needed, the nearest on offer is 7;"):
-        sizing.size(parse(slow), tmp_path, report)
+        sized_by(parse(slow), tmp_path, report)
     for more in ('start = "inverter"\n' + slow, slow + "[gear]\nratio = 62\n", slow.replace("7]", "52]")):
         with pytest.raises(AssertionError, match="the machine at constant speed"):
-            sizing.size(parse(more), tmp_path, report)
+            sized_by(parse(more), tmp_path, report)
 
 
 def test_without_a_fit_the_study_goes_on_with_the_nearest(tmp_path, monkeypatch):
@@ -426,11 +429,14 @@ def test_without_a_fit_the_study_goes_on_with_the_nearest(tmp_path, monkeypatch)
 def test_a_long_soft_start_is_waited_for(tmp_path):
     """At a third of the voltage, rising over 15 s, the machine is judged when it runs."""
     config = one_candidate("", fluctuation=0.9)
-    soft = dataclasses.replace(config.starter.soft_start, voltage=0.3, time=15.0)
+    soft = dataclasses.replace(config.drive.starter.soft_start, voltage=0.3, time=15.0)
     config = dataclasses.replace(
-        config, start="soft", starter=dataclasses.replace(config.starter, soft_start=soft)
+        config,
+        drive=dataclasses.replace(
+            config.drive, start="soft", starter=dataclasses.replace(config.drive.starter, soft_start=soft)
+        ),
     )
-    c, *weak = sizing.size(config, tmp_path, lambda *said: None).candidates
+    c, *weak = sized_by(config, tmp_path).candidates
     assert c.verdict is Standing.CHOSEN and c.worst_start
     assert c.checks["start"].value is not None and c.checks["crank_speed"].utilisation < 1.0
     # from the worst angle the smaller ones take longer, or do not start at all
@@ -446,7 +452,7 @@ def test_ctrl_c_ends_sizing(tmp_path, monkeypatch):
     for way in (CoSimulation, CompiledSimulation):
         monkeypatch.setattr(way, "run", stopped)
     with pytest.raises(InterruptedRunError):
-        sizing.size(one_candidate(""), tmp_path, lambda *said: None)
+        sized_by(one_candidate(""), tmp_path)
 
 
 def test_a_motor_at_its_rated_load_is_as_warm_as_its_nameplate_says():
@@ -473,10 +479,11 @@ def test_a_motor_at_its_rated_load_is_as_warm_as_its_nameplate_says():
 def test_above_the_corner_an_inverter_has_less_torque(tmp_path, monkeypatch):
     """Twice the rated frequency: the breakdown torque of the check is a quarter, roughly, of that at 50 Hz."""
     monkeypatch.setattr(sizing, "catalogue", lambda extra: small(1))
-    config = dataclasses.replace(one_candidate("[gear]\nratio = 104\n", fluctuation=0.9), start="inverter")
+    config = one_candidate("[gear]\nratio = 104\n", fluctuation=0.9)
+    config = dataclasses.replace(config, drive=dataclasses.replace(config.drive, start="inverter"))
     # with a shorter ramp the start from the worst angle takes too long
     config = dataclasses.replace(config, run=dataclasses.replace(config.run, ramp=3.0))
-    outcome = sizing.size(config, tmp_path, lambda *said: None)
+    outcome = sized_by(config, tmp_path)
     (c,) = outcome.candidates
     at_50_hz = float(breakdown(c.drive.parameters, T=config.plans["sizing"].demands.temperature).air_gap_tau)
     breakdown_torque = c.checks["peak_torque"].limit * config.plans["sizing"].demands.breakdown_margin
@@ -490,10 +497,10 @@ def test_above_the_corner_an_inverter_has_less_torque(tmp_path, monkeypatch):
     lighter = dataclasses.replace(
         c, drive=dataclasses.replace(c.drive, added_inertia=(1.0 - step) * c.drive.added_inertia)
     )
-    MotorTrials(config, outcome.duty).judged(lighter)
+    trials_of(config, outcome.duty).judged(lighter)
     assert lighter.sizes["peak_torque"] > 0.9
     monkeypatch.setattr(motor_trials, "torque_evening_inertia", lambda *of: 0.0)
-    (light,) = sizing.size(config, tmp_path, lambda *said: None).candidates
+    (light,) = sized_by(config, tmp_path).candidates
     assert light.verdict is Standing.INSUFFICIENT and "peak torque" in light.reason
     assert light.drive.added_inertia < 0.1 * c.drive.added_inertia
 
@@ -501,9 +508,9 @@ def test_above_the_corner_an_inverter_has_less_torque(tmp_path, monkeypatch):
 def test_the_peak_torque_is_that_of_the_feed_that_moves_too(tmp_path, monkeypatch):
     """A motor that breaks down while the feed moves to one side stalls there."""
     config = one_candidate("", fluctuation=0.9)
-    duty = duty_of(config, tmp_path, None)
-    c = MotorTrials(config, duty).candidate(small(1)[0])
-    trial = try_motor(config, c.motor, c.drive, duty, None)
+    duty = duty_by(config, tmp_path)
+    c = trials_of(config, duty).candidate(small(1)[0])
+    trial = try_motor(task_of(config), c.motor, c.drive, duty, None)
     assert len(trial.shifts) >= 2
     longest = max(trial.shifts, key=lambda shift: np.max(np.abs(shift[1]["motor.air_gap_tau"].values)))[1]
     moved = longest.assign({"motor.air_gap_tau": 3.0 * longest["motor.air_gap_tau"]})
@@ -515,8 +522,8 @@ def test_the_peak_torque_is_that_of_the_feed_that_moves_too(tmp_path, monkeypatc
 
 def test_the_shift_of_the_feed_keeps_its_mass():
     config = parse(HEAVY)
-    rig = Rig(config, Drive(DcMotor, config.motor, config.machine), {})
-    signals = rig.event_signals(config.one_sided("left"), 2.0, {})
+    rig = Rig(config.operation, Drive(DcMotor, DcMotor.Parameters(), config.machine), {})
+    signals = rig.event_signals(one_sided_event(config.events, "left"), 2.0, {})
     left, right = (signals[f"machine.{side}.material_mass"] for side in ("left", "right"))
     assert isinstance(left, Profile)
     for t in (0.0, 2.1, 2.2, 5.0):

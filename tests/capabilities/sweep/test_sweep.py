@@ -395,7 +395,7 @@ def test_the_largest_loads_come_first_and_the_limit_of_the_current_is_told():
     ]
     assert [plan.best_is for plan in plans] == ["largest", "least", "least"]
     assert Study.from_text(TRANSIENTS).config.plans["sweep"].best_is == "least"
-    limit = Study.from_text("").config.motor.limit.i
+    limit = Study.from_text("").config.motor.parameters.limit.i
     hard, soft = (Study.from_text(ONE_JAM.format(force)).sweep(workers=1) for force in (3889, 300))
     assert hard.table["current_peak"].max() == pytest.approx(limit, rel=1e-3)
     assert json.loads(hard.to_json())["current_limit"]["value"] == limit

@@ -13,6 +13,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from records import record_of
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
@@ -39,9 +40,7 @@ from chainunit.study.drive_fmus import export_drive, with_files
 from chainunit.study.line import shaft_runs
 from chainunit.study.line.placed import Line
 from chainunit.study.line.shaft import UNEVEN, remedies, two_masses
-from chainunit.study.record import StudyRecord
 from chainunit.study.rig import Rig
-from chainunit.study.statics import statics
 from chainunit.system import CoSimulation
 
 SYSTEM = '[system]\nmachine = "Accelerator"\n'
@@ -66,12 +65,12 @@ def parse(text):
 def study_of(text):
     given = config.parse(text)
     drive = choose(given, Path(), lambda *_: None).drive
-    return StudyRecord(given, drive, statics(given, drive))
+    return record_of(given, drive)
 
 
 def findings(text):
     study = study_of(SYSTEM + ("" if "[driveline]" in text else BARE) + text)
-    return TorsionAnalysis.find(study, Work(Rig(study.config, study.drive, {}), lambda *_: None))
+    return TorsionAnalysis.find(study, Work(Rig(study.config.operation, study.drive, {}), lambda *_: None))
 
 
 def line_of(text):
@@ -539,7 +538,7 @@ damping_ratios = [0.05]
 def test_ranges_of_the_natural_frequency_say_over_what_they_are():
     """The inertia of a chain unit varies over its turn, i23 over that of the shaft; an order meets both."""
     study = study_of(SLOW_LINE)
-    found = TorsionAnalysis.find(study, Work(Rig(study.config, study.drive, {}), lambda *_: None))
+    found = TorsionAnalysis.find(study, Work(Rig(study.config.operation, study.drive, {}), lambda *_: None))
     J = study.statics.normal.outputs.J
     ratio = found.analysis.ratio
     low, high = (
@@ -642,7 +641,9 @@ def test_a_slow_line_is_not_analysed(monkeypatch, speed, made):
     # a table of its own asks for it
     for more in ("", "[torsion]\nspeeds = 2\n"):
         study = study_of(text + more)
-        found = TorsionAnalysis.find(study, Work(Rig(study.config, study.drive, {}), lambda *_: None))
+        found = TorsionAnalysis.find(
+            study, Work(Rig(study.config.operation, study.drive, {}), lambda *_: None)
+        )
         assert (found is not None) == (made or bool(more))
         assert [remark.kind for remark in study.remarks] == [] if found else ["torsion left out"]
 

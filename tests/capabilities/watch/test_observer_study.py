@@ -20,6 +20,7 @@ from chainunit.drives.terminal_signals import terminal_signals
 from chainunit.machines.load_observer import FARTHEST, Inputs, rotor_torque
 from chainunit.study import config
 from chainunit.study.choice import choose, with_parts_beside
+from chainunit.study.cycle import cycle
 from chainunit.study.drive_fmus import with_files
 from chainunit.study.package import export_study, study_system
 from chainunit.study.rig import Rig
@@ -48,7 +49,11 @@ TEXT = f"[observer]\n[coupling]\ntrip_torque = {TRIP}\n{RUN}{EVENTS}"
 
 def drive_of(text, folder):
     values = config.parse(text)
-    return with_parts_beside(values, choose(values, folder, lambda *_: None).drive)
+    drive, turn = (
+        choose(values, folder, lambda *_: None).drive,
+        cycle(values.machine, values.run.crank_speed, values.feed),
+    )
+    return with_parts_beside(drive, values.plans, values.feed, turn)
 
 
 @pytest.fixture(scope="module")
@@ -119,7 +124,7 @@ def test_the_observer_changes_nothing_in_the_runs(study, tmp_path):
 def test_the_compiled_system_estimates_the_same(study):
     """One ODE of the whole system, with error control, in place of the exchange of values. In co-simulation the
     signals are held over a step: the difference falls with the step."""
-    drive, signals = study.drive, Rig(study.config, study.drive, None).signals(ramp=True)
+    drive, signals = study.drive, Rig(study.config.operation, study.drive, None).signals(ramp=True)
     names = ("left.material_mass", "right.processing_force", "imbalance.feed", "rocker.tau")
     full = [f"observer.{name}" for name in names]
     files = {name: study.folder / f"{c.title}.fmu" for name, c in drive.graph.components.items()}
@@ -140,7 +145,7 @@ def test_the_compiled_system_estimates_the_same(study):
 @native
 def test_a_torque_that_no_load_explains_leaves_the_estimates_within_bounds(study):
     """A stop of the rocker, without a coupling: the motor stalls at its current limit."""
-    rig = Rig(replace(study.config, coupling=None), study.drive, None)
+    rig = Rig(replace(study.config, coupling=None).operation, study.drive, None)
     with rig.from_rest() as simulation:
         simulation.run(4.0, rig.step)
         begin = simulation.save()
@@ -164,7 +169,7 @@ def test_the_report_says_who_notices(study):
 
 def test_the_system_of_a_package_has_the_observer(tmp_path):
     drive = drive_of("[observer]", tmp_path)
-    system = study_system(config.parse("[observer]"), drive)
+    system = study_system(drive, config.parse("[observer]").operation)
     assert set(system.connections) >= {
         ("motor.phi", "observer.phi"),
         ("motor.w", "observer.w"),

@@ -109,7 +109,7 @@ def test_a_ramp_is_told_within_a_turn_of_its_threshold(tmp_path):
     forces = {f"machine.{side}.processing_force": 50.0 for side in signs}
     run = HiddenRun(speed, 45.0, ramps | forces | {"motor.w_ref": speed * config.machine.ratio}, before=5.0)
     logger = Logger(rate=200.0, offset={"motor.i": 0.02}, mark_angle=-0.1)
-    drive = Drive(DcMotor, config.motor, config.machine)
+    drive = Drive(DcMotor, config.motor.parameters, config.machine)
     columns, rng = ("motor.i", "motor.u", "motor.w"), np.random.default_rng(3)
     write_recording(synthetic(drive, columns, run, logger, rng), tmp_path / "ramp.csv.gz")
     (tmp_path / "mine.toml").write_text(study_text(TRUTH["machine"], file="ramp.csv.gz"), "utf-8")

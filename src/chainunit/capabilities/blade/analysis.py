@@ -5,6 +5,7 @@ The mechanics are in `machines.knife_drive`.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -15,9 +16,9 @@ from ...machines.knife_drive import Stack
 from ...reading.results import derived, part, result
 from ...reading.text import number
 from ...study.analysis import Analysis, Findings, Work
-from ...study.config import Config
 from ...study.cycle import Cycle, cycle
 from ...study.drive import Drive
+from ...study.operation import OperatingConditions
 from ...study.record import StudyRecord
 from ...study.turn import EVERY, POINTS
 
@@ -123,7 +124,7 @@ class BladeAnalysis(Analysis):
     name = "blade"
 
     @staticmethod
-    def applies(config: Config, drive: Drive) -> bool:
+    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
         """Whether the machine has a blade."""
         return drive.machine.model.cuts
 
@@ -143,11 +144,11 @@ class BladeAnalysis(Analysis):
                 f"machine.stack.top = {stack.top:g} m: must be > {stack.table:g} m, the height of the table"
             )
         turn = cycle(machine, config.run.crank_speed, config.feed, POINTS)
-        return BladeFindings(turn, stack, _numbers(turn, stack, config))
+        return BladeFindings(turn, stack, _numbers(turn, stack, config.operation))
 
 
-def _numbers(turn: Cycle, stack: Stack, config: Config) -> Cutting:
-    blade, time = turn.outputs.blade, config.turn
+def _numbers(turn: Cycle, stack: Stack, operation: OperatingConditions) -> Cutting:
+    blade, time = turn.outputs.blade, operation.turn
     against = -(blade.cut_fx * blade.vx + blade.cut_fy * blade.vy)
     work = float(np.mean(against)) * time
     losses = float(np.mean(turn.outputs.dissipated_power)) * time - work
@@ -163,7 +164,7 @@ def _numbers(turn: Cycle, stack: Stack, config: Config) -> Cutting:
         speed_in_stack=float(np.max(speed, where=inside > 0.0, initial=0.0)),
         cut_work=work,
         cut_path=path,
-        cut_work_by_path=config.feed.cut_force * path,
+        cut_work_by_path=operation.feed.cut_force * path,
         # a smaller difference of the two sums is roundoff
         losses=losses if losses > 1e-9 * work else 0.0,
     )

@@ -15,7 +15,6 @@ from ...report.blocks import Block, Source
 from ...report.capability import Capability, Contents
 from ...study.analysis import Analysis
 from ...study.conditions import is_one_of
-from ...study.config import Config
 from ...study.cycle import Cycle
 from ...study.record import StudyRecord
 from ...study.rules import OF_CHAIN_UNIT, OtherModel, Rule, has_sides
@@ -63,12 +62,19 @@ class ChainsCapability(Capability):
         return ChainUnitOfChains(machine.p, model=machine.model, law=chain, number=int(chain.rods))
 
     def turns(
-        self, config: Config, feeds: Iterable[Any], folder: Path, backend: Backend | None
+        self,
+        values: Mapping[str, Any],
+        machine: Machine,
+        crank_speed: float,
+        feeds: Iterable[Any],
+        folder: Path,
+        backend: Backend | None,
     ) -> list[Cycle] | None:
         """Those of all starts."""
         from .analysis import turns_of_starts
 
-        return turns_of_starts(config, feeds, folder, backend) if config.table("chain") else None
+        chain: ChainOrgans | None = values["chain"]
+        return turns_of_starts(chain, machine, crank_speed, feeds, folder, backend) if chain else None
 
     def model_verdict(
         self, study: StudyRecord, speed: float, actual: float, residuals: Mapping[str, float]

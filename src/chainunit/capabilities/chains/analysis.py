@@ -24,11 +24,11 @@ from ...core.errors import InterruptedRunError, RunError
 from ...core.quantities import Layout
 from ...drives.motor import Motor
 from ...fmu.backends import Backend
-from ...machines.api import ChainedUnit, ChainUnitMachine
+from ...machines.api import ChainedUnit, ChainUnitMachine, ChainUnitOfChains
 from ...machines.chain_unit import SIDES, Feed
+from ...machines.machine import Machine
 from ...study.analysis import Analysis, Work
 from ...study.arrays import peak
-from ...study.config import Config
 from ...study.cycle import Cycle, cycle
 from ...study.drive import Drive
 from ...study.drive_fmus import export_machine
@@ -71,9 +71,9 @@ class ChainAnalysis(Analysis):
     needs_runs, at_end = True, True
 
     @staticmethod
-    def applies(config: Config, drive: Drive) -> bool:
+    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
         """Where the organs are chains."""
-        return config.table("chain") is not None
+        return isinstance(drive.machine, ChainUnitOfChains)
 
     @staticmethod
     def find(study: StudyRecord, work: Work) -> ChainResult | None:
@@ -174,18 +174,25 @@ def run_turns(
 
 
 def turns_of_starts(
-    config: Config, feeds: Iterable[Feed], folder: Path, backend: Backend | None
+    chain: ChainOrgans,
+    machine: Machine,
+    speed: float,
+    feeds: Iterable[Feed],
+    folder: Path,
+    backend: Backend | None,
 ) -> list[Cycle]:
-    """The machine with chains over all turns of all starts, of shape (turns, points), with each of the `feeds`. The
-    FMU is written to `folder`."""
-    drive, chain, outputs = Drive(Motor, None, config.machine), config.table("chain"), ("tau", "J")
-    starts, turns, speed = int(chain.starts), int(chain.turns), config.run.crank_speed
+    """The machine with chains over all turns of all starts, of shape (turns, points), at that `speed` of the crank
+    [rad/s] with each of the `feeds`. The FMU is written to `folder`."""
+    drive, outputs = Drive(Motor, None, machine), ("tau", "J")
+    starts, turns = int(chain.starts), int(chain.turns)
     cycles = []
     with closing(Fmu(export_machine(drive, folder, backend))) as fmu:
         for feed in feeds:
             sample = run_turns(fmu, drive, speed, feed, outputs, starts=starts, turns=turns)
             tau, J = (sample.values[name].reshape(-1, POINTS) for name in outputs)
-            cycles.append(Cycle(sample.angle, tau * drive.ratio, SimpleNamespace(J=J, tau=tau)))
+            cycles.append(
+                Cycle(sample.angle, tau * drive.ratio, SimpleNamespace(J=J, tau=tau), speed, drive.ratio)
+            )
     return cycles
 
 

@@ -10,7 +10,6 @@ from pydantic import Field
 from ...report.capability import Capability, Contents
 from ...study.analysis import Analysis
 from ...study.conditions import has_entries
-from ...study.config import Config
 from ...study.entry_values import numbers
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
@@ -56,14 +55,13 @@ class FlywheelCapability(Capability):
         compared: list[float] = reading.form.flywheel.compare
         return FlywheelPlan(reading.values["flywheel"], tuple(sorted(set(compared))))
 
-    def shaft_inertia(self, config: Config) -> float:
+    def shaft_inertia(self, plan: FlywheelPlan | None) -> float:
         """That of the study's flywheel."""
-        plan: FlywheelPlan | None = config.plans[self.name]
         return 0.0 if plan is None else float(plan.table.J)
 
-    def not_with_foreign_motor(self, config: Config) -> str:
+    def not_with_foreign_motor(self, plan: FlywheelPlan | None) -> str:
         """A flywheel is added to the rotor."""
-        return "" if config.plans[self.name] is None else "its rotor takes no flywheel; leave [flywheel] out"
+        return "" if plan is None else "its rotor takes no flywheel; leave [flywheel] out"
 
     def analyses(self) -> Iterable[type[Analysis]]:
         """The runs with each flywheel."""

@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -16,8 +17,6 @@ from ...reading.results import derived, part, result
 from ...reading.text import number
 from ...study.analysis import Analysis, Findings, Work
 from ...study.catalogue_drive import with_inertia
-from ...study.choice import tune
-from ...study.config import Config
 from ...study.cycle import needed_inertia
 from ...study.drive import Drive
 from ...study.limits import given_motor
@@ -115,9 +114,9 @@ class FlywheelAnalysis(Analysis):
     needs_runs = True
 
     @staticmethod
-    def applies(config: Config, drive: Drive) -> bool:
+    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
         """Whether the study asks for flywheels, and the motor is one of this package."""
-        return config.plans["flywheels"] is not None and drive.foreign is None
+        return plans["flywheels"] is not None and drive.foreign is None
 
     @staticmethod
     def find(study: StudyRecord, work: Work) -> FlywheelFindings:
@@ -165,20 +164,21 @@ def _own(study: StudyRecord, findings: FlywheelFindings) -> Wheel:
 
 def _run(study: StudyRecord, rig: Rig, findings: FlywheelFindings, flywheel: float) -> Wheel:
     """The start-up and steady running of the study with another flywheel [kg m2], without its safety coupling."""
-    config = study.config
-    turned = with_inertia(config, replace(study.drive, observer=None), flywheel)
-    drive = tune(config, turned)
+    tables, operation = study.config.drive, rig.operation
+    turned = with_inertia(tables, replace(study.drive, observer=None), flywheel)
+    assert study.config.motor is not None
+    drive, _ = study.config.motor.completed(turned, tables, study.statics.normal)
     findings.is_retuned = findings.is_retuned or drive.parameters != turned.parameters
-    sides = drive.machine.loaded_sides(config.feed)
+    sides = drive.machine.loaded_sides(operation.feed)
     rig = replace(rig, drive=drive, fed_from=None)
     with rig.from_rest() as simulation:
-        started = start_up(rig, simulation, config.stop, lambda time: None, {})
+        started = start_up(rig, simulation, lambda time: None, {})
     run = started.run
     residual = worst_residual(rig.residuals(run))
-    turns = whole_turns(drive, run.sel(time=slice(started.steady_from, None)), config.run.turns)
-    steady = Window(Phase.STEADY, turns, drive, sides, config.run.crank_speed)
+    turns = whole_turns(drive, run.sel(time=slice(started.steady_from, None)), operation.run.turns)
+    steady = Window(Phase.STEADY, turns, drive, sides, operation.crank_speed)
     rows = run.sel(time=slice(None, turns["time"].values[0]))
-    start = Window(Phase.START_UP, rows, drive, sides, config.run.crank_speed, steady=steady)
+    start = Window(Phase.START_UP, rows, drive, sides, operation.crank_speed, steady=steady)
     return _wheel(study, findings, flywheel, read_answers(steady), read_answers(start), turns, residual)
 
 
@@ -209,7 +209,12 @@ def _wheel(
     values = {name: own.get(name, getattr(steady, name, None) if turning else None) for name in names}
     answers = FlywheelAnswers(**values)
     checks = given_motor(
-        study.config, drive, answers.winding_temperature, answers.current_rms, answers.start_time
+        drive,
+        study.config.plate,
+        study.config.permitted_temperature[1],
+        answers.winding_temperature,
+        answers.current_rms,
+        answers.start_time,
     )
     return Wheel(answers, turns, checks)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -17,7 +17,7 @@ from ...recordings.inspection import (
 )
 from ...recordings.measurands import MEASURANDS, OF_TERMINALS, SIGNALS, usual_offset
 from ...recordings.problem import Comparison, Problem, RecordedRun, Sensor
-from ...recordings.recorded_drive import drive_of, is_of_shaft, plant_for
+from ...recordings.recorded_drive import check_motor_is_known, is_of_shaft, plant_for
 from ...recordings.recording import Recording
 from ...recordings.residuals import (
     PriorConflict,
@@ -28,8 +28,10 @@ from ...recordings.residuals import (
 )
 from ...recordings.unknown import Unknown
 from ...study.arrays import rms
+from ...study.choice import drive_of
 from ...study.config import Config
 from ...study.drive import Drive
+from ...study.motor_sources import OwnMotor
 from ...system import Profile
 from ...work.progress import TaskProgress, quiet
 from .information import Combination, Information, information
@@ -185,13 +187,14 @@ def identify(
     RunError
         where the fit does not end.
     """
-    plan = plan_of(config)
+    plan = plan_of(config.plans)
     workers = min(2, os.cpu_count() or 1)
     progress("reading recordings", 0.0, 1.0)
     recordings = read_runs(plan.runs)
-    drive = drive_of(config, recordings)
+    check_motor_is_known(recordings, is_known=config.knows_motor)
+    drive = drive_of(config)
     progress("simulating", 0.1, 1.0)
-    problem = _problem(config, plan, drive, recordings)
+    problem = _problem(config.feed, plan, drive, recordings)
     inspect_runs(problem, workers)
     progress("what the recordings can tell", 0.15, 1.0)
     start = problem.initial_point(workers)
@@ -214,15 +217,15 @@ def identify(
     return IdentifiedMachine(config, plan, problem, before, best, around, after, *tests)
 
 
-def plan_of(config: Config) -> IdentificationPlan:
-    """The plan of a study.
+def plan_of(plans: Mapping[str, Any]) -> IdentificationPlan:
+    """The plan of a study, among those of all capabilities.
 
     Raises
     ------
     InputError
         for a study without the table [identify].
     """
-    plan: IdentificationPlan | None = config.plans["identification"]
+    plan: IdentificationPlan | None = plans["identification"]
     if plan is None:
         raise InputError(
             "identify: is missing; add [[identify.run]] with the recordings, and [[identify.parameter]] with the "
@@ -273,17 +276,21 @@ def _same_rows(first: Recording, second: Recording) -> bool:
 
 
 def _problem(
-    config: Config, plan: IdentificationPlan, drive: Drive, recordings: Mapping[str, Recording]
+    loads: Any, plan: IdentificationPlan, drive: Drive, recordings: Mapping[str, Recording]
 ) -> Problem:
     sought = [replace(u, name=system_name(u.name)) for u in plan.sought]
     measured = dict.fromkeys(name for each in recordings.values() for name in each.columns if name != "mark")
     plant = plant_for(drive, measured, [u.name for u in sought])
     of_shaft = is_of_shaft(measured)
-    runs = [_run(config, drive, run, recordings[run.name], of_shaft) for run in plan.runs]
+    free = {u.name for u in sought}
+    runs = [_run(loads, free, drive, run, recordings[run.name], of_shaft) for run in plan.runs]
     return Problem(plant, runs, sought, _sensors(plan, measured, recordings))
 
 
-def _run(config: Config, drive: Drive, run: PlannedRun, recording: Recording, of_shaft: bool) -> RecordedRun:
+def _run(
+    feed: Any, sought: Set[str], drive: Drive, run: PlannedRun, recording: Recording, of_shaft: bool
+) -> RecordedRun:
+    """A run with the `feed` of the study; the numbers that are `sought` are free."""
     values: dict[str, Any] = {}
     if not of_shaft:
         reference = drive.reference(run.crank_speed)
@@ -297,10 +304,9 @@ def _run(config: Config, drive: Drive, run: PlannedRun, recording: Recording, of
             )
         changes = ((begin, lasts, w * drive.ratio) for begin, lasts, w in run.speeds)
         values["motor.w_ref"] = Profile(values["motor.w_ref"], tuple(changes))
-    feed = drive.loads(config.feed) if run.has_feed else dict.fromkeys(drive.loads(config.feed), 0.0)
-    sought = {system_name(u.name) for u in plan_of(config).sought}
+    stated = drive.loads(feed) if run.has_feed else dict.fromkeys(drive.loads(feed), 0.0)
     # a sought feed of a loaded run is free
-    loads = {name: float(x) for name, x in feed.items() if not (run.has_feed and name in sought)}
+    loads = {name: float(x) for name, x in stated.items() if not (run.has_feed and name in sought)}
     added = {system_name(name): x for name, x in run.added.items()}
     return RecordedRun(run.name, recording, run.crank_speed, values | loads, added, run.ambient, run.off)
 
@@ -321,10 +327,11 @@ def _sensors(
 
 def remarks(machine: IdentifiedMachine) -> Iterator[str]:
     """Sentences on data that are missing or assumed."""
-    runs, config = machine.problem.runs, machine.config
+    runs, motor = machine.problem.runs, machine.config.motor
     columns = {name for run in runs for name in run.recording.columns}
     if (
-        issubclass(config.motor_type, InductionMotor)
+        motor is not None
+        and issubclass(motor.kind, InductionMotor)
         and "motor.i" in columns
         and "motor.power" not in columns
     ):
@@ -348,8 +355,9 @@ def remarks(machine: IdentifiedMachine) -> Iterator[str]:
                 "columns, and machines that are alike in both halves of a turn may be taken for each other"
             )
     has_motor = bool(columns & set(OF_TERMINALS))
-    if has_motor and config.motor is not None and config.motor_type.follows(config.motor):
-        tuned = [f"motor.{name}" for name in CONTROL if f"motor.{name}" not in config.file.given]
+    if has_motor and isinstance(motor, OwnMotor) and motor.kind.follows(motor.parameters):
+        given = machine.config.file.given
+        tuned = [f"motor.{name}" for name in CONTROL if f"motor.{name}" not in given]
         if tuned:
             names = ", ".join(tuned)
             yield f"{names}: not in the file, and tuned as for a new drive; give the values of the real converter"

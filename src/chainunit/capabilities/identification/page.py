@@ -27,7 +27,7 @@ def identification_report(machine: IdentifiedMachine) -> b.Report:
     """The report on an identification."""
     result = as_data(summary_of(machine))
     s = b.Source(result)
-    config: Config = machine.config
+    config = machine.config
     with shown_in(config.units):
         figures = tuple(_figures(s, machine))
         return b.Report(

@@ -155,7 +155,7 @@ def summary_of(machine: IdentifiedMachine) -> IdentificationSummary:
 def _summary(machine: IdentifiedMachine) -> IdentificationSummary:
     best, estimates, start = machine.best, machine.estimates, machine.information_at_start
     return IdentificationSummary(
-        heading=Heading.of(machine.config),
+        heading=Heading.of(machine.config.title, machine.config.file),
         is_described=machine.is_described,
         status="complete" if machine.is_described else "the model does not describe the recordings",
         sought=len(estimates),

@@ -11,16 +11,17 @@ import numpy as np
 from ...core.files import atomic_file
 from ...fmu.backends import Backend
 from ...reading.results import as_data
-from ...reading.text import shown_in
+from ...reading.text import Units, shown_in
 from ...report import blocks as b
 from ...report import figure as fig
 from ...report.lines import Line, Name, line
 from ...report.task import Task, Writer
-from ...study.config import Config
-from ...study.study_file import toml_text
+from ...study.config import Config, FileContents
+from ...study.heading import Heading
+from ...study.study_file import changed_tables, toml_text
 from ...work.progress import TaskProgress
 from .best import Best, find_best
-from .result import BestMachine, best_machine, best_tables, units_of
+from .result import BestMachine, best_machine, units_of
 from .table import wishes_of
 from .words import conflict_sentences
 
@@ -29,11 +30,11 @@ FILE = "best.toml"
 """The study file with the best machine."""
 
 
-def optimum_report(best: Best, config: Config) -> b.Report:
-    """The report on a search."""
-    units = units_of(best, config)
+def optimum_report(best: Best, title: str, file: FileContents, units: Units) -> b.Report:
+    """The report on a search for a study with that title, file and units."""
+    units = units_of(best, file.tables, units)
     with shown_in(units):
-        result = as_data(best_machine(best, config))
+        result = as_data(best_machine(best, Heading.of(title, file)))
     s = b.Source(result)
     sections = [b.Section("parameters", "Parameters and limits", tuple(_machine(s, best)))]
     if best.met:
@@ -42,7 +43,7 @@ def optimum_report(best: Best, config: Config) -> b.Report:
         sections.append(b.Section("front", "Two objectives", tuple(_front(s, best))))
     sections.append(b.Section("checks", "Starts and checks", tuple(_checks(s, best))))
     return b.Report(
-        _title(best, config),
+        _title(best, title),
         "Search for the best machine",
         result,
         tuple(_opening(s, best)),
@@ -54,10 +55,10 @@ def optimum_report(best: Best, config: Config) -> b.Report:
     )
 
 
-def _title(best: Best, config: Config) -> str:
+def _title(best: Best, title: str) -> str:
     if best.met:
-        return config.title or "The best machine"
-    return f"{config.title}: no machine found" if config.title else "No machine found"
+        return title or "The best machine"
+    return f"{title}: no machine found" if title else "No machine found"
 
 
 class OptimizedStudy(NamedTuple):
@@ -67,14 +68,26 @@ class OptimizedStudy(NamedTuple):
     best: Best
 
     @property
+    def report(self) -> b.Report:
+        """The report on the search."""
+        return optimum_report(self.best, self.config.title, self.config.file, self.config.units)
+
+    @property
     def conflict(self) -> str:
         """Why no machine meets all limits."""
         return " ".join(conflict_sentences(self.best))
 
+    def tables(self, folder: Path) -> dict[str, Any]:
+        """The tables of the study file with the best machine, as a file in `folder` has them."""
+        assert self.best.machine is not None
+        by_name = self.best.machine.by_name
+        values = {f"machine.{name}": by_name[name] for name in self.best.wishes.names}
+        return changed_tables(self.config, values, "the best machine", folder)
+
     def as_file(self) -> tuple[Path, dict[str, Any]]:
         """The study file with the best machine, beside that of the study: its name, and its tables."""
         source = Path(self.config.file.source).parent / FILE
-        return source, best_tables(self.best, self.config, source.parent)
+        return source, self.tables(source.parent)
 
 
 def _compute(
@@ -82,31 +95,30 @@ def _compute(
 ) -> OptimizedStudy:
     """Search for the best machine of a study. A refusal begins with the name of the study file, if there is one."""
     with config.file.refusals():
-        return OptimizedStudy(config, find_best(wishes_of(config), progress, backend))
+        return OptimizedStudy(config, find_best(wishes_of(config.plans), progress, backend))
 
 
 def _accept(config: Config, **options: Any) -> None:
     with config.file.refusals():
-        wishes_of(config)
+        wishes_of(config.plans)
 
 
 def _writers(outcome: OptimizedStudy, folder: Path, of_report: list[Writer]) -> list[Writer]:
     """With the study file of the best machine, where there is one."""
-    config, best = outcome
 
     def study_file() -> list[Path]:
-        text = toml_text(best_tables(best, config, folder))
+        text = toml_text(outcome.tables(folder))
         with atomic_file(folder / FILE) as part:
             part.write_text(text, "utf-8")
         return [folder / FILE]
 
-    return [*([study_file] if best.met else []), *of_report]
+    return [*([study_file] if outcome.best.met else []), *of_report]
 
 
 TASK: Task[Config, OptimizedStudy] = Task(
     "optimize",
     _compute,
-    lambda outcome: optimum_report(outcome.best, outcome.config),
+    lambda outcome: outcome.report,
     content=BestMachine,
     files=(*PICTURES, FILE),
     accept=_accept,

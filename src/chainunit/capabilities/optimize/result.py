@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,11 +10,9 @@ import numpy as np
 from ...core.quantities import narrowed, quantity
 from ...reading.results import OWN, InUnit, part, result
 from ...reading.text import Units
-from ...study.config import Config
 from ...study.cycle_quantities import CycleBasis
 from ...study.heading import Heading
 from ...study.organ_limits import limits_of_organs
-from ...study.study_file import changed_tables
 from ...study.verdict import SpeedLimit, passed_limits
 from .best import Best
 from .checks import STEPS, Neighbours
@@ -143,11 +140,11 @@ class BestMachine:
     over_turn: Mapping[str, InUnit] = part("crank angle and crank torque of today's and of the best machine")
 
 
-def best_machine(best: Best, config: Config) -> BestMachine:
+def best_machine(best: Best, heading: Heading) -> BestMachine:
     """The result of a search as data; its sentences have the units of `shown_in`."""
     wishes, objective = best.wishes, best.wishes.objectives[0]
     return BestMachine(
-        heading=Heading.of(config),
+        heading=heading,
         status="complete" if best.met else CONFLICT,
         objectives=[q.name for q in wishes.objectives],
         speed=wishes.crank_speed,
@@ -181,17 +178,9 @@ def best_machine(best: Best, config: Config) -> BestMachine:
     )
 
 
-def best_tables(best: Best, config: Config, folder: Path) -> dict[str, Any]:
-    """The tables of the study file with the best machine, as a file in `folder` has them."""
-    assert best.machine is not None
-    by_name = best.machine.by_name
-    values = {f"machine.{name}": by_name[name] for name in best.wishes.names}
-    return changed_tables(config, values, "the best machine", folder)
-
-
-def units_of(best: Best, config: Config) -> Units:
-    """The units of the report: the study has them, and W for powers where one is below 100 W and the study does not
-    name a unit."""
+def units_of(best: Best, tables: Mapping[str, Any], units: Units) -> Units:
+    """The units of the report: the `units` of the study, and W for powers where one is below 100 W and the `tables`
+    of the study do not name a unit."""
     powers = [
         abs(x)
         for name, q in best.quantities.items()
@@ -199,10 +188,10 @@ def units_of(best: Best, config: Config) -> Units:
         for x in (best.today[name], best.found[name], limit and limit.low, limit and limit.high)
         if q.unit == "W" and x
     ]
-    named = config.file.tables.get("report", {}).get("units", {})
+    named = tables.get("report", {}).get("units", {})
     if "power" in named or not any(x < _SMALL for x in powers):
-        return config.units
-    return {**config.units, "power": ("W",)}
+        return units
+    return {**units, "power": ("W",)}
 
 
 def _limit_of(best: Best, name: str) -> TurnLimit | None:

@@ -120,15 +120,15 @@ def read_wishes(
     )
 
 
-def wishes_of(config: Any) -> Wishes:
-    """The wishes of a study.
+def wishes_of(plans: Mapping[str, Any]) -> Wishes:
+    """The wishes of a study, among the plans of all capabilities.
 
     Raises
     ------
     InputError
         for a study without the table [optimize].
     """
-    wishes: Wishes | None = config.plans.get("optimize")
+    wishes: Wishes | None = plans.get("optimize")
     if wishes is None:
         raise InputError(
             "optimize: is missing; add [optimize] with objectives, and [optimize.free] with the parameters that may "

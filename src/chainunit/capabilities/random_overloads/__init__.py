@@ -14,7 +14,6 @@ from ...report.capability import Capability, Contents
 from ...report.lines import Line
 from ...study.analysis import Analysis
 from ...study.conditions import given, is_above_zero
-from ...study.config import Config
 from ...study.event_table import RandomEvent, read_random_event
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
@@ -22,7 +21,7 @@ from ...study.record import StudyRecord
 from ...study.rig import Rig
 from ...study.rules import MACHINE_FMU, NEEDS_MODEL, Rule, has_sides
 from ...work.runner import check_scheduler
-from .table import MonteCarlo, RandomPlan, plan_of
+from .table import MonteCarlo, RandomPlan
 
 _EVENT = "monte_carlo.event"
 
@@ -63,36 +62,34 @@ class RandomOverloads(Capability):
             event = read_random_event(reading.form.monte_carlo.event, _EVENT)
         return RandomPlan(reading.values["monte_carlo"], event)
 
-    def random_events(self, config: Config) -> Mapping[str, RandomEvent]:
+    def random_events(self, plan: RandomPlan) -> Mapping[str, RandomEvent]:
         """Their event."""
-        return {_EVENT: plan_of(config).event}
+        return {_EVENT: plan.event}
 
-    def longest_run(self, config: Config) -> float:
+    def longest_run(self, plan: RandomPlan) -> float:
         """The time that is followed after an event; 0 without runs."""
-        plan = plan_of(config)
         return float(plan.table.duration) if plan.is_asked_for else 0.0
 
-    def not_with_foreign_motor(self, config: Config) -> str:
+    def not_with_foreign_motor(self, plan: RandomPlan) -> str:
         """They read the motor's current and torque."""
-        if not plan_of(config).is_asked_for:
+        if not plan.is_asked_for:
             return ""
         return (
             "its current and torque are not known, of which random overloads tell the quantiles; leave "
             "monte_carlo.runs out"
         )
 
-    def check_scheduler(self, config: Config, scheduler: str) -> None:
+    def check_scheduler(self, plan: RandomPlan, scheduler: str) -> None:
         """The workers of a scheduler make these runs."""
-        if not plan_of(config).is_asked_for:
+        if not plan.is_asked_for:
             raise InputError(
                 f"scheduler {printable(scheduler)}: is for random overloads, and this study has none "
                 "(monte_carlo.runs); leave it out"
             )
         check_scheduler(scheduler)
 
-    def check_runs(self, config: Config, rig: Rig) -> None:
+    def check_runs(self, plan: RandomPlan, rig: Rig) -> None:
         """Refuse an event for which the drive has no inputs."""
-        plan = plan_of(config)
         for event in plan.event.hardest() if plan.is_asked_for else ():
             if not rig.takes(event):
                 raise InputError(f'monte_carlo.event.type = "{event.kind}": {event.without}')
@@ -120,7 +117,7 @@ class RandomOverloads(Capability):
         if "monte_carlo" not in study.findings:
             return ()
         words = " Then come {=monte_carlo.runs} overloads at random, each by itself: {event}."
-        return s.line(words, event=plan_of(study.config).event.title)
+        return s.line(words, event=study.config.plans[self.name].event.title)
 
     def answer(self, s: Source, study: StudyRecord) -> Iterator[Block]:
         """The largest quantile of the crank torque, and how often a run ends badly."""

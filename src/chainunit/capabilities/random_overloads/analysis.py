@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 from ...study.analysis import Analysis, Work
-from ...study.config import Config
 from ...study.drive import Drive
 from ...study.record import StudyRecord
 from .runs import MonteCarloResult, RandomTask, run
@@ -18,9 +19,9 @@ class RandomAnalysis(Analysis):
     needs_runs = True
 
     @staticmethod
-    def applies(config: Config, drive: Drive) -> bool:
+    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
         """Whether the study asks for runs."""
-        return bool(config.plans["random_overloads"].is_asked_for)
+        return bool(plans["random_overloads"].is_asked_for)
 
     @staticmethod
     def find(study: StudyRecord, work: Work) -> MonteCarloResult:
@@ -31,8 +32,7 @@ class RandomAnalysis(Analysis):
         RunError
             where a batch fails; earlier ones are in the store.
         """
-        files = work.rig.files
-        assert work.folder is not None and files is not None
-        drive = replace(study.drive, observer=None)
-        task = RandomTask(study.config, drive, files, work.steady, work.rig.fed_from)
+        assert work.folder is not None
+        rig = replace(work.rig, drive=replace(study.drive, observer=None))
+        task = RandomTask(study.config.plans["random_overloads"], rig, work.steady)
         return run(task, work.folder, work.progress, scheduler=work.scheduler)

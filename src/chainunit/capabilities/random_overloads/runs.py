@@ -26,12 +26,11 @@ from ...machines.chain_unit import SIDES, SideName
 from ...reading.results import Estimate, derived, part, result
 from ...study.analysis import Findings
 from ...study.block_runs import BlockRuns, EventRun, EventSimulation, RunPoint
-from ...study.config import Config
-from ...study.drive import Drive
 from ...study.event import AnySide, Event
 from ...study.event_table import RandomEvent
 from ...study.limits import limit_reached
 from ...study.measures import MEASURES, read_measure, same_measure
+from ...study.operation import OperatingConditions
 from ...study.quantiles import CONFIDENCE, quantile, runs_needed, share
 from ...study.readings import crank_angle
 from ...study.record import StudyRecord
@@ -41,7 +40,7 @@ from ...work.job import Job, ResultVariable, texts
 from ...work.progress import TaskProgress
 from ...work.runner import run as run_job
 from ...work.store import made_anew
-from .table import plan_of
+from .table import RandomPlan
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -79,18 +78,15 @@ QUANTILES = (0.05, 0.5, 0.95, 0.99)
 
 @dataclass(frozen=True)
 class RandomTask:
-    """The data that a worker needs: the study, its drive, the FMUs, the time of the steady state [s].
+    """The data that a worker needs: the plan of the runs, the drive with its FMUs, the time of the steady state [s].
 
     The runs are made on the compiled system; without a C compiler, or if they are to be `cosimulated`, by the
     co-simulation of the FMUs.
     """
 
-    config: Config
-    drive: Drive
-    files: Mapping[str, Path]
+    plan: RandomPlan
+    rig: Rig
     steady: float
-    fed_from: float | None = None
-    """time at which a machine that starts empty was fed [s]"""
     cosimulated: bool = False
 
     @property
@@ -99,31 +95,31 @@ class RandomTask:
         return not self.cosimulated and compiler() is not None
 
     @property
-    def rig(self) -> Rig:
-        """The drive, with its FMUs."""
-        return Rig(self.config, self.drive, self.files, fed_from=self.fed_from)
+    def files(self) -> Mapping[str, Path]:
+        """The FMUs by component."""
+        return self.rig.files or {}
 
     @property
     def method(self) -> str:
         """How the runs are made: "compiled", on the compiled system, or by the FMUs as the key `simulation` says."""
-        return "compiled" if self.is_compiled else self.config.simulation
+        return "compiled" if self.is_compiled else self.rig.operation.simulation
 
     def digest(self, block: BlockRuns | None = None) -> str:
         """A digest of everything on which the results depend: every parameter, and the code of the compiled system or
         the content of the FMUs. The compiled system is built unless its `block` is given."""
-        config, drive = self.config, self.drive
+        plan, operation, graph = self.plan, self.rig.operation, self.rig.graph
         relevant = {
             "chainunit": __version__,
-            "simulation": config.simulation,
-            "connections": drive.graph.connections,
-            "start": drive.graph.values,
-            "feed": asdict(config.feed),
-            "run": asdict(config.run),
-            "event": plan_of(config).event.identity(),
-            "monte_carlo": {k: v for k, v in asdict(plan_of(config).table).items() if k != "runs"},
-            "coupling": asdict(config.coupling) if config.coupling else None,
+            "simulation": operation.simulation,
+            "connections": graph.connections,
+            "start": graph.values,
+            "feed": asdict(operation.feed),
+            "run": asdict(operation.run),
+            "event": plan.event.identity(),
+            "monte_carlo": {k: v for k, v in asdict(plan.table).items() if k != "runs"},
+            "coupling": asdict(operation.coupling) if operation.coupling else None,
             "steady": self.steady,
-            "fed_from": self.fed_from,
+            "fed_from": self.rig.fed_from,
         }
         content = hashlib.sha256(json.dumps(relevant, sort_keys=True).encode())
         if self.is_compiled:
@@ -134,7 +130,7 @@ class RandomTask:
 
     def block(self, states: Any = None) -> BlockRuns:
         """The compiled system in its steady state, with these `states` if they are known."""
-        return BlockRuns(self.rig, plan_of(self.config).event.hardest(), start=self.steady, states=states)
+        return BlockRuns(self.rig, self.plan.event.hardest(), start=self.steady, states=states)
 
 
 def result_variables(event: RandomEvent) -> list[ResultVariable]:
@@ -168,7 +164,7 @@ class Parcel:
         """The parcel of a task whose FMUs are files."""
         if task.is_compiled:
             block = task.block()
-            return cls(replace(task, files={}), task.digest(block), {}, block.states)
+            return cls(replace(task, rig=replace(task.rig, files={})), task.digest(block), {}, block.states)
         return cls(task, task.digest(), {name: Path(file).read_bytes() for name, file in task.files.items()})
 
     def start(self) -> BlockRuns | EventSimulation:
@@ -187,7 +183,7 @@ class Parcel:
             for name, file in files.items():
                 file.write_bytes(self.content[name])
             # it unpacks the FMUs
-            return EventSimulation(replace(self.task, files=files).rig, self.task.steady)
+            return EventSimulation(replace(self.task.rig, files=files), self.task.steady)
         finally:
             remove_folder(folder)
 
@@ -222,45 +218,38 @@ class Draw:
     """trip torque at the crank [N m]; infinite without a coupling"""
 
 
-def draw(config: Config, number: int) -> Draw:
+def draw(plan: RandomPlan, operation: OperatingConditions, number: int) -> Draw:
     """The event of the run with that number. It is the same in every process, and in whatever order the runs
     are made."""
-    random = np.random.default_rng([int(plan_of(config).table.seed), number])
-    offset = random.uniform(0.0, config.turn)
-    values = plan_of(config).event.draw(random)
+    event, coupling = plan.event, operation.coupling
+    random = np.random.default_rng([int(plan.table.seed), number])
+    offset = random.uniform(0.0, operation.turn)
+    values = event.draw(random)
     spread = random.standard_normal()
-    trip = (
-        config.coupling.trip_torque * max(0.1, 1.0 + config.coupling.scatter * spread)
-        if config.coupling
-        else math.inf
-    )
-    side: AnySide = plan_of(config).event.side
-    if plan_of(config).event.of.has_side and not side:
+    trip = coupling.trip_torque * max(0.1, 1.0 + coupling.scatter * spread) if coupling else math.inf
+    side: AnySide = event.side
+    if event.of.has_side and not side:
         side = SIDES[random.integers(len(SIDES))]
-    return Draw(plan_of(config).event.event(side, values), values, offset, trip)
+    return Draw(event.event(side, values), values, offset, trip)
 
 
-def point(rig: Rig, chance: Draw) -> RunPoint:
-    """The run of a rig with these random quantities."""
-    duration, limit = (
-        plan_of(rig.config).table.duration,
-        chance.trip_torque / rig.drive.ratio,
-    )
-    return RunPoint(rig, chance.event, duration, chance.offset, limit)
+def point(rig: Rig, chance: Draw, duration: float) -> RunPoint:
+    """The run of a rig with these random quantities, for the `duration` [s] from the event on."""
+    return RunPoint(rig, chance.event, duration, chance.offset, chance.trip_torque / rig.drive.ratio)
 
 
 def sample(task: RandomTask, chance: Draw, run: EventRun) -> Sample:
     """The results of a run that did not fail."""
     assert run.series is not None
-    config, drive, begin = task.config, task.drive, task.steady + chance.offset
+    operation, drive, begin = task.rig.operation, task.rig.drive, task.steady + chance.offset
     angle = float(np.interp(begin, run.series["time"].values, crank_angle(drive, run.series)))
     # from the saved state on, as the event may begin inside a step
-    window = Window(Phase.EVENT, run.series, drive, (), config.run.crank_speed)
+    window = Window(Phase.EVENT, run.series, drive, (), operation.crank_speed)
     stalls = not run.ended and read_measure("stall_time", window) is not None
     return Sample(
         crank_angle=angle % (2.0 * math.pi),
         event=begin,
-        trip_torque=chance.trip_torque if config.coupling else None,
+        trip_torque=chance.trip_torque if operation.coupling else None,
         **{each.name: read_measure(each.name, window) for each in fields(Sample) if each.name in MEASURES},
         stalls=float(stalls),
         trips=float(run.ended),
@@ -270,9 +259,9 @@ def sample(task: RandomTask, chance: Draw, run: EventRun) -> Sample:
 def make_runs(parcel: Parcel, begin: int, end: int) -> dict[str, Any]:
     """The results of the runs from number `begin` to `end` - 1, by the names of `result_variables`."""
     task = parcel.task
-    chances = [draw(task.config, number) for number in range(begin, end)]
+    chances = [draw(task.plan, task.rig.operation, number) for number in range(begin, end)]
     system = _system_of(parcel)
-    runs = system.runs([point(system.rig, chance) for chance in chances])
+    runs = system.runs([point(system.rig, chance, task.plan.table.duration) for chance in chances])
     results = [_result_of(task, chance, run) for chance, run in zip(chances, runs, strict=True)]
     return {name: [result[name] for result in results] for name in results[0]}
 
@@ -415,9 +404,9 @@ def job_of(task: RandomTask) -> Job:
     return Job(
         name="monte_carlo",
         title="overloads at random",
-        points=int(plan_of(task.config).table.runs),
+        points=int(task.plan.table.runs),
         batch=BATCH if task.is_compiled else COSIMULATED_BATCH,
-        variables=result_variables(plan_of(task.config).event),
+        variables=result_variables(task.plan.event),
         work=make_runs,
         task=parcel,
         digest=parcel.digest,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ...core.quantities import Value, declaration, quantity
-from ...study.config import Config
 from ...study.event_table import RandomEvent
 
 
@@ -35,9 +34,3 @@ class RandomPlan:
     def is_asked_for(self) -> bool:
         """Whether there are runs."""
         return bool(self.table.runs)
-
-
-def plan_of(config: Config) -> RandomPlan:
-    """The plan of a study."""
-    plan: RandomPlan = config.plans["random_overloads"]
-    return plan

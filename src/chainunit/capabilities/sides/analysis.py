@@ -14,10 +14,9 @@ from ...machines.chain_unit import SIDES, Feed, SideName
 from ...reading.results import InUnit, derived, part, result
 from ...study.analysis import Analysis, Findings, Work
 from ...study.arrays import peak
-from ...study.config import Config
 from ...study.cycle import cycle
 from ...study.drive import Drive
-from ...study.one_sided import OverloadFactors, cycle_alone, overload_factors
+from ...study.load_cases import OverloadFactors, cycle_alone, overload_factors
 from ...study.organ_limits import slack_and_mode
 from ...study.record import StudyRecord
 
@@ -142,7 +141,7 @@ class OrganAnalysis(Analysis):
     name = "organs"
 
     @staticmethod
-    def applies(config: Config, drive: Drive) -> bool:
+    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
         """Whether the machine has working organs on its sides."""
         return bool(drive.machine.model.sides)
 

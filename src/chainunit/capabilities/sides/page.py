@@ -10,7 +10,7 @@ from ...report import blocks as b
 from ...report import figure as fig
 from ...report.lines import capital
 from ...report.pictures import Pictures
-from ...study.one_sided import OverloadFactors
+from ...study.load_cases import OverloadFactors
 from ...study.record import StudyRecord
 from ...study.verdict import CRANK_GOOD, ROCKER_GOOD_EMPTY
 from .analysis import Limits, OrganFindings

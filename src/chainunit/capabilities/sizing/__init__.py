@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from ...fmu.backends import Backend
+from ...machines.machine import Machine
 from ...report.blocks import Block, Source
 from ...report.capability import Capability, Contents
 from ...study.analysis import Analysis
@@ -59,23 +60,29 @@ class SizingCapability(Capability):
         form = reading.form.sizing
         return SizingPlan(reading.values["sizing"], form.gear_kind, form.ratio_series, form.ratios)
 
-    def unused_values(self, config: Config) -> Iterable[str]:
+    def unused_values(self, machine: Machine) -> Iterable[str]:
         """A machine without sides has no one-sided feed."""
-        return () if config.machine.model.sides else ("sizing.one_sided_share",)
+        return () if machine.model.sides else ("sizing.one_sided_share",)
 
     def drive(
         self, config: Config, folder: Path, progress: TaskProgress, backend: Backend | None
     ) -> DriveProposal | None:
         """The best of the motors that it tries."""
-        if config.plans[self.name] is None:
-            return None
-        from .search import size
-
-        return size(config, folder, progress, backend).proposal(config)
-
-    def permitted_temperature(self, config: Config) -> tuple[str, float] | None:
-        """That of its table."""
         plan: SizingPlan | None = config.plans[self.name]
+        if plan is None:
+            return None
+        from .duty import duty_of
+        from .search import motors_on_offer, size
+        from .task import SizingTask
+
+        task = SizingTask(plan, config.drive, config.machine, config.operation, config.events)
+        motors = motors_on_offer(task, config.file.catalogue)
+        progress("the machine at constant speed", 0.0, 1.0)
+        duty = duty_of(task, config.values, folder, backend)
+        return size(task, motors, duty, folder, progress, backend).proposal(config.drive)
+
+    def permitted_temperature(self, plan: SizingPlan | None) -> tuple[str, float] | None:
+        """That of its table."""
         return None if plan is None else ("sizing.temperature", float(plan.demands.temperature))
 
     def analyses(self) -> Iterable[type[Analysis]]:

@@ -20,6 +20,7 @@ from ...study.cycle import cycle
 from ...study.drive import Drive
 from ...study.event import Event, Role
 from ...study.event_torques import from_event_on
+from ...study.events import one_sided_event
 from ...study.limits import starting
 from ...study.measures import STARTED
 from ...study.readings import crank_motion
@@ -84,7 +85,7 @@ def _for_starts(
 ) -> tuple[Alternative, ...]:
     """The ways for a sized drive that starts direct on line, if the start decides its setting and an overload would
     open a coupling that running alone allows. A way whose run fails is left out."""
-    if study.config.start != "direct" or not setting.start_decides:
+    if study.config.drive.start != "direct" or not setting.start_decides:
         return ()
     if not setting.opened_by(setting.least_in_running) or StartAnalysis.name not in study.findings:
         return ()
@@ -167,19 +168,19 @@ def _as_numbers(setting: Setting, running: float, starts: list[StartNumbers], **
 
 def _soft_starter(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative:
     """The same motor with a soft starter; at its full voltage the drive is that of the study."""
-    config = study.config
+    tables = study.config.drive
     assert study.plate is not None and study.start is not None
     plate = study.plate.nameplate
-    usual = longest_start(config, study.start.start_time)
+    usual = longest_start(rig.operation.ramp_end, study.start.start_time)
 
     def rigs() -> Iterator[_Trial]:
         for voltage, time in SOFT_STARTERS:
-            starter = dataclasses.replace(config.starter, soft_start=SoftStart(voltage=voltage, time=time))
-            own = dataclasses.replace(config, start="soft", starter=starter)
-            p = with_starter(rig.drive.parameters, plate, own)
+            starter = dataclasses.replace(tables.starter, soft_start=SoftStart(voltage=voltage, time=time))
+            own = dataclasses.replace(tables, start="soft", starter=starter)
+            p = with_starter(own, rig.drive.parameters, plate)
             soft = dataclasses.replace(
                 rig,
-                config=own,
+                operation=dataclasses.replace(rig.operation, soft_time=time),
                 drive=dataclasses.replace(rig.drive, parameters=p),
             )
             yield soft, usual + time, {"voltage": voltage, "ramp": time}
@@ -216,22 +217,25 @@ def _opened(overloads: Mapping[str, float], numbers: WayNumbers) -> dict[str, fl
 def _inverter(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative:
     """The same motor and gear with an inverter, which keeps the speed better: its running and its overloads are those
     of runs of its own."""
-    config = study.config
+    tables = study.config.drive
     assert study.plate is not None
     plate = study.plate.nameplate
 
     def rigs(boost: float) -> Iterator[_Trial]:
-        inverter = dataclasses.replace(config.starter.inverter, boost=boost)
-        starter = dataclasses.replace(config.starter, inverter=inverter)
+        inverter = dataclasses.replace(tables.starter.inverter, boost=boost)
+        starter = dataclasses.replace(tables.starter, inverter=inverter)
+        own = dataclasses.replace(tables, start="inverter", starter=starter)
         for ramp in RAMPS:
-            run = dataclasses.replace(config.run, ramp=ramp)
-            own = dataclasses.replace(config, start="inverter", run=run, starter=starter)
-            p = with_starter(rig.drive.parameters, plate, own)
+            run = dataclasses.replace(rig.operation.run, ramp=ramp)
+            operation = dataclasses.replace(rig.operation, run=run, soft_time=0.0)
+            p = with_starter(own, rig.drive.parameters, plate)
             drive = dataclasses.replace(rig.drive, parameters=p, follows=True, observer=None, observed={})
-            fed = dataclasses.replace(rig, config=own, drive=with_inertia(own, drive, drive.added_inertia))
+            fed = dataclasses.replace(
+                rig, operation=operation, drive=with_inertia(own, drive, drive.added_inertia)
+            )
             yield fed, 1.5 * ramp + 1.0, {"ramp": ramp, "boost": boost}
 
-    for boost in boosts(config.starter.inverter.boost, "starter.inverter.boost" in config.file.given):
+    for boost in boosts(tables.starter.inverter.boost, "starter.inverter.boost" in tables.given):
         best = _gentlest(rigs(boost), study, setting.running, math.inf)
         if best is not None:
             break
@@ -248,33 +252,33 @@ def _inverter(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative:
 def _runs(study: StudyRecord, rig: Rig, of: PeakOf) -> tuple[float, dict[str, xr.Dataset]]:
     """The largest torque `of` normal duty of another drive, at the crank [N m], and its runs with the overloads from
     their begin on, by name."""
-    config = rig.config
+    operation = rig.operation
     duty: list[tuple[str, xr.Dataset]] = []
     shocks: dict[str, xr.Dataset] = {}
     with rig.from_rest() as simulation:
-        started = start_up(rig, simulation, config.stop, lambda time: None, {})
+        started = start_up(rig, simulation, lambda time: None, {})
         rig = started.rig
         steady = started.run.sel(time=slice(started.steady_from, None))
         begin = simulation.save()
         angle, speed = crank_motion(rig.drive, steady)
         events = {
             name: event
-            for name, event in config.events.items()
+            for name, event in study.config.events.items()
             if name in study.answers and not event.from_rest
         }
         leads = lead_times(rig, simulation, [*events.values()], float(angle[-1]), float(np.mean(speed)))
         for (name, event), lead in zip(events.items(), leads, strict=True):
             at = begin + lead
-            run = follow(rig, simulation, event, at, at + event.follow(config.turn)).run.sel(
+            run = follow(rig, simulation, event, at, at + event.time_followed(operation.turn)).run.sel(
                 time=slice(at, None)
             )
             if event.role is Role.DUTY:
                 duty.append((name, run))
             elif event.role is Role.SHOCK:
                 shocks[name] = run
-        for side in (each for each in SIDES if each in config.machine.model.sides):
-            event = config.one_sided(side)
-            run = follow(rig, simulation, event, begin, begin + event.p.shift + 2.0 * config.turn).run
+        for side in (each for each in SIDES if each in rig.drive.machine.model.sides):
+            event = one_sided_event(study.config.events, side)
+            run = follow(rig, simulation, event, begin, begin + event.p.shift + 2.0 * operation.turn).run
             duty.append((all_feed_on(side), run))
     return duty_peak(rig.drive, [(STEADY, steady), *duty], of).torque, shocks
 
@@ -289,8 +293,8 @@ def slip_run(rig: Rig, start: StartNumbers, setting: float) -> xr.Dataset | None
     times in which it slips."""
     rig = from_angle(rig, start.angle)
     drive = rig.drive
-    capacity, speed = setting / drive.ratio, rig.config.run.crank_speed * drive.ratio
-    inertia = float(np.min(cycle(drive.machine, rig.config.run.crank_speed, rig.config.feed).outputs.J))
+    capacity, speed = setting / drive.ratio, rig.operation.crank_speed * drive.ratio
+    inertia = float(np.min(cycle(drive.machine, rig.operation.crank_speed, rig.operation.feed).outputs.J))
     smooth = max(_SMOOTH * speed, capacity / (_FASTEST * inertia))
     p = SlipClutch.Parameters(phi_start=drive.parameters.phi_start, setting=capacity, w_smooth=smooth)
     parts = drive.graph.components
@@ -301,7 +305,7 @@ def slip_run(rig: Rig, start: StartNumbers, setting: float) -> xr.Dataset | None
     signals = rig.signals(ramp=True)
     assert start.start_time is not None
     piece, pieces, state = 0.25 * start.start_time + _SWING, list[xr.Dataset](), None
-    full, slip_time = STARTED * rig.config.run.crank_speed * drive.driven_machine.ratio, 0.0
+    full, slip_time = STARTED * rig.operation.crank_speed * drive.driven_machine.ratio, 0.0
     for k in range(12):
         times = np.linspace(k * piece, (k + 1) * piece, int(piece / _ROWS) + 2)
         run = monolithic(system, signals, times, rtol=1e-6, start=state)
@@ -375,7 +379,8 @@ def _before_flywheel(study: StudyRecord, rig: Rig, setting: Setting) -> Alternat
     if not rig.drive.added_inertia or study.start is None:
         return None
     events = _loaded_starts(study)
-    starts = starts_from_all(rig, longest_start(study.config, study.start.start_time), events, on_motor_side)
+    longest = longest_start(rig.operation.ramp_end, study.start.start_time)
+    starts = starts_from_all(rig, longest, events, on_motor_side)
     if any(start.start_time is None for start in starts):
         return None
     running, shocks = _runs(study, dataclasses.replace(rig, fed_from=None), on_motor_side)

@@ -32,7 +32,7 @@ def recommended_setting(study: StudyRecord) -> Setting | None:
         running=running_peak(study).torque,
         start=hardest_start(study).torque,
         motor=pull_out(study),
-        gear=study.config.gear.torque_limit,
+        gear=study.config.drive.gear.torque_limit,
         overloads={} if normal else {n: peak for n, peak in shocks.items() if n not in wrong},
         disturbances={n: x for n, x in peaks_in_events(study, Role.DISTURBANCE).items() if n not in wrong},
         wrong=normal or [n for n in wrong if n in shocks],
@@ -71,7 +71,7 @@ def effects(
         rows = until.sizes["time"]
         last = run.isel(time=slice(rows - 1, rows + 1)).interp(time=[min(end, float(time[-1]))])
         without = at_gear(drive, run)
-        wanted = goal(without, study.config.gear.torque_limit)
+        wanted = goal(without, study.config.drive.gear.torque_limit)
         above = int(np.argmax(np.abs(gear_torque(drive, run)) > wanted))
         in_time = max(float(time[max(above - 1, 0)]) - trip, 0.0)
         with_coupling = max(at_gear(drive, until), at_gear(drive, last))

@@ -198,7 +198,7 @@ def way_words(study: StudyRecord, each: Alternative, setting: Setting) -> str:
 
 def _set(study: StudyRecord, each: Alternative, setting: Setting) -> str:
     """The setting of a way and what it protects, in words."""
-    gear = study.config.gear.torque_limit
+    gear = study.config.drive.gear.torque_limit
     if each.numbers.setting is None:
         return f"no setting is left below the {_torque(gear)} that the gear may carry"
     text = f"set to {_at_both(study, each.numbers.setting)}, it opens "

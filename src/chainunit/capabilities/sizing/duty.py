@@ -15,12 +15,12 @@ from ...core.quantities import Value, declaration, quantity
 from ...fmu.backends import Backend
 from ...machines.chain_unit import SIDES, SideName
 from ...reading.results import derived, part, result
-from ...study.config import Config
 from ...study.cycle import Cycle, cycle, energy_swing, needed_inertia
-from ...study.one_sided import all_on_one
+from ...study.load_cases import all_on_one
 from ...study.quantiles import HIGH
 from ...study.registry import registered
-from .table import Sizing, plan_of
+from .table import Sizing
+from .task import SizingTask
 
 
 def rms(*parts: tuple[float, Any]) -> float:
@@ -66,21 +66,24 @@ class Duty:
         return {"larger_rms": self.heavier, "larger_peak": max(peaks)[1]} if peaks else None
 
 
-def duty_of(config: Config, folder: Path, backend: Backend | None) -> Duty:
-    """The duty of a study with [sizing]; an FMU of a machine that has to be run for it is written to `folder`."""
-    feed, w = config.feed, config.run.crank_speed
-    loads = {side: all_on_one(side, feed) for side in SIDES if side in config.machine.model.sides}
-    normal = cycle(config.machine, w, feed)
-    one_sided = {side: cycle(config.machine, w, case) for side, case in loads.items()}
+def duty_of(task: SizingTask, values: Mapping[str, Any], folder: Path, backend: Backend | None) -> Duty:
+    """The duty of a machine; an FMU of one that has to be run for it is written to `folder`. `values` are those of
+    the tables of the capabilities."""
+    machine, feed, w = task.machine, task.operation.feed, task.operation.crank_speed
+    loads = {side: all_on_one(side, feed) for side in SIDES if side in machine.model.sides}
+    normal = cycle(machine, w, feed)
+    one_sided = {side: cycle(machine, w, case) for side, case in loads.items()}
     sizes = [(rms((1.0, turn.crank_torque)), side) for side, turn in one_sided.items()]
     # if both sides are alike it is the left one
     heavier = min(sizes, key=lambda each: -each[0])[1] if sizes else None
     for capability in registered():
-        if turns := capability.turns(config, (feed, *loads.values()), folder, backend):
+        if turns := capability.turns(values, machine, w, (feed, *loads.values()), folder, backend):
             normal, *others = turns
             one_sided = dict(zip(loads, others, strict=True))
-    demands, ratio = plan_of(config).demands, config.machine.ratio
-    return Duty(normal, one_sided, heavier, cycle_numbers(demands, w, ratio, normal, one_sided, heavier))
+    demands = task.plan.demands
+    return Duty(
+        normal, one_sided, heavier, cycle_numbers(demands, w, machine.ratio, normal, one_sided, heavier)
+    )
 
 
 def _peak(cycle: Cycle) -> float:

@@ -7,10 +7,10 @@ from typing import Any
 
 from ...reading.results import GIVEN, as_data, derived, part, result
 from ...study.analysis import Analysis, Findings, Work
-from ...study.catalogue_drive import gear_with
-from ...study.config import Config
+from ...study.catalogue_drive import as_used
 from ...study.coupling import remark_on_rams
 from ...study.drive import Drive
+from ...study.drive_tables import DriveTables
 from ...study.proposal import DriveProposal
 from ...study.record import StudyRecord
 from .alternatives import alternatives
@@ -125,15 +125,15 @@ class SizingFindings(Findings):
         """Place of the nearest candidate, where none fits."""
         return None if self.chosen_candidate else self.candidates.index(self.best)
 
-    def proposal(self, config: Config) -> DriveProposal:
-        """The drive of a study by these findings."""
+    def proposal(self, tables: DriveTables) -> DriveProposal:
+        """The drive of a study by these findings, with the gear of its `tables`."""
         best, trial, fits = self.best, self.best.trial, self.chosen_candidate is not None
         return DriveProposal(
             "sizing",
             self,
             best.drive,
             best.motor,
-            gear_with(config, best.drive.ratio, self.plan.offer),
+            as_used(tables, best.drive, self.plan.offer),
             "Which motor, gear and flywheel does {noun} need? Its {driver} turns at {=run.crank_speed:4}.",
             self.answer,
             insufficient="" if fits else INSUFFICIENT,
@@ -183,9 +183,9 @@ class ProtectionAnalysis(Analysis):
     needs_runs = True
 
     @staticmethod
-    def applies(config: Config, drive: Drive) -> bool:
+    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
         """Whether the study asks for sizing."""
-        return config.plans["sizing"] is not None
+        return plans["sizing"] is not None
 
     @staticmethod
     def find(study: StudyRecord, work: Work) -> None:

@@ -51,7 +51,7 @@ def gear_order(study: StudyRecord, setting: Setting | None, margin: float) -> Ge
     on it."""
     if study.insufficient or STEADY not in study.answers:
         return None
-    running, factor = running_peak(study, at_gear), study.config.gear.start_factor
+    running, factor = running_peak(study, at_gear), study.config.drive.gear.start_factor
     loads = {"running": GearLoad(running.torque, running_words(study, running.run))}
     if starts := StartFindings.found_in(study):
         loads["start"] = GearLoad(starts.worst.gear_torque, "a start", factor)

@@ -16,12 +16,12 @@ from ...core.errors import InterruptedRunError, RunError
 from ...drives.catalogue import CatalogueMotor
 from ...drives.gear_ratios import gear_unit, next_ratio, ratio_on_offer
 from ...study.catalogue_drive import catalogue_drive, with_inertia
-from ...study.config import Config
 from ...study.limits import SPEED_DEVIATION
 from .candidate import Candidate, TrialResult
 from .duty import CycleNumbers, Duty
 from .inverter import least_boost, misses_by_a_hair
-from .table import SizingPlan, plan_of
+from .table import SizingPlan
+from .task import SizingTask
 from .trial import try_motor
 
 _EVENED = ("speed", "rms_torque", "peak_torque", "temperature")
@@ -39,24 +39,24 @@ deviation is for the slip in the run."""
 class MotorTrials:
     """Trials of motors for the `duty` of a study, by the FMU `files`, or without them on the compiled system."""
 
-    config: Config
+    task: SizingTask
     duty: Duty
     files: Mapping[str, Path] | None = None
 
     @property
     def plan(self) -> SizingPlan:
         """The demands on the motor, and the gears on offer."""
-        return plan_of(self.config)
+        return self.task.plan
 
     @property
     def has_given_ratio(self) -> bool:
         """Whether the file gives the ratio of the gear."""
-        return "gear.ratio" in self.config.file.given
+        return "gear.ratio" in self.task.tables.given
 
     @property
     def has_given_boost(self) -> bool:
         """Whether the file gives the boost of the inverter."""
-        return "starter.inverter.boost" in self.config.file.given
+        return "starter.inverter.boost" in self.task.tables.given
 
     @property
     def is_made(self) -> bool:
@@ -66,9 +66,15 @@ class MotorTrials:
     def candidate(self, motor: CatalogueMotor, chosen: float | None = None) -> Candidate:
         """A candidate without a flywheel, with the `chosen` ratio, or that which the file gives, or the ratio on
         offer that is nearest to the one at which the crank has its speed."""
-        plan, series, torque = self.plan, "", self.duty.normal.crank_torque
+        plan, task, series = self.plan, self.task, ""
         with_ratio = partial(
-            catalogue_drive, self.config, motor, torque, plan.demands.ambient, offer=plan.offer
+            catalogue_drive,
+            task.tables,
+            task.machine,
+            self.duty.normal,
+            motor,
+            plan.demands.ambient,
+            offer=plan.offer,
         )
         drive = with_ratio(gear_ratio=chosen)
         if chosen is not None:
@@ -84,7 +90,7 @@ class MotorTrials:
         angle."""
         c.worst_start = worst_start
         try:
-            trial = try_motor(self.config, c.motor, c.drive, self.duty, self.files, worst_start=worst_start)
+            trial = try_motor(self.task, c.motor, c.drive, self.duty, self.files, worst_start=worst_start)
             c.trial = trial.result()
         except InterruptedRunError:
             raise
@@ -123,7 +129,7 @@ class MotorTrials:
         trials: list[Candidate] = []
 
         def trial_with(flywheel: float) -> Candidate:
-            candidate = dataclasses.replace(bare, drive=with_inertia(self.config, bare.drive, flywheel))
+            candidate = dataclasses.replace(bare, drive=with_inertia(self.task.tables, bare.drive, flywheel))
             trials.append(self.judged(candidate))
             return candidate
 
@@ -138,7 +144,7 @@ class MotorTrials:
         if heavy_enough(first) or mean > bare.motor.nameplate.torque:
             return first
         inertia = numbers.inertia_wanted / bare.drive.ratio**2 / (1.0 - bare.margin)
-        whole = max(inertia, torque_evening_inertia(first, numbers, self.config.run.crank_speed)) - there
+        whole = max(inertia, torque_evening_inertia(first, numbers, self.task.operation.crank_speed)) - there
         if whole < _SMALL * there:
             return first
         below = 0.0

@@ -18,7 +18,6 @@ from ...drives.catalogue import CatalogueMotor, catalogue
 from ...drives.gear_ratios import UNITS, nearest
 from ...fmu.backends import Backend
 from ...reading.text import number
-from ...study.config import Config
 from ...study.drive_fmus import export_drive
 from ...study.limits import SPEED_DEVIATION
 from ...study.quantiles import HIGH
@@ -26,63 +25,68 @@ from ...study.relay import HEAVIEST, LIGHT, class_words
 from ...study.sections import SOFTER
 from ...work.progress import TaskProgress
 from .candidate import Candidate
-from .duty import Duty, duty_of
+from .duty import Duty
 from .findings import SizingFindings
 from .inverter import inverter_needs
 from .motor_trials import MotorTrials
 from .preference import choice, poles_rank, rank
-from .table import plan_of
+from .task import SizingTask
 
 _WORSE_WITH_POWER = ("gear_start",)
 """Checks that a larger motor makes worse."""
 
 
-def size(
-    config: Config, folder: Path, progress: TaskProgress, backend: Backend | None = None
-) -> SizingFindings:
-    """Choose a motor of the catalogue for the study. At least `sizing.candidates` motors are tried, from
-    small to large, and then more until one fits with the margin, and none that follows could be preferred to
-    it, or the catalogue ends.
-
-    Parameters
-    ----------
-    config : a study with [sizing]
-    folder : where the FMUs are written
-    progress, backend : see `chainunit.study.run.run_study`
+def motors_on_offer(task: SizingTask, own: Path | None) -> list[CatalogueMotor]:
+    """The motors of the catalogue with the requested numbers of poles, the smallest first, with the motors of the
+    file of `own` ones.
 
     Raises
     ------
     InputError
-        for a catalogue that cannot be read, or that has no motor with the requested numbers of poles.
+        for a catalogue that cannot be read or has no such motor, and as `check_ratios`.
     """
-    limits = plan_of(config).demands
-    motors = [
-        m
-        for m in catalogue(config.file.catalogue)
-        if limits.poles_least <= m.nameplate.poles <= limits.poles_most
-    ]
+    limits, tables = task.plan.demands, task.tables
+    motors = [m for m in catalogue(own) if limits.poles_least <= m.nameplate.poles <= limits.poles_most]
     motors.sort(key=lambda m: (m.nameplate.power, poles_rank(m.nameplate.poles)))
     if not motors:
         raise InputError(
             f"sizing.poles_least = {limits.poles_least:g}, sizing.poles_most = {limits.poles_most:g}: the catalogue "
             "has no motor with so many poles"
         )
-    if config.start != "inverter" and "gear.ratio" not in config.file.given:
-        check_ratios(plan_of(config).ratios, config.run.crank_speed, motors)
-    progress("the machine at constant speed", 0.0, 1.0)
-    duty = duty_of(config, folder, backend)
+    if tables.start != "inverter" and "gear.ratio" not in tables.given:
+        check_ratios(task.plan.ratios, task.operation.crank_speed, motors)
+    return motors
+
+
+def size(
+    task: SizingTask,
+    motors: list[CatalogueMotor],
+    duty: Duty,
+    folder: Path,
+    progress: TaskProgress,
+    backend: Backend | None = None,
+) -> SizingFindings:
+    """Choose one of the `motors` for the `duty`. At least `sizing.candidates` motors are tried, from small to large,
+    and then more until one fits with the margin and none that follows could be preferred to it, or the catalogue
+    ends.
+
+    Parameters
+    ----------
+    folder : where the FMUs are written
+    progress, backend : see `chainunit.study.run.run_study`
+    """
     numbers = duty.numbers
     notes = [
         "Catalogue data are typical; iron losses are not in the motor model.",
         "The gear's losses act as viscous drag on the motor shaft, with the mean power that its efficiency costs.",
     ]
-    if config.machine.in_place:
+    if task.machine.in_place:
         notes.append(
             f"Peaks of the cycle and the flywheel are those of single turns, {100 * HIGH:g} % quantile over all "
             "turns of all starts of the chains."
         )
     # a flywheel evens the torque of a cycle, but gives no mean power
-    power = numbers.power_mean / (1.0 - limits.margin)
+    power = numbers.power_mean / (1.0 - task.plan.demands.margin)
     strong = [m for m in motors if m.nameplate.power >= power]
     if not strong:
         notes.append(
@@ -90,14 +94,15 @@ def size(
             f"{number(power, 'W')}: the largest were tried."
         )
         strong = [m for m in motors if m.nameplate.power == motors[-1].nameplate.power]
-    candidates = _search(_trials(config, strong[0], duty, folder, progress, backend), strong, progress)
+    trials = MotorTrials(task, duty)
+    candidates = _search(_with_files(trials, strong[0], folder, progress, backend), strong, progress)
     notes += [
         f"{c.motor.designation} would be preferred, but for its start: {c.reason}."
         for c in candidates[1:]
         if c.remedy
     ]
-    notes += _needs(candidates[0], MotorTrials(config, duty))
-    return SizingFindings(plan_of(config), duty, candidates, notes, len(motors), len(motors) - len(strong))
+    notes += _needs(candidates[0], trials)
+    return SizingFindings(task.plan, duty, candidates, notes, len(motors), len(motors) - len(strong))
 
 
 def check_ratios(ratios: Sequence[float], crank_speed: float, motors: Sequence[CatalogueMotor]) -> None:
@@ -129,16 +134,10 @@ def check_ratios(ratios: Sequence[float], crank_speed: float, motors: Sequence[C
     )
 
 
-def _trials(
-    config: Config,
-    motor: CatalogueMotor,
-    duty: Duty,
-    folder: Path,
-    progress: TaskProgress,
-    backend: Backend | None,
+def _with_files(
+    trials: MotorTrials, motor: CatalogueMotor, folder: Path, progress: TaskProgress, backend: Backend | None
 ) -> MotorTrials:
-    """The trials of motors such as this one: on the compiled system where there is a compiler."""
-    trials = MotorTrials(config, duty)
+    """The trials of motors such as this one: on the compiled system where there is a compiler, else by FMUs."""
     drive = trials.candidate(motor).drive
     if compiler() is not None and backend != "python" and not drive.foreign_titles:
         return trials
@@ -182,10 +181,15 @@ def _search(trials: MotorTrials, motors: list[CatalogueMotor], progress: TaskPro
 def _remedy(trials: MotorTrials, c: Candidate) -> str:
     """What makes a candidate fit whose start alone is too hard for the gear: on the line it is tried with a soft
     starter."""
-    start = trials.config.start
+    tables = trials.task.tables
+    start = tables.start
     if start != "direct":
         return SOFTER[start]
-    softly = dataclasses.replace(trials, config=dataclasses.replace(trials.config, start="soft"))
+    soft_tables = dataclasses.replace(tables, start="soft")
+    operation = dataclasses.replace(trials.task.operation, soft_time=soft_tables.soft_time)
+    softly = dataclasses.replace(
+        trials, task=dataclasses.replace(trials.task, tables=soft_tables, operation=operation)
+    )
     soft = softly.candidate(c.motor, c.drive.ratio)
     soft.drive = dataclasses.replace(soft.drive, added_inertia=c.drive.added_inertia)
     if not softly.judged(soft, worst_start=True).fits:
@@ -211,7 +215,7 @@ def _needs(best: Candidate, trials: MotorTrials) -> Iterator[str]:
         relay = f"{'of ' if relay_class <= HEAVIEST else ''}{class_words(relay_class)}"
         yield f"The start takes an overload relay {relay}; one of class {LIGHT} may trip in it."
     if best.drive.follows:
-        yield from inverter_needs(best, trials.config.starter.overload, trials.has_given_boost)
+        yield from inverter_needs(best, trials.task.tables.starter.overload, trials.has_given_boost)
     if best.unit is None:
         largest = UNITS[trials.plan.gear_kind][-1]
         end = (

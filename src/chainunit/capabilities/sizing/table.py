@@ -12,7 +12,6 @@ from ...core.quantities import Value, declaration, quantity
 from ...drives.gear_ratios import UNITS
 from ...drives.gearing import Transmission
 from ...study.catalogue_drive import GearOffer
-from ...study.config import Config
 from ...study.entry_values import numbers
 
 
@@ -120,9 +119,3 @@ class SizingPlan:
     def words(self) -> dict[str, Any]:
         """The words and lists of the table, by key, without empty ones."""
         return {key: x for key in SIZING_KEYS if (x := getattr(self, key))}
-
-
-def plan_of(config: Config) -> SizingPlan:
-    """The plan of a study with [sizing]."""
-    plan: SizingPlan = config.plans["sizing"]
-    return plan

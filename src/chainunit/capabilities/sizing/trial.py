@@ -19,8 +19,8 @@ from ...drives.induction_motor import volts_per_hertz
 from ...drives.motor import T_RATED
 from ...machines.chain_unit import SideName
 from ...study.arrays import peak
-from ...study.config import Config
 from ...study.drive import Drive
+from ...study.events import one_sided_event
 from ...study.limits import Check, heating, keeping_speed, starting
 from ...study.measures import time_to_start
 from ...study.readings import crank_angle, load_inertia, only_whole_turns, turns_made
@@ -43,7 +43,8 @@ from ...study.window import BURNT, is_settled
 from ...system import Simulation
 from .candidate import TrialResult
 from .duty import Duty, rms
-from .table import Sizing, plan_of
+from .table import Sizing
+from .task import SizingTask
 
 _GAP = "motor.air_gap_tau"
 _STANDS = 0.25
@@ -56,7 +57,7 @@ class Trial:
     feed on each side. The runs `shifts` are between these, each with its name: in them the feed comes or moves and
     the motor settles."""
 
-    config: Config
+    task: SizingTask
     motor: CatalogueMotor
     drive: Drive
     heavier: SideName | None
@@ -80,7 +81,7 @@ class Trial:
         """Time of the start from the angle 0 [s]; None where it fails."""
         runs = (self.start, self.steady)
         speed, time = (np.concatenate([run[name].values for run in runs]) for name in ("motor.w", "time"))
-        requested = self.config.run.crank_speed * self.drive.ratio
+        requested = self.task.operation.crank_speed * self.drive.ratio
         return time_to_start(time, speed, self.speed, requested) if self.speed > CREEPS * requested else None
 
     @cached_property
@@ -135,7 +136,7 @@ class Trial:
         highest = max(self.start_current, *(peak(run[name].values) for run in self._running))
         lasting = [exceeded_for(*self._start_currents, OVERLOADED), *(s.long_current for s in self.starts)]
         rated = float(self.motor.nameplate.rated_current)
-        return max(rated, self._rms(name), highest / self.config.starter.overload, *lasting)
+        return max(rated, self._rms(name), highest / self.task.tables.starter.overload, *lasting)
 
     @cached_property
     def speed(self) -> float:
@@ -191,7 +192,7 @@ class Trial:
         # losses
         running, start = (warm / cold * heat for heat in self._heat)
         starts = permitted_starts(p, running, start, self._cooling, self._demands.temperature)
-        if plate.starts and self.config.start == "direct":
+        if plate.starts and self.task.tables.start == "direct":
             # the number of starts in the catalogue is that of the bare rotor
             total = p.rotor.J + float(np.mean(load_inertia(self.drive, self.steady)))
             starts = min(starts, plate.starts * plate.J / total)
@@ -212,8 +213,8 @@ class Trial:
         follows it: of the duty or, for a machine that starts empty, of a turn without feed."""
         steady = after = sum(share * float(np.mean(run["motor.heat"])) for share, run in self._cases)
         time, heat = self.start["time"].values, self.start["motor.heat"].values
-        if self.config.empty_start:
-            after = float(np.mean(heat[time >= time[-1] - self.config.turn]))
+        if self.task.operation.empty_start:
+            after = float(np.mean(heat[time >= time[-1] - self.task.operation.turn]))
         extra = [float(np.trapezoid(heat - after, time))]
         extra += [start.heat - after * start.followed for start in self.starts]
         return steady, max(0.0, *extra)
@@ -224,7 +225,7 @@ class Trial:
 
     @property
     def _demands(self) -> Sizing:
-        return plan_of(self.config).demands
+        return self.task.plan.demands
 
     @property
     def _running(self) -> tuple[xr.Dataset, ...]:
@@ -262,14 +263,14 @@ class Trial:
 
         start = starting(self.start_time, plate)
         if self.drive.follows:
-            start = dataclasses.replace(start, limit=1.0 + 1.2 * self.config.run.ramp)
+            start = dataclasses.replace(start, limit=1.0 + 1.2 * self.task.operation.run.ramp)
         weaker = min(1.0, plate.frequency / self.frequency)
         # a motor that does not start has the limits that it has at its speed
         cooling = (
             1.0 if self.start_time is None else self._cooling / self.drive.motor.cooling(MATH, p, plate.speed)
         )
         breakdown = self.breakdown_torque / demands.breakdown_margin
-        requested_speed = self.drive.ratio * self.config.run.crank_speed
+        requested_speed = self.drive.ratio * self.task.operation.crank_speed
         peak_torque = max(peak(run[_GAP]) for run in self._running)
         too_hot = "no start is permitted, as running alone is too hot"
         checks = {
@@ -291,8 +292,8 @@ class Trial:
             inertia = float(np.max(load_inertia(self.drive, self.steady)))
             ratio = (inertia + p.rotor.J - plate.J) / plate.J
             checks["inertia"] = Check("inertia ratio", ratio, demands.inertia_ratio, "1")
-        if "gear.torque_limit" in self.config.file.given:
-            gear = self.config.gear
+        if "gear.torque_limit" in self.task.tables.given:
+            gear = self.task.tables.gear
             checks["gear"] = Check("torque of the gear", self.duty.torque, gear.torque_limit, "N.m")
             hardest = max([at_gear(self.drive, self.start), *(s.gear_torque for s in self.starts)])
             title = "torque of the gear in a start"
@@ -301,7 +302,7 @@ class Trial:
 
 
 def try_motor(
-    config: Config,
+    task: SizingTask,
     motor: CatalogueMotor,
     drive: Drive,
     duty: Duty,
@@ -317,42 +318,44 @@ def try_motor(
     RunError
         where an FMU fails.
     """
-    plate, turn = motor.nameplate, config.turn
-    ramp = config.run.ramp if drive.follows else 0.0
+    plate, operation, turn = motor.nameplate, task.operation, task.operation.turn
+    ramp = operation.run.ramp if drive.follows else 0.0
     # three times as long as the rated torque takes to bring all inertia up to speed, and at least the ramp of
     # the start
     inertia = drive.fmu_parameters.rotor.J + duty.numbers.inertia_mean / drive.ratio**2
-    rise = config.starter.soft_start.time if config.start == "soft" else ramp
+    rise = task.tables.soft_time or ramp
     window = max(1.0, 3.0 * inertia * plate.speed / plate.torque, 1.5 * rise)
-    if config.empty_start:
+    if operation.empty_start:
         # the run ends with a turn without feed
         window += turn
-    rig = Rig(config, drive, files)
+    rig = Rig(operation, drive, files)
     shifts, one_sided = [], {}
     with rig.from_rest() as simulation:
         start = simulation.run(window, rig.step)
-        if config.empty_start:
+        if operation.empty_start:
             rig = dataclasses.replace(rig, fed_from=simulation.time)
             simulation.signals = rig.signals(ramp=True)
-            window += max(1.0, config.run.settle_turns) * turn
+            window += max(1.0, operation.run.settle_turns) * turn
             shifts.append((SETTLING, simulation.run(window, rig.step)))
         *settling, steady = _until_settled(rig, simulation, window + 2.0 * turn)
         shifts += [(SETTLING, run) for run in settling]
         event = simulation.save()
         for side in duty.one_sided:
-            feed = config.one_sided(side)
+            feed = one_sided_event(task.events, side)
             shift = follow(rig, simulation, feed, event, event + feed.p.shift + turn).run
             shifts.append((all_feed_on(side), shift))
             one_sided[side] = simulation.run(simulation.time + turn, rig.step)
-    trial = Trial(config, motor, drive, duty.heavier, start, steady, tuple(shifts), one_sided)
+    trial = Trial(task, motor, drive, duty.heavier, start, steady, tuple(shifts), one_sided)
     if not worst_start or drive.simulated_machine.model.never_repeats or trial.start_time is None:
         return trial
-    return dataclasses.replace(trial, starts=starts_from_all(rig, longest_start(config, trial.start_time)))
+    return dataclasses.replace(
+        trial, starts=starts_from_all(rig, longest_start(operation.ramp_end, trial.start_time))
+    )
 
 
 def _until_settled(rig: Rig, simulation: Simulation, stop: float) -> list[xr.Dataset]:
     """Runs of two turns, the first to the time `stop` [s], until the turns of a run close."""
-    turn, drive = rig.config.turn, rig.drive
+    turn, drive = rig.operation.turn, rig.drive
     runs = [simulation.run(stop, rig.step)]
     while simulation.time < stop + PATIENCE * turn:
         turns = only_whole_turns(drive, runs[-1])

@@ -24,9 +24,10 @@ from ...core.system_description import reference
 from ...machines.machine import Machine
 from ...reading.results import InUnit
 from ...study.block_runs import BlockRuns, Cause
-from ...study.choice import choose
+from ...study.choice import drive_of
 from ...study.config import Config
 from ...study.cycle_quantities import CycleQuantity, cycle_quantity, evaluate
+from ...study.event import Event
 from ...study.measures import Answers
 from ...study.rig import Rig
 from ...work.job import Job, ResultVariable
@@ -62,6 +63,8 @@ class SweepTask:
     feed: Any
     crank_speed: float
     rig: Rig | None = None
+    event: Event | None = None
+    """the event of the measures"""
     threads: int = 1
     """number of threads of the native loop; the results do not depend on it"""
 
@@ -73,8 +76,8 @@ class SweepTask:
     @cached_property
     def block(self) -> BlockRuns:
         """The runs of the measures."""
-        assert self.rig is not None
-        return block_of(self.rig, self.plan)
+        assert self.rig is not None and self.event is not None
+        return block_of(self.rig, self.plan, self.event)
 
     @cached_property
     def reasons(self) -> list[StateReason]:
@@ -144,19 +147,18 @@ class SweepTask:
             "first": [list(map(float, x)) for x in plan.values(0, min(8, plan.points)).values()],
             "batch": batch_of(plan),
         }
-        if self.rig is not None:
-            config, drive = self.rig.config, self.rig.drive
-            event = config.events[plan.event]
+        if self.rig is not None and self.event is not None:
+            operation, graph, event = self.rig.operation, self.rig.graph, self.event
             relevant |= {
-                "run": asdict(config.run),
+                "run": asdict(operation.run),
                 "event": [event.kind, event.side, Layout(type(event.p)).by_name(event.p)],
-                "connections": drive.graph.connections,
-                "start": drive.graph.values,
-                "empty_start": config.empty_start,
-                "ramp_end": config.ramp_end,
+                "connections": graph.connections,
+                "start": graph.values,
+                "empty_start": operation.empty_start,
+                "ramp_end": operation.ramp_end,
             }
-            if config.coupling is not None:
-                relevant["coupling"] = asdict(config.coupling)
+            if operation.coupling is not None:
+                relevant["coupling"] = asdict(operation.coupling)
         return hashlib.sha256(json.dumps(relevant, sort_keys=True).encode()).hexdigest()
 
 
@@ -206,7 +208,8 @@ def make_points(task: SweepTask, begin: int, end: int) -> dict[str, Any]:
         sound = np.flatnonzero(reason == 0)
         if len(sound):
             own = {name: x[sound] for name, x in values.items()}
-            measured, causes = measures(task.block, plan, own)
+            assert task.event is not None
+            measured, causes = measures(task.block, plan, task.event, own)
             for name, x in measured.items():
                 results[name][sound] = x
             reason[sound] = [task.codes[cause, ""] if cause else 0 for cause in causes]
@@ -228,11 +231,12 @@ def task_of(config: Config) -> SweepTask:
             "(chainunit keys sweep.parameter)",
             "sweep.parameter",
         )
-    drive = choose(config, Path(), lambda *said: None).drive
-    rig = Rig(config, drive, {}) if plan.measures else None
-    if rig is not None:
-        check_drive(rig, plan)
-    return SweepTask(plan, drive.machine, config.feed, float(config.run.crank_speed), rig)
+    drive = drive_of(config)
+    rig = event = None
+    if plan.measures:
+        rig, event = Rig(config.operation, drive, {}), config.events[plan.event]
+        check_drive(rig, plan, event)
+    return SweepTask(plan, drive.machine, config.feed, float(config.run.crank_speed), rig, event)
 
 
 def job_of(task: SweepTask) -> Job:

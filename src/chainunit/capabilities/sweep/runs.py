@@ -13,6 +13,7 @@ from ...core.errors import Faults, InputError
 from ...core.native.compilers import compiler
 from ...core.quantities import Layout
 from ...study.block_runs import BlockRuns, Cause, EventRun, RunPoint
+from ...study.event import Event
 from ...study.measures import read_measure
 from ...study.rig import Rig
 from ...study.window import Phase, Trip, Window
@@ -22,8 +23,8 @@ from .table import SPEED
 _RATIO = "machine.ratio"
 
 
-def check_drive(rig: Rig, plan: SweepPlan) -> None:
-    """Refuse what the transients of a drive cannot have.
+def check_drive(rig: Rig, plan: SweepPlan, event: Event) -> None:
+    """Refuse what the transients of a drive with this `event` cannot have.
 
     Raises
     ------
@@ -31,7 +32,7 @@ def check_drive(rig: Rig, plan: SweepPlan) -> None:
         for an event that the drive cannot have, for a swept quantity that changes no run or is not one number of the
         drive, and where there is no C compiler.
     """
-    event, faults = rig.config.events[plan.event], Faults()
+    faults = Faults()
     if not rig.takes(event):
         faults.add([InputError(f"sweep.event = {plan.event}: {event.without}", "sweep.event")])
     known = rig.drive.simulated_machine.model.parameter_layout.names
@@ -57,20 +58,20 @@ def check_drive(rig: Rig, plan: SweepPlan) -> None:
     faults.refuse()
 
 
-def block_of(rig: Rig, plan: SweepPlan) -> BlockRuns:
+def block_of(rig: Rig, plan: SweepPlan, event: Event) -> BlockRuns:
     """The compiled system of a rig whose values a sweep varies; see `check_drive`."""
     varying = [full for each in plan.parameters for full in _of_system(each.name)]
-    return BlockRuns(rig, [rig.config.events[plan.event]], varying)
+    return BlockRuns(rig, [event], varying)
 
 
 def measures(
-    block: BlockRuns, plan: SweepPlan, values: Mapping[str, Any]
+    block: BlockRuns, plan: SweepPlan, event: Event, values: Mapping[str, Any]
 ) -> tuple[dict[str, Any], list[Cause | None]]:
     """The measures of the plan by name, and the causes for which there are none, of points with these values by full
     name, each of shape (points,)."""
     count = len(next(iter(values.values())))
     points = [
-        _point(block.rig, plan, {name: float(x[k]) for name, x in values.items()}) for k in range(count)
+        _point(block.rig, event, {name: float(x[k]) for name, x in values.items()}) for k in range(count)
     ]
     results = {name: np.full(count, np.nan) for name in plan.measures}
     causes: list[Cause | None] = []
@@ -91,9 +92,9 @@ def _of_system(name: str) -> list[str]:
     return [name, f"model.{short}"] if part == "machine" else []
 
 
-def _point(rig: Rig, plan: SweepPlan, values: Mapping[str, float]) -> RunPoint:
+def _point(rig: Rig, event: Event, values: Mapping[str, float]) -> RunPoint:
     """The run with these values by full name."""
-    config, event = rig.config, rig.config.events[plan.event]
+    operation = rig.operation
     feed = {name.removeprefix("feed."): x for name, x in values.items() if name.startswith("feed.")}
     begin = f"event.{event.name}."
     of_event = {name.removeprefix(begin): x for name, x in values.items() if name.startswith(begin)}
@@ -102,18 +103,18 @@ def _point(rig: Rig, plan: SweepPlan, values: Mapping[str, float]) -> RunPoint:
         machine = rig.drive.machine.replace(ratio=values[_RATIO])
         rig = replace(rig, drive=replace(rig.drive, machine=machine))
     if feed or SPEED in values:
-        loads = Layout(type(config.feed)).from_names(feed, config.feed)
-        speed = values.get(SPEED, config.run.crank_speed)
-        rig = replace(rig, config=replace(config, feed=loads, run=replace(config.run, crank_speed=speed)))
+        loads = Layout(type(operation.feed)).from_names(feed, operation.feed)
+        run = replace(operation.run, crank_speed=values.get(SPEED, operation.crank_speed))
+        rig = replace(rig, operation=replace(operation, feed=loads, run=run))
     limit = rig.guards.get(rig.drive.motor_torque, math.inf)
     of_system = {full: x for name, x in values.items() for full in _of_system(name)}
-    return RunPoint(rig, event, event.follow(rig.config.turn), limit=limit, values=of_system)
+    return RunPoint(rig, event, event.time_followed(rig.operation.turn), limit=limit, values=of_system)
 
 
 def _window(point: RunPoint, run: EventRun) -> Window:
     """The rows of a run from its event on."""
     assert run.series is not None and run.steady is not None
-    drive, speed = point.rig.drive, float(point.rig.config.run.crank_speed)
+    drive, speed = point.rig.drive, point.rig.operation.crank_speed
     steady = Window(Phase.STEADY, run.steady, drive, (), speed)
     # the energy behind a coupling that opens is not followed
     trip = Trip(float(run.series["time"][-1]), math.nan, None) if run.ended else None

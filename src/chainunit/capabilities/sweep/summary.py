@@ -193,7 +193,7 @@ def summary_of(findings: SweepFindings) -> SweepSummary:
     return SweepSummary(
         findings=findings,
         sample=sample,
-        heading=Heading.of(config),
+        heading=Heading.of(config.title, config.file),
         size=SweepSize(
             method=_METHODS[plan.method],
             points=plan.points,

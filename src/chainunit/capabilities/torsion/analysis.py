@@ -3,7 +3,8 @@ remarks."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +12,6 @@ from ...core.errors import InputError
 from ...drives.cardan import ORDERS, frequency_band
 from ...reading.results import part, result
 from ...study.analysis import Analysis, Findings, Work
-from ...study.config import Config
 from ...study.drive import Drive
 from ...study.line.shaft import two_masses
 from ...study.line.shaft_runs import shaft_findings
@@ -37,7 +37,7 @@ class TorsionAnalysis(Analysis):
     name = "torsion"
 
     @staticmethod
-    def applies(config: Config, drive: Drive) -> bool:
+    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
         """Whether the driveline turns, so that its torsion is analysed."""
         return drive.line.part("driveline") is not None
 
@@ -59,9 +59,10 @@ class TorsionAnalysis(Analysis):
                 k_least=(modes.k_least, "rad/s", "frequency"),
             )
             return None
-        line = two_masses(drive, float(np.mean(turn.outputs.J)))
-        inertia = float(np.min(turn.outputs.J)), float(np.max(turn.outputs.J))
-        bands = [frequency_band(two_masses(drive, J)) for J in inertia]
+        inertia = turn.inertia_at(drive.ratio)
+        line = two_masses(drive, float(np.mean(inertia)))
+        ends = float(np.min(inertia)), float(np.max(inertia))
+        bands = [frequency_band(two_masses(drive, J)) for J in ends]
         span = min(band.least for band in bands), max(band.largest for band in bands)
         slowest = SLOWEST * span[1]
         if plan.table.slowest * speed < slowest:

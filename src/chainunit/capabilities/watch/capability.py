@@ -13,6 +13,7 @@ from ...study.analysis import Analysis
 from ...study.capability import Estimates, FileReference
 from ...study.conditions import given
 from ...study.config import Config
+from ...study.cycle import Cycle
 from ...study.drive import Drive
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
@@ -99,12 +100,11 @@ class WatchCapability(Capability):
                         key=table,
                     )
 
-    def beside(self, config: Config, drive: Drive) -> Drive:
+    def beside(self, plan: WatchPlans, drive: Drive, feed: Any, turn: Cycle) -> Drive:
         """The drive with its load observer."""
         from .observation import with_observer
 
-        plans: WatchPlans = config.plans[self.name]
-        return drive if plans.observer is None else with_observer(config, plans.observer, drive)
+        return drive if plan.observer is None else with_observer(drive, plan.observer, feed, turn)
 
     def take_estimates(self, config: Config, estimates: Estimates, tables: dict[str, Any]) -> None:
         """The recording is watched with the errors of the estimates, and the observer knows the false imbalance that
@@ -114,7 +114,7 @@ class WatchCapability(Capability):
         if "watch" in tables:
             tables["watch"]["identification"] = estimates.file
         if "observer" in tables:
-            imbalance = false_imbalance_of(config, estimates)
+            imbalance = false_imbalance_of(config.machine, config.feed, config.run.crank_speed, estimates)
             tables["observer"] |= {name: float(f"{x:.4g}") for name, x in imbalance.items()}
 
     def analyses(self) -> Iterable[type[Analysis]]:

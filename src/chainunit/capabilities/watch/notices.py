@@ -14,7 +14,6 @@ from ...machines.chain_unit import SIDES
 from ...reading.results import derived, part, result
 from ...study.analysis import Analysis, Findings, Work
 from ...study.arrays import peak
-from ...study.config import Config
 from ...study.drive import Drive
 from ...study.event_torques import from_event_on
 from ...study.organ_limits import slack_and_mode
@@ -121,7 +120,7 @@ class ObserverAnalysis(Analysis):
     needs_runs = True
 
     @staticmethod
-    def applies(config: Config, drive: Drive) -> bool:
+    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
         """Whether the study has an observer."""
         return drive.observer is not None
 

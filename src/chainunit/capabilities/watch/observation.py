@@ -11,10 +11,10 @@ import numpy as np
 from ...core.quantities import Layout
 from ...drives.terminal_signals import TerminalSignals, terminal_signals
 from ...machines.load_observer import LoadObserver
+from ...machines.machine import Machine
 from ...study.arrays import rms
 from ...study.capability import Estimates
-from ...study.config import Config
-from ...study.cycle import cycle
+from ...study.cycle import Cycle
 from ...study.drive import Drive
 from ...system import ModelComponent
 from .false_loads import false_loads
@@ -28,14 +28,13 @@ FORCE_CHANGE, FORCE_FLUCTUATION = 0.01, 0.005
 """Change of a processing force in a second that is followed, and its natural fluctuation, in parts of an overload."""
 
 
-def with_observer(config: Config, table: ObserverTable, drive: Drive) -> Drive:
-    """The drive with a load observer by that `table`."""
-    p, speed = drive.fmu_parameters, config.run.crank_speed * drive.ratio
-    turn = cycle(drive.machine, config.run.crank_speed, config.feed)
+def with_observer(drive: Drive, table: ObserverTable, feed: Any, turn: Cycle) -> Drive:
+    """The drive with a load observer by that `table`, for a machine with this `feed` and `turn` in normal running."""
+    p, speed = drive.fmu_parameters, turn.crank_speed * drive.ratio
     torque = np.asarray(turn.crank_torque) / drive.ratio + p.rotor.d * speed
     signals = terminal_signals(drive.motor, p, speed, float(np.mean(torque)))
     values = drive.machine.by_name | {"rotor.J": p.rotor.J, "rotor.d": p.rotor.d}
-    values |= weights(signals) | tuning(table, config.feed, speed, rms(torque))
+    values |= weights(signals) | tuning(table, feed, speed, rms(torque))
     component = ModelComponent(LoadObserver, LoadObserver.parameter_layout.from_names(values))
     wires = {"phi": "phi", "w": "w", **signals.outputs}
     return replace(drive, observer=component, observed=wires)
@@ -93,14 +92,17 @@ def tuning(table: ObserverTable, feed: Any, speed: float, torque: float) -> dict
     }
 
 
-def false_imbalance_of(config: Config, estimates: Estimates) -> dict[str, float]:
-    """The keys of the table [observer] with the false imbalance of an observer of the estimated machine."""
+def false_imbalance_of(
+    machine: Machine, usual: Any, crank_speed: float, estimates: Estimates
+) -> dict[str, float]:
+    """The keys of the table [observer] with the false imbalance of an observer of the estimated machine, with the
+    `usual` feed at that speed of the crank [rad/s]."""
     values = estimates.values
     loads = {name.removeprefix("feed."): x for name, x in values.items() if name.startswith("feed.")}
-    feed = Layout(type(config.feed)).from_names(loads, config.feed)
+    feed = Layout(type(usual)).from_names(loads, usual)
     own = {name.removeprefix("machine."): x for name, x in values.items()}
-    known = config.machine.by_name | own | usual_loads(feed)
-    return false_imbalance(known, list(own), estimates.covariance, config.run.crank_speed)
+    known = machine.by_name | own | usual_loads(feed)
+    return false_imbalance(known, list(own), estimates.covariance, crank_speed)
 
 
 def false_imbalance(

@@ -120,7 +120,7 @@ def _summary(watched: WatchedRecording) -> WatchSummary:
     plan, recording, p = watched.plan, watched.recording, watched.parameters
     duration = float(recording.time[-1] - recording.time[0])
     return WatchSummary(
-        heading=Heading.of(watched.config),
+        heading=Heading.of(watched.config.title, watched.config.file),
         recording=WatchedFile(
             file=str(plan.file),
             columns=list(recording.columns),

@@ -23,7 +23,7 @@ from ...recordings.fit import Fit, fit
 from ...recordings.inspection import FEWEST_TURNS, constant_parts, inspect_runs
 from ...recordings.measurands import MEASURANDS, usual_offset
 from ...recordings.problem import MARK_ANGLE, Problem, RecordedRun, Sensor, speed_column
-from ...recordings.recorded_drive import drive_of, is_of_shaft, plant_for
+from ...recordings.recorded_drive import check_motor_is_known, is_of_shaft, plant_for
 from ...recordings.recording import Recording
 from ...recordings.residuals import (
     PriorConflict,
@@ -34,6 +34,7 @@ from ...recordings.residuals import (
 )
 from ...recordings.unknown import Unknown
 from ...study.arrays import rms, stretches
+from ...study.choice import drive_of
 from ...study.config import Config
 from ...study.drive import Drive
 from ...system.instance import Fmu, Instance
@@ -166,15 +167,14 @@ def file_name(name: str) -> str:
     return name.replace("machine.", "feed.", 1)
 
 
-def watch_plan_of(config: Config) -> WatchPlan:
-    """The plan of a study.
+def watch_plan_of(plan: WatchPlan | None) -> WatchPlan:
+    """The plan of a study that asks for a watch.
 
     Raises
     ------
     InputError
         for a study without the table [watch].
     """
-    plan: WatchPlan | None = config.plans["watch"].watch
     if plan is None:
         raise InputError("watch: is missing; add [watch] with the recording (file)", key="watch")
     return plan
@@ -189,7 +189,7 @@ def watch(config: Config, progress: TaskProgress = quiet) -> WatchedRecording:
         for a study without that table, another machine than the chain unit, and with a line for each fault of the
         recording.
     """
-    plan = watch_plan_of(config)
+    plan, observer = watch_plan_of(config.plans["watch"].watch), config.plans["watch"].observer
     workers = min(2, os.cpu_count() or 1)
     progress("reading the recording", 0.0, 1.0)
     recording, errors = _read_files(plan)
@@ -201,8 +201,9 @@ def watch(config: Config, progress: TaskProgress = quiet) -> WatchedRecording:
             f"and < {duration:.4g} s, the duration of {plan.file}",
             "watch.learning",
         )
-    drive = drive_of(config, {RUN: recording})
-    problem = _problem(config, plan, drive, recording)
+    check_motor_is_known({RUN: recording}, is_known=config.knows_motor)
+    drive = drive_of(config)
+    problem = _problem(config.feed, plan, drive, recording)
     inspect_runs(problem, workers)
     progress("learning angle, zero and forces", 0.1, 1.0)
     learned = fit(problem, None, workers)
@@ -214,7 +215,7 @@ def watch(config: Config, progress: TaskProgress = quiet) -> WatchedRecording:
     phi, w = crank_motion(recording, angle, drive.ratio)
     checks = tuple(residual_tests(learned))
     first = problem.runs[0].recording
-    values = _parameters(config, plan, drive, first, learned_values, ratio, noises(checks, first))
+    values = _parameters(observer, plan, drive, first, learned_values, ratio, noises(checks, first))
     uncertainty = _uncertainty(plan, values, errors)
     values |= dict(zip(UNCERTAINTIES, uncertainty, strict=True))
     gain = {name: learned_values.get(f"gain({name})", 1.0) for name in recording.columns}
@@ -258,9 +259,9 @@ def _read_files(plan: WatchPlan) -> tuple[Recording, MachineErrors | None]:
     return recordings[0], errors
 
 
-def _problem(config: Config, plan: WatchPlan, drive: Drive, recording: Recording) -> Problem:
-    """The begin of the recording, in which feed and forces are constant."""
-    feed = Layout(type(config.feed)).by_name(config.feed)
+def _problem(loads: Any, plan: WatchPlan, drive: Drive, recording: Recording) -> Problem:
+    """The begin of the recording, in which feed and forces are constant, about as the `loads` of the study."""
+    feed = Layout(type(loads)).by_name(loads)
     sought = []
     for name, value in feed.items():
         full = f"machine.{name}"
@@ -288,7 +289,7 @@ def _signals(recording: Recording) -> dict[str, str]:
 
 
 def _parameters(
-    config: Config,
+    observer: ObserverTable | None,
     plan: WatchPlan,
     drive: Drive,
     recording: Recording,
@@ -329,7 +330,7 @@ def _parameters(
     layout = drive.machine.model.feed_layout
     feed = layout.from_names({name: learned_values[f"machine.{name}"] for name in layout.names})
     table = replace(
-        config.plans["watch"].observer or instance(ObserverTable, {}),
+        observer or instance(ObserverTable, {}),
         signal_noise=plan.noise * louder[0],
         speed_noise=plan.noise * louder[1],
         rate=1.0 / recording.step,

@@ -23,7 +23,7 @@ from .part import PartOfLine
 
 if TYPE_CHECKING:
     from ..analysis import Analysis
-    from ..config import Config
+    from ..cycle import Cycle
     from ..drive import Drive
     from ..file_reading import FileReading
     from ..keys import Key
@@ -120,18 +120,15 @@ class DrivelinePart(PartOfLine):
             check(table)
         return DrivelinePlan(table, read.place, read.damping_ratio)
 
-    def not_with_foreign_motor(self, config: Config) -> str:
+    def not_with_foreign_motor(self, plan: DrivelinePlan | None) -> str:
         """Its vibration follows from the inertia of the rotor."""
-        words = "the inertia of its rotor is not known; leave [driveline] out"
-        return "" if config.plans[self.name] is None else words
+        return "" if plan is None else "the inertia of its rotor is not known; leave [driveline] out"
 
-    def placed(self, config: Config, drive: Drive) -> PlacedPart | None:
+    def placed(self, plan: DrivelinePlan | None, drive: Drive, turn: Cycle) -> PlacedPart | None:
         """The driveline, with the damping that its damping ratio asks for."""
-        from ..cycle import cycle
         from .placed import PlacedPart
-        from .shaft import two_masses
+        from .shaft import masses_of
 
-        plan: DrivelinePlan | None = config.plans[self.name]
         if plan is None:
             return None
         values = Layout(Driveline).by_name(plan.table)
@@ -141,8 +138,8 @@ class DrivelinePart(PartOfLine):
         part = PlacedPart(self.name, self.model, p, ratio, p.J4)
         if plan.damping_ratio is None:
             return part
-        J = cycle(drive.machine, config.run.crank_speed, config.feed).outputs.J
-        masses = two_masses(replace(drive, line=drive.line.behind(part)), float(np.mean(J)))
+        inertia = float(np.mean(turn.inertia_at(drive.ratio)))
+        masses = masses_of(p, drive.fmu_parameters.rotor.J, inertia)
         damped = with_damping_ratio(masses, plan.damping_ratio)
         return replace(part, parameters=replace(p, d2=damped.d2, d3=damped.d3))
 

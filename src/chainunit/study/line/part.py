@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from ...core.model import Model
 from ..capability import StudyCapability
 
 if TYPE_CHECKING:
-    from ..config import Config
+    from ..cycle import Cycle
     from ..drive import Drive
     from ..record import StudyRecord
     from .placed import PlacedPart
@@ -21,9 +21,10 @@ class PartOfLine(StudyCapability):
     model: ClassVar[type[Model]]
     """its model, which becomes an FMU; with the terminals `driven` and `machine` on the side of the machine"""
 
-    def placed(self, config: Config, drive: Drive) -> PlacedPart | None:
-        """The part of a study behind the parts that the `drive` has already; None where the study has none."""
-        raise NotImplementedError
+    def placed(self, plan: Any, drive: Drive, turn: Cycle) -> PlacedPart | None:
+        """The part of a study behind the parts that the `drive` has already, by its `plan`; None where the study has
+        none. `turn` is that of the machine in normal running."""
+        return None
 
     def remark(self, study: StudyRecord) -> None:
         """Add to the study the remarks on the part."""

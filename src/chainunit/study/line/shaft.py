@@ -132,10 +132,13 @@ def driveline_of(drive: Drive) -> Parameters:
 def two_masses(drive: Drive, inertia: float) -> Cardan:
     """The drive's line between its rotor and a machine with the `inertia` at the motor [kg m2]. Both inertias
     are reduced to the shafts of the line."""
-    line = driveline_of(drive)
+    return masses_of(driveline_of(drive), drive.fmu_parameters.rotor.J, inertia)
+
+
+def masses_of(line: Parameters, rotor: float, inertia: float) -> Cardan:
+    """The `line` between a `rotor` and a machine, of which the inertias at the motor are given [kg m2]."""
     shafts = {v.name: getattr(line, v.name) for v in variables(ShaftLine)}
-    J1 = drive.fmu_parameters.rotor.J * line.ratio**2
-    return Cardan(**shafts, J1=J1, J4=line.J4 + inertia * line.ratio**2)
+    return Cardan(**shafts, J1=rotor * line.ratio**2, J4=line.J4 + inertia * line.ratio**2)
 
 
 def line_modes(drive: Drive, inertia: Any) -> LineModes:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -16,7 +17,6 @@ from ...reading.results import part, result
 from ...study.transients import follow
 from ...system import rigid
 from ..analysis import Analysis, Findings, Work, is_examined
-from ..config import Config
 from ..drive import Drive
 from ..record import Amount, StudyRecord
 from .shaft import (
@@ -55,7 +55,7 @@ class ShaftAnalysis(Analysis):
     needs_runs = True
 
     @staticmethod
-    def applies(config: Config, drive: Drive) -> bool:
+    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
         """Whether the drive has a driveline."""
         return drive.line.part("driveline") is not None
 
@@ -85,7 +85,7 @@ def _rigid_runs(study: StudyRecord, work: Work) -> dict[str, xr.Dataset]:
         for name, event in events.items():
             if not event.from_rest:
                 begin = study.event[name]
-                stop = begin + event.follow(study.config.turn)
+                stop = begin + event.time_followed(study.config.operation.turn)
                 runs[name] = follow(rig, simulation, event, begin, stop, guards=rig.guards).run
     for name, event in events.items():
         if event.from_rest:

@@ -1,13 +1,14 @@
-"""Feed and organs of a chain unit on one side alone, and the factors of a load from one side over that from both."""
+"""The load cases of a machine: its turns with them, and the factors of a load from one side over that from both."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
 
-from ..core.quantities import Value, declaration, quantity
+from ..core.quantities import Layout, Value, declaration, quantity
 from ..machines.api import EMPTY, ChainUnitMachine
 from ..machines.chain_unit import Feed, SideLoads, SideName, other
+from ..machines.machine import Machine
 from .arrays import peak
 from .cycle import Cycle, cycle
 
@@ -42,6 +43,20 @@ def one_sided_feeds(feed: Feed) -> dict[str, Feed]:
         "all feed on the left": all_on_one("left", feed),
         "all feed on the right": all_on_one("right", feed),
     }
+
+
+def no_feed(feed: Any) -> Any:
+    """A feed of the same kind without material; a quantity that cannot be zero has its start value."""
+    layout = Layout(type(feed))
+    return layout.instance([0.0 if v.quantity.admits(0.0) else v.quantity.start for v in layout.variables])
+
+
+def turns_by_load(machine: Machine, crank_speed: float, feed: Any) -> dict[str, Cycle]:
+    """The turns of a machine at that speed of its crank [rad/s], by load case: normal running with this `feed`, and
+    the one-sided cases, or that without feed."""
+    sided = bool(machine.model.sides)
+    feeds = one_sided_feeds(feed) if sided else {"normal running": feed, "without feed": no_feed(feed)}
+    return {name: cycle(machine, crank_speed, each) for name, each in feeds.items()}
 
 
 def cycle_alone(

@@ -1,0 +1,32 @@
+"""The tables of a drive in a study file: its gear, its starter, and its control."""
+
+from __future__ import annotations
+
+from collections.abc import Set
+from dataclasses import dataclass, field
+
+from ..drives.gearing import Transmission
+from .sections import Starter
+
+
+@dataclass(frozen=True)
+class DriveTables:
+    """The tables and keys of a study file that state the drive beside its motor."""
+
+    feed_forward: bool
+    gear: Transmission
+    start: str
+    """one of `chainunit.study.sections.STARTS`"""
+    starter: Starter
+    given: Set[str] = field(compare=False)
+    """names of all values that the file sets, such as "gear.ratio\""""
+
+    @property
+    def soft_time(self) -> float:
+        """Time in which a soft starter raises the voltage [s]; 0 without one."""
+        return float(self.starter.soft_start.time) if self.start == "soft" else 0.0
+
+    @property
+    def given_gains(self) -> set[str]:
+        """Names of the parameters of the motor that the file sets."""
+        return {name.removeprefix("motor.") for name in self.given if name.startswith("motor.")}

@@ -1,0 +1,125 @@
+"""The motor that a study file states: parameters, a designation of the catalogue, or a foreign FMU."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..core.errors import InputError, refusal_prefix
+from ..drives.catalogue import CatalogueMotor
+from ..drives.induction_motor import InductionMotor
+from ..drives.motor import Motor
+from ..machines.machine import Machine
+from ..system import FmuComponent, foreign_component
+from .catalogue_drive import as_used, catalogue_drive, with_inertia
+from .cycle import Cycle
+from .drive import Drive
+from .drive_tables import DriveTables
+from .registry import registered
+
+
+class MotorSource(ABC):
+    """A motor as the study file states it."""
+
+    kind: type[Motor]
+    """its model"""
+    plate: CatalogueMotor | None
+    """the motor of the catalogue, if it is one"""
+
+    def check(self, tables: DriveTables, plans: Mapping[str, Any]) -> None:
+        """Refuse a motor that lacks what the tables or the `plans` of the capabilities need.
+
+        Raises
+        ------
+        InputError
+            see `chainunit.system.foreign_component`.
+        """
+        return None
+
+    @abstractmethod
+    def drive(self, tables: DriveTables, machine: Machine, turn: Cycle, added: float) -> Drive:
+        """The machine with this motor and an `added` inertia on its shaft [kg m2]; `turn` is that of the machine in
+        normal running."""
+
+    @abstractmethod
+    def completed(self, drive: Drive, tables: DriveTables, turn: Cycle) -> tuple[Drive, DriveTables]:
+        """The drive with its line, and the tables, with the values that follow from the machine and the line."""
+
+
+@dataclass(frozen=True)
+class OwnMotor(MotorSource):
+    """A motor whose `parameters` the file gives."""
+
+    kind: type[Motor]
+    parameters: Any
+    plate: None = None
+
+    def drive(self, tables: DriveTables, machine: Machine, turn: Cycle, added: float) -> Drive:
+        """See `MotorSource`."""
+        follows, p = self.kind.follows(self.parameters), self.parameters
+        return Drive(self.kind, p, machine, follows, feed_forward=tables.feed_forward, added_inertia=added)
+
+    def completed(self, drive: Drive, tables: DriveTables, turn: Cycle) -> tuple[Drive, DriveTables]:
+        """The gains of the control are tuned to the inertia; gains that the file gives stay as they are."""
+        inertia = drive.rotor_inertia + float(np.mean(turn.inertia_at(drive.ratio)))
+        parameters, tuning = drive.motor.tune(drive.parameters, inertia, tables.given_gains)
+        return replace(drive, parameters=parameters, tuning=tuning), tables
+
+
+@dataclass(frozen=True)
+class NamedMotor(MotorSource):
+    """A motor of the catalogue."""
+
+    plate: CatalogueMotor
+    kind: type[Motor] = InductionMotor
+
+    def drive(self, tables: DriveTables, machine: Machine, turn: Cycle, added: float) -> Drive:
+        """See `MotorSource`."""
+        drive = with_inertia(tables, catalogue_drive(tables, machine, turn, self.plate), added)
+        return replace(drive, feed_forward=tables.feed_forward)
+
+    def completed(self, drive: Drive, tables: DriveTables, turn: Cycle) -> tuple[Drive, DriveTables]:
+        """The tables are those of `chainunit.study.catalogue_drive.as_used`."""
+        return drive, as_used(tables, drive)
+
+
+@dataclass(frozen=True)
+class ForeignMotor(MotorSource):
+    """A motor that is a foreign FMU."""
+
+    file: Path
+    names: Mapping[str, str]
+    """the FMU's names by ours, where they differ"""
+    kind: type[Motor] = Motor
+    plate: None = None
+
+    @cached_property
+    def component(self) -> FmuComponent:
+        """The FMU; errors are those of `chainunit.system.foreign_component`."""
+        with refusal_prefix("system.motor: ", "system.motor"):
+            return foreign_component(self.file, "motor", self.names)
+
+    def check(self, tables: DriveTables, plans: Mapping[str, Any]) -> None:
+        """See `MotorSource`; also refused is a quantity that only a motor of this package has."""
+        inputs = self.component.connectors
+        with refusal_prefix("system.motor: ", "system.motor"):
+            for part in registered():
+                if words := part.not_with_foreign_motor(plans[part.name]):
+                    raise InputError(f"{self.file}: {words}")
+            if tables.feed_forward and "tau_ff" not in inputs:
+                raise InputError(f"{self.file}: has no input tau_ff in N.m; leave feed_forward out")
+
+    def drive(self, tables: DriveTables, machine: Machine, turn: Cycle, added: float) -> Drive:
+        """See `MotorSource`; a study with an added inertia is refused."""
+        motor, fed = self.component, tables.feed_forward
+        return Drive(Motor, None, machine, "w_ref" in motor.connectors, feed_forward=fed, foreign=motor)
+
+    def completed(self, drive: Drive, tables: DriveTables, turn: Cycle) -> tuple[Drive, DriveTables]:
+        """Nothing follows."""
+        return drive, tables

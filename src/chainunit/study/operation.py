@@ -1,0 +1,51 @@
+"""The operation of a machine in a study: its speed, its loads, and the times of its run."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from .sections import Coupling, Run
+
+
+@dataclass(frozen=True)
+class OperatingConditions:
+    """What the runs of a drive have in common."""
+
+    run: Run
+    feed: Any
+    """loads in normal running, as the machine declares them"""
+    empty_start: bool = False
+    """whether the feed comes once the machine runs"""
+    soft_time: float = 0.0
+    """time in which a soft starter raises the voltage [s]; 0 without one"""
+    coupling: Coupling | None = None
+    simulation: str = "cs"
+    """one of `chainunit.study.sections.SIMULATIONS`"""
+
+    @property
+    def crank_speed(self) -> float:
+        """Speed of the crank in normal running [rad/s]."""
+        return float(self.run.crank_speed)
+
+    @property
+    def turn(self) -> float:
+        """Time of a turn of the crank at the requested speed [s]."""
+        return 2.0 * math.pi / self.crank_speed
+
+    @property
+    def ramp_end(self) -> float:
+        """Time at which the ramp of the reference or of the soft starter ends [s]."""
+        return float(max(self.run.ramp, self.soft_time))
+
+    @property
+    def steady_begin(self) -> float:
+        """Time from which running counts as steady [s]: `run.settle_turns` after the start, or later, after
+        an empty machine is fed."""
+        return float(self.ramp_end + self.run.settle_turns * self.turn)
+
+    @property
+    def stop(self) -> float:
+        """End of the run of start-up and steady running [s], if the motor settles at once."""
+        return float(self.steady_begin + (self.run.turns + 0.1) * self.turn)
