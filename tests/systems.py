@@ -50,7 +50,7 @@ def whole_systems():
     return chains, {
         "motor": pair("ChamberForces", "DcMotor", values={"machine.ratio": 20.0}),
         "line": System(parts, joints),
-        "feed-forward": Drive(DcMotor, study.motor, study.machine, feed_forward=True).graph,
+        "feed-forward": Drive(DcMotor, study.motor.parameters, study.machine, feed_forward=True).graph,
         "chains": pair(chains, "DcMotor", values=turning),
     }
 

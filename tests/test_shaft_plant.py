@@ -51,7 +51,11 @@ def recorded(seed, angles=("mark",), measured=("crank.tau", "crank.w"), speed=3.
     run = HiddenRun(speed, 30.0, {**TRUTH, "motor.w_ref": 50.0 * speed, **values}, angle=2.0)
     logger = Logger(rate, offset={"crank.tau": -1.1}, angles=angles, mark_angle=0.15, drift=-4e-5)
     return synthetic(
-        Drive(DcMotor, CONFIG.motor, CONFIG.machine), measured, run, logger, np.random.default_rng(seed)
+        Drive(DcMotor, CONFIG.motor.parameters, CONFIG.machine),
+        measured,
+        run,
+        logger,
+        np.random.default_rng(seed),
     )
 
 

@@ -20,7 +20,7 @@ from chainunit.system import Profile
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 CONFIG = parse("")
-DRIVE = Drive(DcMotor, CONFIG.motor, CONFIG.machine)
+DRIVE = Drive(DcMotor, CONFIG.motor.parameters, CONFIG.machine)
 RUN = HiddenRun(3.0, 5.0, {"motor.w_ref": 150.0, "machine.left.material_mass": 20.0}, angle=1.0, before=2.0)
 PLAIN = Logger(rate=200.0, noise=0.0, jitter=0.0)
 
