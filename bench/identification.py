@@ -53,8 +53,8 @@ RANGES = {
     "joint_damping": (0.2, 2.0),
     **{name: (10.0, 60.0) if "mass" in name else (0.0, 200.0) for name in FEED},
 }
-"""Ranges in which numbers are drawn; the masses of rods are drawn within 40 % of the masses of the packaged machine, all
-other masses and inertias within 30 %."""
+"""Ranges in which numbers are drawn; the masses of rods are drawn within 40 % of the masses of the packaged machine,
+all other masses and inertias within 30 %."""
 WEIGHED, GAIN, NOISE, BITS, DURATION = 0.05, 0.01, 0.01, 12, 60.0
 INDUCTION = {
     "stator.R": 25.0, "stator.C": 400.0, "stator.R_th": 0.4, "main.L": 1.1, "cage.R": 18.0, "cage.L": 0.14,

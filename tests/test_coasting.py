@@ -15,6 +15,8 @@ from chainunit.study.run import Runner, run_study
 from chainunit.system import System, monolithic
 from chainunit.system.graph import ModelComponent
 
+pytestmark = pytest.mark.second
+
 STUDY = """
 organ = "{organ}"
 [run]

@@ -329,6 +329,7 @@ def test_the_direct_fmu_runs_as_its_equations(kind, tmp_path):
 # -- start
 
 
+@pytest.mark.second
 def test_starts_where_it_hangs():
     """300 random machines, feeds and numbers of rods, at any angle: closed, the angles those of the statics by
     another method, and the same without weight."""

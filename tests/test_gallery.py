@@ -388,6 +388,7 @@ fluctuation = "10 %"
 """
 
 
+@pytest.mark.second
 @pytest.mark.parametrize(
     ("name", "speed"),
     [

@@ -148,6 +148,7 @@ def test_a_motor_that_fits_by_its_speed_keeps_it(tmp_path):
     assert "speed missed" not in warnings
 
 
+@pytest.mark.second
 def test_a_motor_whose_gear_misses_the_speed_starts_all_the_same(tmp_path):
     """Behind a gear for three quarters of the speed: the verdict speaks of the speed alone."""
     text = KNIFE.replace("1.5 kW, 90L", "3 kW, 100L").replace("efficiency = 1", "ratio = 49")

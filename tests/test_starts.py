@@ -49,6 +49,7 @@ def pump(tmp_path_factory):
     return run_study(config.parse(PUMP), tmp_path_factory.mktemp("pump"))
 
 
+@pytest.mark.second
 def test_the_worst_start_is_named_with_its_angle(pump):
     """The start puts more on the gear than running does, and the worst is that of all angles."""
     assert pump.failure is None

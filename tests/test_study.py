@@ -231,6 +231,7 @@ def test_what_chains_are_refused(text, told):
         config.parse(text)
 
 
+@pytest.mark.second
 def test_a_run_that_fails_keeps_what_it_computed(tmp_path, monkeypatch):
     from chainunit.study import config
     from chainunit.study.run import run_study
@@ -572,6 +573,7 @@ def test_the_load_cycle_is_whole_turns_that_the_numbers_follow_from(text, turns,
     assert steady["power_mean"] == pytest.approx(np.mean(ideal) * study.config.run.crank_speed, rel=0.02)
 
 
+@pytest.mark.second
 def test_a_slow_motor_still_makes_its_turns(tmp_path):
     """At 60 V the crank turns more slowly than is asked: the run is as long as the turns take."""
     study, numbers = ran(LIGHT.replace("[run]", "[run]\ncrank_speed = 6\nturns = 2") + LOW_VOLTAGE, tmp_path)
@@ -614,6 +616,7 @@ def test_the_study_waits_until_the_turns_close(tmp_path):
     assert not any(warning.kind == "turns do not close" for warning in study.warnings)
 
 
+@pytest.mark.second
 @pytest.mark.parametrize(
     ("text", "told", "there"),
     [

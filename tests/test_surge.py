@@ -18,6 +18,8 @@ from chainunit.machines.machine import Machine
 from chainunit.study import config
 from chainunit.study.event_table import read_events, read_random_event
 
+pytestmark = pytest.mark.second
+
 PRESS = Path(__file__).parents[1] / "examples" / "linkages" / "slider_crank_press.toml"
 STUDY = """
 [machine]

@@ -10,6 +10,8 @@ from chainunit.models import MODELS
 from chainunit.study.config import parse
 from chainunit.study.run import run_study
 
+pytestmark = pytest.mark.second
+
 SHORT = """organ = "chain"
 [chain]
 rods = 8

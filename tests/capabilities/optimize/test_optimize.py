@@ -594,6 +594,7 @@ def test_what_cannot_be_searched(words, tmp_path):
     assert done.returncode == 2 and words in done.stderr
 
 
+@pytest.mark.second
 def test_the_command(tmp_path, best):
     (tmp_path / "mine.toml").write_text(TABLE)
     done = chainunit("optimize", "mine.toml", "-o", "out/deep", cwd=tmp_path)

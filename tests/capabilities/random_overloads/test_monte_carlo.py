@@ -180,6 +180,7 @@ def test_a_killed_study_goes_on_from_what_it_saved(killed):
     assert opened(folder).runs == RUNS
 
 
+@pytest.mark.second
 def test_the_store_is_that_of_an_unbroken_study(killed, tmp_path):
     """In this process, from the first to the last run: the bytes of every file are the same."""
     folder, _, _ = killed
@@ -424,6 +425,7 @@ def test_a_current_at_its_limit_and_damaged_batches_are_noted(current, told):
     assert notes["runs made anew"] == {"text": words}
 
 
+@pytest.mark.second
 def test_question_and_answer_tell_of_random_overloads(tmp_path):
     """A coupling that opens in most runs is a warning, not a number in a table alone."""
     (tmp_path / "study.toml").write_text("event = []\n" + STUDY.format(runs=6))

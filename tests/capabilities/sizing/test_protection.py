@@ -141,6 +141,7 @@ def test_the_relay_that_is_ordered_is_simulated(on_line, monkeypatch):
     assert protection["relay_class"]["value"] == "class 30"
 
 
+@pytest.mark.second
 def test_a_motor_is_not_judged_by_turns_that_are_not_steady(on_line):
     """Turns that begin in the start take up energy: no mean of them stands for running that lasts. A motor that does
     not start from another angle is not told as one that keeps the speed."""
@@ -356,6 +357,7 @@ def test_a_drive_whose_start_is_harder_than_its_shocks_has_no_coupling(on_line):
     assert "running (all feed on the right) puts" in said
 
 
+@pytest.mark.second
 @pytest.mark.parametrize("way", [Way.SOFT_STARTER, Way.INVERTER], ids=["soft", "inverter"])
 def test_a_starter_that_is_recommended_holds_in_a_study_of_its_own(on_line, way, tmp_path):
     """With starter and setting as the sentence gives them the coupling stays shut in the start and in running, and
@@ -793,6 +795,7 @@ def test_the_largest_torque_is_that_of_voltage_frequency_and_a_warm_winding():
     assert pull_out_torque(drive, run.isel(time=[0]), T) < result[0] * drive.ratio
 
 
+@pytest.mark.second
 def test_behind_an_open_coupling_the_machine_has_its_chains(tmp_path):
     """It goes on from the rods' angles and speeds at that instant, and its energy from there on is only lost."""
     text = """organ = "chain"

@@ -210,6 +210,7 @@ def test_the_noise_of_columns_that_the_observer_does_not_use():
     assert watching.noises(checks, recording) == (3.0, 1.0)
 
 
+@pytest.mark.second
 def test_a_sensor_that_fails_behind_the_begin(tmp_path):
     """It makes a false alarm, which the page doubts; a machine that stops is watched all the same."""
     stuck = changed(tmp_path, motor_i=lambda t, x: np.where(t > 35.0, x[7000], x))
