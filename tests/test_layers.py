@@ -80,7 +80,8 @@ DOORS = {
     "study.run": {"run_study"},
     "report.study_task": {"_accept", "_compute", "_fmus"},
     "app.studies": {"_take"},
-    # the export of a study, and the tasks of the capabilities
+    # the export of a study and its linear model, and the tasks of the capabilities
+    "study.linear": {"_point_of_study"},
     "study.package": {"drive_to_export", "export_study", "model_and_start"},
     "capabilities.identification.identification": {"identify"},
     "capabilities.optimize.page": {"_accept", "_compute"},

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from .machines.api import ChainUnitMachine as ChainUnitMachine
     from .machines.chain_unit import ChamberForces as ChamberForces
     from .machines.chain_unit import SideLoads as SideLoads
+    from .study.linear import linearize as linearize
+    from .system.linear import LinearModel as LinearModel
 
     __version__: str
 
@@ -30,10 +32,12 @@ else:
         "ChamberForces": ".machines.chain_unit",
         "GeometryError": ".core.errors",
         "InputError": ".core.errors",
+        "LinearModel": ".system.linear",
         "RunError": ".core.errors",
         "SideLoads": ".machines.chain_unit",
         "Study": ".app.studies",
         "StudyResult": ".app.studies",
+        "linearize": ".study.linear",
     }
 
     def __getattr__(name):

@@ -1,0 +1,351 @@
+"""The linear model of a study, a linkage file or a model at a point that words name: `linearize`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..core.engines import MATH
+from ..core.errors import InputError, RunError, near_name, refusal_prefix, shown
+from ..core.model import Model
+from ..core.quantities import Quantity, Variable
+from ..mechanism.models import DirectMachine
+from ..models import model_named
+from ..reading.tables import to_number
+from ..system.compiled_simulation import CompiledSystem
+from ..system.linear import LinearModel, place
+from ..system.linear import linearize as linearize_model
+from ..system.signals import at_time
+from ..system.simulation import Simulation
+from . import config as study_files
+from .config import Config
+from .drive import Drive
+from .event import Event
+from .operation import OperatingConditions
+from .package import drive_to_export, is_study_file, model_and_start
+from .readings import crank_angle
+from .rig import Rig
+from .start_up import start_up
+from .transients import follow, lead_times
+from .verdict import START, STEADY
+
+At = str | Mapping[str, Any] | None
+"""A point: RUN:TIME of a study, or values of states and inputs by name, as a text NAME=VALUE,.. or a mapping."""
+_USUAL_SPEED = 2.0 * np.pi
+"""Speed of the driver of a linkage that turns [rad/s]: 60 rev/min, as of the command ``chainunit linkage``."""
+_USUAL_WAY_SPEED = 0.1
+"""That of one that slides [m/s]."""
+
+
+class LinearPoint(NamedTuple):
+    """A model with the values of a point of it, by name, and the point in words."""
+
+    model: type[Model]
+    parameters: Any
+    inputs: dict[str, float]
+    states: dict[str, float]
+    words: str
+
+    def linear(self) -> LinearModel:
+        """The linear model at the point."""
+        return linearize_model(self.model, self.parameters, self.inputs, self.states, at=self.words)
+
+
+def linearize(
+    of: Any, at: At = None, *, config: str | Path | None = None, inverse: bool = False
+) -> LinearModel:
+    """The linear model of a drive, a linkage or a model at a point: A, B, C, D by exact derivatives.
+
+    Parameters
+    ----------
+    of : a `Study` or a study file, whose drive becomes one system; a linkage file; or the name of a model, such as
+        ``"DcMotor"``
+    at : the point. Of a study: ``"RUN:TIME"``, such as ``"start_up:0.4 s"`` or ``"jam_left:3.2 s"``, the time of the
+        run as its rows have it; by default steady running, at the end of the run of start-up and steady running. Or
+        values of states and inputs by name, ``"phi=30 deg, w=60 rpm"`` or a mapping; all others are those of steady
+        running, of the start of a model, or of a linkage whose driver goes at 60 rev/min (0.1 m/s) at the angle 0
+        (in the middle of its way). A direct model has the torque at which its speed is constant, unless ``tau`` is
+        given
+    config : a study file whose machine, feed or motor gives the values of a named model
+    inverse : of a linkage file: the model that takes motion and gives torque and reactions, which has D alone, in
+        place of the direct one
+
+    Returns
+    -------
+    The linear model, whose ``state_space()`` is python-control's ``StateSpace``.
+
+    Raises
+    ------
+    InputError, RunError
+        for a name, a time or a value that the model has not, and where a run ends before the time.
+
+    Examples
+    --------
+    >>> from chainunit import linearize
+    >>> motor = linearize("DcMotor")
+    >>> motor.unit_of("A", 2, 3), motor.poles[-1].state
+    ('rad/(s2.A)', 'armature.i')
+    """
+    if hasattr(of, "config"):
+        return _point_of_study(of.config, at).linear()
+    return linear_point(str(of), at, None if config is None else Path(config), inverse=inverse).linear()
+
+
+def linear_point(
+    name: str,
+    at: At = None,
+    values: Path | None = None,
+    *,
+    inverse: bool = False,
+    progress: Callable[[str], None] = lambda what: None,
+) -> LinearPoint:
+    """The point of a file or a model by its name; `values` is the study file that gives the values of a named model.
+    See `linearize`."""
+    whole, is_file = is_study_file(name), name.lower().endswith(".toml")
+    if whole and values is not None:
+        raise InputError(
+            f"--config {values}: is not of a study file, which has its own values; leave it out for {name}"
+        )
+    if inverse and (whole or not is_file):
+        raise InputError(f"--inverse: is of linkage files; leave it out for {name}")
+    if whole:
+        return _point_of_study(study_files.load(Path(name)), at, progress)
+    if is_file:
+        return _point_of_linkage(model_named(name), at, inverse)
+    loaded = None if values is None else study_files.load(values)
+    model, start = model_and_start(name, loaded, progress=progress)
+    return _at_values(model, start, at)
+
+
+# -- models and linkages
+
+
+def _at_values(model: type[Model], start: Mapping[str, float], at: At) -> LinearPoint:
+    """The point of a model with these start values, and with the values of `at`."""
+    given = _values(model, at)
+    names = set(model.parameter_layout.names)
+    p = model.check(model.parameter_layout.from_names({k: x for k, x in start.items() if k in names}))
+    own = set(model.input_layout.names)
+    inputs = {k: float(x) for k, x in start.items() if k in own} | {
+        k: x for k, x in given.items() if k in own
+    }
+    states: dict[str, float] = {}
+    if model.state_layout:
+        x = model.begin(p, model.input_layout.from_names(inputs))
+        states = {k: float(v) for k, v in model.state_layout.by_name(x).items()}
+        states |= {k: v for k, v in given.items() if k in states}
+    if issubclass(model, DirectMachine) and "tau" not in given:
+        inputs["tau"] = holding_torque(model, p, inputs, states)
+    words = ", ".join(f"{k} = {x:g}" for k, x in given.items())
+    return LinearPoint(model, p, inputs, states, words or "start of the model")
+
+
+def holding_torque(
+    model: type[DirectMachine], p: Any, inputs: Mapping[str, float], states: Mapping[str, float]
+) -> float:
+    """The torque on the shaft at which its speed is constant at this point [N m], of a driver that slides the force
+    [N]: a = (tau - tau_held)/(J_added + J)."""
+    assert model.state_layout is not None
+    u = model.input_layout.from_names(dict(inputs) | {"tau": 0.0})
+    outputs = model.parts[0].layout.by_name(
+        model.evaluate(MATH, p, u, model.state_layout.from_names(dict(states)))[0]
+    )
+    return float(-outputs["a"] * (p.J_added + outputs["J"]))
+
+
+def _point_of_linkage(machine: Any, at: At, inverse: bool) -> LinearPoint:
+    """The point of a linkage at the angle (place) and speed of its driver."""
+    low, high = machine.span
+    ratio = float(machine.Parameters().ratio)
+    usual = (0.0, _USUAL_SPEED) if machine.turns else (0.5 * (low + high), _USUAL_WAY_SPEED)
+    phi, w = (x * ratio for x in usual)
+    start = {"phi": phi, "w": w} if inverse else {"phi_start": phi, "w_start": w}
+    point = _at_values(machine if inverse else machine.direct(), start, at)
+    if at is None:
+        unit = ("rad", "rad/s") if machine.turns else ("m", "m/s")
+        point = point._replace(words=f"phi = {phi:g} {unit[0]}, w = {w:g} {unit[1]}")
+    return point
+
+
+def _values(model: type[Model], at: At) -> dict[str, float]:
+    """The values that a point gives to states and inputs."""
+    if at is None:
+        return {}
+    variables = (*(model.state_layout.variables if model.state_layout else ()), *model.input_layout.variables)
+    if isinstance(at, str):
+        pairs = {}
+        for each in at.split(","):
+            name, sign, text = (part.strip() for part in each.partition("="))
+            if not sign:
+                raise InputError(
+                    f"--at {shown(at)}: must be NAME=VALUE, .. of states and inputs of {model.name}, such as "
+                    f'"{variables[0].name}={_EXAMPLES.get(variables[0].unit, "0.5")}"; RUN:TIME is of a study'
+                )
+            pairs[name] = text
+        at = pairs
+    values = {}
+    for name, given in at.items():
+        k = place("state or input", name, variables)
+        try:
+            values[name] = to_number(variables[k], given)
+        except ValueError as error:
+            raise InputError(f"--at: {error}") from None
+    return values
+
+
+_EXAMPLES = {"rad": "30 deg", "rad/s": "60 rpm", "m": "20 mm", "m/s": "0.1 m/s"}
+
+
+# -- a study
+
+
+def _point_of_study(
+    config: Config, at: At, progress: Callable[[str], None] = lambda what: None
+) -> LinearPoint:
+    """The point of the whole drive of a study."""
+    drive = drive_to_export(config, progress=progress)
+    return drive_point(drive, config.operation, config.events, at, progress)
+
+
+def drive_point(
+    drive: Drive,
+    operation: OperatingConditions,
+    events: Mapping[str, Event],
+    at: At = None,
+    progress: Callable[[str], None] = lambda what: None,
+) -> LinearPoint:
+    """The point of a drive in its operation, compiled to one system. The runs are those of the compiled system, which
+    agree with the co-simulation of a study to some 1e-5.
+
+    Parameters
+    ----------
+    drive, operation, events : those of a study
+    at : see `linearize`
+
+    Raises
+    ------
+    InputError
+        where motor or machine is a foreign FMU, for an unknown run, and for a time that the run has not.
+    RunError
+        where the safety coupling opens before.
+    """
+    rig = Rig(operation, drive, None)
+    with refusal_prefix("linear model: "):
+        system = CompiledSystem(rig.graph)
+    run, time, given = STEADY, None, {}
+    if isinstance(at, str) and "=" not in at:
+        run, time = _run_and_time(at, [START, STEADY, *events])
+    else:
+        given = _values(system.model, at)
+    progress(f"run to {run.replace('_', ' ')}")
+    simulation: Any  # of the compiled system, which has no FMUs to close
+    with rig.from_rest() as simulation:
+        if run in (START, STEADY):
+            simulation = _from_rest(rig, simulation, time)
+        elif events[run].from_rest:
+            assert time is not None
+            simulation = rig.from_rest(events[run])
+            _run(simulation, rig, time)
+        else:
+            assert time is not None
+            _in_event(rig, simulation, events[run], time)
+    assert system.model.state_layout is not None
+    now = float(simulation.time)
+    inputs = system.inputs | {full: float(at_time(x, now)) for full, x in simulation.signals.items()}
+    states = dict(zip(system.model.state_layout.names, map(float, simulation.states), strict=True))
+    for own in (inputs, states):
+        own |= {name: x for name, x in given.items() if name in own}
+    words = f"{'steady running' if run == STEADY else run}, t = {now:.6g} s"
+    return LinearPoint(
+        system.model,
+        system.p,
+        inputs,
+        states,
+        ", ".join([words, *(f"{name} = {x:g}" for name, x in given.items())]),
+    )
+
+
+def _run_and_time(at: str, runs: list[str]) -> tuple[str, float | None]:
+    name, sign, text = (part.strip() for part in at.partition(":"))
+    if name not in runs:
+        raise InputError(
+            f"--at {shown(at)}: there is no run {shown(name)}{near_name(name, runs) or ';'} there are "
+            f'{", ".join(runs)}; must be RUN:TIME, such as "{START}:0.4 s", or NAME=VALUE, .. of states and inputs'
+        )
+    if not sign and name == STEADY:
+        return name, None
+    try:
+        return name, to_number(
+            Variable("--at", "time of the run", Quantity("s", "", low=0.0, high=1e6)), text
+        )
+    except ValueError as error:
+        raise InputError(f'{error}; must be RUN:TIME, such as "{name}:0.4 s"') from None
+
+
+def _run(simulation: Simulation, rig: Rig, time: float) -> None:
+    """Run to the time [s].
+
+    Raises
+    ------
+    RunError
+        where the safety coupling opens before.
+    """
+    if time > simulation.time:
+        simulation.run(time, rig.step, guards=rig.guards)
+    _refuse_opened(simulation, time)
+
+
+def _refuse_opened(simulation: Simulation, time: float) -> None:
+    if simulation.time < time * (1.0 - 1e-9) - 1e-9:
+        raise RunError(
+            f"the safety coupling opens at t = {simulation.time:.4g} s, before the point at {time:.4g} s; take an "
+            "earlier one"
+        )
+
+
+def _silent(time: float) -> None:
+    """Report no time of a run."""
+
+
+def _from_rest(rig: Rig, simulation: Any, time: float | None) -> Any:
+    """The simulation of start-up and steady running at the time [s], by default at its end."""
+    if time is None or rig.operation.empty_start:
+        started = start_up(rig, simulation, _silent, rig.guards)
+        _refuse_opened(simulation, started.stop - 0.5 * rig.step)
+        if time is None:
+            return simulation
+        rig = started.rig
+        simulation = rig.from_rest()
+    _run(simulation, rig, time)
+    return simulation
+
+
+def _in_event(rig: Rig, simulation: Any, event: Event, time: float) -> None:
+    """Bring the simulation to the time [s] of the run of an event."""
+    if not rig.takes(event):
+        raise InputError(f"--at: {event.title} is not in the study, as {event.without}")
+    started = start_up(rig, simulation, _silent, rig.guards)
+    _refuse_opened(simulation, started.stop - 0.5 * rig.step)
+    rig = started.rig
+    begin = simulation.save()
+    steady = started.run.sel(time=slice(started.steady_from, None))
+    angles = crank_angle(rig.drive, steady)
+    angle = float(angles[-1])
+    speed = float(angles[-1] - angles[0]) / float(steady["time"][-1] - steady["time"][0])
+    (lead,) = lead_times(rig, simulation, [event], angle, speed)
+    stop = begin + lead + event.time_followed(rig.operation.turn)
+    if not begin < time <= stop:
+        raise InputError(
+            f"--at {time:g} s: the run of {event.name} goes from {begin:.4g} s to {stop:.4g} s; the event begins at "
+            f"{begin + lead:.4g} s"
+        )
+    if time > begin + lead:
+        follow(rig, simulation, event, begin + lead, time, guards=rig.guards)
+    else:
+        simulation.restore()
+        simulation.signals = rig.signals()
+        simulation.run(time, rig.step, guards=rig.guards)
+    _refuse_opened(simulation, time)

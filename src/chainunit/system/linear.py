@@ -1,0 +1,378 @@
+"""The linear model of any model at a point: A, B, C, D by exact derivatives of the traced equations.
+
+    dx/dt = dx0 + A (x - x0) + B (u - u0)        y = y0 + C (x - x0) + D (u - u0)
+
+A compiled system (`chainunit.system.compiled`) is a model, too. The derivatives are those of the equations in
+CasADi's symbols (`chainunit.core.symbolic_trace`), from which the C code of FMUs comes: none is a difference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from ..core.engines import MATH
+from ..core.errors import InputError, near_name, shown
+from ..core.model import Model
+from ..core.quantities import Variable, quotient
+from ..core.symbolic_trace import trace
+from ..reading.results import GIVEN, OWN, InUnit, derived, part, result
+from .poles import Pole, poles_of
+
+NEAR = 1e-3
+"""Distance over which the slopes are compared, as a share of the size of a state or input."""
+AT = 1e-9
+"""The same for a kink at the point itself."""
+CHANGE = 0.05
+"""Change of a slope over that distance, as a share of its largest value, from which it is told."""
+_SHARP = 0.2
+"""Share of this change that is made in the nearest tenth of the distance, from which it is told: of the slope of a
+square it is 0.1, of that of a cube 0.01, of a kink 1."""
+_SLIGHT = 1e-6
+"""Effect of a slope over the size of its column, as a share of the size of its row, below which it is none."""
+
+
+@result
+class LinearSignal:
+    """An input or output of a linear model, and its value at the point."""
+
+    name: str = part("its name in the model")
+    unit: str = part("its unit")
+    description: str = part("its description")
+    value: float = part("its value at the point", unit=OWN)
+
+
+@result
+class LinearState(LinearSignal):
+    """A state of a linear model, its value at the point, and its time derivative there."""
+
+    rate: InUnit = part("its time derivative at the point; not 0 where the point is no rest")
+
+
+@result
+class Bend:
+    """A place near the point where the slopes change so much that the linear model holds only nearer than that."""
+
+    by: str = part("the state or input that moves")
+    kink: bool = part(
+        "whether the slopes jump at the point itself, as at the end of a limit: the matrices have the slopes of one "
+        "side; else they bend within the distance, as friction does near rest"
+    )
+    within: InUnit = part("distance from the point, to either side, between which the slopes are compared")
+    rows: tuple[str, ...] = part("the states, by der(..), and outputs whose slopes change", unit=GIVEN)
+    change: float = part(
+        "largest change of a slope over its largest value within the distance",
+        unit="1",
+    )
+
+
+@result
+class LinearModel:
+    """The linear model of a model at a point. Its outputs are the states and the outputs of the model, as its FMU has
+    them, without counts and switches."""
+
+    model: str = part("name of the model")
+    description: str = part("description of the model")
+    at: str = part("the point in words")
+    states: tuple[LinearState, ...] = part("the states x")
+    inputs: tuple[LinearSignal, ...] = part("the inputs u")
+    outputs: tuple[LinearSignal, ...] = part("the outputs y")
+    A: np.ndarray
+    """derivatives of dx/dt by x, shape (states, states); `unit_of` gives the units of the entries"""
+    B: np.ndarray
+    """derivatives of dx/dt by u, shape (states, inputs)"""
+    C: np.ndarray
+    """derivatives of y by x, shape (outputs, states)"""
+    D: np.ndarray
+    """derivatives of y by u, shape (outputs, inputs)"""
+    bends: tuple[Bend, ...] = part("places near the point where the slopes change, none where all is smooth")
+
+    @derived(GIVEN)
+    def matrices(self) -> dict[str, Any]:
+        """A, B, C and D as lists of rows, in the order of states, inputs and outputs; null for a slope that is not
+        defined at the point. The unit of an entry is that of its row by that of its column; a row of A and B is in
+        the unit of the state per second."""
+        return {name: _rows(getattr(self, name)) for name in "ABCD"}
+
+    @derived()
+    def poles(self) -> tuple[Pole, ...]:
+        """The poles: eigenvalues of A, the slowest first; none where a slope in A is not defined."""
+        if not np.isfinite(self.A).all():
+            return ()
+        return poles_of(self.A, [state.name for state in self.states])
+
+    def unit_of(self, matrix: str, row: int, column: int) -> str:
+        """The unit of an entry of the `matrix` "A", "B", "C" or "D"."""
+        if matrix in "AB":
+            above = quotient(self.states[row].unit, "s")
+        else:
+            above = self.outputs[row].unit
+        below = (self.states if matrix in "AC" else self.inputs)[column].unit
+        return quotient(above, below)
+
+    def response(self, to: str, of: str, frequency: Any) -> np.ndarray:
+        """The frequency response of an output to an input.
+
+        Parameters
+        ----------
+        to, of : names of the input and of the output
+        frequency : frequencies [rad/s], shape (n,)
+
+        Returns
+        -------
+        the complex gain C (jw - A)^-1 B + D in the unit of the output by that of the input, shape (n,).
+
+        Raises
+        ------
+        InputError
+            for a name that is no input or no output, and where a slope is not defined at the point.
+        """
+        column, row = place("input", to, self.inputs), place("output", of, self.outputs)
+        self._refuse_undefined()
+        b, c, d = self.B[:, column], self.C[row], self.D[row, column]
+        one = np.eye(len(self.states))
+        return np.array(
+            [c @ np.linalg.solve(1j * w * one - self.A, b) + d for w in np.asarray(frequency, float)], complex
+        )
+
+    def state_space(self) -> Any:
+        """The linear model as python-control's ``StateSpace``, whose states, inputs and outputs have the names of the
+        model with _ in place of each point, as python-control takes no points in names: ``motor_w`` is motor.w.
+
+        Its signals count from the point: they are x - x0, u - u0 and y - y0.
+
+        Raises
+        ------
+        InputError
+            where a slope is not defined at the point.
+        """
+        import control
+
+        self._refuse_undefined()
+        kinds = {"states": self.states, "inputs": self.inputs, "outputs": self.outputs}
+        names = {kind: labels([each.name for each in signals]) for kind, signals in kinds.items()}
+        return control.ss(self.A, self.B, self.C, self.D, name=self.model, **names)
+
+    def _refuse_undefined(self) -> None:
+        for name in "ABCD":
+            for row, column in np.argwhere(~np.isfinite(getattr(self, name)))[:1]:
+                of = (self.states if name in "AB" else self.outputs)[row].name
+                by = (self.states if name in "AC" else self.inputs)[column].name
+                raise InputError(
+                    f"{self.model}: the derivative of {'der(' + of + ')' if name in 'AB' else of} by {by} is not "
+                    "defined at this point, a corner of the equations; take a point beside it"
+                )
+
+
+def _rows(matrix: Any) -> list[list[float | None]]:
+    return [[float(x) if np.isfinite(x) else None for x in row] for row in matrix]
+
+
+def labels(names: Sequence[str]) -> list[str]:
+    """The names with _ in place of points, each of them another one."""
+    taken: list[str] = []
+    for name in names:
+        own = name.replace(".", "_")
+        while own in taken:
+            own += "_"
+        taken.append(own)
+    return taken
+
+
+def place(kind: str, name: str, signals: Sequence[LinearSignal | Variable]) -> int:
+    """The place of the `kind` of signal with that name.
+
+    Raises
+    ------
+    InputError
+        where there is none; it names those that there are.
+    """
+    names = [each.name for each in signals]
+    if name not in names:
+        there = f"there are {', '.join(names)}" if len(names) <= _MOST else f"there are {len(names)}"
+        raise InputError(f"{shown(name)}: no such {kind}{near_name(name, names) or ';'} {there}")
+    return names.index(name)
+
+
+_MOST = 60
+
+
+def linearize(
+    model: type[Model],
+    parameters: Any = None,
+    inputs: Mapping[str, float] | None = None,
+    states: Mapping[str, float] | None = None,
+    *,
+    at: str = "",
+) -> LinearModel:
+    """The linear model of `model` at a point.
+
+    Parameters
+    ----------
+    parameters : its `Parameters`, or values by name; all others have their start values
+    inputs : values by name; all others have their start values
+    states : values by name; all others have those of the model's own start with these inputs
+    at : the point in words
+
+    Raises
+    ------
+    KeyError
+        for a name that is not declared.
+    InputError, GeometryError
+        for parameters that are refused, and for a point at which the model has no finite values.
+    """
+    layout = model.parameter_layout
+    if not isinstance(parameters, model.Parameters):
+        parameters = layout.from_names(dict(parameters or {}))
+    p = model.check(parameters)
+    u = model.input_layout.from_names(dict(inputs or {}))
+    x = _states(model, p, u, states or {})
+    equations = _derivatives(model)
+    point = equations.point(p, x, u)
+    values, slopes = equations.at(point)
+    n = len(x)
+    if not np.isfinite(values).all():
+        first = equations.row_names[int(np.flatnonzero(~np.isfinite(values))[0])]
+        raise InputError(f"{model.name}: {first} is not a finite number at this point; take another point")
+    rows = [
+        LinearSignal(v.name, v.unit, v.description, float(y))
+        for v, y in zip(equations.rows, values, strict=True)
+    ]
+    columns = [LinearSignal(v.name, v.unit, v.description, v0) for v, v0 in equations.columns_at(point)]
+    return LinearModel(
+        model.name,
+        model.description,
+        at,
+        tuple(
+            LinearState(s.name, s.unit, s.description, s.value, InUnit(r.value, quotient(s.unit, "s")))
+            for s, r in zip(columns[:n], rows[:n], strict=True)
+        ),
+        tuple(columns[n:]),
+        tuple(rows[n:]),
+        slopes[:n, :n],
+        slopes[:n, n:],
+        slopes[n:, :n],
+        slopes[n:, n:],
+        tuple(equations.bends(point, values, slopes)),
+    )
+
+
+def _states(model: type[Model], p: Any, u: Any, states: Mapping[str, float]) -> list[float]:
+    """The states by the declared order, those that are not given from the start of the model."""
+    layout = model.state_layout
+    if layout is None:
+        if states:
+            raise KeyError(next(iter(states)))
+        return []
+    if set(states) == set(layout.names):
+        return [float(states[name]) for name in layout.names]
+    return [float(x) for x in layout.values(layout.from_names(dict(states), model.begin(p, u)))]
+
+
+class _Derivatives:
+    """The equations of a model with their derivatives, as functions of CasADi. Rows are the derivatives of the
+    states, the states and the outputs; columns are the states and the inputs."""
+
+    def __init__(self, model: type[Model]) -> None:
+        import casadi
+
+        traced = trace(model)
+        self._model = model
+        self._states = model.state_layout.variables if model.state_layout else ()
+        inputs = model.input_layout.variables
+        outputs = [v for of in model.parts for v in of.layout.variables]
+        kept = [k for k, v in enumerate(outputs) if v.type == "Real"]
+        self.rows = (*self._states, *self._states, *(outputs[k] for k in kept))
+        names = [v.name for v in self.rows]
+        n = len(self._states)
+        self.row_names = [*(f"der({name})" for name in names[:n]), *names[n:]]
+        # an input that is a count or a switch has no slope
+        chosen = [k for k, v in enumerate(inputs) if v.type == "Real"]
+        self._columns = [(0, k) for k in range(n)] + [(1, k) for k in chosen]
+        self.columns = [*self._states, *(inputs[k] for k in chosen)]
+        x = casadi.vertsplit(traced.symbols[2]) if n else []
+        u = casadi.vertsplit(traced.symbols[1])
+        values = [*traced.derivatives, *x, *(traced.outputs[k] for k in kept)]
+        rows = casadi.vertcat(*map(casadi.SX, values))
+        by = casadi.vertcat(*x, *(u[k] for k in chosen))
+        slopes = casadi.jacobian(rows, by)
+        self._all, self._slopes = (
+            casadi.Function(name, traced.symbols, [casadi.densify(each) for each in of], {"cse": True})
+            for name, of in (("values", (rows, slopes)), ("slopes", (slopes,)))
+        )
+
+    def point(self, p: Any, x: Sequence[float], u: Any) -> tuple[Any, ...]:
+        """The point as the functions take it: states and inputs, and before and behind them parameters and derived
+        values."""
+        layout, own = self._model.parameter_layout, self._model.input_layout
+        if self._model.derived_count and not hasattr(p, "derived"):
+            p = self._model.with_derived(MATH, p)
+        fixed = layout.values(p), (p.derived if self._model.derived_count else [])
+        return np.array(fixed[0], float), [np.array(x, float), np.array(own.values(u), float)], fixed[1]
+
+    def columns_at(self, point: tuple[Any, ...]) -> list[tuple[Variable, float]]:
+        """Each column with its value."""
+        at = zip(self.columns, self._columns, strict=True)
+        return [(v, float(point[1][kind][k])) for v, (kind, k) in at]
+
+    def at(self, point: tuple[Any, ...]) -> tuple[np.ndarray, np.ndarray]:
+        """The values of the rows, shape (rows,), and their slopes, shape (rows, columns)."""
+        p, (x, u), derived_values = point
+        values, slopes = self._all(p, u, x, derived_values)
+        return np.array(values, float).ravel(), self._shaped(slopes)
+
+    def _shaped(self, slopes: Any) -> np.ndarray:
+        return np.array(slopes, float).reshape(len(self.rows), len(self.columns))
+
+    def _moved(self, point: tuple[Any, ...], column: int, by: float) -> np.ndarray:
+        """The slopes with one column moved."""
+        p, moving, derived_values = point
+        own = [each.copy() for each in moving]
+        kind, k = self._columns[column]
+        own[kind][k] += by
+        return self._shaped(self._slopes(p, own[1], own[0], derived_values))
+
+    def bends(self, point: tuple[Any, ...], values: np.ndarray, slopes: np.ndarray) -> list[Bend]:
+        """The places near the point where slopes change faster than those of smooth powers."""
+        sizes = np.array([max(v.quantity.nominal or 1.0, abs(at)) for v, at in self.columns_at(point)])
+        least = _SLIGHT * (
+            np.array([[v.quantity.nominal or 1.0] for v in self.rows]) + np.abs(values)[:, None]
+        )
+        undefined = ~np.isfinite(slopes)
+        found = []
+        for column, v in enumerate(self.columns):
+            for share in (AT, NEAR):
+                distance = float(share * sizes[column])
+                with np.errstate(all="ignore"):
+                    jump, most = self._jump(point, column, distance, sizes, slopes)
+                    nearer, _ = self._jump(point, column, 0.1 * distance, sizes, slopes)
+                    told = ~(jump <= CHANGE * most + least) & ~(nearer <= _SHARP * jump)
+                of_rows = told.any(axis=1) | undefined[:, column]
+                if of_rows.any():
+                    changes = [float(x) for x in (jump[told] / most[told]) if np.isfinite(x)]
+                    names = [name for name, of in zip(self.row_names, of_rows, strict=True) if of]
+                    within = InUnit(distance, v.unit)
+                    found.append(Bend(v.name, share == AT, within, tuple(names), max(changes, default=1.0)))
+                    break
+        return found
+
+    def _jump(
+        self, point: tuple[Any, ...], column: int, distance: float, sizes: np.ndarray, slopes: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The largest change of each slope between the point and both sides, and the largest of the three, shape
+        (rows, columns), both by the `sizes` of the columns. Of the `slopes` at the point those that are not defined
+        do not count."""
+        here, low, high = (
+            np.where(np.isfinite(slopes), each * sizes, 0.0)
+            for each in (slopes, *(self._moved(point, column, by) for by in (-distance, distance)))
+        )
+        jumps = np.abs([high - low, high - here, here - low])
+        return np.max(jumps, axis=0), np.max(np.abs([low, high, here]), axis=0)
+
+
+@lru_cache(maxsize=8)
+def _derivatives(model: type[Model]) -> _Derivatives:
+    return _Derivatives(model)

@@ -1,0 +1,366 @@
+"""The linear model of a model at a point, against differences, FMUs, and the speed loop of a study."""
+
+from __future__ import annotations
+
+import ctypes
+import doctest
+import itertools
+import json
+import math
+from pathlib import Path
+
+import control
+import numpy as np
+import pytest
+from systems import initialized
+
+from chainunit import InputError, LinearModel, linearize
+from chainunit.core.engines import MATH
+from chainunit.core.model import Model, Part
+from chainunit.core.quantities import base_units, declaration, quantity
+from chainunit.drives import speed_control
+from chainunit.models import MODELS
+from chainunit.reading.results import as_data
+from chainunit.study import linear
+from chainunit.study.linear import linear_point
+from chainunit.system.linear import labels
+from chainunit.system.linear import linearize as linearize_model
+from chainunit.system.poles import poles_of
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+GALLERY = ("watt_six_bar", "slider_crank_press", "cylinder_lift")
+
+
+def moved(model, seed=1):
+    """Inputs and states by name near the start of a model, where it moves and where all is smooth."""
+    rng = np.random.default_rng(seed)
+    p = model.check(model.Parameters())
+
+    def near(variables, values):
+        return {
+            v.name: x + 0.2 * max(v.quantity.nominal or 1.0, abs(x)) * rng.uniform(0.3, 1.0)
+            for v, x in zip(variables, values, strict=True)
+        }
+
+    inputs = near(model.input_layout.variables, [v.quantity.start for v in model.input_layout.variables])
+    states = {}
+    if model.state_layout:
+        x = model.begin(p, model.Inputs())
+        states = near(model.state_layout.variables, model.state_layout.values(x))
+    return inputs, states
+
+
+def rows(model, p, inputs, states):
+    """Derivatives of the states, states and outputs, by the equations with floats."""
+    u = model.input_layout.from_names(inputs)
+    x, rates = None, []
+    if model.state_layout:
+        x = model.state_layout.from_names(states)
+        rates = [*model.derivatives(MATH, p, u, x), *model.state_layout.values(x)]
+    parts = zip(model.parts, model.evaluate(MATH, p, u, x), strict=True)
+    outputs = [
+        y
+        for part, out in parts
+        for v, y in zip(part.layout.variables, part.layout.values(out), strict=True)
+        if v.type == "Real"
+    ]
+    return np.array([*rates, *outputs], float)
+
+
+def check_slopes(model, p, inputs, states, tolerance=1e-7):
+    """Compare A, B, C, D with central differences, extrapolated to distance zero by Richardson's rule."""
+    found = linearize_model(model, p, inputs, states)
+    inputs = {s.name: s.value for s in found.inputs}
+    states = {s.name: s.value for s in found.states}
+    own = np.block([[found.A, found.B], [found.C, found.D]])
+    values = rows(model, p, inputs, states)
+    told = [s.rate.value for s in found.states] + [s.value for s in found.outputs]
+    np.testing.assert_allclose(told, values, rtol=1e-9, atol=1e-9 * np.max(np.abs(values), initial=1.0))
+    variables = {
+        v.name: v for layout in (model.state_layout, model.input_layout) if layout for v in layout.variables
+    }
+    names = [*states, *inputs]
+    sizes = np.array([max(variables[k].quantity.nominal or 1.0, abs({**states, **inputs}[k])) for k in names])
+    scale = np.max(np.abs(own) * sizes, axis=1, initial=0.0) + np.abs(values) + 1e-6
+    for column, (name, size) in enumerate(zip(names, sizes, strict=True)):
+        table = []
+        for h in (4e-4 * size / 2**k for k in range(3)):
+            ends = []
+            for sign in (1.0, -1.0):
+                either = [
+                    {k: x + sign * h * (k == name and of is group) for k, x in of.items()}
+                    for of in (inputs, states)
+                    for group in [states if column < len(states) else inputs]
+                ]
+                ends.append(rows(model, p, *either))
+            table.append((ends[0] - ends[1]) / (2.0 * h))
+        first = [(4.0 * b - a) / 3.0 for a, b in itertools.pairwise(table)]
+        difference = (16.0 * first[1] - first[0]) / 15.0
+        off = np.abs(own[:, column] - difference) * size / scale
+        assert np.max(off) < tolerance, (model.name, name, int(np.argmax(off)), np.max(off))
+    return found
+
+
+@pytest.mark.parametrize("name", [n for n in MODELS if n not in ("ChainUnitFlexible", "LoadObserver")])
+def test_slopes_of_packaged_models_are_those_of_differences(name):
+    model = MODELS[name]
+    found = check_slopes(model, model.check(model.Parameters()), *moved(model))
+    assert np.abs(found.D).max() > 0.0 and bool(found.states) == (model.States is not None)
+
+
+@pytest.mark.second
+@pytest.mark.parametrize("name", ["ChainUnitFlexible", "LoadObserver"])
+def test_slopes_of_large_models_are_those_of_differences(name):
+    model = MODELS[name]
+    check_slopes(model, model.check(model.Parameters()), *moved(model))
+
+
+@pytest.mark.parametrize("inverse", [False, True])
+@pytest.mark.parametrize("name", GALLERY)
+def test_slopes_of_linkages_are_those_of_differences(name, inverse):
+    point = linear_point(str(EXAMPLES / "linkages" / f"{name}.toml"), inverse=inverse)
+    found = check_slopes(point.model, point.parameters, point.inputs, point.states)
+    assert len(found.states) == (0 if inverse else 2) and not found.bends
+
+
+@pytest.fixture(scope="module")
+def drive():
+    return linear_point(str(EXAMPLES / "jam_with_driveline.toml"), "start_up:0.4 s")
+
+
+def test_slopes_of_the_compiled_drive_are_those_of_differences(drive):
+    found = check_slopes(drive.model, drive.parameters, drive.inputs, drive.states)
+    assert {"motor.w", "driveline.driven.w"} <= {s.name for s in found.states}
+    assert drive.words == "start_up, t = 0.4 s"
+    state = {s.name: s for s in found.states}
+    assert state["motor.phi"].rate.value == state["motor.w"].value and state["motor.w"].rate.unit == "rad/s2"
+
+
+@pytest.mark.second
+@pytest.mark.parametrize("name", MODELS)
+def test_slopes_are_the_directional_derivatives_of_the_fmu(native_fmus, name):
+    model = MODELS[name]
+    inputs, states = moved(model)
+    found = linearize_model(model, None, inputs, states)
+    with initialized(native_fmus[name, 2][0]) as (unit, told):
+        reference = {v.name: v.valueReference for v in told.modelVariables}
+        unit.setReal([reference[n] for n in inputs], list(inputs.values()))
+        if states:
+            unit.enterContinuousTimeMode()
+            values = (ctypes.c_double * len(states))(*states.values())
+            unit.setContinuousStates(values, len(states))
+        apart = set().union(*(part.by_differences for part in model.parts))
+        kept = [k for k, s in enumerate(found.outputs) if s.name not in apart]
+        unknown = [v.variable.valueReference for v in told.derivatives]
+        unknown += [reference[found.outputs[k].name] for k in kept]
+        own = np.block([[found.A, found.B], [found.C[kept], found.D[kept]]])
+        for column, signal in enumerate((*found.states, *found.inputs)):
+            theirs = unit.getDirectionalDerivative(unknown, [reference[signal.name]], [1.0])
+            size = np.max(np.abs(own), axis=1, initial=0.0) + 1e-3
+            np.testing.assert_allclose(own[:, column] / size, np.array(theirs) / size, atol=1e-9)
+
+
+# -- the speed loop of a study
+
+
+def test_poles_of_the_speed_loop_are_those_of_the_study():
+    motor = MODELS["DcMotor"]
+    lossless = {n: 0.0 for n in ("rotor.d", "rotor.friction") if n in motor.parameter_layout.names}
+    p = motor.parameter_layout.from_names(lossless)
+    load = 0.7
+    inertia = p.rotor.J + load
+    found = linearize_model(motor, p, {"load.J": load, "w_ref": 50.0}, {"w": 50.0, "phi": 1.0})
+    loop = motor.speed_loop(p, inertia)
+    speed = p.speed_control.kp, p.speed_control.ki
+    current = p.current_control.kp, p.current_control.ki
+    closed = control.feedback(
+        control.minreal(speed_control._open_loop(p.armature, speed, current, inertia), verbose=False), 1
+    )
+    own = [
+        complex(pole.real, sign * pole.imaginary)
+        for pole in found.poles
+        for sign in (1, -1)[: 1 + bool(pole.imaginary)]
+    ]
+    for pole in closed.poles():
+        assert min(abs(each - pole) for each in own) < 1e-6 * abs(pole), (pole, own)
+    # the deviation after a step of the load, as the study draws it
+    response = found.response("load.tau_bias", "w", loop.crossover * np.array([0.1, 1.0, 10.0]))
+    s = control.tf("s")
+    kp, ki = speed
+    torque = (kp + ki / s) * speed_control._current_loop(p.armature, current) * p.armature.k
+    by_load = control.minreal(control.feedback(-1.0 / (inertia * s), -torque), verbose=False)
+    np.testing.assert_allclose(response, by_load(1j * loop.crossover * np.array([0.1, 1.0, 10.0])), rtol=1e-6)
+    step = control.step_response(found.state_space()["w", "load_tau_bias"], loop.time)
+    np.testing.assert_allclose(step.outputs, loop.deviation, atol=1e-6 * loop.largest_deviation)
+
+
+def test_signs_and_units_of_a_motor():
+    found = linearize("DcMotor")
+    at = {s.name: k for k, s in enumerate(found.states)}
+    p = MODELS["DcMotor"].Parameters()
+    A = found.A
+    assert A[at["phi"], at["w"]] == 1.0 and found.unit_of("A", at["phi"], at["w"]) == "1"
+    assert A[at["w"], at["armature.i"]] == pytest.approx(p.armature.k / p.rotor.J)
+    assert found.unit_of("A", at["w"], at["armature.i"]) == "rad/(s2.A)"
+    k = [s.name for s in found.inputs].index("load.tau_bias")
+    assert found.B[at["w"], k] == pytest.approx(-1.0 / p.rotor.J)
+    assert base_units(found.unit_of("B", at["w"], k)) == base_units("rad/(s2.N.m)")
+    assert found.unit_of("D", 0, k) == "J/(N.m)" and found.unit_of("C", 1, at["w"]) == "s"
+
+
+# -- places that are not smooth
+
+
+class Kinks(Model):
+    """A mass on a stop and friction near rest."""
+
+    name, description = "Kinks", "a mass on a stop"
+
+    @declaration
+    class Parameters:
+        stiffness: float = quantity("N/m", "of the stop", default=100.0)
+
+    @declaration
+    class Inputs:
+        force: float = quantity("N", "on the mass", default=0.0)
+
+    @declaration
+    class States:
+        x: float = quantity("m", "place")
+        v: float = quantity("m/s", "speed")
+
+    @declaration
+    class Outputs:
+        stop: float = quantity("N", "force of the stop")
+        root: float = quantity("1", "a root")
+
+    @staticmethod
+    def derivatives(xp, p, u, x):
+        friction = x.v / xp.sqrt(x.v * x.v + 1e-10)
+        return [x.v, u.force - p.stiffness * xp.maximum(x.x, 0.0) - friction]
+
+    @staticmethod
+    def _outputs(xp, p, u, x, shared):
+        return Kinks.Outputs(stop=p.stiffness * xp.maximum(x.x, 0.0), root=xp.sqrt(xp.maximum(x.x, 0.0)))
+
+
+Kinks.parts = (Part(Kinks.Outputs, Kinks._outputs),)
+
+
+def test_kinks_and_bends_are_told():
+    found = linearize_model(Kinks, None, {}, {"x": 0.0, "v": 0.0})
+    by = {bend.by: bend for bend in found.bends}
+    assert set(by) == {"x", "v"}
+    assert by["x"].kink and {"der(v)", "stop", "root"} == set(by["x"].rows)
+    assert not by["v"].kink and by["v"].rows == ("der(v)",) and by["v"].within.unit == "m/s"
+    # away from both all is smooth
+    assert not linearize_model(Kinks, None, {}, {"x": 0.5, "v": 1.0}).bends
+    # a square has a slope of 0 at its least place, and no kink
+    assert not linearize("Accelerator").bends
+
+
+def test_a_slope_that_is_not_defined_is_told():
+    found = linearize_model(Kinks, None, {}, {"x": 0.0, "v": 1.0})
+    assert not np.isfinite(found.C[3, 0])
+    data = as_data(found)
+    json.dumps(data, allow_nan=False)
+    assert data["matrices"]["C"][3][0] is None
+    with pytest.raises(InputError, match="the derivative of root by x is not defined at this point"):
+        found.state_space()
+    with pytest.raises(InputError, match="not defined"):
+        found.response("force", "x", [1.0])
+
+
+# -- poles, labels, refusals
+
+
+def test_poles_of_known_matrices():
+    spring = np.array([[0.0, 1.0], [-25.0, -2.0]])
+    (pole,) = poles_of(spring, ["x", "v"])
+    assert (pole.real, pole.imaginary) == pytest.approx((-1.0, math.sqrt(24.0)))
+    assert pole.natural_frequency == pytest.approx(5.0) and pole.damping_ratio == pytest.approx(0.2)
+    assert pole.time_constant == pytest.approx(1.0)
+    # an energy that counts and a first-order lag beside it
+    A = np.zeros((4, 4))
+    A[:2, :2], A[2, 0], A[3, 3] = spring, 1e9, -0.25
+    zero, slow, fast = poles_of(A, ["x", "v", "energy", "T"])
+    assert (zero.real, zero.imaginary, zero.state) == (0.0, 0.0, "energy")
+    assert zero.damping_ratio is None and zero.time_constant is None
+    assert slow.state == "T" and slow.time_constant == pytest.approx(4.0) and slow.damping_ratio == 1.0
+    assert fast.real == pytest.approx(-1.0)
+    assert poles_of(np.zeros((0, 0)), []) == ()
+    (unstable,) = poles_of([[2.0]], ["x"])
+    assert unstable.damping_ratio == -1.0 and unstable.time_constant == -0.5
+
+
+def test_the_state_space_is_the_linear_model_with_names(drive):
+    found = drive.linear()
+    system = found.state_space()
+    assert isinstance(system, control.StateSpace) and system.name == found.model
+    for name in "ABCD":
+        np.testing.assert_array_equal(getattr(system, name), getattr(found, name))
+    assert system.input_labels == labels([s.name for s in found.inputs])
+    assert "motor_w_ref" in system.input_labels and "driveline_driven_w" in system.output_labels
+    w = [0.3, 30.0]
+    own = found.response("motor.w_ref", "motor.w", w)
+    np.testing.assert_allclose(system["motor_w", "motor_w_ref"](1j * np.array(w)), own, rtol=1e-8)
+    poles = sorted(np.abs(system.poles()))
+    listed = sorted(p.natural_frequency for p in found.poles for _ in range(1 + bool(p.imaginary)))
+    np.testing.assert_allclose(poles, listed, rtol=1e-6, atol=1e-7)
+
+
+def test_labels_stay_apart():
+    assert labels(["a.b", "a_b", "c"]) == ["a_b", "a_b_", "c"]
+
+
+def test_a_model_without_states_has_d_alone():
+    found = linearize("ChamberForces", "phi=30 deg, w=2")
+    assert isinstance(found, LinearModel) and found.A.shape == (0, 0) and found.poles == ()
+    names = [s.name for s in found.inputs], [s.name for s in found.outputs]
+    row, column = names[1].index("tau"), names[0].index("a")
+    inertia = next(s.value for s in found.outputs if s.name == "J")
+    assert found.D[row, column] == pytest.approx(inertia, rel=1e-12)
+    assert found.unit_of("D", row, column) == "N.m.s2/rad"
+    slope = next(s.value for s in found.outputs if s.name == "tau_bias_dw")
+    assert found.D[row, names[0].index("w")] == pytest.approx(slope, rel=1e-9)
+    assert found.state_space().ninputs == len(found.inputs)
+
+
+def test_a_direct_model_has_the_torque_that_holds_its_speed():
+    found = linearize("ChainUnit", "phi=30 deg, w=60 rpm")
+    assert found.at == "phi = 0.523599, w = 6.28319"
+    assert {s.name: s.rate.value for s in found.states} == {
+        "phi": pytest.approx(2.0 * math.pi), "w": pytest.approx(0.0, abs=1e-9)
+    }  # fmt: skip
+    found = linearize(EXAMPLES / "linkages" / "slider_crank_press.toml", {"tau": 0.0})
+    assert abs({s.name: s.rate.value for s in found.states}["w"]) > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("of", "more", "words"),
+    [
+        ("DcMotor", {"at": "steady"}, "must be NAME=VALUE"),
+        ("DcMotor", {"at": "speed=3"}, '"speed": no such state or input'),
+        ("DcMotor", {"at": "w=3 kg"}, "--at: w"),
+        ("DcMotor", {"at": {"w": math.inf}}, "--at: w"),
+        ("DcMotors", {}, "DcMotors: no such model"),
+        ("DcMotor", {"inverse": True}, "--inverse: is of linkage files"),
+        (EXAMPLES / "jam_with_driveline.toml", {"at": "jam:2 s"}, "there is no run"),
+        (EXAMPLES / "jam_with_driveline.toml", {"at": "start_up:2 kg"}, "--at"),
+        (EXAMPLES / "jam_with_driveline.toml", {"at": "start_up"}, "RUN:TIME"),
+        (EXAMPLES / "jam_with_driveline.toml", {"at": "jam_left:1 s"}, "the run of jam_left goes from"),
+        (
+            EXAMPLES / "jam_with_driveline.toml",
+            {"config": "x.toml"},
+            "--config x.toml: is not of a study file",
+        ),
+    ],
+)
+def test_a_wrong_point_is_refused(of, more, words):
+    with pytest.raises(InputError) as refused:
+        linearize(of, **more)
+    assert words in str(refused.value)
+
+
+def test_the_examples_of_docstrings():
+    assert doctest.testmod(linear).attempted > 0 == doctest.testmod(linear).failed
