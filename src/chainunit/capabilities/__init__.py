@@ -20,6 +20,7 @@ NAMES = (
     "watch",
     "sweep",
     "comparison",
+    "linear",
 )
 """The folders of the capabilities, in the order in which their tables, results and sections come."""
 

@@ -123,7 +123,8 @@ class LinearModel:
 
         Returns
         -------
-        the complex gain C (jw - A)^-1 B + D in the unit of the output by that of the input, shape (n,).
+        the complex gain C (jw - A)^-1 B + D in the unit of the output by that of the input, shape (n,); NaN at a
+        frequency that is an undamped pole.
 
         Raises
         ------
@@ -133,10 +134,13 @@ class LinearModel:
         column, row = place("input", to, self.inputs), place("output", of, self.outputs)
         self._refuse_undefined()
         b, c, d = self.B[:, column], self.C[row], self.D[row, column]
-        one = np.eye(len(self.states))
-        return np.array(
-            [c @ np.linalg.solve(1j * w * one - self.A, b) + d for w in np.asarray(frequency, float)], complex
-        )
+        one, values = np.eye(len(self.states)), []
+        for w in np.asarray(frequency, float):
+            try:
+                values.append(c @ np.linalg.solve(1j * w * one - self.A, b) + d)
+            except np.linalg.LinAlgError:
+                values.append(complex(np.nan, np.nan))
+        return np.array(values, complex)
 
     def state_space(self) -> Any:
         """The linear model as python-control's ``StateSpace``, whose states, inputs and outputs have the names of the
