@@ -118,7 +118,7 @@ class StartAnalysis(Analysis):
         """The starts; None where the motor does not start at all."""
         if study.start is None or study.start.start_time is None:
             return None
-        work.progress("starts from other crank angles", 1.0, 1.0)
+        work.progress(f"starts from other {study.driver_noun} angles", 1.0, 1.0)
         starts = starts_from_all(work.rig, longest_start(work.rig.operation.ramp_end, study.start.start_time))
         tables = study.config.drive
         limit = tables.gear.start_limit if "gear.torque_limit" in tables.given else math.inf
