@@ -269,7 +269,7 @@ _HAPPENINGS = {
     "chain",
     "current limit": "The motor runs into its current limit of {limit}",
     "gear passed": "The torque passes the gear's permitted {limit}",
-    "stall": "The crank stands after the event",
+    "stall": "The {driver} stands after the event",
     "trip": "The safety coupling opens after the event",
     "not recovered": "The speed does not return to its steady band within the time followed",
 }
