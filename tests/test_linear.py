@@ -7,6 +7,7 @@ import doctest
 import itertools
 import json
 import math
+import re
 from pathlib import Path
 
 import control
@@ -14,15 +15,18 @@ import numpy as np
 import pytest
 from systems import initialized
 
-from chainunit import InputError, LinearModel, linearize
+from chainunit import InputError, LinearModel, RunError, Study, linearize
 from chainunit.core.engines import MATH
 from chainunit.core.model import Model, Part
 from chainunit.core.quantities import base_units, declaration, quantity
 from chainunit.drives import speed_control
 from chainunit.models import MODELS
 from chainunit.reading.results import as_data
-from chainunit.study import linear
+from chainunit.study import config, linear
 from chainunit.study.linear import linear_point
+from chainunit.study.package import drive_to_export
+from chainunit.study.rig import Rig
+from chainunit.system import monolithic
 from chainunit.system.linear import labels
 from chainunit.system.linear import linearize as linearize_model
 from chainunit.system.poles import poles_of
@@ -206,6 +210,42 @@ def test_signs_and_units_of_a_motor():
     assert found.B[at["w"], k] == pytest.approx(-1.0 / p.rotor.J)
     assert base_units(found.unit_of("B", at["w"], k)) == base_units("rad/(s2.N.m)")
     assert found.unit_of("D", 0, k) == "J/(N.m)" and found.unit_of("C", 1, at["w"]) == "s"
+
+
+# -- points of runs
+
+
+def test_the_point_of_a_run_is_that_of_the_monolithic_solution(drive):
+    """The states at 0.4 s, by an independent solver."""
+    loaded = config.load(EXAMPLES / "jam_with_driveline.toml")
+    own = drive_to_export(loaded)
+    rig = Rig(loaded.operation, own, None)
+    rows = monolithic(rig.graph, rig.signals(ramp=True), [0.0, 0.4], rtol=1e-9)
+    for name, value in drive.states.items():
+        nominal = max(abs(float(rows[name][-1])), 1.0)
+        assert value == pytest.approx(float(rows[name][-1]), abs=2e-6 * nominal), name
+    assert drive.inputs["motor.w_ref"] == pytest.approx(float(rig.signals(ramp=True)["motor.w_ref"](0.4)))
+
+
+@pytest.mark.second
+def test_points_of_steady_running_and_of_an_event():
+    study = Study.from_file(EXAMPLES / "jam_trips_coupling.toml")
+    steady = linearize(study)
+    force = next(s.value for s in steady.inputs if s.name == "machine.left.processing_force")
+    speed = next(s for s in steady.states if s.name == "motor.w")
+    reference = next(s.value for s in steady.inputs if s.name == "motor.w_ref")
+    assert steady.at.startswith("steady running") and speed.value == pytest.approx(reference, rel=0.1)
+    with pytest.raises(InputError, match="the event begins at") as refused:
+        linearize(study, "jam_left:0.1 s")
+    begin = float(re.search(r"begins at ([\d.]+) s", str(refused.value))[1])
+    before, later = (linearize(study, f"jam_left:{begin + by:.4f} s") for by in (-0.05, 0.01))
+    forces = [
+        next(s.value for s in each.inputs if s.name == "machine.left.processing_force")
+        for each in (before, later)
+    ]
+    assert forces[0] == force < forces[1]
+    with pytest.raises(RunError, match="the safety coupling opens at t = "):
+        linearize(study, f"jam_left:{begin + 3.0:.4f} s")
 
 
 # -- places that are not smooth
