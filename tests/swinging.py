@@ -50,7 +50,14 @@ STEPHENSON = {
 }
 """A second dyad hangs on coupler and ground (Stephenson III)."""
 
-ALL = {"double_rocker": DOUBLE_ROCKER, "watt": WATT, "stephenson": STEPHENSON}
+CLOCKWISE = {
+    **WATT,
+    "driver": {**WATT["driver"], "zero": "95 deg", "positive": "clockwise"},
+    "start": {**WATT["start"], "phi": "35 deg"},
+}
+"""The same six-bar with an angle that counts the other way."""
+
+ALL = {"double_rocker": DOUBLE_ROCKER, "watt": WATT, "stephenson": STEPHENSON, "clockwise": CLOCKWISE}
 
 
 def with_range(data, span):

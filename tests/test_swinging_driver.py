@@ -15,6 +15,7 @@ import fmpy
 import numpy as np
 import pytest
 from command import chainunit
+from fmpy.validation import validate_fmu
 from linkage_files import MACHINES, tables
 from multibody import Multibody
 from scipy.optimize import brentq
@@ -121,6 +122,8 @@ def test_fmus_agree_with_the_independent_solution_and_refuse_an_angle_outside(na
             start_values={"phi": phi, "w": w, "a": 3.0},
         )[0]  # fmt: skip
 
+    if make != "native 3":  # there fmpy misses the aliases, see test_gallery_clients
+        assert not validate_fmu(str(file))
     for phi, w in ((LOW, 2.0), (0.8, -2.0), (HIGH, -1.0)):
         wanted = own.solution(own.followed(phi), phi, w, 3.0)
         names = [key for key in wanted if key == "tau" or key.endswith((".fx", ".fy"))]
@@ -256,6 +259,19 @@ def test_a_driver_that_slides_is_told_its_range_too():
     span, groups = closing(data)
     assert span == ["0.1 m", "0.499999 m"] and groups == ["rod, top"]
     model({**data, "driver": {"joint": "cylinder", "range": span}})
+
+
+def test_a_parallelogram_has_the_range_between_its_change_points():
+    """Coupler and rocker are at the angle of the crank: the sine of 0.0573 deg is 1e-3."""
+    data = copy.deepcopy(with_range(DOUBLE_ROCKER, None))
+    data["ground"]["O2"] = [1.0, 0.0]
+    for link, point, length in (("crank", "A", 0.5), ("coupler", "B", 1.0), ("rocker", "B", 0.5)):
+        data["links"][link]["points"][point] = [length, 0]
+    data["start"] = {"phi": "60 deg", "points": {"B": [1.25, 0.43]}}
+    assert "comes to a dead position at 180 deg of crank" in refusal(data)
+    span, groups = closing(data)
+    assert span == ["0.0573 deg", "179.9427 deg"] and groups == ["coupler, rocker"] * 2
+    model(with_range(data, span))
 
 
 def test_a_start_that_does_not_close_has_no_range():

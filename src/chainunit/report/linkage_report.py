@@ -222,7 +222,7 @@ def _animation(f: LinkageFindings) -> Animation:
         Reading(f"{effort} at the driver", over(lambda g: g.outputs["tau"]) * machine.ratio, unit("N.m")),
     )
     clip = Clip(
-        "turn", "At constant speed", time, linkage.places(state.m), readings,
+        "turn", f"{'There and back at' if f.back else 'At'} constant speed", time, linkage.places(state.m), readings,
         (*linkage.arrows(titles, joints, force, named=True), *linkage_loads.load_arrows(state)),
         blocks=linkage.blocks(state.m),
     )  # fmt: skip
