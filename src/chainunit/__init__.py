@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from .core.errors import GeometryError as GeometryError
     from .core.errors import InputError as InputError
     from .core.errors import RunError as RunError
+    from .core.errors import WriteError as WriteError
     from .machines.api import EMPTY as EMPTY
     from .machines.api import ChainUnitMachine as ChainUnitMachine
     from .machines.chain_unit import ChamberForces as ChamberForces
@@ -34,6 +35,7 @@ else:
         "SideLoads": ".machines.chain_unit",
         "Study": ".app.studies",
         "StudyResult": ".app.studies",
+        "WriteError": ".core.errors",
     }
 
     def __getattr__(name):

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
-from ..core.errors import InputError, RunError, WriteError
+from ..core.errors import InputError, RunError, WriteError, one_of, shown
 from ..core.model import Model
 from . import export as python
 from .native import export as native
@@ -53,6 +53,8 @@ def export(
     """
     if fmi not in (2, 3):
         raise InputError(f"fmi = {fmi}: must be 2 or 3")
+    if backend not in (None, *get_args(Backend)):
+        raise InputError(f"backend = {shown(backend)}: must be {one_of(backend, get_args(Backend))}")
     if backend == "python":
         return _by_python(model, file, start, fmi, platforms, "")
     if backend is None and not platforms and not targets.compiles(fmi):

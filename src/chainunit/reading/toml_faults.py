@@ -126,4 +126,10 @@ def _twice(lines: list[str], line: int, heading: re.Match[str]) -> str:
             if first[1] != begin:
                 return f"{begin}{name}{end} stands beside {first[0].strip()}{']' * (len(first[1]) - 1)} in line {k}"
             return f"[{name}] stands twice, first in line {k}; put the keys of both into one table"
+    for k, other in enumerate(lines[: line - 1], 1):
+        if _HEADING.match(other):
+            break
+        if re.match(rf"\s*{re.escape(name)}\s*=\s*[^{{\s]", other):
+            advice = f"; [system] has the key {name} for a name" if name in ("machine", "motor") else ""
+            return f"{begin}{name}{end} is a table, and line {k} sets {name} to a value{advice}"
     return f"{begin}{name}{end}: what is in it stands before already; put the keys of both into one table"

@@ -194,7 +194,7 @@ def _certificate(
         if name.endswith(DIFFERENCE):
             text = (
                 f"Difference of {name.removesuffix(DIFFERENCE)} to the monolithic solution, in parts of its "
-                f"peak: at most {most} ({{title}}), {len(compared_runs)} runs compared."
+                f"peak: at most {most} ({{title}}); runs compared: {len(compared_runs)}."
             )
         yield b.Text(s.line(text, title=titles[run]), form="short")
 

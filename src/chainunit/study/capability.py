@@ -175,8 +175,8 @@ class StudyCapability:
     def remark(self, study: StudyRecord) -> None:
         """Add remarks on the model of the machine to a study."""
 
-    def words(self) -> Mapping[str, str]:
-        """By name, the words on the numbers of its results, for a comparison of two."""
+    def words(self, driver: str) -> Mapping[str, str]:
+        """By name, the words on the numbers of its results, for a comparison of two; they name the `driver`."""
         return {}
 
     def take_estimates(self, config: Config, estimates: Estimates, tables: dict[str, Any]) -> None:

@@ -106,9 +106,9 @@ def remark_on_coupling(study: StudyRecord, trip: float) -> None:
 
 
 _RAM = (
-    "A coupling {set_for}that opens at {trip} does not limit the force on the link {ram} near its dead centre, at a "
-    "crank angle of {dead}: the setting stands for {fastest} where the link is fastest, for {thirty} at 30 deg and "
-    "{ten} at 10 deg before the dead centre; at the dead centre the force has no limit. In running the pin "
+    "A coupling {set_for}that opens at {trip} does not limit the force on the link {ram} near its dead centre, at "
+    "{a driver} angle of {dead}: the setting stands for {fastest} where the link is fastest, for {thirty} at 30 deg "
+    "and {ten} at 10 deg before the dead centre; at the dead centre the force has no limit. In running the pin "
     "pushes with {working} at most; "
 )
 _RAM_WITHIN, _RAM_ALWAYS = "within {angle}, the last {way}, ", "at every angle "

@@ -5,7 +5,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -99,9 +98,10 @@ class ForeignMotor(MotorSource):
     kind: type[Motor] = Motor
     plate: None = None
 
-    @cached_property
+    @property
     def component(self) -> FmuComponent:
-        """The FMU; errors are those of `chainunit.system.foreign_component`."""
+        """The FMU as it is now, as its file may change between two runs of a study; errors are those of
+        `chainunit.system.foreign_component`."""
         with refusal_prefix("system.motor: ", "system.motor"):
             return foreign_component(self.file, "motor", self.names)
 

@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Literal, Self, TypeAlias
 
 import xarray as xr
 
+from ..core.descriptions import of_driver
 from ..core.errors import RunError
 from ..drives.catalogue import CatalogueMotor
 from ..fmu.backends import Origin
@@ -130,12 +131,12 @@ class StudyRecord:
         return [remark for remark in self.remarks if remark.severity == "note"]
 
     def warn(self, kind: str, text: str, /, *runs: str, **parts: Amount | str) -> None:
-        """Add a warning, see `Remark.of`."""
-        self.remarks.append(Remark.of("warning", kind, text, *runs, **parts))
+        """Add a warning, see `Remark.of`; its text may have slots for the driver, see `of_driver`."""
+        self.remarks.append(Remark.of("warning", kind, of_driver(text, self.driver_noun), *runs, **parts))
 
     def note(self, kind: str, text: str, /, *runs: str, **parts: Amount | str) -> None:
-        """Add a note, see `Remark.of`."""
-        self.remarks.append(Remark.of("note", kind, text, *runs, **parts))
+        """Add a note, see `warn`."""
+        self.remarks.append(Remark.of("note", kind, of_driver(text, self.driver_noun), *runs, **parts))
 
     @property
     def titles(self) -> dict[str, str]:

@@ -114,7 +114,8 @@ def _on_start(study: StudyRecord) -> None:
         study.warn(
             "fed before speed",
             "start-up: the motor does not bring the empty machine to its speed in a reasonable time: the feed comes "
-            "after {fed}, with the crank at {speed} in place of {wanted}; take a larger motor or a lighter flywheel.",
+            "after {fed}, with the {driver} at {speed} in place of {wanted}; take a larger motor or a lighter "
+            "flywheel.",
             START,
             fed=(feed_time, "s"),
             speed=(speed, "rad/s", "speed"),
@@ -202,7 +203,7 @@ def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
             addition = " The overloads begin from this state."
         warn(
             "speed missed",
-            "steady running: the crank turns at {speed_mean} in place of {wanted}; {why}.{branched}",
+            "steady running: the {driver} turns at {speed_mean} in place of {wanted}; {why}.{branched}",
             STEADY,
             speed_mean=(shown_speed(steady.speed_mean, requested), "rad/s", "speed"),
             asked=(requested, "rad/s", "speed"),
@@ -213,7 +214,7 @@ def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
     if not has_turn(study.drive, study.steady):
         warn(
             "no whole turn",
-            "steady running: the crank does not make a whole turn; means are over the whole run, and there is no "
+            "steady running: the {driver} does not make a whole turn; means are over the whole run, and there is no "
             f"{LOAD_CYCLE}.{{refused}}",
             STEADY,
             refused="" if lasts(study) else _REFUSED,
@@ -268,7 +269,7 @@ _HAPPENINGS = {
     "chain",
     "current limit": "The motor runs into its current limit of {limit}",
     "gear passed": "The torque passes the gear's permitted {limit}",
-    "stall": "The crank stands after the event",
+    "stall": "The {driver} stands after the event",
     "trip": "The safety coupling opens after the event",
     "not recovered": "The speed does not return to its steady band within the time followed",
 }

@@ -95,6 +95,7 @@ class StudyData:
     warnings: list[Remark] = part("faults, and demands that are not met")
     notes: list[Remark] = part("assumptions behind the numbers")
     slips: tuple[UnusualValue, ...] = part("given values of an unusual size")
+    driver: str = part("the noun of the link that the motor turns")
     speed_loop: Mapping[str, Loop] = part("the linearised speed loop, by inertia")
     control: Tuning | str = part("the tuned gains of the speed control, or words on it")
     runs: RunData = part(inline=True)
@@ -118,6 +119,7 @@ def _data(study: StudyRecord) -> StudyData:
         warnings=study.warnings,
         notes=study.notes,
         slips=study.config.file.unusual,
+        driver=study.driver_noun,
         speed_loop=study.statics.loops,
         control=drive.tuning
         or (

@@ -61,7 +61,7 @@ class StartFindings(Findings):
         if worst.gear_torque > self.limit:
             study.warn(
                 "start at gear",
-                "{start} from a crank angle of {angle} puts {torque} on the output of the gear; the gear permits "
+                "{start} from {a driver} angle of {angle} puts {torque} on the output of the gear; the gear permits "
                 "{limit} in a start (gear.torque_limit x gear.start_factor): {remedy}.",
                 "start_up",
                 start=start,
@@ -72,7 +72,7 @@ class StartFindings(Findings):
         elif math.isinf(self.limit) and worst.gear_torque > START_FACTOR * self.running:
             study.warn(
                 "start at gear",
-                "{start} from a crank angle of {angle} puts {torque} on the output of the gear, {over} times the "
+                "{start} from {a driver} angle of {angle} puts {torque} on the output of the gear, {over} times the "
                 "{running} of {running_in}. Gears of catalogues commonly permit about {large} times their rated "
                 "torque in a start: choose the gear by this torque (gear.torque_limit, gear.start_factor), or "
                 "{remedy}.",
@@ -86,7 +86,7 @@ class StartFindings(Findings):
         if self.stuck:
             study.warn(
                 "no start",
-                "The motor does not bring the crank to its speed from {where}: take a larger motor{ramp}.",
+                "The motor does not bring the {driver} to its speed from {where}: take a larger motor{ramp}.",
                 "start_up",
                 where=" and ".join(number(each.angle, "rad") for each in self.stuck),
                 ramp=", or a higher voltage of the soft starter"
@@ -118,7 +118,7 @@ class StartAnalysis(Analysis):
         """The starts; None where the motor does not start at all."""
         if study.start is None or study.start.start_time is None:
             return None
-        work.progress("starts from other crank angles", 1.0, 1.0)
+        work.progress(f"starts from other {study.driver_noun} angles", 1.0, 1.0)
         starts = starts_from_all(work.rig, longest_start(work.rig.operation.ramp_end, study.start.start_time))
         tables = study.config.drive
         limit = tables.gear.start_limit if "gear.torque_limit" in tables.given else math.inf

@@ -13,9 +13,12 @@ from typing import Any
 import numpy as np
 
 
-def _share(s: Any) -> Any:
-    """A share between 0 and 1; that of a float without numpy, ten times as fast for a solver."""
-    return min(max(s, 0.0), 1.0) if isinstance(s, float) else np.clip(s, 0.0, 1.0)
+def _share(t: Any, begin: float, duration: float) -> Any:
+    """The share of a change that is past at the time `t`, between 0 and 1; that of a float without numpy, ten times
+    as fast for a solver."""
+    if isinstance(t, float):
+        return min(max((t - begin) / duration, 0.0), 1.0)
+    return np.clip((np.asarray(t) - begin) / duration, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -49,7 +52,7 @@ class Profile:
         value: Any = self.start
         before = self.start
         for at, duration, after in self.changes:
-            s = _share((t - at) / duration)
+            s = _share(t, at, duration)
             value = value + (after - before) * (s * s * s * (10.0 + s * (6.0 * s - 15.0)))
             before = after
         return value if np.ndim(t) else float(value)
@@ -59,7 +62,7 @@ class Profile:
         value: Any = 0.0
         before = self.start
         for at, duration, after in self.changes:
-            s = _share((t - at) / duration)
+            s = _share(t, at, duration)
             value = value + (after - before) / duration * (30.0 * s * s * (1.0 - s) ** 2)
             before = after
         return value if np.ndim(t) else float(value)

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ... import __version__
+from ...core.descriptions import USUAL_DRIVER
 from ...core.errors import InputError, printable
 from ...core.quantities import variables
 from ...reading.text import entry
@@ -26,10 +27,10 @@ _ROUNDING = 1e-12
 
 
 @cache
-def _words() -> dict[str, str]:
+def _words(driver: str) -> dict[str, str]:
     """By name, the words on the numbers of a result."""
-    words = {name: text for part in registered() for name, text in part.words().items()}
-    return words | {v.name: v.description for of in (ShaftAnswers, Answers) for v in variables(of)}
+    words = {name: text for part in registered() for name, text in part.words(driver).items()}
+    return words | {v.name: v.described(driver) for of in (ShaftAnswers, Answers) for v in variables(of)}
 
 
 _TITLES = {"steady": "steady running", "start_up": "start-up", "settling": "settling"}
@@ -94,7 +95,9 @@ def compare(a: StoredResult, b: StoredResult) -> dict[str, Any]:
     given = {side: dict(_given_values(each.data)) for side, each in results.items()}
     names = list(dict.fromkeys([*given["a"], *given["b"]]))
     different = [name for name in names if not _same(given["a"].get(name), given["b"].get(name))]
-    groups = {side: dict(_groups(each)) for side, each in results.items()}
+    drivers = {each.words("driver") or USUAL_DRIVER for each in results.values()}
+    driver = drivers.pop() if len(drivers) == 1 else "driver"
+    groups = {side: dict(_groups(each, driver)) for side, each in results.items()}
     both = [name for name in groups["a"] if name in groups["b"]]
     return {
         "chainunit": __version__,
@@ -247,24 +250,24 @@ class _Group:
     numbers: Mapping[str, tuple[str, Mapping[str, Any]]]
 
 
-def _groups(result: StoredResult) -> Iterator[tuple[str, _Group]]:
-    """The numbers of each run of a result, by their place in it."""
+def _groups(result: StoredResult, driver: str) -> Iterator[tuple[str, _Group]]:
+    """The numbers of each run of a result, by their place in it; their words name the `driver`."""
     data = result.data
     for run in ("start_up", "settling"):
-        yield from _group(run, result.title_of(run), data.get(run))
+        yield from _group(run, result.title_of(run), data.get(run), driver)
     for run, numbers in _mapping(data.get("answers")).items():
-        yield from _group(f"answers.{run}", result.title_of(run), numbers)
+        yield from _group(f"answers.{run}", result.title_of(run), numbers, driver)
     for run, numbers in _mapping(data.get("shaft")).items():
-        yield from _group(f"shaft.{run}", f"{result.title_of(run)}: driveline", numbers)
+        yield from _group(f"shaft.{run}", f"{result.title_of(run)}: driveline", numbers, driver)
     for run, pins in _mapping(data.get("pins")).items():
-        yield from _group(f"pins.{run}", f"{result.title_of(run)}: forces in the bearings", pins)
+        yield from _group(f"pins.{run}", f"{result.title_of(run)}: forces in the bearings", pins, driver)
     random = _mapping(data.get("monte_carlo")).get("quantiles")
-    yield from _group("monte_carlo.quantiles", "overloads at random", random)
+    yield from _group("monte_carlo.quantiles", "overloads at random", random, driver)
 
 
-def _group(place: str, title: str, node: Any) -> Iterator[tuple[str, _Group]]:
+def _group(place: str, title: str, node: Any, driver: str) -> Iterator[tuple[str, _Group]]:
     numbers = {
-        name.removeprefix("."): (_spoken(name.removeprefix(".")), each)
+        name.removeprefix("."): (_spoken(name.removeprefix("."), driver), each)
         for name, each in _leaves(node, "")
         if _is_entry(each) and (each["value"] is None or _is_number(each))
     }
@@ -272,11 +275,11 @@ def _group(place: str, title: str, node: Any) -> Iterator[tuple[str, _Group]]:
         yield place, _Group(title, numbers)
 
 
-def _spoken(name: str) -> str:
+def _spoken(name: str, driver: str) -> str:
     """The name of a number in words: ``crank_torque_peak.q95`` -> crank torque, peak, 95 %."""
     first, _, rest = name.partition(".")
     rest = f"{rest[1:]} % of runs below" if rest[1:].isdigit() and rest[0] == "q" else rest.replace(".", ", ")
-    return ", ".join(filter(None, (_words().get(first, first.replace("_", " ")), rest)))
+    return ", ".join(filter(None, (_words(driver).get(first, first.replace("_", " ")), rest)))
 
 
 def _measures(a: _Group, b: _Group) -> dict[str, Any]:

@@ -420,7 +420,7 @@ def _on_line(findings: FlywheelFindings, study: StudyRecord) -> None:
     causes = remedies(driveline_of(study.drive))
     study.warn(
         "ripple behind flywheel",
-        "with a flywheel of {flywheel} the motor's speed fluctuates by {motor_ripple}, the crank's by "
+        "with a flywheel of {flywheel} the motor's speed fluctuates by {motor_ripple}, the {driver}'s by "
         "{speed_ripple}: the shaft line makes the rest, which no flywheel on the motor's shaft evens; {remedy}.",
         flywheel=(best.flywheel, "kg.m2"),
         motor_ripple=(best.answers.motor_ripple, "1", "percent"),

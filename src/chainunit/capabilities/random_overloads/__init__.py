@@ -94,11 +94,11 @@ class RandomOverloads(Capability):
             if not rig.takes(event):
                 raise InputError(f'monte_carlo.event.type = "{event.kind}": {event.without}')
 
-    def words(self) -> Mapping[str, str]:
+    def words(self, driver: str) -> Mapping[str, str]:
         """Those of a run."""
         from .runs import Sample
 
-        return {v.name: v.description for v in variables(Sample)}
+        return {v.name: v.described(driver) for v in variables(Sample)}
 
     def analyses(self) -> Iterable[type[Analysis]]:
         """The runs."""

@@ -281,7 +281,7 @@ def _result_of(task: RandomTask, chance: Draw, run: EventRun) -> dict[str, Any]:
 
 _OUTCOMES = {
     "trips": "in {share} of them the safety coupling opens",
-    "stalls": "in {share} of them the crank stands at the end",
+    "stalls": "in {share} of them the {driver} stands at the end",
 }
 """By quantity of a random run, the words on the share of the runs that end so."""
 

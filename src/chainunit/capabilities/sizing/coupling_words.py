@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from ...core.descriptions import of_driver
 from ...core.quantities import variables
 from ...reading.text import number
 from ...study.coupling import hardest_start
@@ -19,7 +20,7 @@ def _torque(value: float) -> str:
 
 def _at_both(study: StudyRecord, value: float) -> str:
     """A torque at the crank, and at the motor's shaft, on which the coupling sits."""
-    return f"{_torque(value)} at the crank, {_torque(value / study.drive.ratio)} at the motor's shaft"
+    return f"{_torque(value)} at the {study.driver_noun}, {_torque(value / study.drive.ratio)} at the motor's shaft"
 
 
 def _list_of(study: StudyRecord, peaks: Mapping[str, float]) -> str:
@@ -31,7 +32,7 @@ _OBSTACLES = {
     Obstacle.START: "No safety coupling protects this drive as it starts now: {start} puts {start_torque} on it, so "
     "that it has to open above {least}, and {bound}. For running alone {least_in_running} would do.",
     Obstacle.MOTOR: "No safety coupling protects this drive: it has to open above {above}, and the motor gives at "
-    "most {motor} at the crank.",
+    "most {motor} at the {driver}.",
     Obstacle.GEAR: "No safety coupling protects this drive: it has to open above {above}, and the gear may carry "
     "{gear}.",
     Obstacle.OVERLOADS: "No safety coupling is recommended: it has to open above {above}, and {bound}.",
@@ -72,7 +73,7 @@ def coupling_sentence(study: StudyRecord, setting: Setting, alternatives: Sequen
     of = f"that {start}" if setting.start > setting.running else f"that {running_words(study, running.run)}"
     above = f"{_torque(setting.least)}, {MARGIN:g} times the {_torque(setting.normal)} {of} puts on it"
     if setting.obstacle is not None:
-        return _OBSTACLES[setting.obstacle].format(
+        return of_driver(_OBSTACLES[setting.obstacle], study.driver_noun).format(
             start=start,
             setting=_at_both(study, setting.least),
             release=number(Coupling().release_time, "s"),
@@ -90,7 +91,7 @@ def coupling_sentence(study: StudyRecord, setting: Setting, alternatives: Sequen
     text = (
         f"Recommended safety coupling{caveat}: {_at_both(study, setting.least)}; this is {MARGIN:g} times the "
         f"{_torque(setting.normal)} {of} puts on it, and {'above' if setting.stalls else 'below'} the "
-        f"{_torque(setting.motor)} that the motor gives at the crank. It opens where "
+        f"{_torque(setting.motor)} that the motor gives at the {study.driver_noun}. It opens where "
         f"{_effects(study, setting.effects)}"
     )
     text += f"; it stays shut where {_list_of(study, shut)}." if shut else "."
@@ -170,9 +171,9 @@ _WAYS = {
 
 
 _FAILURES = {
-    Way.SOFT_STARTER: "No soft starter that was tried brings the crank to its speed from every angle within the "
+    Way.SOFT_STARTER: "No soft starter that was tried brings the {driver} to its speed from every angle within the "
     "locked-rotor time of the motor.",
-    Way.INVERTER: "An inverter does not bring the crank to its speed from every angle with any ramp and boost "
+    Way.INVERTER: "An inverter does not bring the {driver} to its speed from every angle with any ramp and boost "
     "(starter.inverter.boost) that were tried.",
     Way.SLIP_CLUTCH: "A slip clutch that running alone permits slips on in the start and does not bring the machine "
     "to its speed.",
@@ -183,7 +184,7 @@ _FAILURES = {
 def way_words(study: StudyRecord, each: Alternative, setting: Setting) -> str:
     """The sentence on a way to a safety coupling that a start does not open, beside the one of that `setting`."""
     if each.numbers.start is None:
-        return _FAILURES[each.way]
+        return of_driver(_FAILURES[each.way], study.driver_noun)
     numbers = {
         v.name: number(value, v.unit, v.kind, full=v.name not in ("voltage", "ramp", "boost"))
         for v in variables(WayNumbers)

@@ -52,7 +52,7 @@ def inverter_needs(best: Candidate, overload: float, is_given: bool) -> Iterator
     boost, trial = best.drive.parameters.inverter.boost, best.trial
     if best.starts and not is_given:
         text = f"The inverter needs a voltage boost of {_percent(boost)} at frequency zero (starter.inverter.boost)"
-        less = "; with less the motor does not start the machine from every crank angle"
+        less = f"; with less the motor does not start the machine from every {best.drive.driver_noun} angle"
         yield f"{text}{less if boost > BOOSTS[0] else ''}."
     ordered, highest = trial.inverter_current, trial.start_current
     if ordered is not None and highest is not None:

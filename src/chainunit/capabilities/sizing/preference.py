@@ -160,7 +160,9 @@ def _unstarted(c: Candidate) -> str:
     """The reason of a candidate that does not bring the machine up to speed."""
     if c.trial.stall_angle is None:
         return "it does not bring the machine up to speed"
-    reason = f"without a flywheel it stalls at {number(c.trial.stall_angle, 'rad')} of the crank"
+    reason = (
+        f"without a flywheel it stalls at {number(c.trial.stall_angle, 'rad')} of the {c.drive.driver_noun}"
+    )
     if c.bound:
         reason += f", and no flywheel that sizing.inertia_ratio = {c.bound:g} permits carries it through"
     elif c.heaviest:

@@ -37,7 +37,9 @@ def ordered_gear(study: StudyRecord, setting: Setting | None, margin: float) -> 
         reason += f", in which it may carry {decides.times:g} times that"
     if order.left_out:
         names = ", ".join(map(study.title_of, order.left_out))
-        reason += f"; left out, as the energy balance is not kept: {names}"
+        reason += (
+            f"; a lower bound, as the energy balance is not kept ({names}): shorten run.step before you order"
+        )
     free = number(margin, "1", "percent", full=False)
     title = f"gear, rated output torque at least, with the margin of {free}; decided by {reason}"
     return OrderedGear(

@@ -26,7 +26,7 @@ def report(swept: SweptStudy) -> b.Report:
     """The report on a sweep."""
     summary, config = swept.summary, swept.findings.config
     with shown_in(config.units):
-        s = b.Source(as_data(summary))
+        s = b.Source(as_data(summary), config.machine.model.driver_noun)
         sections = (
             b.Section("influences", "Which parameter moves what", tuple(_influences(s, summary))),
             b.Section("best", "Points in order", tuple(_best(s, summary))),
@@ -264,8 +264,8 @@ def _basis(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
     if summary.findings.plan.quantities:
         yield b.Text(
             s.line(
-                "Quantities of a turn are those at constant speed of the crank with the feed of normal running, at "
-                "{=angles} crank angles; extremes are those at these angles."
+                "Quantities of a turn hold at constant speed of the {driver} with the feed of normal running, at "
+                "{=angles} {driver} angles; extremes are those at these angles."
             ),
             "note",
             "long",
