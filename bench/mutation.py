@@ -292,7 +292,8 @@ class Bench:
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
         )  # fmt: skip
         try:
-            said, _ = process.communicate(timeout=self.allowed)
+            # a mutant may run for ever: it shall not take the time of a whole stage
+            said, _ = process.communicate(timeout=self.allowed / 6.0 if files else self.allowed)
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             process.communicate()
@@ -423,7 +424,12 @@ def main() -> None:
         "--results", type=Path, required=True, help="JSON lines; what is in it is not run again"
     )
     options.add_argument("--workers", type=int, default=2, help="processes of a run of the tests")
-    options.add_argument("--allowed", type=float, default=1800.0, help="seconds of a run of the tests")
+    options.add_argument(
+        "--allowed",
+        type=float,
+        default=1800.0,
+        help="seconds of a run of a whole stage; six runs of files take as long",
+    )
     options.add_argument(
         "--near",
         action="store_true",

@@ -22,7 +22,7 @@ from chainunit.core.model import Terminal
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.motor import Motor
 from chainunit.study import config, run
-from chainunit.study.choice import choose
+from chainunit.study.choice import choose, drive_of
 from chainunit.study.drive import Drive
 from chainunit.study.drive_fmus import export_drive, with_files
 from chainunit.study.readings import crank_motion, crank_torque, largest_torque, pull_out_torque
@@ -93,6 +93,17 @@ def test_it_has_the_terminals_variables_alone(file):
     }
     # it declares no units: they are those of the terminals
     assert motor.connectors["w"].unit == "rad/s" and motor.connectors["load.J"].unit == "kg.m2"
+
+
+def test_a_file_that_changes_between_two_runs_is_read_again(file, tmp_path):
+    (tmp_path / "ForeignMotor.fmu").write_bytes(file.read_bytes())
+    study = tmp_path / "study.toml"
+    study.write_text('[system]\nmotor = "ForeignMotor.fmu"\n')
+    read = config.load(study)
+    assert drive_of(read).foreign is not None
+    (tmp_path / "ForeignMotor.fmu").unlink()
+    with pytest.raises(InputError, match="no such FMU"):
+        drive_of(read)
 
 
 def test_it_runs_as_our_motor_of_the_same_parameters(file, machine, fmus):

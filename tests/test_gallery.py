@@ -32,6 +32,7 @@ KINDS = {
     "dwell_six_bar": ["RRR", "RRR"],
     "edge_trimmer": ["triad"],
     "knife_drive": ["RRR", "triad"],
+    "level_luffing_crane": ["RRR"],
     "pump_jack": ["RRR"],
     "scotch_yoke_pump": ["RPP"],
     "slider_crank_press": ["RRP"],
@@ -50,11 +51,10 @@ def machine(name: str) -> Machine:
 
 
 def way(name):
-    """Places of the driver: a turn, or the range of a cylinder, not quite to its ends."""
-    described = machine(name).model.described_by
-    if not described.structure.driver.linear:
+    """Places of the driver: a turn, or its range, not quite to its ends."""
+    if machine(name).model.turns:
         return TURN
-    low, high = described.data["range"]
+    low, high = machine(name).model.span
     return np.linspace(low + 1e-3, high - 1e-3, 101)
 
 
@@ -178,6 +178,15 @@ def test_the_force_of_a_cylinder_is_as_the_file_says(name, link):
         [1e3 * each for each in sorted(ends)], rel=0.02
     )
     assert np.degrees(np.ptp(getattr(out, link).angle)) == pytest.approx(angle, abs=0.5)
+
+
+def test_the_hook_of_the_crane_moves_level():
+    swing, along, rise = said("level_luffing_crane", r"by (\d+) degrees it goes (\S+) m, .* by (\d+) mm")
+    low, high = machine("level_luffing_crane").model.span
+    out = machine("level_luffing_crane").outputs(np.linspace(low, high, 2001))
+    hook = out.fly_jib.P
+    assert (np.ptp(hook.x), np.ptp(hook.y)) == pytest.approx((along, 1e-3 * rise), rel=0.01)
+    assert np.degrees(high - low) == pytest.approx(swing)
 
 
 @pytest.mark.filterwarnings("error")

@@ -13,7 +13,7 @@ import pytest
 import xarray as xr
 from command import chainunit
 
-from chainunit import ChainUnitMachine, InputError, RunError, Study, StudyResult
+from chainunit import ChainUnitMachine, InputError, RunError, Study, StudyResult, WriteError
 from chainunit.app import studies
 from chainunit.core import ledger
 from chainunit.core.files import claim
@@ -83,6 +83,25 @@ def test_a_foreign_fmu_is_seen_before_earlier_results_are_removed(tmp_path):
     (tmp_path / "identified.toml").write_text("mine")
     with pytest.raises(InputError, match=r"identified\.toml: would be lost"):
         Study(**TABLES).identify(tmp_path)
+
+
+def test_an_unknown_backend_is_refused(tmp_path):
+    with pytest.raises(
+        InputError, match=r'backend = "natve": must be one of native, python; was "native" meant'
+    ):
+        Study(**TABLES).run(tmp_path / "out", backend="natve")
+    assert not (tmp_path / "out" / "result.json").exists()
+
+
+def test_a_file_that_cannot_be_written_is_a_public_error(result, tmp_path, monkeypatch):
+    def full(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    folder = tmp_path / "out"
+    folder.mkdir()
+    monkeypatch.setattr("chainunit.core.files.os.replace", full)
+    with pytest.raises(WriteError, match="No space left"):
+        result.save(folder)
 
 
 def test_answers_are_a_table_with_units(result):

@@ -177,6 +177,10 @@ FILES = [
     ("feed_forward = True", [(1, "no valid TOML: feed_forward = True", "feed_forward = true")]),
     ("[run]\n[machine]\n[run]", [(3, "no valid TOML", "[run] stands twice, first in line 1")]),
     ("[run]\nturns = 1\nturns = 2", [(3, "no valid TOML", "turns stands twice")]),
+    (
+        'motor = "induction"\n[motor]\n',
+        [(2, "no valid TOML", "[motor] is a table, and line 1 sets motor to a value; [system] has the key motor")],
+    ),
     ("title = 'a", [(1, "no valid TOML", "a quotation mark is missing")]),
     ("title =\n", [(1, "no valid TOML", "its value is missing")]),
     ("[machine\nr = 1", [(1, "no valid TOML: [machine", "']'")]),

@@ -187,7 +187,7 @@ def linkage_command(
         typer.Option("--speed", help='Speed of the driver with its unit; "60 rpm" by default, or "0.1 m/s".'),
     ] = None,
 ) -> None:
-    """Show a linkage: its groups, drawing, motion, torque, inertia and reactions over a turn.
+    """Show a linkage: its groups, drawing, motion, torque, inertia and reactions over a turn, or over its range.
 
     Writes report.html, linkage.json, linkage.md and pictures into the output folder.
     """
@@ -197,8 +197,7 @@ def linkage_command(
     from ..report.linkage_report import TASK, LinkageQuestion
 
     machine = Machine(read_linkage(file))
-    turns = machine.model.turns
-    usual, unit = ("60 rpm", "rad/s") if turns else ("0.1 m/s", "m/s")
+    usual, unit = ("0.1 m/s", "m/s") if machine.model.slides else ("60 rpm", "rad/s")
     rate = option_value("--speed", speed or usual, unit, "speed of the driver")
     carry_out(TASK, LinkageQuestion(machine, rate, str(file)), output)
 

@@ -191,8 +191,9 @@ _RUN = 4.0
 def excitation(interface: Interface) -> Callable[[float], dict[str, float]]:
     """The inputs as functions of time [s], for the reference results: all change smoothly, within their bounds.
 
-    A shaft runs from rest, unevenly. A load or a torque has a size that suits the inertia of its shaft. Every other
-    input swings about its start value, or about its usual size where the start value is 0.
+    A shaft runs from rest, unevenly, or swings within its bounds. A load or a torque has a size that suits the
+    inertia of its shaft. Every other input swings about its start value, or about its usual size where the start
+    value is 0.
     """
     model = interface.model
     sizes = interface.script.sizes
@@ -202,7 +203,7 @@ def excitation(interface: Interface) -> Callable[[float], dict[str, float]]:
             inertia = _inertia(interface, terminal.members["tau_bias"])
             moving = _load(sizes.get(terminal.members["tau_bias"], _PUSH * inertia), inertia)
         elif terminal.kind == FLANGE:
-            moving = _SHAFT
+            moving = _shaft(interface, terminal.members.get("phi", ""))
             turning = [s for s in interface.signals_of("input") if s.name == terminal.members.get("tau")]
             if turning and model.state_layout:
                 # with a usual torque the states of a light shaft would run away
@@ -225,6 +226,19 @@ _SHAFT: dict[str, Callable[[float], float]] = {
     "w": lambda t: _RUN * (1.0 - math.cos(2.0 * t)),
     "a": lambda t: 2.0 * _RUN * math.sin(2.0 * t),
 }
+
+
+def _shaft(interface: Interface, phi: str) -> dict[str, Callable[[float], float]]:
+    """The motion of a shaft: it runs from rest, or swings where the input `phi` has bounds."""
+    bounds = [s.variable.quantity for s in interface.signals_of("input") if s.name == phi]
+    if not bounds or not math.isfinite(bounds[0].high - bounds[0].low):
+        return _SHAFT
+    middle, reach = 0.5 * (bounds[0].low + bounds[0].high), 0.45 * (bounds[0].high - bounds[0].low)
+    return {
+        "phi": lambda t: middle + reach * math.sin(2.0 * t),
+        "w": lambda t: 2.0 * reach * math.cos(2.0 * t),
+        "a": lambda t: -4.0 * reach * math.sin(2.0 * t),
+    }
 
 
 def _load(tau: float, inertia: float) -> dict[str, Callable[[float], float]]:

@@ -41,6 +41,8 @@ class DriverPort(NamedTuple):
     words: DriverWords
     units: Mapping[str, str] = MappingProxyType({})
     """units of quantities at the driver, by those of a driver that turns, where they differ"""
+    stop: str = ""
+    """the output of the end stops; empty without them"""
 
     def unit(self, unit: str) -> str:
         """The unit of a quantity at the driver that is in `unit` where the driver turns."""
@@ -98,7 +100,21 @@ ROTATING = DriverPort(
     ),
     DriverWords("motor torque", "angle"),
 )
-"""A driver that a motor turns."""
+"""A driver that a motor turns all the way round."""
+
+
+_END_STOPS = "{} of the end stops against the driver: above 0 behind the upper end of its range"
+
+
+@declaration
+class SwingingAnswer(RotatingAnswer):
+    """Acceleration, the torque on the shaft, and that of the end stops."""
+
+    end_stop_torque: Value = quantity("N.m", _END_STOPS.format("torque"), nominal=1000.0)
+
+
+SWINGING = ROTATING._replace(answer=SwingingAnswer, stop="end_stop_torque")
+"""A driver that a motor turns to and fro within a range."""
 
 
 _UNITS = {
@@ -149,11 +165,6 @@ def _sliding(name: str, rotating: type, words: str, fields: Fields = ()) -> type
     return made
 
 
-_END_STOPS = quantity(
-    "N",
-    "force of the end stops against the driver: above 0 behind the upper end of its range",
-    nominal=1000.0,
-)
 SLIDING = DriverPort(
     _sliding("WayMotion", ShaftMotion, "Motion of a driver that slides."),
     _sliding("WayPortValues", PortValues, "The load of a driver that slides, at the point (phi0, w0)."),
@@ -166,7 +177,7 @@ SLIDING = DriverPort(
         "WayAnswer",
         RotatingAnswer,
         "Acceleration of a driver that slides, and the force that it needs.",
-        [("end_stop_force", Value, _END_STOPS)],
+        [("end_stop_force", Value, quantity("N", _END_STOPS.format("force"), nominal=1000.0))],
     ),
     way_terminals(load=True),
     way_terminals(load=False),
@@ -177,5 +188,6 @@ SLIDING = DriverPort(
     ),
     DriverWords("force on the driver", "way"),
     MappingProxyType({unit: _UNITS[unit] for unit in ("rad", "rad/s", "N.m", "kg.m2")}),
+    "end_stop_force",
 )
 """A driver that a cylinder pushes."""

@@ -1,4 +1,4 @@
-"""The end stops of a driver that slides by itself. Standard library only: FMUs carry this file."""
+"""The end stops of a driver that moves by itself within a range. Standard library only: FMUs carry this file."""
 
 from __future__ import annotations
 
@@ -21,19 +21,32 @@ class EndStops:
     damping: Value = quantity("N.s/m", "damping of each", default=0.0, min=0.0, tunable=True)
 
 
-def usual_stops(force: float, mass: float, length: float) -> EndStops:
-    """Stops for a driver with the largest holding force [N], the largest reflected mass [kg] and the range [m].
+@declaration
+class SwingStops(EndStops):
+    """End stops of a driver that swings."""
+
+    stiffness: Value = quantity(
+        "N.m/rad", "torsional stiffness of each", default=1e8, above=0.0, max=1e15, tunable=True
+    )
+    damping: Value = quantity(
+        "N.m.s/rad", "torsional damping of each", default=0.0, min=0.0, max=1e15, tunable=True
+    )
+
+
+def usual_stops(force: float, mass: float, length: float, of: type[EndStops] = EndStops) -> EndStops:
+    """Stops for a driver with the largest holding force [N], the largest reflected mass [kg] and the range [m]; of
+    one that swings, the torque [N m], the inertia [kg m2] and the range [rad].
 
     The energy force * length compresses them by `GIVES` of the range; their damping is half of the critical one.
     """
     stiffness = 2.0 * force / (GIVES * GIVES * length)
-    return EndStops(stiffness=stiffness, damping=(stiffness * mass) ** 0.5)
+    return of(stiffness=stiffness, damping=(stiffness * mass) ** 0.5)
 
 
 class StopAction(NamedTuple):
-    """The action of the end stops: the `force` against the driver [N], 0 within the range, above 0 behind its upper
-    end and below 0 before its lower one; the `energy` in their springs [J]; and the part of the force that their
-    dampers take, `lost` [N]."""
+    """The action of the end stops: the `force` (of a driver that swings the torque) against the driver [N, N m], 0
+    within the range, above 0 behind its upper end and below 0 before its lower one; the `energy` in their springs
+    [J]; and the part of the force that their dampers take, `lost` [N, N m]."""
 
     force: Any
     energy: Any
@@ -41,7 +54,8 @@ class StopAction(NamedTuple):
 
 
 def stop_action(xp: Any, law: EndStops, span: tuple[float, float], q: Any, w: Any) -> StopAction:
-    """The action of the stops at both ends of the `span` [m] at way `q` [m] and speed `w` [m/s] of the driver.
+    """The action of the stops at both ends of the `span` [m, rad] at place `q` [m, rad] and speed `w` [m/s, rad/s] of
+    the driver.
 
     A stop never pulls: where its damper would, it holds back the spring. So the spring alone is conservative, and
     `lost` times `w` is never negative.

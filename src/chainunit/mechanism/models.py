@@ -133,13 +133,15 @@ class InverseMachine(LinkageModel, MachineModel):
     """Outputs whose derivatives are taken by differences, see `chainunit.core.model.Part`."""
 
     span: ClassVar[tuple[float, float]] = (0.0, 2.0 * math.pi)
-    """Places of the driver from which to which it goes: a whole turn [rad], or a way [m]."""
+    """Places of the driver from which to which it goes: a whole turn [rad], or its range [rad, m]."""
     driver_port: ClassVar[DriverPort] = ROTATING
     """The declarations of its driver, which turns or slides."""
     turns: ClassVar[bool] = True
-    """Whether its driver turns."""
+    """Whether its driver turns all the way round; else it goes to and fro within `span`."""
+    slides: ClassVar[bool] = False
+    """Whether its driver slides; else it turns."""
     end_stops: ClassVar[EndStops | None] = None
-    """The usual end stops of a driver that slides, at both ends of `span`."""
+    """The usual end stops of a driver with a range, at both ends of `span`."""
 
     def __init_subclass__(cls) -> None:
         own = vars(cls)
@@ -234,7 +236,7 @@ class InverseMachine(LinkageModel, MachineModel):
         stops = cls.end_stops
         if stops is None:
             return cls._direct_of(DirectMachine)
-        more = ("end_stops", EndStops, group(EndStops, "end stops of the driver", default=stops))
+        more = ("end_stops", type(stops), group(type(stops), "end stops of the driver", default=stops))
         return cls._direct_of(DirectMachine, [more])
 
     @classmethod
@@ -371,7 +373,7 @@ class DirectMachine(LinkageModel):
 
     @classmethod
     def _stops(cls, xp: Any, p: Any, x: Any) -> StopAction | None:
-        """The action of the end stops on the driver that slides; None for one that turns."""
+        """The action of the end stops on a driver with a range; None for one that turns round."""
         if cls.inverse.end_stops is None:
             return None
         return stop_action(xp, p.end_stops, cls.inverse.span, x.phi / p.ratio, x.w / p.ratio)
@@ -386,7 +388,7 @@ class DirectMachine(LinkageModel):
         fields["kinetic_energy"] += 0.5 * p.J_added * (x.w * x.w)
         fields["power"] = u.tau * x.w
         if stops is not None:
-            fields["end_stop_force"] = stops.force
+            fields[cls.inverse.driver_port.stop] = stops.force
             fields["potential_energy"] += stops.energy
             fields["dissipated_power"] += stops.lost * s.w
         return cls.Outputs(a=a, tau_bias=s.bias / p.ratio, J=s.J / (p.ratio * p.ratio), **fields)
@@ -394,7 +396,7 @@ class DirectMachine(LinkageModel):
 
 def acceleration(p: Any, u: Any, s: MachineState, stop: Any = 0.0) -> Any:
     """Motor acceleration [rad/s2]: (J_added + J) a = tau - tau_bias - stop/ratio at the motor shaft, with the force
-    `stop` of the end stops at the driver [N]."""
+    `stop` of the end stops at the driver [N], or their torque [N m]."""
     return (u.tau - (s.bias + stop) / p.ratio) / (p.J_added + s.J / (p.ratio * p.ratio))
 
 

@@ -151,10 +151,15 @@ def drawing(machine: Machine, phi: float | None = None) -> str:
     for way in ways.values():
         _rail(canvas, *map(to_page, way))
     if isinstance(crank, Crank):
-        # the circle of the crank pin
+        # the circle of the crank pin, or its arc
         radius = math.dist(at[crank.bar.pin], at[crank.end])
         x, y = at[crank.bar.pin]
-        canvas.add("circle", cx=x, cy=y, r=radius, fill="none", stroke="#999999", stroke_dasharray="4 4")
+        look = {"fill": "none", "stroke": "#999999", "stroke_dasharray": "4 4"}
+        if machine.model.turns:
+            canvas.add("circle", cx=x, cy=y, r=radius, **look)
+        else:
+            arc = map(to_page, _curve(linkage.places(orbit)[crank.end]))
+            canvas.add("polyline", points=" ".join(f"{x:.2f},{y:.2f}" for x, y in arc), **look)
     hanging = linkage.hanging(orbit)
     for pin in whole.linkage.ground:
         if pin in at:

@@ -45,15 +45,16 @@ def rails(turn: Mechanism) -> dict[str, tuple[tuple[float, float], tuple[float, 
     return ways
 
 
-def paths(turn: Mechanism) -> dict[str, tuple[Any, Any]]:
-    """The paths of all points that are not pins [m]; `turn` is the mechanism over a whole turn."""
+def paths(turn: Mechanism, further: str = "") -> dict[str, tuple[Any, Any]]:
+    """The paths of all points that are not pins, and of one `further` point [m]; `turn` is the mechanism over the
+    whole way of its driver."""
     topology, at = turn.topology, places(turn)
     pins = {pin for pin, _ in topology.joints}
     return {
         f"path of {point}": at[point]
         for points in topology.points.values()
         for point in points
-        if point in at and point not in pins
+        if point in at and (point not in pins or point == further)
     }
 
 

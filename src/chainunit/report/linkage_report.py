@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,7 +24,8 @@ from .motion import Animation, Clip, Reading
 from .task import Task, no_check
 
 PICTURES = ("linkage.svg", "linkage.png", "linkage_reactions.png", "linkage_stroke.png")
-_PICTURES_PER_TURN = 120
+_PICTURES = 120
+"""Pictures of a turn, or of the way there and back."""
 
 
 class LinkageQuestion(NamedTuple):
@@ -90,19 +91,30 @@ def _result(f: LinkageFindings, source: str) -> dict[str, Any]:
         "groups_in_words": f.sentence,
         "degrees_of_freedom": 1,
         "speed": _entry(f.speed, unit("rad/s")),
-        "turn": _of(f, f.turn, Layout(type(f.turn)).names),
+        **_forces_of(f),
         "groups": {name: _of(f, each, ("margin_at",)) for name, each in f.groups.items()},
-        "joints": {name: _of(f, each, ("peak_at",)) for name, each in f.joints.items()},
         "strokes": {name: _of(f, each, at_driver) for name, each in f.strokes.items()},
         "swings": {name: _of(f, each, at_driver) for name, each in f.swings.items()},
         "dead_centres": {name: _entry(places, unit("rad")) for name, places in f.dead_centres.items()},
         "angles": angles,
         "points": points,
-        "over_the_way": {
-            "driver": array_entry(f.q, unit("rad")),
-            **{name: array_entry(f.outputs[name], unit(of)) for name, of in (("tau", "N.m"), ("J", "kg.m2"))},
-        },
+        "over_the_way": {"driver": array_entry(f.q, unit("rad")), **_over_the_way(f)},
+        **({"back": _forces_of(f.back) | {"over_the_way": _over_the_way(f.back)}} if f.back else {}),
     }
+
+
+def _forces_of(f: LinkageFindings) -> dict[str, Any]:
+    """Effort at the driver, and reactions."""
+    return {
+        "turn": _of(f, f.turn, Layout(type(f.turn)).names),
+        "joints": {name: _of(f, each, ("peak_at",)) for name, each in f.joints.items()},
+    }
+
+
+def _over_the_way(f: LinkageFindings) -> dict[str, Any]:
+    """Effort and inertia at each place."""
+    unit = f.machine.model.driver_port.unit
+    return {name: array_entry(f.outputs[name], unit(of)) for name, of in (("tau", "N.m"), ("J", "kg.m2"))}
 
 
 def _opening(s: b.Source, f: LinkageFindings) -> Iterator[b.Block]:
@@ -181,29 +193,38 @@ def _reversals(s: b.Source, f: LinkageFindings, path: str) -> Iterator[b.Block]:
 
 def _animation(f: LinkageFindings) -> Animation:
     machine = f.machine
-    low, high = f.description.span
-    q = np.linspace(low, high, _PICTURES_PER_TURN + 1)
-    state = _state(f, q)
-    step = (len(f.q) - 1) // _PICTURES_PER_TURN
-    effort, unit = ("Torque" if machine.model.turns else "Force"), machine.model.driver_port.unit
+    low, _ = f.description.span
+    step = (2 if f.back else 1) * (len(f.q) - 1) // _PICTURES
+    q, speed = f.q[::step], np.full(_PICTURES // (2 if f.back else 1) + 1, f.speed)
     time = (q - low) / f.speed
+    if f.back:  # the last place is that of the way back, too
+        q, speed = np.concatenate([q, q[-2::-1]]), np.concatenate([speed, -speed[1:]])
+        time = np.concatenate([time, time[1:] + time[-1]])
+
+    def over(values: Callable[[LinkageFindings], Any]) -> Any:
+        """A quantity at the places of the pictures."""
+        forth = values(f)[::step]
+        return np.concatenate([forth, values(f.back)[::-1][::step][1:]]) if f.back else forth
+
+    state = _state(f, q, speed)
+    effort, unit = ("Force" if machine.model.slides else "Torque"), machine.model.driver_port.unit
     description, driver = f.description, state.m.linkage.driver
     titles = {name: description.variable("joint", name) for name in description.structure.joints}
     receivers = description.parts(MATH, machine.p, machine.model.Inputs()).receivers
     joints = {variable: receivers[name][0][0] for name, variable in titles.items()}
-    arrows = linkage.arrows(
-        titles,
-        joints,
-        lambda output: (f.outputs[f"{output}.fx"][::step], f.outputs[f"{output}.fy"][::step]),
-        named=True,
-    )
+
+    def force(output: str) -> tuple[Any, Any]:
+        x, y = (over(lambda g, axis=axis: g.outputs[f"{output}.{axis}"]) for axis in ("fx", "fy"))  # type: ignore[misc]
+        return x, y
+
     readings = (
         Reading("Place of the driver", q, unit("rad")),
-        Reading(f"{effort} at the driver", f.outputs["tau"][::step] * machine.ratio, unit("N.m")),
+        Reading(f"{effort} at the driver", over(lambda g: g.outputs["tau"]) * machine.ratio, unit("N.m")),
     )
     clip = Clip(
-        "turn", "At constant speed", time, linkage.places(state.m), readings,
-        (*arrows, *linkage_loads.load_arrows(state)), blocks=linkage.blocks(state.m),
+        "turn", f"{'There and back at' if f.back else 'At'} constant speed", time, linkage.places(state.m), readings,
+        (*linkage.arrows(titles, joints, force, named=True), *linkage_loads.load_arrows(state)),
+        blocks=linkage.blocks(state.m),
     )  # fmt: skip
     shown = linkage.shown_pins(state.m.linkage)
     return Animation(
@@ -215,64 +236,105 @@ def _animation(f: LinkageFindings) -> Animation:
         hanging=linkage.hanging(state.m),
         orbit=(driver.bar.pin, driver.end) if machine.model.turns else None,
         names=linkage.labels(state.m.linkage),
-        paths=linkage.paths(state.m),
+        paths=linkage.paths(state.m, driver.end if f.back else ""),
         rails=linkage.rails(state.m),
     )
 
 
-def _state(f: LinkageFindings, q: Any) -> MachineState:
-    """The machine at these places of its driver, with the loads of normal running."""
+def _state(f: LinkageFindings, q: Any, speed: Any) -> MachineState:
+    """The machine at these places and speeds of its driver, with the loads of normal running."""
     machine = f.machine
     feed = machine.model.feed_layout.by_name(machine.model.Feed())
-    return machine.state(machine.inputs({"phi": q * machine.ratio, "w": f.speed * machine.ratio, **feed}))
+    return machine.state(machine.inputs({"phi": q * machine.ratio, "w": speed * machine.ratio, **feed}))
+
+
+def _ways(f: LinkageFindings) -> dict[str, LinkageFindings]:
+    """The findings by the direction in which the driver goes, without a name where there is one alone."""
+    return {"forth": f, "back": f.back} if f.back else {"": f}
 
 
 def _forces(s: b.Source, f: LinkageFindings) -> Iterator[b.Block]:
+    there = ", there and back over its range" if f.back else ""
     yield b.Text(
-        s.line("Inverse dynamics at {=speed:4} of the driver, with the loads of normal running."), "lead"
+        s.line(f"Inverse dynamics at {{=speed:4}} of the driver{there}, with the loads of normal running."),
+        "lead",
     )
-    turns, unit = f.machine.model.turns, f.machine.model.driver_port.unit
-    effort, inertia_word = ("torque", "inertia") if turns else ("force", "mass")
-    yield b.Table(
-        s.rows(type(f.turn), "turn"), title=f"{capital(effort)}, power and {inertia_word} at the driver"
-    )
+    slides = f.machine.model.slides
+    effort, inertia_word = ("force", "mass") if slides else ("torque", "inertia")
     names = Layout(JointTurn).names
-    rows = (
-        b.TableRow((_title(f, name), *(s.number(f"joints.{name}.{each}") for each in names)))
-        for name in f.joints
-    )
-    yield b.Table(
-        tuple(rows), b.heads("joint", "largest force", "at", "RMS", "largest moment"), title="Reactions"
-    )
+    for way in _ways(f):
+        path, on = "back." if way == "back" else "", f", on the way {way}" if way else ""
+        title = f"{capital(effort)}, power and {inertia_word} at the driver{on}"
+        yield b.Table(s.rows(type(f.turn), f"{path}turn"), title=title)
+        rows = (
+            b.TableRow((_title(f, name), *(s.number(f"{path}joints.{name}.{each}") for each in names)))
+            for name in f.joints
+        )
+        heads = b.heads("joint", "largest force", "at", "RMS", "largest moment")
+        yield b.Table(tuple(rows), heads, title=f"Reactions{on}")
+    yield from _figures(f, effort, inertia_word)
+
+
+def _figures(f: LinkageFindings, effort: str, inertia_word: str) -> Iterator[b.Block]:
+    """The figures over the way of the driver, with a curve, or of reactions a panel, for each direction."""
+    model, unit, ratio, ways = f.machine.model, f.machine.model.driver_port.unit, f.machine.ratio, _ways(f)
     angle = fig.Axis(
-        "angle of the driver" if turns else "way of the driver", unit("rad"), step=45.0 if turns else None
+        "way of the driver" if model.slides else "angle of the driver",
+        unit("rad"),
+        step=45.0 if model.turns else None,
     )
-    ratio = f.machine.ratio
-    curves = (
-        (fig.Axis(f"{effort} at the driver", unit("N.m")), f.outputs["tau"] * ratio),
-        (fig.Axis("power at the driver", "W"), f.outputs["tau"] * ratio * f.speed),
-        (fig.Axis(f"reflected {inertia_word}", unit("kg.m2"), low=0.0), f.outputs["J"] * ratio**2),
+    panels: tuple[tuple[fig.Axis, Callable[[LinkageFindings], Any]], ...] = (
+        (fig.Axis(f"{effort} at the driver", unit("N.m")), lambda g: g.outputs["tau"] * ratio),
+        (fig.Axis("power at the driver", "W"), lambda g: g.outputs["tau"] * ratio * g.speed),
+        (fig.Axis(f"reflected {inertia_word}", unit("kg.m2"), low=0.0), lambda g: g.outputs["J"] * ratio**2),
     )
     title = f"{capital(effort)}, power and {inertia_word}"
     yield fig.Figure(
         "linkage-turn",
         f"{title} over the way of the driver",
         f"{title} at the driver over its way.",
-        fig.stacked(angle, ((axis, (fig.Curve(axis.label, f.q, y, in_legend=False),)) for axis, y in curves)),
+        fig.stacked(
+            angle,
+            (
+                (
+                    axis,
+                    tuple(
+                        fig.Curve(way or axis.label, f.q, of(each), look, in_legend=bool(way) and k == 0)
+                        for look, (way, each) in enumerate(ways.items())
+                    ),
+                )
+                for k, (axis, of) in enumerate(panels)
+            ),
+        ),
         file=PICTURES[1],
     )
     yield from linkage_loads.force_over_stroke(
-        {"": _state(f, f.q)}, {"": "a turn at constant speed"}, PICTURES[3]
+        {way: _state(f, f.q, each.speed) for way, each in ways.items()},
+        {way: f"on the way {way}" if way else "a turn at constant speed" for way in ways},
+        PICTURES[3],
     )
-    forces = tuple(
-        fig.Curve(name, f.q, np.hypot(f.outputs[f"{v}.fx"], f.outputs[f"{v}.fy"]), look=k)
-        for k, name in enumerate(f.joints)
-        for v in [f.description.variable("joint", name)]
-    )
+    forces = {
+        way: tuple(
+            fig.Curve(
+                name,
+                f.q,
+                np.hypot(each.outputs[f"{v}.fx"], each.outputs[f"{v}.fy"]),
+                look=k,
+                in_legend=way != "back",
+            )
+            for k, name in enumerate(f.joints)
+            for v in [f.description.variable("joint", name)]
+        )
+        for way, each in ways.items()
+    }
     yield fig.Figure(
         "linkage-reactions", "Reactions over the way of the driver",
         "The force in each joint over the way of the driver.",
-        ((fig.Panel(angle, fig.Axis("force", "N", low=0.0), forces),),), file=PICTURES[2],
+        tuple(
+            (fig.Panel(angle, fig.Axis(f"force{', ' * bool(way)}{way}", "N", low=0.0), curves),)
+            for way, curves in forces.items()
+        ),
+        file=PICTURES[2],
     )  # fmt: skip
 
 

@@ -1,4 +1,5 @@
-"""A linkage over the way of its driver at constant speed, by inverse dynamics: motion, torque, inertia, reactions.
+"""A linkage over the way of its driver at constant speed, by inverse dynamics: motion, torque, inertia, reactions. A
+driver that swings goes there and back.
 
 Extremes and means are taken over the whole way, not at the `PLACES` of the curves alone."""
 
@@ -6,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -104,6 +105,8 @@ class LinkageFindings:
     """places of the driver at which each of these joints and links turns back, by the name of its variables"""
     limits: dict[str, tuple[float, float]]
     """least and largest value of the angle of each link and of each place of a point, by output"""
+    back: LinkageFindings | None = None
+    """the findings on the way back, at the same places, of a driver that swings"""
 
     @property
     def description(self) -> LinkageDescription:
@@ -150,7 +153,15 @@ class _Way:
 
 
 def linkage_findings(machine: Machine, speed: float) -> LinkageFindings:
-    """The linkage over its way at a constant `speed` of the driver [rad/s], with the loads of normal running."""
+    """The linkage over its way at a constant `speed` of the driver [rad/s, m/s], with the loads of normal running; of
+    a driver that swings there and, as `back`, at the opposite speed."""
+    if machine.model.turns or machine.model.slides:
+        return _findings(machine, speed)
+    return replace(_findings(machine, abs(speed)), back=_findings(machine, -abs(speed)))
+
+
+def _findings(machine: Machine, speed: float) -> LinkageFindings:
+    """The linkage over its way in one direction."""
     description: LinkageDescription = machine.model.described_by  # type: ignore[attr-defined]
     q = np.linspace(*description.span, PLACES)
     way = _Way(machine, speed)
@@ -259,13 +270,13 @@ def _motions(
             f"{description.variable('link', name)}.w",
         )
         for name in structure.links
-        if description.link_turns[name][0] == 0.0
+        if description.link_turns[name][0] == 0.0 or not turns
     ]
     _, outputs = way.state(q)
     parts = [each for each in parts if np.ptp(outputs[each[2]]) > STANDS]
     dead_centres = roots(way.outputs(rate for *_, rate in parts), q, around=turns) if parts else []
     for (name, of, output, _), back in zip(parts, dead_centres, strict=True):
-        # a driver that slides has ends of its own
+        # a driver with a range has ends of its own
         places = back if turns and len(back) else np.array([q[0], *back, q[-1]])
         course = way.outputs([output])(places)[0]
         low, high = int(np.argmin(course)), int(np.argmax(course))

@@ -4,6 +4,7 @@ them, and the example that gives the values that the file leaves out."""
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from datetime import date
 from functools import cache, lru_cache
@@ -162,6 +163,14 @@ def _machine_model(table: Any, source: str) -> type[MachineModel]:
     if table.machine.lower().endswith(LINKAGE):
         with refusal_prefix("system.machine: ", "system.machine"):
             model = read_linkage(beside(table.machine, source))
+            if not (model.turns or model.slides):
+                low, high = (math.degrees(end) for end in model.span)
+                raise InputError(
+                    f"{table.machine} has a driver that swings from {low:g} deg to {high:g} deg, and a study, a "
+                    "sizing and a sweep need one that turns all the way round; chainunit linkage --speed shows its "
+                    "forces there and back, chainunit export makes an FMU that takes its motion, or, with --direct, "
+                    "its torque"
+                )
             if not model.turns:
                 raise InputError(
                     f"{table.machine} has a driver that slides, and a motor turns; export it as an FMU, or drive it "

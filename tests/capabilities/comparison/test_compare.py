@@ -199,6 +199,19 @@ def test_a_result_beside_itself_differs_in_nothing(folder, tmp_path):
     assert f"All {data['given_equal']['value']:.0f} given values are the same." in done.stdout
 
 
+def test_numbers_have_the_noun_of_a_common_driver(folder, tmp_path):
+    one, other = (json.loads((folder / "a" / "result.json").read_text()) for _ in range(2))
+    one["driver"] = other["driver"] = "eccentric"
+    for driver, noun in (("eccentric", "eccentric"), ("crank", "driver")):
+        other["driver"] = driver
+        files = [tmp_path / "one.json", tmp_path / "other.json"]
+        for file, data in zip(files, (one, other), strict=True):
+            file.write_text(json.dumps(data))
+        found = compare(*map(read_result, files))
+        titles = {each["title"] for run in found["runs"].values() for each in run["measures"].values()}
+        assert f"{noun} torque, peak" in titles and not any("crank torque" in title for title in titles)
+
+
 def test_values_of_one_alone_leave_no_empty_table(folder, tmp_path):
     """On the terminal, where the given values of an event of one alone are left out."""
     (tmp_path / "b").mkdir()

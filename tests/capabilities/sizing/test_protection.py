@@ -430,9 +430,8 @@ def test_a_recommendation_rests_on_right_runs_alone(on_line):
     # a jam that counts as wrong does not decide the torque of the rocker either
     right = recommended_setting(without("jam_left", "jam_right"))
     ordered = as_dict(without("blocked"))["sizing"]["gear"]["decided_by"]
-    assert ordered.endswith(
-        "; a lower bound, as the energy balance is not kept (the rocker is blocked): shorten run.step before you order"
-    )
+    wrong = "the energy balance is not kept (the rocker is blocked)"
+    assert ordered.endswith(f"; a lower bound, as {wrong}: shorten run.step before you order")
     assert _rocker_until(on_line, right) < _rocker_until(on_line, kept)
     assert set(kept.overloads) == set(sizing_of(on_line).setting.overloads) - {"blocked"} and kept.wrong == [
         "blocked"

@@ -16,6 +16,8 @@ from ...mechanism.machine import Mechanism
 
 PLACES = 720
 """Places over the span at which a group is looked at."""
+_ROUNDED = 2e-3
+"""Part of a length by which its two limits, rounded towards each other, may come closer."""
 
 
 def open_group(links: Sequence[str], where: str, hint: str = "") -> InputError:
@@ -81,7 +83,7 @@ def gap_hint(
         return ""
     fits = []
     for name, _, low, high in wanted:
-        if low < high:
+        if high - low > _ROUNDED * low:
             most = "" if high == math.inf else f" and {_mm(high, -1.0)}"
             fits.append(f"a length of {name} {'between' if most else 'above'} {_mm(low, 1.0)}{most}")
     return f"{words}; {' or '.join(fits)} closes it all the way" if fits else f"{words}; change both lengths"

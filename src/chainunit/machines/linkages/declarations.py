@@ -170,6 +170,6 @@ RESERVED = frozenset(
         AddedInertia,
         LoadInput,
     )
-    for name in (*names_of(of), "end_stops", "end_stop_force")
+    for name in (*names_of(of), "end_stops", "end_stop_force", "end_stop_torque")
 )
 """Names of variables that every machine has."""

@@ -7,7 +7,8 @@ Each entry that is a quantity is a number in SI units, a text with a unit ("80 m
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +39,7 @@ from .model import machine_of
 from .shared_pins import shared_pins
 from .start import StartPose
 from .structure import CYLINDER, JointEntry
+from .way import WHOLE
 
 TABLES = (
     "title", "name", "about", "gravity", "ratio", "parameters", "inputs", "tables", "ground", "driver", "links",
@@ -103,7 +105,7 @@ class _LinkageReader(LoadReader):
         self.refuse()
         alike = alike_points(self.points, self.named_points(links, loads))
         self.all(freedom_faults(links, joints, driver, alike))
-        start = self.start(parameters, links, joints, driver)
+        start = self.start(parameters, links, joints, driver, span)
         self.refuse()
         described = {
             "name": name,
@@ -301,7 +303,7 @@ class _LinkageReader(LoadReader):
         return joint
 
     def driver(self, joints: list[dict[str, Any]]) -> tuple[dict[str, Any], list[float] | None]:
-        """The driver, and the range of one that slides."""
+        """The driver, and its range; None for one that turns all the way round."""
         table = self.table("driver")
         self.keys("driver", table, _DRIVER_KEYS)
         if "joint" in table:
@@ -324,16 +326,31 @@ class _LinkageReader(LoadReader):
                 "name of a point in [ground]",
             )
             return {}, None
-        if "range" in table:
-            self.fault(
-                "driver.range", "belongs to a driver that slides; one that turns goes all the way round"
-            )
         positive = table.get("positive", "counter-clockwise")
         if positive not in ("clockwise", "counter-clockwise"):
             self.fault("driver.positive", f'is {shown(positive)}; must be "clockwise" or "counter-clockwise"')
         zero = self.entry("driver.zero", table.get("zero", 0.0), "rad")
         sense = -1.0 if positive == "clockwise" else 1.0
-        return {"joint": own[0]["name"], "link": link, "linear": False, "zero": zero, "sense": sense}, None
+        driver = {"joint": own[0]["name"], "link": link, "linear": False, "zero": zero, "sense": sense}
+        if "range" not in table:
+            return driver, None
+        return driver | {"swings": True}, self.span(table, "angle", "rad", '["-20 deg", "75 deg"]')
+
+    def span(self, table: Mapping[str, Any], place: str, unit: str, example: str) -> list[float]:
+        """The range of the driver, between two values of its `place`."""
+        span = [0.0, 0.0]
+        with self.at("driver.range"):
+            given = table.get("range")
+            if not isinstance(given, list) or len(given) != 2:
+                raise InputError(f"must be the least and the most {place} of the driver, such as {example}")
+            span = [self.number("driver.range", each, unit) for each in given]
+            if not span[0] < span[1]:
+                raise InputError("must rise")
+            if unit == "rad" and span[1] - span[0] > WHOLE * (1.0 + 1e-12):
+                raise InputError(
+                    f"is {shown(given)}, more than a turn; for a driver that turns all the way round leave it out"
+                )
+        return span
 
     def slide(
         self, table: Mapping[str, Any], joints: list[dict[str, Any]]
@@ -353,14 +370,7 @@ class _LinkageReader(LoadReader):
             )
             return {}, None
         link = joint["by"][0] if joint["on"][0] == GROUND else joint["on"][0]
-        span = [0.0, 0.0]
-        with self.at("driver.range"):
-            given = table.get("range")
-            if not isinstance(given, list) or len(given) != 2:
-                raise InputError("must be the least and the most way of the driver, such as [0.2, 0.6]")
-            span = [self.number("driver.range", each, "m") for each in given]
-            if not span[0] < span[1]:
-                raise InputError("must rise")
+        span = self.span(table, "way", "m", "[0.2, 0.6]")
         return {"joint": joint["name"], "link": link, "linear": True}, span
 
     # the start pose
@@ -371,6 +381,7 @@ class _LinkageReader(LoadReader):
         links: list[dict[str, Any]],
         joints: list[dict[str, Any]],
         driver: dict[str, Any],
+        span: Sequence[float] | None,
     ) -> dict[str, Any]:
         """The value of the driver at the start, and the poses of all links there."""
         table = self.table("start")
@@ -397,6 +408,10 @@ class _LinkageReader(LoadReader):
         value = 0.0
         with self.at("start.phi"):
             value = self.number("start.phi", table.get("phi", 0.0), "m" if driver["linear"] else "rad")
+            if span and not driver["linear"] and not span[0] <= value <= span[1]:
+                given = f"is {shown(table['phi'])}" if "phi" in table else "is 0 where it is not given"
+                low, high = (f"{math.degrees(end):g} deg" for end in span)
+                raise InputError(f"{given}; must be an angle in driver.range, from {low} to {high}")
         self.given_pose(table, pose)
         if driver["linear"]:
             pose.slide = next(each for each, _ in entries if each.name == driver["joint"]), value

@@ -55,7 +55,7 @@ class LoadReader(EntryReader):
                 places, values = self.columns(key, table, over)
                 of_x, of_value = places[0][1], values[0][1]
                 at = [x for x, _ in places]
-                turns = over == "phi" and of_x == "rad"
+                turns = over == "phi" and of_x == "rad" and "range" not in self.table("driver")
                 if any(b <= a for a, b in pairwise(at)):
                     raise InputError(f"{over} must rise" + ", within less than one turn" * turns)
                 if turns and at[-1] - at[0] >= 2.0 * math.pi:

@@ -20,20 +20,20 @@ from ...core.errors import GeometryError, InputError
 from ...core.messages import unit_behind
 from ...core.model import About, FmuData, Making, Requirement, keep
 from ...core.planar import ZERO
-from ...core.quantities import Value, declared_class, group, quantity
+from ...core.quantities import Layout, Value, declared_class, group, quantity
 from ...groups.loads import GuideLosses, PinLosses, Weight
 from ...groups.triad import MOST_MISFIT
 from ...mechanism.assur import GROUND, PRISMATIC
 from ...mechanism.curves import TableCurve
-from ...mechanism.driver_ports import ROTATING, SLIDING
-from ...mechanism.end_stops import EndStops, usual_stops
+from ...mechanism.driver_ports import ROTATING, SLIDING, SWINGING
+from ...mechanism.end_stops import EndStops, SwingStops, usual_stops
 from ...mechanism.expressions import expression, value_of
 from ...mechanism.extremes import MotionExtreme
 from ...mechanism.linkage import Linkage
 from ...mechanism.machine import MachineState, Mechanism, derived_numbers
 from ...mechanism.models import InverseMachine
-from .closing import dead_group, gap_hint, open_group
 from .declarations import LinkageMotion, LinkBody, common_parameters, field_of
+from .following import LEAST_MARGIN, FollowedLinkage
 from .geometry import LinkGeometry
 from .loads import (
     ForceLaw,
@@ -47,17 +47,17 @@ from .loads import (
     requirement_of_width,
     widths_of,
 )
-from .narrow import check_triads, lesser, lows, turns_of_triads
+from .narrow import lesser, turns_of_triads
 from .outputs import DescribedLinkage, LinkageOutputs
 from .parts import LinkageParts
 from .probes import constant_outputs, description_axis, notes_on, repeated_outputs
 from .structure import check_groups, structure_of
+from .way import DriverWay
 
-ANGLES = 48
-"""Places of the driver at which a linkage is checked to close."""
 STANDARD_GRAVITY = 9.81
-LEAST_MARGIN = 1e-3
-"""Least margin of a group: closer to a dead position its forces have no limit."""
+_FIXED_RATIO = (
+    "gear ratio, motor turns per driver turn; phi has its bounds at this one, so that the file alone sets it"
+)
 
 
 def machine_of(text: str) -> type[InverseMachine]:
@@ -82,11 +82,11 @@ class LinkageDescription(LinkageOutputs):
     def __init__(self, data: Mapping[str, Any], text: str) -> None:
         self.data, self.text = data, text
         self.structure = structure_of(data)
-        driver = self.structure.driver
+        self.way = DriverWay.of(data)
         check_groups(self.structure, data.get("groups", ()))
         tables = data.get("tables", {})
         self.curves = {
-            name: TableCurve(each["places"], each["values"], each["over"] == "phi" and not driver.linear)
+            name: TableCurve(each["places"], each["values"], each["over"] == "phi" and self.way.turns)
             for name, each in tables.items()
         }
         self.tables = {name: self.curves[name] for name, each in tables.items() if each["over"] == "phi"}
@@ -95,21 +95,19 @@ class LinkageDescription(LinkageOutputs):
         self.Parameters = self._parameters()
         inputs = [field_of(each) for each in data.get("inputs", ())]
         self.port, motion = ROTATING, cast("type", LinkageMotion)
-        if driver.linear:
-            low, high = data["range"]
-            middle = 0.5 * (low + high)
-            way = quantity("m", "way of the driver", default=middle, min=low, max=high)
-            start = quantity("m", "way of the driver at the start", default=middle, min=low, max=high)
-            inputs = [("phi", Value, way), *inputs]
-            motion = SLIDING.motion
-            self.port = SLIDING._replace(
-                start=declared_class("WayStart", (SLIDING.start,), [("phi_start", Value, start)])
+        if self.way.linear:
+            self.port, motion = SLIDING, SLIDING.motion
+        if not self.way.turns:
+            port = self.port if self.way.linear else SWINGING
+            start = declared_class(
+                port.start.__name__, (port.start,), [self._in_range(port.start, "phi_start")]
             )
+            self.port, inputs = port._replace(start=start), [self._in_range(motion, "phi"), *inputs]
         self.Inputs = declared_class("Inputs", (motion,), inputs)
         p, u = self.Parameters(), self.Inputs()
         self.sides = dict(LinkageParts(LinkGeometry(MATH, self.structure, self.values(p, u))).sides)
         self.sides |= turns_of_triads(self.linkage(MATH, p, u))
-        self.link_turns = self._followed(p, u)
+        self.link_turns = self._turns(p)
         self._check_extremes()
         self.widths = (
             checked_widths(data["loads"], self.values(self._ready(), u)) if widths_of(data["loads"]) else ()
@@ -125,8 +123,24 @@ class LinkageDescription(LinkageOutputs):
                 name, words = self.variable("link", link["name"]), f"link {link['name']}"
                 fields.append((name, LinkBody, group(LinkBody, words, default=LinkBody(**own))))
         guides = any(j.kind == PRISMATIC for j in self.structure.joints.values())
-        common = common_parameters(self.structure.driver.linear, guides, self.data["common"])
+        common = common_parameters(self.way.linear, guides, self.data["common"])
+        if self.way.swings:
+            ratio = self._ratio
+            fields.append(("ratio", Value, quantity("1", _FIXED_RATIO, default=ratio, min=ratio, max=ratio)))
         return declared_class("Parameters", (common,), fields)
+
+    @property
+    def _ratio(self) -> float:
+        """The gear ratio of the file."""
+        return float(self.data["common"].get("ratio", 1.0))
+
+    def _in_range(self, declared: type, name: str) -> tuple[str, Any, Any]:
+        """The field of a declaration with the bounds of the driver's range, at the ratio of the file."""
+        q = next(v for v in Layout(declared).variables if v.name == name).quantity
+        low, high = (self._ratio * end for end in self.span)
+        ends = " to ".join(f"{math.degrees(end):g} deg" for end in self.span)
+        words = q.template if self.way.linear else f"{q.template}; range of the driver: {ends}"
+        return name, Value, quantity(q.unit, words, default=0.5 * (low + high), min=low, max=high)
 
     def values(self, p: Any, u: Any) -> dict[str, Any]:
         """The quantities that expressions may name."""
@@ -168,7 +182,7 @@ class LinkageDescription(LinkageOutputs):
     def _extreme(self, name: str, parts: LinkageParts) -> MotionExtreme:
         """An extreme of the motion, by its name in expressions."""
         kind, link, point, axis = parts_of_extreme(name)
-        frame, ends = parts.frames[link], self.structure.driver.linear
+        frame, ends = parts.frames[link], not self.way.turns
         at = frame.coordinates(parts.geometry.point(link, point) if point else ZERO)
 
         def coordinate(xp: Any, m: Any) -> tuple[Any, Any, Any]:
@@ -191,7 +205,7 @@ class LinkageDescription(LinkageOutputs):
         for name in self.extremes:
             extreme = parts_of_extreme(name)
             link = extreme.link
-            if extreme.axis == "angle" and self.link_turns[link][0]:
+            if extreme.axis == "angle" and self.way.turns and self.link_turns[link][0]:
                 raise InputError(
                     f"{name}: {link} turns all the way round, and its angle has no extremes; take those of a "
                     "point, or of a link that swings",
@@ -225,15 +239,12 @@ class LinkageDescription(LinkageOutputs):
         frame = parts.frames[link]
         return lambda xp, m: self.angle(xp, link, description_axis(m.links[link].u, frame), m.q)
 
-    # the rotation of links over the turn
+    # the way of the driver
 
     @property
     def span(self) -> tuple[float, float]:
-        """The least and the largest place of the driver: a turn from the start on [rad], or its range [m]."""
-        if self.data["driver"]["linear"]:
-            low, high = self.data["range"]
-            return float(low), float(high)
-        return self.structure.start, self.structure.start + 2.0 * math.pi
+        """The least and the largest place of the driver: a turn from the start on [rad], or its range [rad, m]."""
+        return self.way.span
 
     @property
     def angle_counts(self) -> str:
@@ -244,76 +255,27 @@ class LinkageDescription(LinkageOutputs):
 
     def places(self) -> list[float]:
         """Places of the driver from the start on, around or over its range."""
-        driver = self.data["driver"]
-        start = self.structure.start
-        if driver["linear"]:
-            low, high = self.data["range"]
-            return [low + (high - low) * k / ANGLES for k in range(ANGLES + 1)]
-        return [start + 2.0 * math.pi * k / ANGLES for k in range(ANGLES)]
+        return self.way.places()
 
-    def _followed(self, p: Any, u: Any) -> dict[str, tuple[float, float]]:
-        """For each link its turns per turn of the driver, and the middle of the rest of its angle [rad].
+    def _followed(self, p: Any) -> FollowedLinkage:
+        """The linkage with these parameters over the way of its driver."""
+        # extremes depend on the rotation of the links
+        linkage = replace(self.linkage(MATH, p, self.Inputs()), extremes=())
+        return FollowedLinkage(self.structure, self.way, linkage)
 
-        Raises
-        ------
-        InputError
-            where the linkage does not close, or passes a dead position, with the place of the driver.
-        """
-        # extremes depend on what is looked for here
-        linkage = replace(self.linkage(MATH, p, u), extremes=())
-        parts = linkage.parts
+    def _turns(self, p: Any) -> dict[str, tuple[float, float]]:
+        """See `FollowedLinkage.turns`; a refusal names the range of the driver in which the linkage closes."""
+        followed = self._followed(p)
         try:
-            derived = derived_numbers(MATH, linkage)
-        except (ArithmeticError, ValueError):
-            raise self._closing(linkage, ()) from None
-        check_triads(linkage, derived)
-        places = self.places()
-        around = [*places, places[0] + 2.0 * math.pi] if not self.data["driver"]["linear"] else places
-        angles: dict[str, list[float]] = {}
-        signs: list[float] = []
-        margins_over_way: list[list[float]] = []
-        for q in around:
-            try:
-                m = Mechanism(MATH, linkage, q, derived)
-            except (ArithmeticError, ValueError):
-                raise self._closing(linkage, derived) from None
-            margins = m.margins()
-            signs = signs or [math.copysign(1.0, margin) for margin in margins]
-            margins_over_way.append([margin * sign for margin, sign in zip(margins, signs, strict=True)])
-            for each, margin in zip(self.structure.groups, margins_over_way[-1], strict=True):
-                if not margin > LEAST_MARGIN:
-                    raise dead_group(each.links, self._at(q))
-            for name in self.structure.links:
-                axis = description_axis(m.links[name].u, parts.frames[name])
-                angle = math.atan2(axis.y, axis.x)
-                before = angles.setdefault(name, [self.structure.poses[name][2]])
-                before.append(before[-1] + math.remainder(angle - before[-1], 2.0 * math.pi))
-
-        def margins_at(q: float) -> list[float]:
-            margins = Mechanism(MATH, linkage, q, derived).margins()
-            return [margin * sign for margin, sign in zip(margins, signs, strict=True)]
-
-        for k, q, least in lows(margins_at, margins_over_way, around):
-            links = self.structure.groups[k].links
-            if not least > LEAST_MARGIN:
-                if math.isnan(least):
-                    raise open_group(links, self._at(q), self._gap(linkage, k, derived, q))
-                raise dead_group(links, self._at(q))
-        turns = {}
-        for name, samples in angles.items():
-            samples = samples[1:]
-            rate = (
-                0.0 if self.data["driver"]["linear"] else round((samples[-1] - samples[0]) / (2.0 * math.pi))
-            )
-            rest = [angle - rate * (q - around[0]) for angle, q in zip(samples, around, strict=True)]
-            turns[name] = rate, 0.5 * (min(rest) + max(rest)) - rate * around[0]
-        return turns
+            return followed.turns()
+        except InputError as error:
+            raise InputError(f"{error}{followed.range_words()}", key=error.key) from None
 
     def obstacle(self, p: Any) -> str:
         """The sentence on the place at which the linkage with these parameters does not close or jams, with the
         parameters; empty where there is none."""
         try:
-            self._followed(p, self.Inputs())
+            self._followed(p).turns()
         except InputError as error:
             given = ", ".join(
                 f"{each['name']} = {getattr(p, each['name']):g}{unit_behind(each['unit'])}"
@@ -321,30 +283,6 @@ class LinkageDescription(LinkageOutputs):
             )
             return f"{error}{f' ({given})' * bool(given)}"
         return ""
-
-    def _at(self, q: float) -> str:
-        if self.data["driver"]["linear"]:
-            return f"{self.data['driver']['joint']} = {q:.6g} m"
-        return f"{math.degrees(q) % 360.0:.4g} deg of {self.data['driver']['link']}"
-
-    def _gap(self, linkage: Linkage, k: int, derived: Sequence[Any], q: float) -> str:
-        """Words on the gap in the group `k` of the structure; see `gap_hint`."""
-        number = k - (len(self.structure.groups) - len(linkage.groups))
-        return gap_hint(linkage, number, derived, q, self.span) if number >= 0 else ""
-
-    def _closing(self, linkage: Linkage, derived: Sequence[Any]) -> InputError:
-        """The refusal with the first place at which the linkage does not close, and the group that does not."""
-        groups = self.structure.groups
-        behind_driver = len(groups) - len(linkage.groups)
-        for q in self.places():
-            for k, each in enumerate(groups):
-                number = k + 1 - behind_driver
-                part = linkage.before(number) if number < len(linkage.groups) else linkage
-                try:
-                    Mechanism(MATH, part, q, derived[: part.derived_count])
-                except (ArithmeticError, ValueError, IndexError):
-                    return open_group(each.links, self._at(q), self._gap(linkage, k, derived, q))
-        return InputError("the linkage does not close: change its lengths", key="links")
 
     # the model
 
@@ -355,8 +293,8 @@ class LinkageDescription(LinkageOutputs):
         return p
 
     def end_stops(self) -> EndStops | None:
-        """The usual end stops of a driver that slides, for its start values; None for one that turns."""
-        if not self.structure.driver.linear:
+        """The usual end stops of a driver with a range, for its start values; None for one that turns round."""
+        if self.way.turns:
             return None
         p, u = self._ready(), self.Inputs()
         linkage, derived = self.linkage(MATH, p, u), p.derived
@@ -365,7 +303,7 @@ class LinkageDescription(LinkageOutputs):
         low, high = self.span
         # a driver that nothing loads still stops its own weight
         force = max(mass * STANDARD_GRAVITY, *(abs(state.bias) for state in states))
-        return usual_stops(force, mass, high - low)
+        return usual_stops(force, mass, high - low, EndStops if self.way.linear else SwingStops)
 
     def model(self) -> type[InverseMachine]:
         """The model."""
@@ -406,7 +344,7 @@ class LinkageDescription(LinkageOutputs):
             constant = constant_outputs(described.structure, described.variable)
             driver_port = described.port
             span = described.span
-            turns = not described.structure.driver.linear
+            turns, slides = described.way.turns, described.way.linear
             end_stops = described.end_stops()
             angle_counts = described.angle_counts
             Parameters = described.Parameters
@@ -481,4 +419,4 @@ class LinkageDescription(LinkageOutputs):
     @property
     def notes(self) -> str:
         """Words for the description of the FMU."""
-        return notes_on(self.structure.driver, self.span, self.angle_counts)
+        return notes_on(self.structure.driver, self.way.limits, self.angle_counts)

@@ -3,6 +3,7 @@ of links); its frame and signs in words."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypeVar
 
@@ -116,21 +117,22 @@ def _connected(start: _Node, pairs: Sequence[set[_Node]]) -> set[_Node]:
     return met
 
 
-def notes_on(driver: DriverEntry, span: tuple[float, float], angle_counts: str) -> str:
-    """Paragraphs on frame, signs and limits of a linkage, each behind an empty line. `span` is the range of a driver
-    that slides [m], `angle_counts` says how the angle of one that turns counts."""
+def notes_on(driver: DriverEntry, limits: tuple[float, float] | None, angle_counts: str) -> str:
+    """Paragraphs on frame, signs and limits of a linkage, each behind an empty line. `limits` is the range of a
+    driver that has one [m, rad], `angle_counts` says how the angle of one that turns counts."""
     if driver.linear:
-        effort = "force"
-        counts = (
-            f"phi is the way of {driver.joint}, from {span[0]:g} m to {span[1]:g} m: beyond, the linkage was not "
-            "checked and may not close."
-        )
+        effort, unit, counts = "force", "m", f"phi is the way of {driver.joint}"
     else:
-        effort = "torque"
-        counts = f"The angle of {driver.link} is phi/ratio and counts {angle_counts}."
+        effort, unit = "torque", "deg"
+        counts = f"The angle of {driver.link} is phi/ratio and counts {angle_counts}"
+    if limits:
+        low, high = limits if driver.linear else map(math.degrees, limits)
+        counts += (
+            f", from {low:g} {unit} to {high:g} {unit}: beyond, the linkage was not checked and may not close"
+        )
     return (
         "\n\nFrame and signs: x points right, y up; the angle of a link counts counter-clockwise from the x axis. "
-        f"{counts} The {effort} tau is the one that the machine needs. The reaction of a joint is the force on the "
+        f"{counts}. The {effort} tau is the one that the machine needs. The reaction of a joint is the force on the "
         "link that its description names first."
         "\n\nLimits: links are rigid, and joints have no play; a joint pushes and pulls. Friction is smoothed: at "
         "rest nothing sticks. Lengths are fixed before the initialization, where lengths for which the linkage does "

@@ -61,14 +61,15 @@ class LinkEntry:
 @dataclass(frozen=True)
 class DriverEntry:
     """The driver as described. A rotation: the link turns about its ground joint, at q = 0 its x axis has the angle
-    `zero` [rad], and q counts counter-clockwise where `sense` is +1. A slide: the joint is prismatic, and q is the
-    way in it."""
+    `zero` [rad], and q counts counter-clockwise where `sense` is +1; where it `swings`, it has a range. A slide: the
+    joint is prismatic, and q is the way in it."""
 
     joint: str
     link: str
     linear: bool
     zero: Entry = 0.0
     sense: float = 1.0
+    swings: bool = False
 
     def angle_counts(self, zero: float) -> str:
         """How its angle counts, in words, where `zero` has this value [rad]."""
@@ -93,10 +94,15 @@ def groups_of(links: Sequence[str], joints: Sequence[JointEntry], driver: Driver
     else:
         groups = _with_cylinder(links, seen, slide)
     for group in groups:
-        if driver.linear and group.kind == "triad":
+        if (driver.linear or driver.swings) and group.kind == "triad":
+            moves, remedy = (
+                ("swings", "turns all the way round; leave driver.range out, or")
+                if driver.swings
+                else ("slides", "turns;")
+            )
             raise InputError(
-                f"the links {', '.join(group.links)} form a triad, and the driver slides: a triad needs a driver "
-                "that turns; drive another link",
+                f"the links {', '.join(group.links)} form a triad, and the driver {moves}: a triad needs a driver "
+                f"that {remedy} drive another link",
                 key=group.links[0],
             )
     return groups
