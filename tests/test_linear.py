@@ -32,7 +32,7 @@ from chainunit.system.linear import linearize as linearize_model
 from chainunit.system.poles import poles_of
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
-GALLERY = ("watt_six_bar", "slider_crank_press", "cylinder_lift")
+GALLERY = ("watt_six_bar", "slider_crank_press", "cylinder_lift", "level_luffing_crane")
 
 
 def moved(model, seed=1):

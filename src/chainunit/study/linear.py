@@ -66,9 +66,9 @@ def linearize(
     at : the point. Of a study: ``"RUN:TIME"``, such as ``"start_up:0.4 s"`` or ``"jam_left:3.2 s"``, the time of the
         run as its rows have it; by default steady running, at the end of the run of start-up and steady running. Or
         values of states and inputs by name, ``"phi=30 deg, w=60 rpm"`` or a mapping; all others are those of steady
-        running, of the start of a model, or of a linkage whose driver goes at 60 rev/min (0.1 m/s) at the angle 0
-        (in the middle of its way). A direct model has the torque at which its speed is constant, unless ``tau`` is
-        given
+        running, of the start of a model, or of a linkage whose driver goes at 60 rev/min (0.1 m/s) at the angle 0,
+        one with a range in its middle. A direct model has the torque at which its speed is constant, unless
+        ``tau`` is given
     config : a study file whose machine, feed or motor gives the values of a named model
     inverse : of a linkage file: the model that takes motion and gives torque and reactions, which has D alone, in
         place of the direct one
@@ -160,12 +160,13 @@ def _point_of_linkage(machine: Any, at: At, inverse: bool) -> LinearPoint:
     """The point of a linkage at the angle (place) and speed of its driver."""
     low, high = machine.span
     ratio = float(machine.Parameters().ratio)
-    usual = (0.0, _USUAL_SPEED) if machine.turns else (0.5 * (low + high), _USUAL_WAY_SPEED)
+    middle = 0.0 if machine.turns else 0.5 * (low + high)
+    usual = middle, _USUAL_WAY_SPEED if machine.slides else _USUAL_SPEED
     phi, w = (x * ratio for x in usual)
     start = {"phi": phi, "w": w} if inverse else {"phi_start": phi, "w_start": w}
     point = _at_values(machine if inverse else machine.direct(), start, at)
     if at is None:
-        unit = ("rad", "rad/s") if machine.turns else ("m", "m/s")
+        unit = ("m", "m/s") if machine.slides else ("rad", "rad/s")
         point = point._replace(words=f"phi = {phi:g} {unit[0]}, w = {w:g} {unit[1]}")
     return point
 
