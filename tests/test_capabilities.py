@@ -103,7 +103,9 @@ def test_a_type_checker_sees_the_methods_and_results_of_capabilities(tmp_path):
     pytest.importorskip("mypy")
     (tmp_path / "user.py").write_text(USER)
     call = [sys.executable, "-m", "mypy", "--config-file=", "--cache-dir", str(tmp_path), "user.py"]
-    env = os.environ | {"MYPYPATH": str(PACKAGE.parent)}
+    # mypy finds an installed package by itself, and refuses to be told its place
+    place = {} if PACKAGE.parent.name == "site-packages" else {"MYPYPATH": str(PACKAGE.parent)}
+    env = os.environ | place
     said = subprocess.run(call, env=env, capture_output=True, text=True, cwd=tmp_path).stdout.splitlines()
     errors = [line for line in said if line.startswith("user.py") and ": error: " in line]
     assert len(errors) == 2
@@ -115,9 +117,8 @@ def test_a_type_checker_sees_the_methods_and_results_of_capabilities(tmp_path):
 def test_the_rest_works_without(name, tmp_path):
     """A study, an export and the schema; a table of the capability is refused as an unknown key."""
     copy = tmp_path / "src" / "chainunit"
-    shutil.copytree(
-        PACKAGE, copy
-    )  # with the compiled modules, which are valid as long as the dates of the files are
+    # with the compiled modules, which are valid as long as the dates of the files are
+    shutil.copytree(PACKAGE, copy)
     shutil.rmtree(copy / "capabilities" / name)
     line, file = f'    "{name}",\n', copy / "capabilities" / "__init__.py"
     text = file.read_text("utf-8")
