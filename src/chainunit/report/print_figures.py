@@ -109,7 +109,7 @@ def _dress(axis: Any, panel: Panel, *, last: bool, first: bool) -> None:
     if last:
         axis.set_xlabel(panel.x.label)
     else:
-        axis.tick_params(labelbottom=False)
+        axis.tick_params(which="both", labelbottom=False)
     axis.set_ylabel("" if panel.y.names else panel.y.label)
     if panel.equal:
         axis.set_aspect("equal", adjustable="datalim")
