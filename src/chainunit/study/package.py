@@ -191,8 +191,8 @@ def _machine(operation: OperatingConditions, model: type[Model], machine: Machin
     """Start values of the machine with its feed and gear, at the speed of the study."""
     speed = operation.crank_speed * machine.ratio
     direct = issubclass(model, DirectMachine)
-    turning = {"w_start": speed} if direct else {"phi": 0.0, "w": speed, "a": 0.0}
-    return machine.by_name | Layout(type(operation.feed)).by_name(operation.feed) | turning
+    motion = {"w_start": speed} if direct else {"phi": 0.0, "w": speed, "a": 0.0}
+    return machine.by_name | Layout(type(operation.feed)).by_name(operation.feed) | motion
 
 
 def drive_to_export(

@@ -176,12 +176,17 @@ class FollowedLinkage:
         lower, upper = ends
         return None if upper.place - lower.place >= WHOLE and not self.way.linear else (lower, upper)
 
+    def _good_margins(self, q: float) -> list[float] | None:
+        """The margins at a place where all groups close, clear of dead positions; None elsewhere."""
+        try:
+            margins = self._margins_at(q)
+        except (ArithmeticError, ValueError):
+            return None
+        return margins if all(margin > LEAST_MARGIN for margin in margins) else None
+
     def _good(self, q: float) -> bool:
         """Whether all groups close at a place, clear of dead positions."""
-        try:
-            return all(margin > LEAST_MARGIN for margin in self._margins_at(q))
-        except (ArithmeticError, ValueError):
-            return False
+        return self._good_margins(q) is not None
 
     def _first_bad(self, places: Sequence[float]) -> tuple[float, float] | None:
         """A good place and the next bad one behind it, of `places` that lie close together; None where all are
@@ -190,11 +195,12 @@ class FollowedLinkage:
         margins: list[list[float]] = []
         bad = None
         for q in places:
-            if not self._good(q):
+            here = self._good_margins(q)
+            if here is None:
                 bad = q
                 break
             passed.append(q)
-            margins.append(self._margins_at(q))
+            margins.append(here)
         # a low between two places may be bad, too
         found = [q for _, q, least in lows(self._margins_at, margins, passed) if not least > LEAST_MARGIN]
         if found:
