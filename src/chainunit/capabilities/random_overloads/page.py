@@ -9,19 +9,16 @@ from ...core.quantities import Layout
 from ...report import blocks as b
 from ...report.lines import Line, join, line
 from ...study.record import StudyRecord
-from .runs import ENDS, Sample
+from .runs import ENDS, OUTCOMES, Sample
 
-_LARGEST, _ENDS = (
-    "crank_torque_peak",
-    {"trips": "the safety coupling opens", "stalls": "the {driver} stands at the end"},
-)
-"""The quantity of random overloads that the answer states, and the ways in which a run may end badly."""
+_LARGEST = "crank_torque_peak"
+"""The quantity of random overloads that the answer states."""
 
 
 def summary(s: b.Source, study: StudyRecord) -> Line:
     """The sentence on random overloads: the largest quantile of the crank torque, and how often a run ends badly."""
     quantiles = s.result["monte_carlo"]["quantiles"]
-    ends = dict(_ENDS) if study.config.coupling else {"stalls": _ENDS["stalls"]}
+    ends = OUTCOMES if study.config.coupling else {"stalls": OUTCOMES["stalls"]}
     parts: list[Line] = [
         line(
             f"{of_driver(words, s.driver)} in ",

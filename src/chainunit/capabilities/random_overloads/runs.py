@@ -46,7 +46,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-ENDS = {"stalls": "the {driver} stands at the end of the run", "trips": "the safety coupling opens"}
+OUTCOMES = {"trips": "the safety coupling opens", "stalls": "the {driver} stands at the end"}
+"""By switch of a run, the words on a run that ends so badly."""
+ENDS = {"stalls": f"{OUTCOMES['stalls']} of the run", "trips": OUTCOMES["trips"]}
 """By switch of a run, its meaning."""
 
 
@@ -279,13 +281,6 @@ def _result_of(task: RandomTask, chance: Draw, run: EventRun) -> dict[str, Any]:
     }
 
 
-_OUTCOMES = {
-    "trips": "in {share} of them the safety coupling opens",
-    "stalls": "in {share} of them the {driver} stands at the end",
-}
-"""By quantity of a random run, the words on the share of the runs that end so."""
-
-
 @result
 class MonteCarloResult(Findings):
     """The results of the runs, by the names of `result_variables`, over the dimension ``run``; and their store."""
@@ -345,12 +340,12 @@ class MonteCarloResult(Findings):
     def remark(self, study: StudyRecord) -> None:
         """Warn of runs that end badly, and note what limits the numbers."""
         note, shares = study.note, self.quantiles
-        for name, words in _OUTCOMES.items():
+        for name, words in OUTCOMES.items():
             share = shares.get(name, {}).get("share")
             if share is not None and share.value > 0.0:
                 study.warn(
                     f"random overload {name}",
-                    f"overloads at random: {words}.",
+                    f"overloads at random: in {{share}} of them {words}.",
                     share=(share.value, "1", "percent"),
                 )
         if self.shortage:
