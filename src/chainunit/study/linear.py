@@ -218,12 +218,12 @@ def drive_point(
     at: At = None,
     progress: Callable[[str], None] = lambda what: None,
 ) -> LinearPoint:
-    """The point of a drive in its operation, compiled to one system. The runs are those of the compiled system, which
+    """The point of a drive in its operation, compiled to one system. The compiled system makes the runs, which
     agree with the co-simulation of a study to some 1e-5.
 
     Parameters
     ----------
-    drive, operation, events : those of a study
+    drive, operation, events : of a study
     at : see `linearize`
 
     Raises

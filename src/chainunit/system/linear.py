@@ -2,7 +2,7 @@
 
     dx/dt = dx0 + A (x - x0) + B (u - u0)        y = y0 + C (x - x0) + D (u - u0)
 
-A compiled system (`chainunit.system.compiled`) is a model, too. The derivatives are those of the equations in
+A compiled system (`chainunit.system.compiled`) is a model, too. The equations are differentiated in
 CasADi's symbols (`chainunit.core.symbolic_trace`), from which the C code of FMUs comes: none is a difference.
 """
 
@@ -192,7 +192,7 @@ def place(kind: str, name: str, signals: Sequence[LinearSignal | Variable]) -> i
     Raises
     ------
     InputError
-        where there is none; it names those that there are.
+        where there is none; it names the signals that there are.
     """
     names = [each.name for each in signals]
     if name not in names:
@@ -218,7 +218,7 @@ def linearize(
     ----------
     parameters : its `Parameters`, or values by name; all others have their start values
     inputs : values by name; all others have their start values
-    states : values by name; all others have those of the model's own start with these inputs
+    states : values by name; all others have the values of the model's own start with these inputs
     at : the point in words
 
     Raises
@@ -265,7 +265,7 @@ def linearize(
 
 
 def _states(model: type[Model], p: Any, u: Any, states: Mapping[str, float]) -> list[float]:
-    """The states by the declared order, those that are not given from the start of the model."""
+    """The states in the declared order; a state that is not given has its value at the start of the model."""
     layout = model.state_layout
     if layout is None:
         if states:
@@ -367,8 +367,8 @@ class _Derivatives:
         self, point: tuple[Any, ...], column: int, distance: float, sizes: np.ndarray, slopes: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """The largest change of each slope between the point and both sides, and the largest of the three, shape
-        (rows, columns), both by the `sizes` of the columns. Of the `slopes` at the point those that are not defined
-        do not count."""
+        (rows, columns), both by the `sizes` of the columns. A slope that is not defined at the point does not
+        count."""
         here, low, high = (
             np.where(np.isfinite(slopes), each * sizes, 0.0)
             for each in (slopes, *(self._moved(point, column, by) for by in (-distance, distance)))

@@ -46,8 +46,8 @@ class Pole:
 def poles_of(A: Any, names: Sequence[str]) -> tuple[Pole, ...]:
     """The poles of the matrix `A` [1/s], shape (n, n), of the states with these names; the slowest first.
 
-    The states are divided into groups that act on each other both ways; A is block triangular in them, and its
-    eigenvalues are those of the blocks. So an integral on which nothing depends, such as an angle or an energy, has a
+    The states are divided into groups that act on each other both ways; A is block triangular in them, and has
+    the eigenvalues of the blocks. So an integral on which nothing depends, such as an angle or an energy, has a
     pole at 0 without rounding; in a block a pole that rounding moves from 0 is set to 0.
     """
     A = np.asarray(A, float)
