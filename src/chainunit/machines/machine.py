@@ -13,6 +13,7 @@ from ..core.errors import InputError
 from ..core.quantities import Variable, complaint
 from ..mechanism.machine import MachineState, Mechanism
 from ..mechanism.models import InverseMachine
+from .equilibria import Rest, rest_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -195,6 +196,19 @@ class Machine:
         u = self.inputs({"phi": phi})
         linkage = self.model.linkage(_XP, self.p, u)
         return Mechanism(_XP, linkage, u.phi / self.p.ratio, getattr(self.p, "derived", ()))
+
+    def at_rest(self, feed: Any = None) -> Rest:
+        """The equilibria of the machine and the effort that holds it elsewhere, with the loads `feed`, an instance of
+        `model.Feed`, by default those of normal running; places and efforts count at the driver.
+
+        Raises
+        ------
+        InputError
+            see the class.
+        TypeError
+            see `state`.
+        """
+        return rest_of(self, feed)
 
     @property
     def stored_per_unit(self) -> Mapping[str, Callable[[Mapping[str, Any]], Any]]:
