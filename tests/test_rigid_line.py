@@ -64,6 +64,7 @@ def test_on_both_sides_of_ten(place):
         for each in told:
             assert each.quantities["ratio"].value == line.ratio and "VDI 2149" in each.text
             assert each.quantities["natural_frequency"].value == line.natural_frequency
+            assert "it is rigid in the turn at constant speed and the speed loop." in each.text
         data = as_dict(study)
         assert data["rigid_line"] == {
             "natural_frequency": {"value": line.natural_frequency, "unit": "rad/s", "kind": "frequency"},

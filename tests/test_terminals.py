@@ -12,6 +12,7 @@ from xml.etree import ElementTree
 import fmpy
 import numpy as np
 import pytest
+from fmpy.validation import validate_fmu
 from lxml import etree
 from systems import component, pair
 
@@ -158,6 +159,13 @@ def files(tmp_path_factory):
     for name, model in models.items():
         export(model, folder / f"{name}.fmu")
     return {name: folder / f"{name}.fmu" for name in models}
+
+
+def test_fmpy_finds_no_fault(files, tmp_path):
+    for fmi in (2, 3):
+        export(MODELS["CardanDriveline"], tmp_path / f"line{fmi}.fmu", fmi=fmi)
+    for file in (*files.values(), *tmp_path.glob("*.fmu")):
+        assert validate_fmu(str(file)) == [], file
 
 
 @pytest.mark.parametrize("machine", ["machine", "press"])

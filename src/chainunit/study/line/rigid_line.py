@@ -16,7 +16,7 @@ class RigidLine:
 
     natural_frequency: float = quantity(
         "rad/s",
-        "lowest natural frequency of torsion of the line, with the machine's largest inertia",
+        "lowest natural frequency of torsion of the line at i23 = 1, with the machine's largest inertia",
         kind="frequency",
     )
     driver_frequency: float = quantity("rad/s", "turns of the {driver} in normal running", kind="frequency")
