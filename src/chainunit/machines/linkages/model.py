@@ -31,7 +31,7 @@ from ...mechanism.expressions import expression, value_of
 from ...mechanism.extremes import MotionExtreme
 from ...mechanism.linkage import Linkage
 from ...mechanism.machine import MachineState, Mechanism, derived_numbers
-from ...mechanism.models import InverseMachine
+from ...mechanism.models import InverseMachine, words_on_motion
 from .declarations import LinkageMotion, LinkBody, common_parameters, field_of
 from .following import LEAST_MARGIN, FollowedLinkage
 from .geometry import LinkGeometry
@@ -338,6 +338,7 @@ class LinkageDescription(LinkageOutputs):
             noun = data["title"] or data["name"]
             driver_noun = data["driver"]["link"]
             description = data["title"] or f"linkage {data['name']}"
+            direct_description = words_on_motion(f"{noun}, moving by itself", described.port)
             made = Making(f"machine_of({described.text!r})", machine_of, (described.text,))
             fmu_data = FmuData(described.notes, About(**data.get("about", {})))
             repeated = repeated_outputs(described.structure, described.variable)
