@@ -228,26 +228,26 @@ def _sides(link: DrawnLink) -> Iterator[tuple[str, str]]:
 
 
 def _beside(link: DrawnLink, at: Mapping[str, Point]) -> list[Point]:
-    """Candidate places for the name of a link: first beside its middle, then beside other points of it."""
+    """Candidate places for the name of a link: first its middle, in it or beside it, then beside its sides."""
+    places = []
     if link.closed:
         corners = [at[joint] for joint in link.joints]
-        return [(sum(x for x, _ in corners) / len(corners), sum(y for _, y in corners) / len(corners))]
-    places = []
+        places = [(sum(x for x, _ in corners) / len(corners), sum(y for _, y in corners) / len(corners))]
     for t in (0.5, 0.4, 0.6, 0.3, 0.7):
         for away in (18.0, 26.0, 40.0):
             for a, b in _sides(link):
                 (x0, y0), (x1, y1) = at[a], at[b]
-                length = math.hypot(x1 - x0, y1 - y0) or 1.0
-                across = ((y0 - y1) / length, (x1 - x0) / length)
-                # a name is wide: beside an upright link it stands further off
-                off = away * (1.0 + 1.3 * abs(across[0]))
-                for sign in (1.0, -1.0):
-                    places.append(
-                        (
-                            x0 + t * (x1 - x0) + sign * off * across[0],
-                            y0 + t * (y1 - y0) + sign * off * across[1],
-                        )
-                    )
+                length = math.hypot(x1 - x0, y1 - y0)
+                # a block has no length, and stands free in any direction
+                turns = (0.5, 0.0, 0.25, 0.75) if length < 1.0 else ()
+                ways = [(math.cos(math.pi * x), math.sin(math.pi * x)) for x in turns] or [
+                    ((y0 - y1) / length, (x1 - x0) / length)
+                ]
+                x, y = x0 + t * (x1 - x0), y0 + t * (y1 - y0)
+                for across in ways:
+                    # a name is wide: beside an upright link it stands further off
+                    off = away * (1.0 + 1.3 * abs(across[0]))
+                    places += [(x + s * off * across[0], y + s * off * across[1]) for s in (1.0, -1.0)]
     return places
 
 
@@ -306,6 +306,8 @@ def _block(canvas: _Canvas, at: Point, angle: float) -> None:
     ]
     points = " ".join(f"{x:.2f},{y:.2f}" for x, y in corners)
     canvas.add("polygon", points=points, fill="none", stroke="#1b1b1b", stroke_width=1.5)
+    xs, ys = [x for x, _ in corners], [y for _, y in corners]
+    canvas.label_boxes.append((min(xs), min(ys), max(xs), max(ys)))
 
 
 def _frame(canvas: _Canvas) -> None:
