@@ -21,6 +21,7 @@ from chainunit.machines.chain_unit import ChamberForces
 from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
+from chainunit.reading.results import as_data
 from chainunit.report import linkage
 from chainunit.report.drawing import drawing
 from chainunit.study.config import parse
@@ -223,6 +224,26 @@ def test_the_clamp_presses_at_its_dead_centre_and_holds_itself():
     pressed = np.maximum(0.002 + np.min(pad) - pad, 0.0)
     work = np.sum(0.5 * np.diff(q) * (without.outputs(q).tau[1:] + without.outputs(q).tau[:-1]))
     assert work == pytest.approx(0.5 * 0.6e6 * pressed[-1] ** 2, rel=5e-4)
+
+
+def test_the_stops_of_the_crane_give_way_to_its_weight_by_a_hundredth_of_its_range():
+    """Its masses stand at their radius of gyration; the hook holds the jib up with far less."""
+    crane = machine("level_luffing_crane")
+    low, high = crane.model.span
+    feed = crane.model.feed_layout.by_name(crane.model.Feed())
+    inertia = np.max(crane.evaluate({"phi": np.linspace(low, high, 2001), **feed})["J"])
+    weight = 9.81 * math.sqrt(inertia * (900.0 + 260.0 + 180.0 + 2000.0))
+    stops = crane.model.end_stops
+    assert 0.5 * stops.stiffness * (0.01 * (high - low)) ** 2 == pytest.approx(
+        weight * (high - low), rel=1e-3
+    )
+    assert stops.damping == pytest.approx(math.sqrt(stops.stiffness * inertia), rel=1e-3)
+
+
+def test_a_machine_without_inputs_has_an_empty_feed_in_a_result():
+    """Of which as_data made no table, so that a study of it ended in an error."""
+    assert not machine("andrews_squeezer").model.feed_layout.names
+    assert as_data(machine("andrews_squeezer").model.Feed()) == {}
 
 
 def test_a_place_of_0_has_no_rounding_in_the_tables():
