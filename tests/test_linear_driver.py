@@ -9,12 +9,12 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
+from by_itself import moved_by_itself
 from command import chainunit
 from fmpy.validation import validate_fmu
 
 from chainunit.core.engines import MATH, numpy_
 from chainunit.core.errors import InputError
-from chainunit.core.integrators import controlled
 from chainunit.core.native.compilers import compiler
 from chainunit.fmu.native.export import export
 from chainunit.machines.linkages.file import description_of, read_linkage
@@ -285,27 +285,11 @@ def test_a_driver_that_moves_by_itself_stays_in_its_range(ratio):
     one it goes to the upper one. No energy is lost but in the pins and the stops."""
     model = read_linkage(LIFT.with_name("tipper.toml")).direct()
     low, high = (ratio * end for end in model.inverse.span)
-    layout = model.state_layout
     p = model.check(replace(model.Parameters(), ratio=ratio))
     for tau, end, sign in ((0.0, low, -1.0), (1.5e5 / ratio, high, 1.0)):
-        u, pace = model.Inputs(tau=tau), 0.0
-        start = model.start(MATH, p, u)
-        # the third state is the energy that the effort gives less the energy lost
-        states = [start.phi, start.w, 0.0]
-
-        def rates(t, v, u=u):
-            x = layout.instance(v[:2])
-            out = model.evaluate(MATH, p, u, x)[0]
-            return [*model.derivatives(MATH, p, u, x), out.power - out.dissipated_power]
-
-        way = []
-        for _ in range(24):
-            states, pace = controlled(rates, lambda t, v: v, states, 0.05, pace, 5e-3, 1e-6, [1.0, 1.0, 1e3])
-            way.append(states[0])
+        states, way, after, gained = moved_by_itself(model, p, model.Inputs(tau=tau), 1.2, 24, 1e-6, 1e3)
         assert low - 0.01 < min(way) and max(way) < high + 0.01
         assert states[0] == pytest.approx(end, abs=3e-4) and abs(states[1]) < 1e-3
-        before, after = (model.evaluate(MATH, p, u, x)[0] for x in (start, layout.instance(states[:2])))
-        gained = sum(s * (o.kinetic_energy + o.potential_energy) for s, o in ((1.0, after), (-1.0, before)))
         assert gained == pytest.approx(states[2], rel=1e-4)
         # at rest the stop carries the difference
         assert after.end_stop_force == pytest.approx(ratio * (tau - after.tau_bias), rel=1e-2)

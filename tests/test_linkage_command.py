@@ -173,13 +173,12 @@ def test_lengths_that_do_not_close_say_where():
 
 
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
-def test_a_native_fmu_refuses_lengths_that_do_not_close(tmp_path):
-    """Although it closes at the start angle."""
+def test_a_native_fmu_refuses_lengths_that_do_not_close(tmp_path, capsys):
+    """Although it closes at the start angle. fmpy prints the message; a logger of this test's own would stay with
+    fmpy when it is gone, and the next FMU of this process that tells something would call it."""
     file = export(read_linkage(PRESS), tmp_path / "press.fmu")
-    logged = []
     with pytest.raises(Exception, match="InitializationMode failed"):
         fmpy.simulate_fmu(
-            str(file), stop_time=0.01, start_values={"l": 0.1, "phi": 1.0}, fmi_type="CoSimulation",
-            logger=lambda *told: logged.append(told[-1].decode()),
-        )  # fmt: skip
-    assert any("least margin of the group of rod, ram" in line for line in logged)
+            str(file), stop_time=0.01, start_values={"l": 0.1, "phi": 1.0}, fmi_type="CoSimulation"
+        )
+    assert "least margin of the group of rod, ram" in capsys.readouterr().out

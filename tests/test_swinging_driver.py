@@ -15,6 +15,7 @@ from dataclasses import replace
 import fmpy
 import numpy as np
 import pytest
+from by_itself import moved_by_itself
 from command import chainunit
 from fmpy.validation import validate_fmu
 from linkage_files import MACHINES, tables
@@ -25,9 +26,7 @@ from swinging import ALL, DOUBLE_ROCKER, STEPHENSON, WATT, with_range
 from test_linear_driver import TRAMMEL
 from test_linkage_random import by_the_machine, deviations
 
-from chainunit.core.engines import MATH
 from chainunit.core.errors import InputError
-from chainunit.core.integrators import controlled
 from chainunit.core.native.compilers import compiler
 from chainunit.fmu.export import export as export_python
 from chainunit.fmu.native.export import export
@@ -436,25 +435,8 @@ def test_a_study_names_what_serves_instead(tmp_path):
 
 
 def run(direct, p, tau, seconds, pieces=24):
-    """States at the end, the largest and the least angle, and gained energy with that which the effort gave less the
-    losses."""
-    u, layout = direct.Inputs(tau=tau), direct.state_layout
-    start = direct.start(MATH, p, u)
-    states, pace, way = [start.phi, start.w, 0.0], 0.0, []
-
-    def rates(t, v):
-        x = layout.instance(v[:2])
-        out = direct.evaluate(MATH, p, u, x)[0]
-        return [*direct.derivatives(MATH, p, u, x), out.power - out.dissipated_power]
-
-    for _ in range(pieces):
-        states, pace = controlled(
-            rates, lambda t, v: v, states, seconds / pieces, pace, 5e-3, 1e-8, [1.0, 1.0, 1e2]
-        )
-        way.append(states[0])
-    first, last = (direct.evaluate(MATH, p, u, x)[0] for x in (start, layout.instance(states[:2])))
-    gained = sum(s * (o.kinetic_energy + o.potential_energy) for s, o in ((1.0, last), (-1.0, first)))
-    return states, way, last, gained
+    """States at the end, the angles on the way, the outputs at the end, and the gained energy."""
+    return moved_by_itself(direct, p, direct.Inputs(tau=tau), seconds, pieces, 1e-8, 1e2)
 
 
 @pytest.mark.parametrize("ratio", [1.0, 8.0])
