@@ -301,8 +301,10 @@ class LinkageDescription(LinkageOutputs):
         states = [MachineState(MATH, Mechanism(MATH, linkage, q, derived), 0.0) for q in self.places()]
         mass = max(state.J for state in states)
         low, high = self.span
-        # a driver that nothing loads still stops its own weight
-        force = max(mass * STANDARD_GRAVITY, *(abs(state.bias) for state in states))
+        bodies = sum(body.m for body in states[0].m.bodies.values())
+        # a driver that nothing loads still stops its own weight, one that swings at its radius of gyration
+        arm = 1.0 if self.way.linear or not bodies else math.sqrt(mass / bodies)
+        force = max(mass * STANDARD_GRAVITY / arm, *(abs(state.bias) for state in states))
         return usual_stops(force, mass, high - low, EndStops if self.way.linear else SwingStops)
 
     def model(self) -> type[InverseMachine]:
