@@ -97,7 +97,13 @@ def springs(data, rng):
             "type": "spring", "on": f"{link}.{rng.choice([*data['links'][link]['points']])}", "by": f"ground.S{k}",
             "stiffness": float(rng.uniform(50.0, 1500.0)), "length": float(rng.uniform(0.1, 0.8)),
         }  # fmt: skip
-    return {**data, "loads": loads, "pins": {"friction": 0.0}, "guides": {"friction": 0.0}}
+    slides = any("toward" in joint for joint in data["joints"].values())
+    return {
+        **data,
+        "loads": loads,
+        "pins": {"friction": 0.0},
+        **({"guides": {"friction": 0.0}} if slides else {}),
+    }
 
 
 def tables_of(seed):
@@ -332,7 +338,7 @@ def test_a_balanced_linkage_rests_anywhere(tmp_path):
 def test_loads_that_depend_on_the_speed_are_named():
     rest = Machine(read_linkage(GALLERY / "slider_crank_press.toml")).at_rest()
     assert rest.by_speed == ("loads.pressing",)
-    assert not Machine(read_linkage(GALLERY / "stephenson_six_bar.toml")).at_rest().by_speed
+    assert not Machine(read_linkage(GALLERY / "knife_drive.toml")).at_rest().by_speed
 
 
 def test_a_driver_counts_its_places_whatever_the_ratio():
@@ -353,9 +359,7 @@ def refusal(data):
 
 def test_a_parallelogram_is_told_as_a_change_point():
     words = refusal(PARALLELOGRAM)
-    assert (
-        "the group of coupler, rocker comes to a change point at 180 deg of crank, a dead position" in words
-    )
+    assert "the group of coupler, rocker comes to a change point at 0 deg of crank, a dead position" in words
     assert "a parallelogram may turn into a crossed one" in words and "cannot close" not in words
     found = re.search(r'write range = \["(\S+) deg", "(\S+) deg"\]', words)
     clear = with_range(PARALLELOGRAM, [f"{x} deg" for x in found.groups()])
@@ -391,17 +395,16 @@ def test_the_command_shows_them(shown):
     q, torque = (np.array(result["holding_over_the_way"][name]["value"]) for name in ("driver", "torque"))
     np.testing.assert_allclose(torque, weight * np.cos(q), rtol=1e-9, atol=1e-12)
     page = (folder / "out" / "report.html").read_text("utf-8")
-    assert "Equilibria of the driver without effort" in page and 'id="linkage-rest"' in page
+    assert "Equilibria of the driver without effort" in page and 'id="plot-linkage-rest"' in page
     assert (folder / "out" / "linkage_rest.png").stat().st_size > 5000
 
 
 def test_the_linear_model_at_an_equilibrium(shown):
     folder, _, result = shown
     found = linearize(folder / "swing.toml", "equilibrium")
-    (pole,) = found.poles if len(found.poles) == 1 else found.poles[:1]
-    assert abs(pole.value.imag) / (2.0 * math.pi) == pytest.approx(
-        result["equilibria"]["1"]["frequency"]["value"]
-    )
+    (pole,) = found.poles
+    frequency = result["equilibria"]["1"]["frequency"]["value"]
+    assert pole.imaginary / (2.0 * math.pi) == pytest.approx(frequency, rel=1e-9) and abs(pole.real) < 1e-9
     with pytest.raises(InputError, match=r'"equilibrium:4": the number of an equilibrium must be 1 to 1'):
         linearize(folder / "swing.toml", "equilibrium:4")
     with pytest.raises(

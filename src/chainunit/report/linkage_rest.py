@@ -77,20 +77,13 @@ def blocks_of(s: b.Source, f: LinkageFindings) -> Iterator[b.Block]:
             s.line(
                 "Over a whole turn at rest the loads take {holding.work}, so that no place has an energy of its own."
             ),
-            "note",
         )
     if rest.by_speed:
         names = join(Name(name.removeprefix("loads.")) for name in rest.by_speed)
         yield b.Text(
-            line(
-                "Loads that depend on the speed count as at rest, one that ",
-                Name("step"),
-                " switches by half: ",
-                names,
-                ".",
-            ),
-            "note",
-        )
+            line("A load that depends on the speed has its value at speed 0 here, half of it where ", Name("step"),
+                 " switches it: ", names, ".")
+        )  # fmt: skip
     if not everywhere:
         yield _figure(f, effort)
 
@@ -108,7 +101,12 @@ def _table(s: b.Source, f: LinkageFindings) -> Iterator[b.Block]:
         (b.Column("energy above the lowest"), "energy"),
         (b.Column("force of the stop" if f.machine.model.slides else "torque of the stop"), "end_stop"),
     ]
-    shown = [each for each in columns if any(getattr(e, each[1]) is not None for e in rest.equilibria)]
+    shown = [
+        (head, name)
+        for head, name in columns
+        if any(getattr(each, name) is not None for each in rest.equilibria)
+        and (name != "energy" or len(rest.equilibria) > 1)
+    ]
     rows = (
         b.TableRow((k, s.number(f"equilibria.{k}.at"), kind,
                     *(s.number(f"equilibria.{k}.{name}") for _, name in shown)))
@@ -116,7 +114,11 @@ def _table(s: b.Source, f: LinkageFindings) -> Iterator[b.Block]:
     )  # fmt: skip
     yield b.Table(
         tuple(rows),
-        (*b.heads("no.", "place of the driver"), b.Column("equilibrium"), *(head for head, _ in shown)),
+        (
+            *b.heads("no.", "place of the driver"),
+            b.Column("equilibrium", of_text=True),
+            *(head for head, _ in shown),
+        ),
         title="Equilibria of the driver without effort",
     )
     if any(each.frequency for each in rest.equilibria):
