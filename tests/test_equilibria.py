@@ -24,10 +24,10 @@ from test_linear_driver import TRAMMEL
 from chainunit import linearize
 from chainunit.core.engines import MATH
 from chainunit.core.errors import InputError
-from chainunit.machines.equilibria import PLACES
 from chainunit.machines.linkages.file import description_of, read_linkage
 from chainunit.machines.linkages.model import machine_of
 from chainunit.machines.machine import Machine
+from chainunit.mechanism.equilibria import PLACES
 
 GALLERY = Path(__file__).parents[1] / "examples" / "linkages"
 TEXT = """

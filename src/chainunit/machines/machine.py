@@ -11,9 +11,9 @@ import numpy as np
 from ..core.engines import numpy_
 from ..core.errors import InputError
 from ..core.quantities import Variable, complaint
+from ..mechanism.equilibria import Rest, rest_of
 from ..mechanism.machine import MachineState, Mechanism
 from ..mechanism.models import InverseMachine
-from .equilibria import Rest, rest_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -208,7 +208,12 @@ class Machine:
         TypeError
             see `state`.
         """
-        return rest_of(self, feed)
+        loads = self._feed(feed)
+
+        def state(q: Any, w: Any) -> MachineState:
+            return self.state(self.inputs({"phi": q * self.ratio, "w": w * self.ratio, **loads}))
+
+        return rest_of(state, self.model.span, self.model.turns)
 
     @property
     def stored_per_unit(self) -> Mapping[str, Callable[[Mapping[str, Any]], Any]]:

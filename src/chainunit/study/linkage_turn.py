@@ -14,11 +14,11 @@ import numpy as np
 
 from ..core.engines import numpy_
 from ..core.quantities import Value, declaration, quantity
-from ..machines.equilibria import Rest
 from ..machines.linkages.model import LinkageDescription
 from ..machines.linkages.structure import CYLINDER
 from ..machines.machine import Machine
 from ..mechanism.assur import PRISMATIC
+from ..mechanism.equilibria import Rest
 from ..mechanism.sampled_quantities import largest, means, roots
 
 PLACES = 361

@@ -303,7 +303,7 @@ class LinkageDescription(LinkageOutputs):
         low, high = self.span
         bodies = sum(body.m for body in states[0].m.bodies.values())
         # a driver that nothing loads still stops its own weight, one that swings at its radius of gyration
-        arm = 1.0 if self.way.linear or not bodies else math.sqrt(mass / bodies)
+        arm = math.sqrt(mass / bodies) if mass and bodies and not self.way.linear else 1.0
         force = max(mass * STANDARD_GRAVITY / arm, *(abs(state.bias) for state in states))
         return usual_stops(force, mass, high - low, EndStops if self.way.linear else SwingStops)
 

@@ -11,18 +11,16 @@ without losses, the shaft free: J q'' = -k q). Friction is left out: it holds th
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from ..core.quantities import Value, declaration, quantity
-from ..mechanism.sampled_quantities import largest, roots
-
-if TYPE_CHECKING:
-    from .machine import Machine
+from .machine import MachineState
+from .sampled_quantities import largest, roots
 
 Kind = Literal["stable", "unstable", "on its stop"]
 
@@ -84,15 +82,11 @@ class Rest:
 class _AtRest:
     """A machine at any places of its driver, at rest."""
 
-    def __init__(self, machine: Machine, feed: Any) -> None:
-        self.machine = machine
-        self.loads = machine.model.feed_layout.by_name(machine.model.Feed() if feed is None else feed)
+    def __init__(self, state: Callable[[Any, Any], MachineState]) -> None:
+        self._state_at = state
 
-    def _state(self, q: Any, w: float = 0.0) -> Any:
-        machine = self.machine
-        return machine.state(
-            machine.inputs({"phi": q * machine.ratio, "w": w * machine.ratio + 0.0 * q, **self.loads})
-        )
+    def _state(self, q: Any, w: float = 0.0) -> MachineState:
+        return self._state_at(q, w + 0.0 * q)
 
     def torque(self, q: Any) -> Any:
         """The effort at the driver, shape (1, n)."""
@@ -131,19 +125,17 @@ class _AtRest:
         return (self.torque(at.ravel())[0].reshape(at.shape) @ weights) * half
 
 
-def rest_of(machine: Machine, feed: Any = None) -> Rest:
-    """A `machine` at rest over the way of its driver, with the loads `feed`, an instance of `model.Feed`; by default
-    those of normal running.
+def rest_of(state: Callable[[Any, Any], MachineState], span: tuple[float, float], turns: bool) -> Rest:
+    """A machine at rest over the way of its driver.
 
-    Raises
-    ------
-    InputError
-        for a load outside its bounds.
-    TypeError
-        for a machine whose outputs depend on states.
+    Parameters
+    ----------
+    state : the machine at places [rad, m] and speeds [rad/s, m/s] of its driver, both of shape (n,)
+    span : the places from which to which the driver goes
+    turns : whether it turns all the way round
     """
-    turns, way = machine.model.turns, _AtRest(machine, feed)
-    q = np.linspace(*machine.model.span, PLACES)
+    way = _AtRest(state)
+    q = np.linspace(*span, PLACES)
     torque = way.torque(q)[0].copy()
     sizes = way.sizes(q)
     nothing = NOTHING * float(np.max(sizes))
