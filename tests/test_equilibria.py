@@ -150,11 +150,8 @@ class Potential:
         self.body = Multibody(text)
         self.q = np.linspace(*made.span, places)
         self.poses = [self.body.followed(self.q[0])]
-        for low, high in itertools.pairwise(self.q):
-            pose = self.poses[-1]
-            for k in (1, 2, 3):
-                pose = self.body.closed(low + (high - low) * k / 3, pose)
-            self.poses.append(pose)
+        for q in self.q[1:]:
+            self.poses.append(self.body.closed(q, self.poses[-1]))
         self.values = np.array([self.of_pose(pose) for pose in self.poses])
 
     def of_pose(self, x):
@@ -227,6 +224,9 @@ def check(count, places=145):
         potential = Potential(made, text, places)
         whole = 2.0 * math.pi
         size = np.ptp(potential.values)
+        if size < 1e-9 * np.max(np.abs(potential.values)):  # the crank moves no mass and no spring
+            assert not rest.equilibria and rest.balanced == (made.span,), seed
+            continue
         inside = [
             (each, kind)
             for each, kind in zip(rest.equilibria, rest.kinds, strict=True)
@@ -273,7 +273,7 @@ def test_random_linkages_rest_where_their_potential_says():
 @pytest.mark.second
 def test_a_hundred_random_linkages():
     kinds = check(100)
-    assert min(kinds["stable"], kinds["unstable"]) > 80 and kinds["on its stop"] > 10, kinds
+    assert min(kinds["stable"], kinds["unstable"]) > 60 and kinds["on its stop"] > 40, kinds
 
 
 # closed forms and words

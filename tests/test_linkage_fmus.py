@@ -151,7 +151,8 @@ def test_a_text_that_is_no_text_is_told(tmp_path):
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
 def test_outputs_that_repeat_another_one_share_its_value(file):
     """The names that share a value, and those that are always 0, by the model itself at random states. Of the values
-    that are left at most a quarter is a motion that repeats another one or stands still (of the scissor lift more)."""
+    that are left at most a quarter is a motion that repeats another one or stands still, of the scissor
+    lift more."""
     machine = Machine(read_linkage(file))
     model, (low, high) = machine.model, machine.model.span
     rng = np.random.default_rng(3)
