@@ -26,24 +26,25 @@ from chainunit.core.symbolic_trace import trace
 from chainunit.core.wasm.encoding import Module
 from chainunit.core.wasm.expressions import OwnFunctions
 from chainunit.core.wasm.module import wasm_module
+from chainunit.machines.flexible import flexible
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.models import MODELS
+from chainunit.study.config import parse
+from chainunit.study.drive import Drive
+from chainunit.system import compiled, monolithic
 from chainunit.system.signals import Profile
 
 GALLERY = Path(__file__).parents[1] / "examples" / "linkages"
 LINKAGES = sorted(file.stem for file in GALLERY.glob("*.toml"))
 QUICK = ["ChamberForces", "ChainUnit", "DcMotor", "InductionMotor", "slider_crank_press", "tipper.direct"]
-REST = [
-    name
-    for name in (*MODELS, *LINKAGES, *(f"{name}.direct" for name in LINKAGES))
-    if name not in (*QUICK, "ChainUnitFlexible")
-]
+REST = [name for name in (*MODELS, *LINKAGES, *(f"{name}.direct" for name in LINKAGES)) if name not in QUICK]
 node = pytest.mark.skipif(NODE is None, reason="no node, which runs the modules as a browser does")
+wasmtime = pytest.mark.skipif(not HAS_WASMTIME, reason="no wasmtime, which is in the extra clients")
 engines = pytest.mark.parametrize(
     "engine",
     [
         pytest.param("node", marks=node),
-        pytest.param("wasmtime", marks=pytest.mark.skipif(not HAS_WASMTIME, reason="no wasmtime")),
+        pytest.param("wasmtime", marks=[pytest.mark.second, wasmtime]),
     ],
 )
 
@@ -219,7 +220,7 @@ def test_a_thousand_states_of_every_model(name):
 
 
 @node
-@pytest.mark.skipif(not HAS_WASMTIME, reason="no wasmtime")
+@wasmtime
 @pytest.mark.second
 @pytest.mark.parametrize(
     "name", [*QUICK, "CardanDriveline", "KnifeDrive", "LoadObserver", "knife_drive.direct"]
@@ -316,8 +317,9 @@ def test_a_function_that_no_engine_has_is_refused():
 class Run:
     """A run of a model in both worlds: inputs at rest but for `signals`, rows every `step` [s]."""
 
-    def __init__(self, name, rows, step, signals, values=None, inputs=None):
+    def __init__(self, name, rows, step, signals, values=None, inputs=None, longest=0.0):
         self.model, self.rows, self.step, self.signals = model_of(name), rows, step, signals
+        self.longest = longest
         self.p = self.model.parameter_layout.from_names(values or {})
         self.inputs = {v.name: v.quantity.start for v in self.model.input_layout.variables} | (inputs or {})
         self.names = list(self.model.state_layout.names)
@@ -330,7 +332,9 @@ class Run:
             ("write", d["inputs"]["address"], numbers(list(self.inputs.values()))),
             *([("call", "derive", [])] if "derive" in d["functions"] else []),
             ("call", "start", []),
-            *run_steps(d, self.signals, self.names, begin=0.5, step=self.step, rows=self.rows),
+            *run_steps(
+                d, self.signals, self.names, begin=0.5, step=self.step, rows=self.rows, longest=self.longest
+            ),
         ]
         *_, count, rows, states = ENGINES[engine](content, steps)
         rows = rows.reshape(self.rows, -1)
@@ -353,7 +357,7 @@ class Run:
             return model.state_layout.instance(list(x))
 
         x = model.state_layout.values(model.start(MATH, p, model.input_layout.from_names(self.inputs)))
-        longest, pace, rows = model.internal_step(MATH, p), 0.0, [x]
+        longest, pace, rows = self.longest or model.internal_step(MATH, p), 0.0, [x]
         for n in range(self.rows - 1):
             begin = 0.5 + n * self.step
 
@@ -386,6 +390,7 @@ RUNS = {
     "InductionMotor": Run(
         "InductionMotor", 101, 1e-3,
         {"w_ref": Profile(0.0, ((0.5, 0.05, 100.0),)), "load.tau_bias": [(0.52, 0.0), (0.57, 20.0)]},
+        longest=7e-5,
     ),
     "ChainUnit": Run(
         "ChainUnit", 101, 2e-3,
@@ -406,3 +411,107 @@ def test_a_run_is_that_of_the_integrators(name, engine):
     assert np.max(np.abs(want - want[0])) > 0.0
     units = [v.unit for v in run.model.state_layout.variables]
     compare(rows.T, want.T, run.names, units, most=1e-10)
+
+
+@engines
+def test_signals_at_the_rows(engine):
+    """Lines, of which a jump is one without length, and smooth changes; also where a row lies on a corner."""
+    lines = [(0.51, 3.0), (0.52, 5.0), (0.54, 5.0), (0.54, -1.0), (0.545, 2.0)]
+    profile = Profile(2.0, ((0.505, 0.01, 4.0), (0.53, 0.02, -3.0)))
+    run = Run("DcMotor", 61, 1e-3, {"load.tau_bias": lines, "w_ref": profile, "load.J": [(0.0, 0.1)]})
+    run.names = ["load.tau_bias", "w_ref", "load.J"]
+    content, d = wasm_module(run.model).content, wasm_module(run.model).description
+    steps = [("call", "start", []), *run_steps(d, run.signals, run.names, begin=0.5, step=1e-3, rows=61)]
+    *_, count, rows, _ = ENGINES[engine](content, steps)
+    tau, w_ref, inertia = rows.reshape(61, -1).T
+    times = 0.5 + 1e-3 * np.arange(61)
+    behind = times >= 0.54
+    want = np.where(
+        behind, np.interp(times, *np.transpose(lines[3:])), np.interp(times, *np.transpose(lines[:3]))
+    )
+    np.testing.assert_allclose(tau, want, rtol=1e-12)
+    assert tau[40] == -1.0 and tau[39] == 5.0 and tau[0] == 3.0 and tau[60] == 2.0
+    np.testing.assert_array_equal(w_ref, [profile(float(t)) for t in times])
+    assert count == 61 and np.all(inertia == 0.1)
+
+
+@engines
+def test_a_run_stops_where_it_cannot_go_on(engine):
+    """With too few substeps, and with states without bounds: its states are those of its last row."""
+    few = Run("DcMotor", 20, 1e-3, {}, values={"solver.max_steps": 1}, longest=2e-4)
+    rows, count = few.in_engine(engine)
+    assert count == 1 and not rows[1:].any()
+    enough = Run("DcMotor", 20, 1e-3, {}, values={"solver.max_steps": 5}, longest=2e-4)
+    assert enough.in_engine(engine)[1] == 20
+    for name, signal in (("DcMotor", "load.tau_bias"), ("ChainUnit", "tau")):
+        run = Run(name, 20, 1e-3, {signal: [(0.0, 1.0), (0.5055, 1.0), (0.5056, math.inf)]})
+        content, d = wasm_module(run.model).content, wasm_module(run.model).description
+        steps = run_steps(d, run.signals, run.names, begin=0.5, step=1e-3, rows=20)
+        derive = [("call", "derive", [])] if "derive" in d["functions"] else []
+        *_, count, rows, states = ENGINES[engine](content, [*derive, ("call", "start", []), *steps])
+        rows = rows.reshape(20, -1)
+        assert count == 6 and np.isfinite(rows).all() and not rows[6:].any()
+        np.testing.assert_array_equal(states, rows[5])
+
+
+@engines
+def test_start_and_requirements_are_those_of_python(engine):
+    """Also of chains, whose start is an iteration."""
+    for model in (flexible(2, 1), MODELS["ChainUnit"], MODELS["KnifeDrive"]):
+        content, d = wasm_module(model, slopes=False).content, wasm_module(model, slopes=False).description
+        assert "forward" not in d["functions"]
+        called = [
+            name for name in ("derive", "requirements", "start", "start_limits") if name in d["functions"]
+        ]
+        tables = [d["requirements"], d["start_limits"]]
+        results = ENGINES[engine](
+            content,
+            [
+                *(("call", name, []) for name in called),
+                *(("read", each["address"], 3 * len(each["rules"])) for each in tables),
+                ("read", d["states"]["address"], len(d["states"]["names"])),
+            ],
+        )
+        required, limits, states = (each for each in results if isinstance(each, np.ndarray))
+        p = model.parameter_layout.instance([v.quantity.start for v in model.parameter_layout.variables])
+        p = model.with_derived(MATH, p)
+        np.testing.assert_allclose(required.reshape(-1, 3), list(model.requirements(MATH, p)), rtol=1e-12)
+        assert [each["subject"] for each in tables[0]["rules"]] == [each.subject for each in model.required]
+        if model.state_layout:
+            u = model.input_layout.instance([v.quantity.start for v in model.input_layout.variables])
+            x = model.start(MATH, p, u)
+            np.testing.assert_allclose(states, model.state_layout.values(x), rtol=1e-12, atol=1e-13)
+            want = np.reshape(list(model.start_limits(MATH, p, u, x)), (-1, 3))
+            np.testing.assert_allclose(limits.reshape(-1, 3), want, rtol=1e-9)
+
+
+@engines
+@pytest.mark.second
+def test_a_jam_of_a_drive_is_that_of_the_reference(engine):
+    """A motor on its machine as one model: the start, and a lump on the left."""
+    config = parse("")
+    drive = Drive(MODELS["DcMotor"], config.motor.parameters, config.machine)
+    whole, loads = compiled(drive.graph), drive.loads(config.feed)
+    model, names = (
+        whole.model,
+        ["motor.tau", "motor.air_gap_tau", "machine.rocker.tau", "motor.w", "motor.phi"],
+    )
+    signals = {
+        "motor.w_ref": Profile(0.0, ((0.0, 0.6, 3.0 * drive.ratio),)),
+        "machine.left.processing_force": Profile(10.0, ((1.0, 0.02, 1500.0), (1.2, 0.02, 10.0))),
+    }
+    content, d = wasm_module(model, slopes=False).content, wasm_module(model, slopes=False).description
+    assert len(content) < 20_000
+    inputs = model.input_layout.values(model.input_layout.from_names(loads))
+    steps = [
+        ("write", d["parameters"]["address"], numbers(model.parameter_layout.values(whole.parameters))),
+        ("write", d["inputs"]["address"], numbers(inputs)),
+        ("call", "start", []),
+        *run_steps(d, signals, names, begin=0.0, step=1e-3, rows=1501),
+    ]
+    *_, count, rows, _ = ENGINES[engine](content, steps)
+    reference = monolithic(drive.graph, {**loads, **signals}, 1e-3 * np.arange(1501))
+    assert count == 1501
+    for name, row in zip(names, rows.reshape(1501, -1).T, strict=True):
+        wanted = reference[name].values
+        assert np.max(np.abs(row - wanted)) < 1e-7 * np.max(np.abs(wanted)), name

@@ -38,7 +38,7 @@ from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
 
-from .recorder import Recording, recorded
+from .recorder import Recorded, recorded
 
 _SINE = (
     -0.16666666666666632,
@@ -297,7 +297,7 @@ OWN = {
 """By kind of the operation that it computes: function, number of its arguments, place of the result."""
 
 
-def recording(kind: str) -> Recording:
+def recording(kind: str) -> Recorded:
     """The basic operations of the function that computes operations of this `kind`."""
     function, arguments, _ = OWN[kind]
     return recorded(function, arguments)

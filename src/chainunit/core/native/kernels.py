@@ -15,7 +15,7 @@ from ..symbolic_trace import Trace
 
 
 @dataclass(frozen=True, eq=False)
-class Kernel:
+class ModelFunction:
     """Groups of results of the same arguments.
 
     `arguments` are the symbols of its arguments, as casadi vectors, and `takes` their letters: ``p`` parameters,
@@ -63,7 +63,7 @@ def difference_groups(model: type[Model]) -> set[int]:
     return {g for g, group in enumerate(output_groups(model)) if places[group[0]] in names}
 
 
-def kernels(t: Trace, derived: Sequence[Any]) -> Iterator[Kernel]:
+def kernels(t: Trace, derived: Sequence[Any], slopes: bool = True) -> Iterator[ModelFunction]:
     """The functions of a traced model: its outputs and their derivatives in a direction (``values``, ``forward``),
     and where it has such, the ``derivatives`` of its states and all for their start, the requirements on its
     parameters, and the values `derived` from them."""
@@ -76,21 +76,22 @@ def kernels(t: Trace, derived: Sequence[Any]) -> Iterator[Kernel]:
     # derived values come last, and only if the model has them
     more = "k" if model.derived_count else ""
 
-    def kernel(name: str, takes: str, groups: list[Any], offsets: list[int], frequency: str) -> Kernel:
-        return Kernel(name, takes, [symbols[each] for each in takes], groups, offsets, frequency)
+    def kernel(name: str, takes: str, groups: list[Any], offsets: list[int], frequency: str) -> ModelFunction:
+        return ModelFunction(name, takes, [symbols[each] for each in takes], groups, offsets, frequency)
 
-    def one(name: str, takes: str, results: Sequence[Any], frequency: str = "ONCE") -> Kernel:
+    def one(name: str, takes: str, results: Sequence[Any], frequency: str = "ONCE") -> ModelFunction:
         return kernel(name, takes, [casadi.vertcat(*map(casadi.SX, results))], [0], frequency)
 
     outputs, places = list(t.outputs), output_groups(model)
     offsets = [sum(map(len, places[:g])) for g in range(len(places))]
     values = [casadi.vertcat(*(outputs[k] for k in group)) for group in places]
     yield kernel("values", f"pux{more}", values, offsets, "OFTEN")
-    apart = groups_without_slopes(model)
-    smooth = [casadi.SX(0, 1) if g in apart else group for g, group in enumerate(values)]
-    smooth.append(casadi.vertcat(*t.derivatives))
-    slopes = [casadi.jtimes(row, casadi.vertcat(us, xs), casadi.vertcat(du, dx)) for row in smooth]
-    yield kernel("forward", f"puxde{more}", slopes, [*offsets, len(outputs)], "SELDOM")
+    if slopes:
+        apart = groups_without_slopes(model)
+        smooth = [casadi.SX(0, 1) if g in apart else group for g, group in enumerate(values)]
+        smooth.append(casadi.vertcat(*t.derivatives))
+        along = [casadi.jtimes(row, casadi.vertcat(us, xs), casadi.vertcat(du, dx)) for row in smooth]
+        yield kernel("forward", f"puxde{more}", along, [*offsets, len(outputs)], "SELDOM")
     if model.state_layout:
         yield one("derivatives", f"pux{more}", t.derivatives, "OFTEN")
         yield from _start(t, zs, one, more)
@@ -111,7 +112,7 @@ def groups_without_slopes(model: type[Model]) -> set[int]:
     return difference_groups(model) | {g for g, group in enumerate(groups) if places[group[0]].type != "Real"}
 
 
-def _start(t: Trace, zs: Any, one: Any, more: str) -> Iterator[Kernel]:
+def _start(t: Trace, zs: Any, one: Any, more: str) -> Iterator[ModelFunction]:
     """The functions that give the states at the start."""
     import casadi
 

@@ -19,7 +19,7 @@ the first one is not 0, else the third; the exponent of 2 of a number; and 2 to 
 
 
 @dataclass(frozen=True, slots=True)
-class Recording:
+class Recorded:
     """Operations, each after its operands, and the places of the results."""
 
     items: list[Operation]
@@ -123,11 +123,11 @@ for _name, _kind in {"add": "ADD", "sub": "SUB", "mul": "MUL", "truediv": "DIV"}
 
 
 @cache
-def recorded(function: Callable[..., Any], arguments: int) -> Recording:
+def recorded(function: Callable[..., Any], arguments: int) -> Recorded:
     """The operations of ``function(xp, *arguments)``, which returns a value or several; argument k is entry (0,
     k)."""
     recorder = Recorder()
     given = [recorder.add(Operation(ARGUMENT, entry=(0, k))) for k in range(arguments)]
     results = function(recorder, *given)
     values = results if isinstance(results, tuple) else (results,)
-    return Recording(recorder.items, [each.place for each in values])
+    return Recorded(recorder.items, [each.place for each in values])

@@ -131,13 +131,6 @@ class Function:
         self.i32(size)
         self._code += b"\xfc\x0a\x00\x00"
 
-    def clear(self, address: int, size: int) -> None:
-        """Set so many bytes at a known address to 0."""
-        self.i32(address)
-        self.i32(0)
-        self.i32(size)
-        self._code += b"\xfc\x0b\x00"
-
     @contextmanager
     def block(self) -> Iterator[None]:
         """Instructions behind whose end `leave` goes."""

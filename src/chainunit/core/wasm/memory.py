@@ -11,7 +11,7 @@ BYTES = 8
 
 
 @dataclass
-class Memory:
+class Places:
     """Places in memory by name, each of so many numbers; `size` is the number of bytes up to the last. The first
     `BYTES` bytes are free, so that 0 is no address."""
 
@@ -53,9 +53,9 @@ class Sizes:
         )
 
 
-def reserve(model: type[Model]) -> Memory:
+def reserve(model: type[Model]) -> Places:
     """The memory of a model: arguments and results of its functions."""
-    n, memory = Sizes.of(model), Memory()
+    n, memory = Sizes.of(model), Places()
     for name, numbers in (
         ("parameters", n.parameters),
         ("inputs", n.inputs),
@@ -72,6 +72,7 @@ def reserve(model: type[Model]) -> Memory:
         ("closed", n.states),
         ("internal_step", 1),
         ("tolerance", 1),
+        ("pace", 1),
         ("requirements", 3 * len(model.required)),
         ("start_limits", 3 * len(model.start_problem.required)),
     ):
@@ -88,4 +89,4 @@ ARGUMENTS = {
     "d": "input_changes",
     "e": "state_changes",
 }
-"""The places of the arguments of a kernel, by its letters (`chainunit.core.native.kernels.Kernel`)."""
+"""The places of the arguments of a kernel, by its letters (`chainunit.core.native.kernels.ModelFunction`)."""

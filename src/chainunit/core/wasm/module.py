@@ -1,6 +1,6 @@
 """The WebAssembly module of a model, and the description of its memory.
 
-The module has the model's functions (`chainunit.core.native.kernels`), without parameters and results: numbers lie in
+The module has the functions of the model (`chainunit.core.native.kernels`). Their arguments and results lie in
 memory, at addresses that the description names.
 
 ``derive()``
@@ -31,13 +31,13 @@ from typing import Any
 from ..engines import casadi_
 from ..model import Model, Requirement
 from ..native.division import Division
-from ..native.kernels import Kernel, groups_without_slopes, kernels, output_groups
+from ..native.kernels import ModelFunction, groups_without_slopes, kernels, output_groups
 from ..native.operations import ARGUMENT, NUMBER, Operations
 from ..quantities import Variable
 from ..symbolic_trace import trace
 from .encoding import Function, Module
 from .expressions import OwnFunctions, Writer
-from .memory import ARGUMENTS, BYTES, Memory, reserve
+from .memory import ARGUMENTS, BYTES, Places, reserve
 from .runs import RUN_PLACES, write_run
 
 _BY_GROUP = ("values", "forward")
@@ -57,8 +57,9 @@ class WasmModule:
 
 
 @lru_cache(maxsize=16)
-def wasm_module(model: type[Model]) -> WasmModule:
-    """The module of a model, deterministic to the byte.
+def wasm_module(model: type[Model], slopes: bool = True) -> WasmModule:
+    """The module of a model, deterministic to the byte; without ``forward`` where no `slopes` are wanted, which is
+    the largest part of most.
 
     Raises
     ------
@@ -70,7 +71,7 @@ def wasm_module(model: type[Model]) -> WasmModule:
     memory, module = reserve(model), Module()
     own, written = OwnFunctions(module), {}
     groups = output_groups(model)
-    for kernel in kernels(t, derived):
+    for kernel in kernels(t, derived, slopes):
         written[kernel.name] = _kernel(kernel, groups, memory, module, own)
     if model.state_layout:
         _start(model, memory, module, written)
@@ -80,7 +81,7 @@ def wasm_module(model: type[Model]) -> WasmModule:
 
 
 def _kernel(
-    kernel: Kernel, groups: list[list[int]], memory: Memory, module: Module, own: OwnFunctions
+    kernel: ModelFunction, groups: list[list[int]], memory: Places, module: Module, own: OwnFunctions
 ) -> Function:
     """Write a kernel: a function for each part of its operations, and one that calls those that are needed."""
     operations = Operations(kernel.arguments, kernel.groups)
@@ -130,7 +131,7 @@ def _kernel(
 
 
 def _addresses(
-    kernel: Kernel, groups: list[list[int]], results: list[list[int]], memory: Memory
+    kernel: ModelFunction, groups: list[list[int]], results: list[list[int]], memory: Places
 ) -> list[list[int]]:
     """The address of each result, by group."""
 
@@ -167,7 +168,7 @@ def _store(function: Function, addresses: Mapping[int, int], place: int, push: C
         push()
 
 
-def _start(model: type[Model], memory: Memory, module: Module, written: Mapping[str, Function]) -> None:
+def _start(model: type[Model], memory: Places, module: Module, written: Mapping[str, Function]) -> None:
     """The function that computes the states at the start."""
     function, n = module.function(export="start"), model.start_problem.unknowns
     if n:
@@ -177,16 +178,18 @@ def _start(model: type[Model], memory: Memory, module: Module, written: Mapping[
             function.call(written["improved"])
             function.copy(memory["unknowns"], memory["improved"], BYTES * n)
     function.call(written["initial"])
+    with function.into(memory["pace"]):
+        function.f64(0.0)
 
 
-def _fill(model: type[Model], memory: Memory, module: Module) -> None:
+def _fill(model: type[Model], memory: Places, module: Module) -> None:
     """The start values of parameters and inputs."""
     for name, layout in (("parameters", model.parameter_layout), ("inputs", model.input_layout)):
         module.fill(memory[name], [v.quantity.start or 0.0 for v in layout.variables])
 
 
 def _description(
-    model: type[Model], groups: list[list[int]], memory: Memory, module: Module
+    model: type[Model], groups: list[list[int]], memory: Places, module: Module
 ) -> dict[str, Any]:
     """Names and addresses of all that a host reads and writes."""
 

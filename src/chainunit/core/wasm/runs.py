@@ -1,573 +1,70 @@
 """Runs of a model inside its module: the integrators of `chainunit.core.integrators`, signals, and rows of results.
 
-``run(begin, step, longest, rows, signals, chosen, into, groups)`` goes from the states in memory at the time
-`begin` [s] on, and gives the number of rows that are written, one for each of `rows` times `step` [s] apart, the
-first at the begin. It writes fewer where the states leave all bounds or a step takes more than ``solver.max_steps``
-substeps. A model with error control has that (`controlled`), with its first substep in memory at the address
-``pace``, 0 where none is known; all others have equal substeps (`rk4`). Substeps are at most `longest` [s], or,
-where that is 0, as long as the model allows. At the end, time and states are those of the last row.
+``run(begin, step, longest, rows, signals, chosen, into, groups)`` goes from the states in memory at the time `begin`
+[s] on, and gives the number of rows that are written, one for each of `rows` times `step` [s] apart, the first at
+the begin. It writes fewer where the states leave all bounds or a step takes more than ``solver.max_steps`` substeps.
+A model with error control has that (`controlled`); its next substep [s] is in memory at the address ``pace``, which
+``start()`` sets to 0, as none is known. All others have equal substeps (`rk4`). Substeps are at most `longest` [s],
+or, where that is 0, as long as the model allows. At the end, the states are those of the last row.
 
 ``signals`` is the address of a table, or 0: the number of signals, and from the next 8 bytes on 24 bytes for each:
 the address of an input, the kind of the signal, its number of points or changes, the address of its numbers, and a
 place for the point where it was read last, 0 at the begin; all whole numbers of 4 bytes, and 4 bytes free.
 
-- Kind 0: lines between points, each with its time [s] and value; before the first and behind the last the value
-stays.
-  Of two points with the same time the second holds from there on.
-- Kind 1: `chainunit.system.signals.Profile`: the value at first, and for each change begin [s], duration [s], and
-value
-  after it.
+- Kind 0, lines between points, each with its time [s] and value. Before the first and behind the last the value
+  stays. Of two points with the same time the second holds from there on.
+- Kind 1, a `chainunit.system.signals.Profile`: the value at first, and for each change begin [s], duration [s], and
+  value after it.
 
 ``chosen`` is the address of the number of results of a row, and from the next 8 bytes on their addresses, 4 bytes
-each; the rows are written to the address `into` one after the other. Before each row the outputs of the `groups`
+each. The rows are written to the address `into`, one after the other. Before each row the outputs of the `groups`
 are computed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Mapping
 
 from .. import integrators
 from ..model import Model
 from .encoding import Function, Module
 from .expressions import OwnFunctions
-from .memory import BYTES, Memory
+from .integration import Controlled, RunParts, StateLoop, even
+from .memory import BYTES, Places
+from .signals import add, signals
 
-RUN_PLACES = ("pace",)
+RUN_PLACES = ("internal_step", "pace")
 """Places in memory of a run that its host may read or write."""
-_RECORD = 24
-"""Bytes of the record of a signal."""
-
-
-@dataclass(frozen=True)
-class _Parts:
-    """What the integrators need: the memory, the number of states, and the functions of the module."""
-
-    memory: Memory
-    states: int
-    module: Module
-    own: OwnFunctions
-    written: Mapping[str, Function]
-    signals: Function
-
-    @property
-    def room(self) -> int:
-        """Bytes of the states."""
-        return BYTES * self.states
 
 
 def write_run(
-    model: type[Model], memory: Memory, module: Module, own: OwnFunctions, written: Mapping[str, Function]
+    model: type[Model], memory: Places, module: Module, own: OwnFunctions, written: Mapping[str, Function]
 ) -> None:
     """Write the functions of runs."""
     assert model.state_layout is not None
     n = len(model.state_layout.names)
-    memory.room("pace", 1)
     memory.room("table of signals", 1)
     memory.room("now", n)
-    signals = _signals(memory, module)
-    parts = _Parts(memory, n, module, own, written, signals)
+    parts = RunParts(memory, n, module, own, written, signals(memory, module))
     most = memory["parameters"] + BYTES * model.parameter_layout.names.index(integrators.MAX_STEPS)
     if model.controlled:
         nominal = memory.room("nominal", n)
         module.fill(nominal, [v.quantity.nominal or 1.0 for v in model.state_layout.variables])
-        advance = _Controlled(parts).write(most)
+        advance = Controlled(parts).write(most)
     else:
-        advance = _even(parts, most)
+        advance = even(parts, most)
     _run(parts, advance)
 
 
-def _signals(memory: Memory, module: Module) -> Function:
-    """The function that sets the inputs with signals, at a time."""
-    f = module.function(["f64"])
-    time, record, left, points, value = 0, f.local("i32"), f.local("i32"), f.local("i32"), f.local()
-    kinds = (_lines(module), _profile(module))
-    f.at(memory["table of signals"], "i32")
-    f.set(record)
-    with f.block():
-        f.get(record)
-        f.do("i32.eqz")
-        f.leave_if(0)
-        f.get(record)
-        f.load("i32")
-        f.set(left)
-        _add(f, record, 8)
-        with f.loop():
-            f.get(left)
-            f.do("i32.eqz")
-            f.leave_if(1)
-            f.get(record)
-            f.load("i32", 12)
-            f.set(points)
-            f.get(record)
-            f.load("i32", 4)
-            with f.when():
-                f.get(time, points, record)
-                f.call(kinds[1])
-                f.set(value)
-                f.otherwise()
-                f.get(time, points, record)
-                f.call(kinds[0])
-                f.set(value)
-            f.get(record)
-            f.load("i32")
-            f.get(value)
-            f.store()
-            _add(f, record, _RECORD)
-            _add(f, left, -1)
-            f.leave(0)
-    return f
-
-
-def _add(f: Function, place: int, n: int) -> None:
-    """Add a number to a whole local."""
-    f.get(place)
-    f.i32(n)
-    f.do("i32.add")
-    f.set(place)
-
-
-def _lines(module: Module) -> Function:
-    """The value on the lines between points, at a time: of the address of the points, and of the record."""
-    f = module.function(["f64", "i32", "i32"], ["f64"])
-    time, points, record = 0, 1, 2
-    k, at, begin, before = f.local("i32"), f.local("i32"), f.local(), f.local()
-
-    def point() -> None:
-        """The address of point k."""
-        f.get(points, k)
-        f.i32(2 * BYTES)
-        f.do("i32.mul", "i32.add")
-        f.set(at)
-
-    f.get(record)
-    f.load("i32", 16)
-    f.set(k)
-    point()
-    with f.loop(), f.block():  # back
-        f.get(k)
-        f.do("i32.eqz")
-        f.leave_if(0)
-        f.get(time, at)
-        f.load()
-        f.do("f64.ge")
-        f.leave_if(0)
-        _add(f, k, -1)
-        _add(f, at, -2 * BYTES)
-        f.leave(1)
-    with f.loop(), f.block():  # on
-        f.get(k)
-        f.i32(1)
-        f.do("i32.add")
-        f.get(record)
-        f.load("i32", 8)
-        f.do("i32.ge_s")
-        f.leave_if(0)
-        f.get(time, at)
-        f.load("f64", 2 * BYTES)
-        f.do("f64.lt")
-        f.leave_if(0)
-        _add(f, k, 1)
-        _add(f, at, 2 * BYTES)
-        f.leave(1)
-    f.get(record, k)
-    f.store("i32", 16)
-    f.get(at)
-    f.load()
-    f.set(begin)
-    f.get(at)
-    f.load("f64", BYTES)
-    f.set(before)
-    with f.block():
-        f.get(time, begin)
-        f.do("f64.lt")
-        f.leave_if(0)
-        f.get(k)
-        f.i32(1)
-        f.do("i32.add")
-        f.get(record)
-        f.load("i32", 8)
-        f.do("i32.ge_s")
-        f.leave_if(0)
-        f.get(before, at)
-        f.load("f64", 3 * BYTES)
-        f.get(before)
-        f.do("f64.sub")
-        f.get(time, begin)
-        f.do("f64.sub")
-        f.get(at)
-        f.load("f64", 2 * BYTES)
-        f.get(begin)
-        f.do("f64.sub", "f64.div", "f64.mul", "f64.add", "return")
-    f.get(before)
-    return f
-
-
-def _profile(module: Module) -> Function:
-    """The value of a profile, at a time: of the address of its numbers, and of the record."""
-    f = module.function(["f64", "i32", "i32"], ["f64"])
-    time, at, record = 0, 1, 2
-    left, value, before, share = f.local("i32"), f.local(), f.local(), f.local()
-    f.get(at)
-    f.load()
-    f.set(value)
-    f.get(value)
-    f.set(before)
-    f.get(record)
-    f.load("i32", 8)
-    f.set(left)
-    with f.block(), f.loop():
-        f.get(left)
-        f.do("i32.eqz")
-        f.leave_if(1)
-        # the share of the change that is past, between 0 and 1
-        f.get(time, at)
-        f.load("f64", BYTES)
-        f.do("f64.sub")
-        f.get(at)
-        f.load("f64", 2 * BYTES)
-        f.do("f64.div")
-        f.f64(0.0)
-        f.do("f64.max")
-        f.f64(1.0)
-        f.do("f64.min")
-        f.set(share)
-        f.get(value, at)
-        f.load("f64", 3 * BYTES)
-        f.get(before)
-        f.do("f64.sub")
-        f.get(share, share)
-        f.do("f64.mul")
-        f.get(share)
-        f.do("f64.mul")
-        f.f64(10.0)
-        f.get(share)
-        f.f64(6.0)
-        f.get(share)
-        f.do("f64.mul")
-        f.f64(15.0)
-        f.do("f64.sub", "f64.mul", "f64.add", "f64.mul", "f64.mul", "f64.add")
-        f.set(value)
-        f.get(at)
-        f.load("f64", 3 * BYTES)
-        f.set(before)
-        _add(f, at, 3 * BYTES)
-        _add(f, left, -1)
-        f.leave(0)
-    f.get(value)
-    return f
-
-
-class _States:
-    """Loops over the states in a function."""
-
-    def __init__(self, f: Function, parts: _Parts) -> None:
-        self._f, self._room, self._at = f, parts.room, f.local("i32")
-
-    @contextmanager
-    def each(self) -> Iterator[None]:
-        """Instructions for each state."""
-        with self._f.counting(self._at, self._room, BYTES):
-            yield
-
-    @contextmanager
-    def into(self, address: int) -> Iterator[None]:
-        """Write the value, which the instructions inside push, to the present state's place in an array."""
-        self._f.get(self._at)
-        yield
-        self._f.store("f64", address)
-
-    def push(self, address: int) -> None:
-        """Push the present state's number in an array."""
-        self._f.get(self._at)
-        self._f.load("f64", address)
-
-    def weighted(self, weights: Sequence[float], address: int) -> None:
-        """Push the sum of the numbers in the arrays from an address on, with these weights."""
-        for k, weight in enumerate(weights):
-            self._f.f64(weight)
-            self.push(address + k * self._room)
-            self._f.do("f64.mul")
-            if k:
-                self._f.do("f64.add")
-
-
-def _even(parts: _Parts, most: int) -> Function:
-    """`rk4` from a time [s] over a step [s], with the longest substep [s]; 1, or 0 where it takes too many."""
-    f, memory = parts.module.function(["f64", "f64", "f64"], ["i32"]), parts.memory
-    begin, step, longest = 0, 1, 2
-    count, h, taken, factor = f.local(), f.local(), f.local(), f.local()
-    x, rates = memory["states"], memory["derivatives"]
-    now, later, states = memory["now"], memory.room("later", parts.states), _States(f, parts)
-
-    def moved(to: int, of: int, share: float) -> None:
-        """Go on from one array to another by a share of the step along the derivatives."""
-        f.f64(share)
-        f.get(h)
-        f.do("f64.mul")
-        f.set(factor)
-        with states.each(), states.into(to):
-            states.push(of)
-            f.get(factor)
-            states.push(rates)
-            f.do("f64.mul", "f64.add")
-
-    f.get(step, longest)
-    f.do("f64.div")
-    f.f64(1e-9)
-    f.do("f64.sub")
-    f.set(count)
-    _leave_where_more(f, count, most)
-    f.f64(1.0)
-    f.get(count)
-    f.do("f64.ceil", "f64.max")
-    f.set(count)
-    f.get(step, count)
-    f.do("f64.div")
-    f.set(h)
-    with f.loop():
-        f.copy(now, x, parts.room)
-        f.copy(later, x, parts.room)
-        f.clear(rates, parts.room)
-        for node, weight in zip(integrators.RK4_NODES, integrators.RK4_WEIGHTS, strict=True):
-            moved(x, now, node)
-            f.get(begin, taken)
-            f.f64(node)
-            f.do("f64.add")
-            f.get(h)
-            f.do("f64.mul", "f64.add")
-            f.call(parts.signals)
-            f.call(parts.written["derivatives"])
-            moved(later, later, weight)
-        f.copy(x, later, parts.room)
-        f.get(taken)
-        f.f64(1.0)
-        f.do("f64.add")
-        f.set(taken)
-        f.get(taken, count)
-        f.do("f64.lt")
-        f.leave_if(0)
-    f.i32(1)
-    return f
-
-
-def _leave_where_more(f: Function, count: int, most: int) -> None:
-    """Return 0 where the number in a local is larger than that at an address."""
-    f.get(count)
-    f.at(most)
-    f.do("f64.gt")
-    with f.when():
-        f.i32(0)
-        f.do("return")
-
-
-class _Controlled:
-    """Writes `controlled` from a time [s] over a step [s], with the longest substep [s]; 1, or 0 where the states
-    leave all bounds or the step takes too many substeps."""
-
-    def __init__(self, parts: _Parts) -> None:
-        self._parts, self._memory = parts, parts.memory
-        f = self.function = parts.module.function(["f64", "f64", "f64"], ["i32"])
-        self._f, self._states = f, _States(f, parts)
-        self._begin, self._step, self._longest = 0, 1, 2
-        self._since, self._taken, self._left, self._h = f.local(), f.local(), f.local(), f.local()
-        self._pace, self._error, self._following, self._sum = f.local(), f.local(), f.local(), f.local()
-        self._usable, self._last = f.local("i32"), f.local("i32")
-        self._stages = parts.memory.room("stages", parts.states * len(integrators.NODES))
-
-    def write(self, most: int) -> Function:
-        """The function; the parameter for the most substeps is at an address."""
-        f, memory, parts = self._f, self._memory, self._parts
-        f.call(parts.written["tolerance"])
-        f.copy(memory["now"], memory["states"], parts.room)
-        f.at(memory["pace"])
-        f.set(self._pace)
-        f.f64(integrators.FIRST)
-        f.get(self._longest)
-        f.do("f64.mul")
-        f.get(self._pace, self._pace)
-        f.f64(0.0)
-        f.do("f64.eq")
-        # of two the first where the condition holds
-        f.do("select")
-        f.set(self._pace)
-        with f.block(), f.loop():
-            f.get(self._since, self._step)
-            f.do("f64.ge")
-            f.leave_if(1)
-            self._increase(self._taken, 1.0)
-            _leave_where_more(f, self._taken, most)
-            self._choose_size()
-            self._trial()
-            self._judge()
-            self._accept()
-            self._next_size()
-            f.leave(0)
-        f.copy(memory["states"], memory["now"], parts.room)
-        with f.into(memory["pace"]):
-            f.get(self._pace)
-        f.i32(1)
-        return f
-
-    def _increase(self, place: int, by: float) -> None:
-        self._f.get(place)
-        self._f.f64(by)
-        self._f.do("f64.add")
-        self._f.set(place)
-
-    def _choose_size(self) -> None:
-        """The next substep: of a rest that is hardly longer, all or half."""
-        f = self._f
-        f.get(self._step, self._since)
-        f.do("f64.sub")
-        f.set(self._left)
-        f.get(self._left)
-        f.get(self._left)
-        f.f64(0.5)
-        f.do("f64.mul")
-        f.get(self._pace, self._pace, self._left)
-        f.f64(0.5)
-        f.do("f64.mul", "f64.gt", "select")
-        f.get(self._pace, self._left)
-        f.do("f64.ge", "select")
-        f.set(self._h)
-
-    def _trial(self) -> None:
-        """The states after the substep, and the derivatives at its stages."""
-        f, memory, parts, states = self._f, self._memory, self._parts, self._states
-        for k, (node, weights) in enumerate(zip(integrators.NODES, integrators.STAGES, strict=True)):
-            if weights:
-                with states.each(), states.into(memory["states"]):
-                    states.push(memory["now"])
-                    f.get(self._h)
-                    states.weighted(weights, self._stages)
-                    f.do("f64.mul", "f64.add")
-            else:
-                f.copy(memory["states"], memory["now"], parts.room)
-            f.get(self._begin, self._since, self._h)
-            f.f64(node)
-            f.do("f64.mul", "f64.add", "f64.add")
-            f.call(parts.signals)
-            f.call(parts.written["derivatives"])
-            f.copy(self._stages + k * parts.room, memory["derivatives"], parts.room)
-
-    def _judge(self) -> None:
-        """Whether states and derivatives are finite, and the error over the permitted one."""
-        f, memory, parts, states = self._f, self._memory, self._parts, self._states
-        for place in (self._sum, self._error):
-            f.f64(0.0)
-            f.set(place)
-        last = self._stages + (len(integrators.NODES) - 1) * parts.room
-        with states.each():
-            f.get(self._sum)
-            states.push(memory["states"])
-            f.f64(0.0)
-            f.do("f64.mul", "f64.add")
-            states.push(last)
-            f.f64(0.0)
-            f.do("f64.mul", "f64.add")
-            f.set(self._sum)
-            f.get(self._error, self._h)
-            states.weighted(integrators.ERRORS, self._stages)
-            f.do("f64.mul", "f64.abs")
-            f.at(memory["tolerance"])
-            states.push(memory["now"])
-            f.do("f64.abs")
-            states.push(memory["states"])
-            f.do("f64.abs", "f64.max")
-            states.push(memory["nominal"])
-            f.do("f64.max", "f64.mul", "f64.div", "f64.max")
-            f.set(self._error)
-        f.get(self._sum)
-        f.f64(0.0)
-        f.do("f64.eq")
-        f.set(self._usable)
-        f.get(self._h)
-        self._shortest()
-        f.do("f64.le")
-        f.set(self._last)
-
-    def _shortest(self) -> None:
-        self._f.f64(integrators.SHORTEST)
-        self._f.get(self._longest)
-        self._f.do("f64.mul")
-
-    def _accept(self) -> None:
-        """Take the states over, corrected to the model's constraints, where the error permits it."""
-        f, memory, parts = self._f, self._memory, self._parts
-        f.get(self._usable)
-        f.do("i32.eqz")
-        f.get(self._last)
-        f.do("i32.and")
-        with f.when():
-            f.i32(0)
-            f.do("return")
-        f.get(self._usable, self._error)
-        f.f64(1.0)
-        f.do("f64.le")
-        f.get(self._last)
-        f.do("i32.or", "i32.and")
-        with f.when():
-            f.get(self._step, self._since, self._h)
-            f.do("f64.add")
-            f.get(self._h, self._left)
-            f.do("f64.ge", "select")
-            f.set(self._since)
-            f.get(self._begin, self._since)
-            f.do("f64.add")
-            f.call(parts.signals)
-            f.call(parts.written["closed"])
-            f.copy(memory["now"], memory["closed"], parts.room)
-
-    def _next_size(self) -> None:
-        """The substep that the error suggests."""
-        f = self._f
-        f.get(self._h)
-        f.f64(integrators.MOST_GROWTH)
-        f.f64(integrators.SAFETY)
-        f.f64(integrators.ERROR_POWER)
-        f.get(self._error)
-        f.call(self._parts.own.of("LOG"))
-        f.do("f64.mul")
-        f.call(self._parts.own.of("EXP"))
-        f.do("f64.mul")
-        f.get(self._error)
-        f.f64(integrators.NO_ERROR)
-        f.do("f64.lt", "select")
-        f.f64(integrators.LEAST_GROWTH)
-        f.do("f64.max")
-        f.f64(integrators.MOST_GROWTH)
-        f.do("f64.min")
-        f.f64(integrators.LEAST_GROWTH)
-        f.get(self._usable)
-        f.do("select", "f64.mul")
-        f.set(self._following)
-        # a substep that the end of the step shortened does not shorten the next one
-        f.get(self._following, self._pace)
-        f.do("f64.max")
-        f.get(self._following, self._usable, self._error)
-        f.f64(1.0)
-        f.do("f64.le", "i32.and")
-        f.get(self._h, self._pace)
-        f.do("f64.lt", "i32.and", "select")
-        self._shortest()
-        f.do("f64.max")
-        f.get(self._longest)
-        f.do("f64.min")
-        f.set(self._pace)
-
-
-def _run(parts: _Parts, advance: Function) -> None:
+def _run(parts: RunParts, advance: Function) -> None:
     """The function of runs."""
     memory, written = parts.memory, parts.written
     f = parts.module.function(["f64", "f64", "f64", "i32", "i32", "i32", "i32", "i32"], ["i32"], "run")
-    begin, step, longest, rows, signals, chosen, into, groups = range(8)
+    begin, step, longest, rows, table, chosen, into, groups = range(8)
     row, time, left, source = f.local("i32"), f.local(), f.local("i32"), f.local("i32")
-    x, kept, states = memory["states"], memory.room("row", parts.states), _States(f, parts)
+    x, kept, states = memory["states"], memory.room("row", parts.states), StateLoop(f, parts)
     with f.into(memory["table of signals"], "i32"):
-        f.get(signals)
+        f.get(table)
     f.get(longest)
     f.f64(0.0)
     f.do("f64.eq")
@@ -594,7 +91,7 @@ def _run(parts: _Parts, advance: Function) -> None:
         f.get(source)
         f.load("i32")
         f.set(left)
-        _add(f, source, 8)
+        add(f, source, 8)
         with f.block(), f.loop():
             f.get(left)
             f.do("i32.eqz")
@@ -603,11 +100,11 @@ def _run(parts: _Parts, advance: Function) -> None:
             f.load("i32")
             f.load()
             f.store()
-            _add(f, source, 4)
-            _add(f, into, BYTES)
-            _add(f, left, -1)
+            add(f, source, 4)
+            add(f, into, BYTES)
+            add(f, left, -1)
             f.leave(0)
-        _add(f, row, 1)
+        add(f, row, 1)
         f.get(row, rows)
         f.do("i32.ge_s")
         f.leave_if(1)
