@@ -293,7 +293,7 @@ class Bench:
         )  # fmt: skip
         try:
             # a mutant may run for ever: it shall not take the time of a whole stage
-            said, _ = process.communicate(timeout=self.allowed / 6.0 if files else self.allowed)
+            said, _ = process.communicate(timeout=self.allowed / 12.0 if files else self.allowed)
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             process.communicate()
@@ -428,7 +428,7 @@ def main() -> None:
         "--allowed",
         type=float,
         default=1800.0,
-        help="seconds of a run of a whole stage; six runs of files take as long",
+        help="seconds of a run of a whole stage; twelve runs of files take as long",
     )
     options.add_argument(
         "--near",

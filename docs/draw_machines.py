@@ -14,8 +14,8 @@ FOLDER = Path(__file__).parent
 FILES = {"ChamberForces": "machine.svg", "KnifeDrive": "knife.svg", "Accelerator": "accelerator.svg"}
 """File of each machine in the folder of this script."""
 GALLERY = FOLDER.parent / "examples" / "linkages"
-PLACES = {"cylinder_lift": 0.55, "tipper": 0.6}
-"""Place of the driver in the picture, where it is not 1 rad [m]."""
+PLACES = {"cylinder_lift": 0.55, "scissor_lift": 0.2, "tipper": 0.6, "toggle_clamp": 1.2}
+"""Place of the driver in the picture, where it is not 1 rad [rad, m]."""
 
 
 def pictures() -> dict[Path, str]:

@@ -3,14 +3,17 @@
 import itertools
 import math
 import re
+from pathlib import Path
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
 from chainunit.machines.machine import Machine
 from chainunit.models import MACHINES
-from chainunit.report.drawing import HEIGHT, WIDTH, dimensions, drawing
+from chainunit.report.drawing import _LOOKS, HEIGHT, WIDTH, dimensions, drawing
 
+GALLERY = Path(__file__).parents[1] / "docs" / "linkages"
 SVG = "{http://www.w3.org/2000/svg}"
 
 
@@ -84,6 +87,27 @@ def test_labels_do_not_overlap(name, phi):
         assert a[0] > b[1] or b[0] > a[1] or a[2] > b[3] or b[2] > a[3], (one, other)
     for text, left, _, top, bottom in boxes:
         assert left > 0.0 and top > 0.0 and bottom < HEIGHT, text
+
+
+@pytest.mark.parametrize("file", sorted(GALLERY.glob("*.svg")), ids=lambda file: file.stem)
+def test_no_link_is_drawn_over_the_name_of_a_link(file):
+    """In the pictures of the gallery."""
+    root = ElementTree.fromstring(file.read_text("utf-8"))
+    colours = {look[0] for look in _LOOKS.values()}
+    edges = []
+    for shape in (*root.iter(f"{SVG}polyline"), *root.iter(f"{SVG}polygon")):
+        corners = [tuple(map(float, point.split(","))) for point in shape.get("points").split()]
+        corners += corners[:1] if shape.tag == f"{SVG}polygon" else []
+        if shape.get("stroke") in colours or shape.get("fill") == "none":
+            edges += itertools.pairwise(corners) if shape.get("stroke-dasharray") is None else ()
+    names = [text for text in root.iter(f"{SVG}text") if text.get("fill") in colours and text.text != "φ"]
+    assert names and edges
+    along = np.linspace(0.0, 1.0, 200)
+    for name in names:
+        x, y, half = float(name.get("x")), float(name.get("y")) - 4.5, 3.2 * len(name.text)
+        for (x0, y0), (x1, y1) in edges:
+            near = np.abs(x0 + along * (x1 - x0) - x) < half
+            assert not np.any(near & (np.abs(y0 + along * (y1 - y0) - y) < 4.5)), name.text
 
 
 def test_a_dimension_of_the_user_is_shown():

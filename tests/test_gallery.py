@@ -6,25 +6,32 @@ machines, reactions within 2e-14, the small angle of the knife within 5e-13."""
 
 from __future__ import annotations
 
+import math
 import re
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
+from chainunit.core.engines import MATH
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
+from chainunit.reading.results import as_data
 from chainunit.report import linkage
 from chainunit.report.drawing import drawing
 from chainunit.study.config import parse
+from chainunit.study.linkage_turn import linkage_findings
 from chainunit.study.run import run_study
 
 FOLDER = Path(__file__).parents[1] / "examples" / "linkages"
 FILES = sorted(FOLDER.glob("*.toml"))
 KINDS = {
+    "andrews_squeezer": ["RRR", "RRR", "RRR"],
     "blake_jaw_crusher": ["RRR", "RRR"],
     "chain_unit": ["RRR", "RRR", "RRR"],
     "crank_shaper": ["RPR", "RRP"],
@@ -34,10 +41,12 @@ KINDS = {
     "knife_drive": ["RRR", "triad"],
     "level_luffing_crane": ["RRR"],
     "pump_jack": ["RRR"],
+    "scissor_lift": ["cylinder", "RRP", "RRR", "RPR"],
     "scotch_yoke_pump": ["RPP"],
     "slider_crank_press": ["RRP"],
     "stephenson_six_bar": ["RRR", "RRR"],
     "tipper": ["cylinder"],
+    "toggle_clamp": ["RRR"],
     "watt_six_bar": ["RRR", "RRR"],
     "whitworth_quick_return": ["RPR", "RRP"],
 }
@@ -189,6 +198,107 @@ def test_the_hook_of_the_crane_moves_level():
     assert np.degrees(high - low) == pytest.approx(swing)
 
 
+def test_the_clamp_presses_at_its_dead_centre_and_holds_itself():
+    """The lever and the link lie on one line there, so that no force of the workpiece turns the lever; on the stop it
+    presses the lever against it. The largest torque is that of a slow lever."""
+    dead, force, most, further = said(
+        "toggle_clamp", r"at (\d+) degrees: .* (\S+) kN, .* needs (\S+) N m .* stop, (\d+) degrees"
+    )
+    clamp, without = (
+        machine("toggle_clamp"),
+        machine("toggle_clamp").replace({"pins.friction": 0.0, "g": 0.0}),
+    )
+    low, high = clamp.model.span
+    q, at = np.linspace(low, high, 9401), math.radians(dead)
+    assert np.degrees(high) == pytest.approx(dead + further)
+    out = clamp.outputs(q, 0.2)
+    assert np.max(out.tau) == pytest.approx(most, abs=0.05)
+    assert -clamp.outputs(at, 1.0).load_power == pytest.approx(0.0, abs=1e-9)
+    arm = without.outputs(at)
+    # O2-T is 95 mm long across the force, O2-B 32 mm
+    assert abs(arm.O2.fy) == pytest.approx(1e3 * force * (1.0 + 95.0 / 32.0), rel=1e-9)
+    assert without.outputs(at).tau == pytest.approx(0.0, abs=1e-8)
+    assert without.outputs(high).tau < -5.0 and without.outputs(high - math.radians(7.0)).tau > 5.0
+    # by virtual work: the torque stores energy in the pad, whose force begins over 0.1 mm
+    pad = without.outputs(q).arm.T.y
+    pressed = np.maximum(0.002 + np.min(pad) - pad, 0.0)
+    work = np.sum(0.5 * np.diff(q) * (without.outputs(q).tau[1:] + without.outputs(q).tau[:-1]))
+    assert work == pytest.approx(0.5 * 0.6e6 * pressed[-1] ** 2, rel=5e-4)
+
+
+def test_the_stops_of_the_crane_give_way_to_its_weight_by_a_hundredth_of_its_range():
+    """Its masses stand at their radius of gyration; the hook holds the jib up with far less."""
+    crane = machine("level_luffing_crane")
+    low, high = crane.model.span
+    feed = crane.model.feed_layout.by_name(crane.model.Feed())
+    inertia = np.max(crane.evaluate({"phi": np.linspace(low, high, 2001), **feed})["J"])
+    weight = 9.81 * math.sqrt(inertia * (900.0 + 260.0 + 180.0 + 2000.0))
+    stops = crane.model.end_stops
+    assert 0.5 * stops.stiffness * (0.01 * (high - low)) ** 2 == pytest.approx(
+        weight * (high - low), rel=1e-3
+    )
+    assert stops.damping == pytest.approx(math.sqrt(stops.stiffness * inertia), rel=1e-3)
+
+
+def test_a_machine_without_inputs_has_an_empty_feed_in_a_result():
+    """Of which as_data made no table, so that a study of it ended in an error."""
+    assert not machine("andrews_squeezer").model.feed_layout.names
+    assert as_data(machine("andrews_squeezer").model.Feed()) == {}
+
+
+def test_a_place_of_0_has_no_rounding_in_the_tables():
+    """The arm of the clamp comes to 0 deg where it clamps; the left pins of the scissor lift stay at x = 0."""
+    clamp, lift = (linkage_findings(machine(name), 0.1) for name in ("toggle_clamp", "scissor_lift"))
+    assert clamp.swings["arm"].least == 0.0 and clamp.limits["arm.angle"][0] == 0.0
+    assert [lift.limits[f"{point}.x"] for point in ("cross_arm.L", "platform.V")] == [(0.0, 0.0)] * 2
+    assert lift.limits["platform.V.y"] == pytest.approx((0.4624, 2.1380), abs=1e-4)
+
+
+def test_the_clamp_stays_shut_without_a_hand():
+    """From beyond its dead centre it moves onto its stop and rests there; from before it, it opens."""
+    direct = read_linkage(FOLDER / "toggle_clamp.toml").direct()
+    u, layout, high = direct.Inputs(tau=0.0), direct.state_layout, direct.inverse.span[1]
+    angles = []
+    for start in (92.0, 86.0):
+        p = direct.check(replace(direct.Parameters(), phi_start=math.radians(start)))
+
+        def rates(t, x, p=p):
+            return direct.derivatives(MATH, p, u, layout.instance([*x]))
+
+        begin = layout.values(direct.start(MATH, p, u))
+        angles.append(solve_ivp(rates, (0.0, 1.0), begin, method="LSODA", rtol=1e-6, atol=1e-6).y[0])
+    shut, opened = angles
+    assert np.min(shut) > math.radians(91.9) and shut[-1] == pytest.approx(high, abs=2e-3)
+    assert np.min(opened) < math.radians(70.0)
+
+
+def test_the_cylinder_carries_the_scissor_lift_by_virtual_work():
+    """The arms turn by one angle: each place follows from it in closed form."""
+    *ends, high, low, most = said("scissor_lift", r"from (\d+) to (\d+) kN, (\S+) to (\S+) times .* (\d+) kN")
+    rise, stroke = said("scissor_lift", r"by (\S+) m with a stroke of (\S+) m")
+    lift = machine("scissor_lift")
+    q = way("scissor_lift")
+    span = np.array(lift.model.span)
+    assert np.ptp(span) == pytest.approx(stroke)
+    assert lift.outputs(span).tau == pytest.approx([1e3 * each for each in ends], rel=0.01)
+    assert lift.outputs(span).tau == pytest.approx([high * 1180.0 * 9.81, low * 1180.0 * 9.81], rel=0.01)
+    assert np.ptp(lift.outputs(span).platform.G.y) == pytest.approx(rise, abs=0.005)
+    pin = lift.outputs(span, 0.03).M
+    assert np.max(np.hypot(pin.fx, pin.fy)) == pytest.approx(1e3 * most, rel=0.01)
+    out = lift.replace({"pins.friction": 0.0, "guides.friction": 0.0}).outputs(q)
+    # pins of the cylinder at P and at 1 m on the arm: their distance is the way of the piston and 0.42 m
+    arm = np.exp(1j * np.arcsin(out.platform.V.y / 3.2))
+    cylinder = arm - (0.6 - 0.2j)
+    assert np.abs(cylinder) == pytest.approx(q + 0.42, rel=1e-12)
+    longer = (cylinder.conj() * 1j * arm).real / np.abs(cylinder)
+    slope = (cylinder.conj() * 1j * arm).imag / np.abs(cylinder) ** 2
+    # each per angle of the arms: four arms, platform with payload and upper roller, barrel and rod
+    arms = 1.6 * arm.real * (34.0 * 0.5 + 30.0 * (0.5 + 1.5 + 1.5) + 2.0 * (180.0 + 1000.0 + 3.0))
+    barrel = 0.2 * cylinder.real / np.abs(cylinder) * slope
+    force = 9.81 * (arms + 22.0 * barrel + 10.0 * (arm.real - barrel)) / longer
+    assert out.tau == pytest.approx(force, rel=1e-12)
+
+
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("name", KINDS)
 def test_each_file_has_a_drawing_with_the_names_of_its_links(name):
@@ -234,14 +344,19 @@ def test_the_page_shows_each_file_with_its_words():
 @pytest.mark.parametrize("name", KINDS)
 def test_each_file_does_the_work_of_its_kind(name):
     """Its loads take power in the mean over a turn, or over the way of a cylinder, of some size against their
-    largest; a force that is on in both directions takes none. The packaged machines begin empty."""
+    largest; a force that is on in both directions takes none. The packaged machines begin empty. The squeezer has
+    nothing but a spring, which gives back what it took."""
     begun = {"chain_unit": {"left_processing_force": 10.0}, "knife_drive": {"cut_force": 3000.0}}
     m, q = machine(name), way(name)
     model = m.model
     feed = model.feed_layout.by_name(model.Feed()) | begun.get(name, {})
-    out = m.evaluate({"phi": q, "w": 1.0, **feed})
+    out = m.evaluate({"phi": q, "w": 0.05 if model.slides else 1.0, **feed})
     # a tipper lifts a mass, which is its load
-    taken = -out["load_power"] if np.any(out["load_power"]) else np.gradient(out["potential_energy"], q)
+    lifted = np.gradient(out["potential_energy"], q) * out["w0"]
+    taken = -out["load_power"] if np.any(out["load_power"]) else lifted
+    if name == "andrews_squeezer":
+        assert np.ptp(out["potential_energy"]) > 0.5 > 1e12 * abs(np.mean(out["power"]))
+        return
     assert np.mean(taken) > 0.02 * np.max(np.abs(taken)) > 0.0
     # the driver gives it; what is over goes into friction and the lift of the parts
     assert np.mean(out["power"]) >= np.mean(taken) * (1.0 - 1e-6)

@@ -1,8 +1,7 @@
-"""The linear model of a model at a point, against differences, FMUs, and the speed loop of a study."""
+"""The linear model of a model at a point, against differences and the speed loop of a study."""
 
 from __future__ import annotations
 
-import ctypes
 import doctest
 import itertools
 import json
@@ -13,16 +12,18 @@ from pathlib import Path
 import control
 import numpy as np
 import pytest
-from systems import initialized
+from records import record_of
 
 from chainunit import InputError, LinearModel, RunError, Study, linearize
 from chainunit.core.engines import MATH
 from chainunit.core.model import Model, Part
 from chainunit.core.quantities import base_units, declaration, quantity
 from chainunit.drives import speed_control
+from chainunit.drives.motor import T_RATED
 from chainunit.models import MODELS
 from chainunit.reading.results import as_data
 from chainunit.study import config, linear
+from chainunit.study.choice import choose
 from chainunit.study.linear import linear_point
 from chainunit.study.package import drive_to_export
 from chainunit.study.rig import Rig
@@ -32,7 +33,10 @@ from chainunit.system.linear import linearize as linearize_model
 from chainunit.system.poles import poles_of
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
-GALLERY = ("watt_six_bar", "slider_crank_press", "cylinder_lift", "level_luffing_crane")
+GALLERY = (
+    *("watt_six_bar", "stephenson_six_bar", "dwell_six_bar", "knife_drive", "slider_crank_press"),
+    *("scotch_yoke_pump", "pump_jack", "cylinder_lift", "level_luffing_crane", "tipper"),
+)
 
 
 def moved(model, seed=1):
@@ -140,30 +144,6 @@ def test_slopes_of_the_compiled_drive_are_those_of_differences(drive):
     assert state["motor.phi"].rate.value == state["motor.w"].value and state["motor.w"].rate.unit == "rad/s2"
 
 
-@pytest.mark.second
-@pytest.mark.parametrize("name", MODELS)
-def test_slopes_are_the_directional_derivatives_of_the_fmu(native_fmus, name):
-    model = MODELS[name]
-    inputs, states = moved(model)
-    found = linearize_model(model, None, inputs, states)
-    with initialized(native_fmus[name, 2][0]) as (unit, told):
-        reference = {v.name: v.valueReference for v in told.modelVariables}
-        unit.setReal([reference[n] for n in inputs], list(inputs.values()))
-        if states:
-            unit.enterContinuousTimeMode()
-            values = (ctypes.c_double * len(states))(*states.values())
-            unit.setContinuousStates(values, len(states))
-        apart = set().union(*(part.by_differences for part in model.parts))
-        kept = [k for k, s in enumerate(found.outputs) if s.name not in apart]
-        unknown = [v.variable.valueReference for v in told.derivatives]
-        unknown += [reference[found.outputs[k].name] for k in kept]
-        own = np.block([[found.A, found.B], [found.C[kept], found.D[kept]]])
-        for column, signal in enumerate((*found.states, *found.inputs)):
-            theirs = unit.getDirectionalDerivative(unknown, [reference[signal.name]], [1.0])
-            size = np.max(np.abs(own), axis=1, initial=0.0) + 1e-3
-            np.testing.assert_allclose(own[:, column] / size, np.array(theirs) / size, atol=1e-9)
-
-
 # -- the speed loop of a study
 
 
@@ -196,6 +176,42 @@ def test_poles_of_the_speed_loop_are_those_of_the_study():
     np.testing.assert_allclose(response, by_load(1j * loop.crossover * np.array([0.1, 1.0, 10.0])), rtol=1e-6)
     step = control.step_response(found.state_space()["w", "load_tau_bias"], loop.time)
     np.testing.assert_allclose(step.outputs, loop.deviation, atol=1e-6 * loop.largest_deviation)
+
+
+@pytest.mark.parametrize(
+    "of", ["", (EXAMPLES / "jam_with_driveline.toml").read_text()], ids=["packaged", "line"]
+)
+def test_poles_of_the_loop_that_a_study_shows(of):
+    """By the numbers and curves of its result alone: margin and crossover; the drawn open loop, which closed gives
+    the response of the linear model; and the drawn deviation, which is a sum of the exponentials of its poles."""
+    loaded = config.parse(of)
+    drive = choose(loaded, Path(), lambda *_: None).drive
+    study = record_of(loaded, drive)
+    lossless = {n: 0.0 for n in ("rotor.d", "rotor.friction") if n in drive.motor.parameter_layout.names}
+    p = drive.motor.parameter_layout.from_names(lossless, drive.fmu_parameters)
+    assert set(study.statics.loops) == {"mean inertia", "least inertia", "largest inertia"}
+    for loop in study.statics.loops.values():
+        shown = as_data(loop)
+        inputs = {"load.J": loop.inertia - p.rotor.J, "w_ref": 50.0}
+        found = linearize_model(drive.motor, p, inputs, {"w": 50.0, "armature.T": T_RATED})
+        closed = found.response("w_ref", "w", loop.frequency)
+        drawn = loop.gain * np.exp(1j * np.radians(loop.phase))
+        np.testing.assert_allclose(closed, drawn / (1.0 + drawn), rtol=1e-6)
+        (at,) = found.response("w_ref", "w", [shown["crossover"]["value"]])
+        at = at / (1.0 - at)
+        assert abs(at) == pytest.approx(1.0, rel=1e-6)
+        assert 180.0 + math.degrees(np.angle(at)) == pytest.approx(shown["phase_margin"]["value"], rel=1e-6)
+        # the poles of states on which the speed depends
+        poles = [pole for pole in found.poles if pole.real < -0.01 and pole.state != "armature.T"]
+        of_poles = [complex(q.real, s * q.imaginary) for q in poles for s in (1, -1)[: 1 + bool(q.imaginary)]]
+        assert len(of_poles) == 4 and max(map(abs, of_poles)) > loop.crossover > min(map(abs, of_poles))
+
+        def left(factor, loop=loop, of_poles=of_poles):
+            basis = np.exp(np.outer(loop.time, np.array(of_poles) * factor))
+            rest = loop.deviation - basis @ np.linalg.lstsq(basis, loop.deviation, rcond=None)[0]
+            return np.max(np.abs(rest)) / loop.largest_deviation
+
+        assert left(1.0) < 1e-7 < 1e-5 < min(left(0.98), left(1.02))
 
 
 def test_signs_and_units_of_a_motor():

@@ -21,6 +21,7 @@ from chainunit.fmu.description import Interface, model_description, model_descri
 from chainunit.fmu.pictures import drawing
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
+from chainunit.models import MODELS
 
 FOLDER = Path(__file__).parents[1] / "examples" / "linkages"
 FILES = sorted(FOLDER.glob("*.toml"))
@@ -94,6 +95,34 @@ def test_the_machine_of_a_user_is_not_of_this_package(tmp_path):
         assert {*model.sketch().pins, *model.sketch().links} <= {*re.findall(r">([^<>]+)</text>", drawn)}
         assert "x points right, y up" in page and "Limits:" in page and "MIT licence" in page
     assert "A. Bauer" in companion_files(Interface(named, {}), "9.9", 2)["documentation/index.html"].decode()
+
+
+def test_a_direct_model_has_the_words_of_its_file():
+    """The title of the file, and the noun of its driver, in FMI 2 and 3; a packaged machine keeps its words."""
+    model = read_linkage(FOLDER / "blake_jaw_crusher.toml").direct()
+    assert model.description == (
+        f"{model.inverse.noun}, moving by itself: from motor torque to angle, speed, acceleration and every reaction"
+    )
+    assert model.inverse.noun != model.inverse.name and model.inverse.driver_noun == "eccentric"
+    for fmi in (2, 3):
+        root = described(model, fmi)
+        words = {v.get("name"): v.get("description") for v in root.find("ModelVariables")}
+        assert root.get("description") == model.description
+        assert words["phi"] == "motor angle; eccentric angle is phi/ratio" and words["w"] == "motor speed"
+    state = model.States(phi=1.0, w=2.0)
+    assert pickle.loads(pickle.dumps(state)) == state
+    lift = read_linkage(FOLDER / "cylinder_lift.toml").direct()
+    assert [v.description for v in lift.state_layout.variables] == [
+        "way of the driver",
+        "speed of the driver",
+    ]
+    assert lift.description.startswith(
+        "Lever that a cylinder lifts, moving by itself: from force on the driver"
+    )
+    chain = MODELS["ChainUnit"]
+    assert chain.state_layout.variables[0].description == "motor angle; crank angle is phi/ratio"
+    knife = MODELS["KnifeDrive"].direct()
+    assert knife.description.startswith("KnifeDrive that moves by itself: from motor torque to angle")
 
 
 def test_the_pictures_of_an_fmu_show_its_start_values():

@@ -230,6 +230,9 @@ def test_the_report_shows_it(study, tmp_path):
         "driveline.k_least",
         "driveline.alpha1",
         "driveline.exponent",
+        "rigid_line.natural_frequency",
+        "rigid_line.driver_frequency",
+        "rigid_line.ratio",
     } <= paths
     assert "with a rigid shaft" in text
     assert as_dict(study)["torque_cycles"]["jam_left"]

@@ -113,6 +113,34 @@ def connections(file):
     ]
 
 
+def test_the_connections_are_those_of_the_terminals_in_the_fmus(package, tmp_path):
+    """SSP 2.0 has no terminals of its own: a tool finds them in the FMUs of the package. Each connection is of two
+    members of one name, in terminals of one kind, and these are connected whole."""
+    with zipfile.ZipFile(package) as archive:
+        archive.extractall(tmp_path)
+    members = {}
+    for name in ("machine", "motor"):
+        (file,) = (c.source for c in read_ssd(str(package)).system.elements if c.name == name)
+        with zipfile.ZipFile(tmp_path / file) as fmu:
+            root = ElementTree.fromstring(fmu.read("terminalsAndIcons/terminalsAndIcons.xml"))
+        for terminal in root.iter("Terminal"):
+            own = {f"{name}.{m.get('variableName')}": m.get("memberName") for m in terminal}
+            members.setdefault(terminal.get("terminalKind"), []).append(own)
+    found = connections(package)
+    sides = {kind: sides for kind, sides in members.items() if len(sides) == 2}
+    assert {*sides} == {
+        "org.chainunit.flange", "org.chainunit.load", "Modelica.Mechanics.Rotational.Interfaces.Flange_a"
+    }  # fmt: skip
+    of_terminals = set()
+    for kind, (one, other) in sides.items():
+        theirs = {member: full for full, member in other.items()}
+        ends = {frozenset((full, theirs[member])) for full, member in one.items() if member in theirs}
+        # the torque of a shaft is given on both sides
+        both = {end for end in ends if not kind.endswith("load") and all(e.endswith(".tau") for e in end)}
+        of_terminals |= ends - both
+    assert {frozenset(c) for c in found} == of_terminals and len(found) == len(of_terminals)
+
+
 def test_connectors_are_the_fmus_variables(package, tmp_path):
     """Names, kinds and units, unit definitions included, are those of the FMU's own description."""
     assert connections(package) == pair("ChamberForces", "DcMotor").connections

@@ -485,6 +485,15 @@ def test_start_and_requirements_are_those_of_python(engine):
             np.testing.assert_allclose(limits.reshape(-1, 3), want, rtol=1e-9)
 
 
+@node
+@wasmtime
+@pytest.mark.second
+@pytest.mark.parametrize("name", RUNS)
+def test_a_run_has_the_same_bits_in_every_engine(name):
+    (there, _), (here, _) = (RUNS[name].in_engine(engine) for engine in ("node", "wasmtime"))
+    np.testing.assert_array_equal(there, here)
+
+
 @engines
 @pytest.mark.second
 def test_a_jam_of_a_drive_is_that_of_the_reference(engine):

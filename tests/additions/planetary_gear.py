@@ -16,7 +16,7 @@ from chainunit.core.ports import (
     PortValues,
     ShaftInput,
     Start,
-    flange,
+    driven_flanges,
     flanges,
     load_terminal,
     shaft_motion,
@@ -112,7 +112,7 @@ class PlanetaryGear(Model):
     terminals = (
         *flanges("inflow"),
         load_terminal(),
-        flange("outflow", "driven.", "driven"),
+        *driven_flanges(),
         load_terminal("load.", "machine"),
     )
     input_rates = MappingProxyType({"phi": "w", "w": "a"})

@@ -104,6 +104,10 @@ OWN = "org.chainunit"
 """Prefix of the names of this package's own kinds of terminals."""
 FLANGE, LOAD, MEASURED = f"{OWN}.flange", f"{OWN}.load", f"{OWN}.measured"
 """Kinds of terminals: of a shaft, of a load port, and of the measured signals of a motor."""
+ROTATIONAL = "Modelica.Mechanics.Rotational.Interfaces.Flange_a"
+TRANSLATIONAL = "Modelica.Mechanics.Translational.Interfaces.Flange_a"
+"""Kinds of the flanges of Modelica's library, as the FMI standard (3.0, 2.4.9) and exporters of Modelica write them:
+the path of the connector's class."""
 
 
 def flange(flow: str, prefix: str = "", name: str = "flange") -> Terminal:
@@ -116,9 +120,21 @@ def flange(flow: str, prefix: str = "", name: str = "flange") -> Terminal:
 def flanges(flow: str) -> tuple[Terminal, Terminal]:
     """The terminals of the shaft: the package's own, and the one that tools with Modelica's library know."""
     own = flange(flow)
-    modelica = "Modelica.Mechanics.Rotational.Interfaces.Flange_a"
-    members = {name: name for name in ("phi", "tau")}
-    return own, Terminal("flange_a", modelica, f"{own.description}, as Modelica's", members, own.flows)
+    return own, _as_modelica(own, "flange_a")
+
+
+def driven_flanges() -> tuple[Terminal, Terminal]:
+    """The same of the second shaft of a part between motor and machine, which drives the machine; its variables
+    carry ``driven.``."""
+    own = flange("outflow", "driven.", "driven")
+    return own, _as_modelica(own, "flange_b")
+
+
+def _as_modelica(own: Terminal, name: str) -> Terminal:
+    """The terminal of a shaft as Modelica's flange: of angle and torque alone. Every one is of the kind Flange_a,
+    as tools join terminals of equal kinds, and Modelica's Flange_a and Flange_b differ in their icon alone."""
+    members = {member: own.members[member] for member in ("phi", "tau")}
+    return Terminal(name, ROTATIONAL, f"{own.description}, as Modelica's", members, own.flows)
 
 
 def measured_terminal(**signals: str) -> Terminal:
@@ -134,9 +150,8 @@ def way_terminals(load: bool) -> tuple[Terminal, ...]:
     members = {member: member for member in ("phi", "w", "a", "tau")}
     words = "the driver and its force"
     own = Terminal("flange", f"{OWN}.linear_flange", words, members, {"tau": "inflow"})
-    modelica = "Modelica.Mechanics.Translational.Interfaces.Flange_a"
     outside = Terminal(
-        "flange_a", modelica, f"{words}, as Modelica's", {"s": "phi", "f": "tau"}, {"f": "inflow"}
+        "flange_a", TRANSLATIONAL, f"{words}, as Modelica's", {"s": "phi", "f": "tau"}, {"f": "inflow"}
     )
     port = {member: member for member in Layout(LoadPort).names}
     words = "the load port: a load as the driver sees it"

@@ -30,7 +30,7 @@ from ..core.ports import (
     PortValues,
     ShaftInput,
     Start,
-    flange,
+    driven_flanges,
     flanges,
     load_terminal,
     shaft_motion,
@@ -196,7 +196,7 @@ class CardanDriveline(Model):
     terminals = (
         *flanges("inflow"),
         load_terminal(),
-        flange("outflow", "driven.", "driven"),
+        *driven_flanges(),
         load_terminal("load.", "machine"),
     )
     input_rates = MappingProxyType({"phi": "w", "w": "a"})

@@ -9,7 +9,7 @@ from ..core.ports import (
     PortSlopes,
     PortValues,
     ShaftInput,
-    flange,
+    driven_flanges,
     flanges,
     load_inertia,
     load_terminal,
@@ -77,7 +77,7 @@ class Gear(Model):
     terminals = (
         *flanges("inflow"),
         load_terminal(),
-        flange("outflow", "driven.", "driven"),
+        *driven_flanges(),
         load_terminal("load.", "machine"),
     )
     parts = (Part(GearOutputs, _outputs),)

@@ -26,11 +26,9 @@ def companion_files(
     if fmi == 2:
         files["model.png"] = png
     else:
-        files |= {
-            "terminalsAndIcons/terminalsAndIcons.xml": xml_bytes(terminals(interface)),
-            "terminalsAndIcons/icon.png": png,
-            "terminalsAndIcons/icon.svg": svg,
-        }
+        files |= {"terminalsAndIcons/icon.png": png, "terminalsAndIcons/icon.svg": svg}
+    if fmi == 3 or model.terminals:
+        files["terminalsAndIcons/terminalsAndIcons.xml"] = xml_bytes(terminals(interface, with_icon=fmi == 3))
     return files | reference_results(interface)
 
 

@@ -472,13 +472,15 @@ def _typed(signal: Signal) -> dict[str, str]:
     return own | start
 
 
-def terminals(interface: Interface) -> Element:
-    """The XML tree of terminalsAndIcons.xml (FMI 3.0): the icon and the terminals of the model."""
+def terminals(interface: Interface, *, with_icon: bool = True) -> Element:
+    """The XML tree of terminalsAndIcons.xml, as FMI 3.0 defines it and FMI 2.0.4 takes it over: the terminals of the
+    model and, `with_icon`, the place of the icon in that folder."""
     root = Element("fmiTerminalsAndIcons", fmiVersion="3.0")
-    graphics = SubElement(root, "GraphicalRepresentation")
-    box = {"x1": "-100", "y1": "-100", "x2": "100", "y2": "100"}
-    SubElement(graphics, "CoordinateSystem", box, suggestedScalingFactorTo_mm="0.1")
-    SubElement(graphics, "Icon", box)
+    if with_icon:
+        graphics = SubElement(root, "GraphicalRepresentation")
+        box = {"x1": "-100", "y1": "-100", "x2": "100", "y2": "100"}
+        SubElement(graphics, "CoordinateSystem", box, suggestedScalingFactorTo_mm="0.1")
+        SubElement(graphics, "Icon", box)
     if not interface.model.terminals:
         return root
     group = SubElement(root, "Terminals")

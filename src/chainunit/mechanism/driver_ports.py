@@ -62,7 +62,7 @@ class AddedInertia:
 class RotatingStates:
     """States of the direct machine; each is an output, too."""
 
-    phi: Value = quantity("rad", "motor angle; crank angle is phi/ratio")
+    phi: Value = quantity("rad", "motor angle; {driver} angle is phi/ratio")
     w: Value = quantity("rad/s", "motor speed")
 
 
@@ -131,7 +131,7 @@ _UNITS = {
 _NOMINAL = {"rad/s2": 0.1, "N.m": 10.0, "N.m/rad": 10.0}
 """By the unit of a driver that turns, the factor of the nominal size."""
 _WORDS = {
-    "; crank angle is phi/ratio": "",
+    "; {driver} angle is phi/ratio": "",
     "torque of the motor": "force",
     "the motor's shaft": "the driver",
     "the motor shaft": "the driver",
@@ -153,7 +153,7 @@ def _sliding(name: str, rotating: type, words: str, fields: Fields = ()) -> type
     for field in fields_of(rotating):
         q = field[2].metadata.get("quantity")
         if q is not None:
-            text = q.description
+            text = q.template
             for turned, pushed in _WORDS.items():
                 text = text.replace(turned, pushed)
             nominal = q.nominal and q.nominal * _NOMINAL[q.unit]

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Any, ClassVar
 
-from ..core.descriptions import USUAL_DRIVER
+from ..core.descriptions import USUAL_DRIVER, of_driver
 from ..core.engines import MATH
 from ..core.model import Making, Model, Part, Sketch, keep
 from ..core.ports import PortSlopes, ShaftMotion
@@ -248,13 +248,13 @@ class InverseMachine(LinkageModel, MachineModel):
         # where the start declares the same name, the machine's own declaration counts
         own = [field for field in fields_of(cls.Parameters) if field[0] in names_of(cls.driver_port.start)]
         port = cls.driver_port
+        states = _of_driver(port.states, cls.driver_noun)
         members = {
             "__module__": cls.__module__,
             "__doc__": f"The direct model of {cls.__name__}: {port.words.effort} in, motion out.",
             "name": cls.direct_name,
             "description": cls.direct_description
-            or f"{cls.name} that moves by itself: from {port.words.effort} to {port.words.place}, speed, "
-            "acceleration and every reaction",
+            or words_on_motion(f"{cls.name} that moves by itself", port),
             "made": Making(f"{cls.expression()}.direct()", direct_model, (cls,)),
             "inverse": cls,
             "fmu_data": cls.fmu_data,
@@ -264,11 +264,7 @@ class InverseMachine(LinkageModel, MachineModel):
             "Parameters": declared_class(
                 "DirectParameters", (port.start, port.added, cls.Parameters), [*own, *parameters]
             ),
-            **(
-                {"States": declared_class("States", (port.states,), fields_of(cls.States))}
-                if cls.States
-                else {"States": port.states}
-            ),
+            "States": declared_class("States", (states,), fields_of(cls.States)) if cls.States else states,
             "Inputs": declared_class(
                 "DirectInputs", (port.effort,), fields_of(cls.Inputs, without=names_of(ShaftMotion))
             ),
@@ -277,8 +273,29 @@ class InverseMachine(LinkageModel, MachineModel):
         }
         model = type(f"Direct{cls.__name__}", (base,), members)
         if cls.made:
-            keep(model, "Parameters", "Inputs")
+            keep(model, "Parameters", "Inputs", *(["States"] if states is not port.states else []))
         return model
+
+
+def words_on_motion(subject: str, port: DriverPort) -> str:
+    """The description of a direct model: the `subject`, and the way from effort to motion."""
+    effort, place = port.words
+    return f"{subject}: from {effort} to {place}, speed, acceleration and every reaction"
+
+
+def _of_driver(declared: type, noun: str) -> type:
+    """The declaration with the `noun` of the driver in the slots of its descriptions; the same class without slots,
+    or with the usual noun."""
+    if noun == USUAL_DRIVER or not any("{driver}" in v.template for v in Layout(declared).variables):
+        return declared
+    fields: list[tuple[str, Any, Any]] = []
+    for name, of, field in fields_of(declared):
+        q = field.metadata["quantity"]
+        own = dataclasses.replace(q, template=of_driver(q.template, noun))
+        fields.append((name, of, dataclasses.field(default=field.default, metadata={"quantity": own})))
+    made: type = declared_class(declared.__name__, (), fields)
+    made.__doc__, made.__module__ = declared.__doc__, __name__
+    return made
 
 
 def running(s: MachineState, a: Any) -> dict[str, Any]:

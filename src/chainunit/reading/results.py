@@ -167,7 +167,8 @@ def _data(x: Any, unit: str, kind: str, titled: bool, driver: str) -> Any:
         return list(x) if isinstance(x, tuple) else x
     if unit:
         return _number(x, unit, kind)
-    if dataclasses.is_dataclass(x) and parts(type(x)):  # type: ignore[arg-type]
+    # a machine may have no inputs: a table without entries
+    if dataclasses.is_dataclass(x) and (parts(type(x)) or not dataclasses.fields(x)):  # type: ignore[arg-type]
         return _table(x, titled, driver)
     if hasattr(x, "tolist"):
         x = x.tolist()

@@ -63,11 +63,13 @@ class Cards:
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table by its head; `short` is the head where there is little room."""
+    """A column of a table by its head; `short` is the head where there is little room. The cells of a column
+    `of_text` begin at the left in a table of numbers, too."""
 
     title: Line
     short: str = ""
     form: Form = "both"
+    of_text: bool = False
 
 
 def heads(*titles: Line) -> tuple[Column, ...]:

@@ -58,9 +58,16 @@ class _Canvas:
             f"<{tag}{attribute_text}>{escape(text)}</{tag}>" if text else f"<{tag}{attribute_text}/>"
         )
 
-    def label(self, text: str, places: list[Point], lines: list[tuple[Point, Point]], **look: Any) -> None:
+    def label(
+        self,
+        text: str,
+        places: list[Point],
+        lines: list[tuple[Point, Point]],
+        own: Collection[tuple[Point, Point]] = (),
+        **look: Any,
+    ) -> None:
         """Draw a label. `places` are the candidates for its middle; it gets the first one that is clear of other
-        labels and of the `lines`."""
+        labels and of the `lines`, before others one that is nearest to its `own` lines."""
         boxes = [_box(text, place) for place in places]
         clear = [
             min(
@@ -70,8 +77,10 @@ class _Canvas:
             )
             for box in boxes
         ]
+        free = [k for k, room in enumerate(clear) if room >= 3.0]
+        beside = (k for k in free if own and _nearest(boxes[k], own) <= _nearest(boxes[k], lines))
         # the first of the places that has room enough, else the one with most
-        best = next((k for k, room in enumerate(clear) if room >= 3.0), int(np.argmax(clear)))
+        best = next(beside, free[0] if free else int(np.argmax(clear)))
         self.label_boxes.append(boxes[best])
         x, y = places[best]
         self.add("text", text, x=x, y=y + 4.5, text_anchor="middle", **look)
@@ -99,6 +108,11 @@ def _from_line(box: tuple[float, ...], line: tuple[Point, Point]) -> float:
         x, y = x0 + t * (x1 - x0), y0 + t * (y1 - y0)
         gaps.append(max(box[0] - x, x - box[2], box[1] - y, y - box[3]))
     return min(gaps) - 3.0
+
+
+def _nearest(box: tuple[float, ...], lines: Collection[tuple[Point, Point]]) -> float:
+    """The distance of the nearest of some lines from a box [px]."""
+    return min(_from_line(box, line) for line in lines)
 
 
 def dimensions(machine: Machine) -> dict[tuple[str, ...], Dimension]:
@@ -197,7 +211,8 @@ def drawing(machine: Machine, phi: float | None = None) -> str:
             continue
         size = sizes.get(("link", link.name))
         words = f"{_short(link.name)} {size.name}" if size else _short(link.name)
-        canvas.label(words, _beside(link, at), lines, fill=_LOOKS[link.look][0])
+        own = [(at[a], at[b]) for a, b in _sides(link)]
+        canvas.label(words, _beside(link, at), lines, own, fill=_LOOKS[link.look][0])
     _frame(canvas)
     _column(canvas, sizes, whole.linkage.ground)
     return _svg(canvas, f"{machine.model.noun}: pins, links and dimensions")
@@ -228,26 +243,26 @@ def _sides(link: DrawnLink) -> Iterator[tuple[str, str]]:
 
 
 def _beside(link: DrawnLink, at: Mapping[str, Point]) -> list[Point]:
-    """Candidate places for the name of a link: first beside its middle, then beside other points of it."""
+    """Candidate places for the name of a link: first its middle, in it or beside it, then beside its sides."""
+    places = []
     if link.closed:
         corners = [at[joint] for joint in link.joints]
-        return [(sum(x for x, _ in corners) / len(corners), sum(y for _, y in corners) / len(corners))]
-    places = []
+        places = [(sum(x for x, _ in corners) / len(corners), sum(y for _, y in corners) / len(corners))]
     for t in (0.5, 0.4, 0.6, 0.3, 0.7):
         for away in (18.0, 26.0, 40.0):
             for a, b in _sides(link):
                 (x0, y0), (x1, y1) = at[a], at[b]
-                length = math.hypot(x1 - x0, y1 - y0) or 1.0
-                across = ((y0 - y1) / length, (x1 - x0) / length)
-                # a name is wide: beside an upright link it stands further off
-                off = away * (1.0 + 1.3 * abs(across[0]))
-                for sign in (1.0, -1.0):
-                    places.append(
-                        (
-                            x0 + t * (x1 - x0) + sign * off * across[0],
-                            y0 + t * (y1 - y0) + sign * off * across[1],
-                        )
-                    )
+                length = math.hypot(x1 - x0, y1 - y0)
+                # a block has no length, and stands free in any direction
+                turns = (0.5, 0.0, 0.25, 0.75) if length < 1.0 else ()
+                ways = [(math.cos(math.pi * x), math.sin(math.pi * x)) for x in turns] or [
+                    ((y0 - y1) / length, (x1 - x0) / length)
+                ]
+                x, y = x0 + t * (x1 - x0), y0 + t * (y1 - y0)
+                for across in ways:
+                    # a name is wide: beside an upright link it stands further off
+                    off = away * (1.0 + 1.3 * abs(across[0]))
+                    places += [(x + s * off * across[0], y + s * off * across[1]) for s in (1.0, -1.0)]
     return places
 
 
@@ -306,6 +321,8 @@ def _block(canvas: _Canvas, at: Point, angle: float) -> None:
     ]
     points = " ".join(f"{x:.2f},{y:.2f}" for x, y in corners)
     canvas.add("polygon", points=points, fill="none", stroke="#1b1b1b", stroke_width=1.5)
+    xs, ys = [x for x, _ in corners], [y for _, y in corners]
+    canvas.label_boxes.append((min(xs), min(ys), max(xs), max(ys)))
 
 
 def _frame(canvas: _Canvas) -> None:

@@ -265,11 +265,14 @@ class _Page:
         columns = [i for i, c in enumerate(table.columns) if c.form != "short"] or range(
             len(table.rows[0].cells)
         )
+        marks = [' class="text"' if table.columns and table.columns[i].of_text else "" for i in columns]
         heads = "".join(
-            f'<th scope="col">{self.line(table.columns[i].title)}</th>' for i in columns if table.columns
+            f'<th scope="col"{mark}>{self.line(table.columns[i].title)}</th>'
+            for i, mark in zip(columns, marks, strict=True)
+            if table.columns
         )
         noted = any(row.note for row in table.rows)
-        rows = [self._row(row, columns) for row in table.rows if row.form != "short"]
+        rows = [self._row(row, columns, marks) for row in table.rows if row.form != "short"]
         body = "".join(rows) if noted else f"<tbody>{''.join(rows)}</tbody>"
         css = "candidates" if noted else "numbers" if table.numeric else "words"
         # on paper a short table stays on one page
@@ -281,17 +284,18 @@ class _Page:
             + f"{body}</table></div>"
         )
 
-    def _row(self, row: b.TableRow, columns: Iterable[int]) -> str:
+    def _row(self, row: b.TableRow, columns: Iterable[int], marks: Sequence[str]) -> str:
         first, *rest = (row.cells[i] for i in columns)
         span = ' rowspan="2"' if row.note else ""
-        cells = f'<th scope="row"{span}>{self._inside(first)}</th>' + "".join(map(self._cell, rest))
+        others = "".join(map(self._cell, rest, marks[1:]))
+        cells = f'<th scope="row"{span}>{self._inside(first)}</th>{others}'
         if not row.note:
             return f"<tr>{cells}</tr>"
         note = f'<tr><td class="why" colspan="{len(rest)}">{self.line(row.note)}</td></tr>'
         return f'<tbody class="{row.severity or "plain"}"><tr>{cells}</tr>{note}</tbody>'
 
-    def _cell(self, cell: b.Cell) -> str:
-        css = ""
+    def _cell(self, cell: b.Cell, mark: str) -> str:
+        css = mark
         if isinstance(cell, b.Share):
             css = ' class="check over"' if cell.utilisation.over else ' class="check"'
         return f"<td{css}>{self._inside(cell)}</td>"

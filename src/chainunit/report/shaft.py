@@ -7,6 +7,7 @@ from typing import Any
 
 from ..core.quantities import Layout
 from ..study.analysis import is_examined
+from ..study.line.rigid_line import HOLDS_FROM
 from ..study.line.shaft import CLASSES, RIGID, LineModes, ShaftAnswers
 from ..study.line.shaft_runs import shaft_findings
 from ..study.record import StudyRecord
@@ -29,7 +30,20 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     yield _shaft(s, study)
     if not is_examined("driveline", study.findings):
         yield b.Table(s.rows(LineModes, "driveline"), title="The driveline's torsion")
+    yield _rigid(s)
     yield from PICTURES.figures(s, study)
+
+
+def _rigid(s: b.Source) -> b.Judgement:
+    """The verdict on a rigid model of the drive, with its two numbers."""
+    holds = s.result["rigid_line"]["holds"]
+    verdict = f"A rigid model of the drive {'holds' if holds else 'does not hold'}"
+    text = s.line(
+        f"{verdict} (VDI 2149: from {HOLDS_FROM:g} times on): the lowest natural frequency of the line, "
+        "{rigid_line.natural_frequency}, is {rigid_line.ratio} times the frequency of the {driver}'s turns, "
+        "{rigid_line.driver_frequency}."
+    )
+    return b.Judgement("good" if holds else "partly", text)
 
 
 def _shaft(s: b.Source, study: StudyRecord) -> b.Table:

@@ -152,8 +152,9 @@ def _grid(table: Table, places: Sequence[int], units: Units, title: str, room: i
         columns.append([table.note_title, *(row.note for row in rows)])
     grid = Grid(title=Styled(title) if title else None, title_justify="left", show_header=bool(table.columns))
     widths = _widths(columns, units, room) if room else [None] * len(columns)
+    of_text = [bool(table.columns) and table.columns[i].of_text for i in places]
     for k, (head, width) in enumerate(zip(heads, widths, strict=True)):
-        right = table.numeric and 0 < k < len(places)
+        right = table.numeric and 0 < k < len(places) and not of_text[k]
         grid.add_column(head, justify="right" if right else "left", width=width)
     for cells in zip(*(column[1:] for column in columns), strict=True):
         grid.add_row(*(plain_cell(cell, units) for cell in cells))

@@ -48,10 +48,14 @@ class LinearPoint(NamedTuple):
     inputs: dict[str, float]
     states: dict[str, float]
     words: str
+    title: str = ""
+    """of the study or the machine; empty for a model by its name"""
 
     def linear(self) -> LinearModel:
         """The linear model at the point."""
-        return linearize_model(self.model, self.parameters, self.inputs, self.states, at=self.words)
+        return linearize_model(
+            self.model, self.parameters, self.inputs, self.states, at=self.words, title=self.title
+        )
 
 
 def linearize(
@@ -168,7 +172,7 @@ def _point_of_linkage(machine: Any, at: At, inverse: bool) -> LinearPoint:
     if at is None:
         unit = ("m", "m/s") if machine.slides else ("rad", "rad/s")
         point = point._replace(words=f"phi = {phi:g} {unit[0]}, w = {w:g} {unit[1]}")
-    return point
+    return point._replace(title=machine.noun)
 
 
 def _values(model: type[Model], at: At) -> dict[str, float]:
@@ -208,7 +212,8 @@ def _point_of_study(
 ) -> LinearPoint:
     """The point of the whole drive of a study."""
     drive = drive_to_export(config, progress=progress)
-    return drive_point(drive, config.operation, config.events, at, progress)
+    point = drive_point(drive, config.operation, config.events, at, progress)
+    return point._replace(title=config.title)
 
 
 def drive_point(

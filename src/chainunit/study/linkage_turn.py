@@ -25,6 +25,8 @@ _LOSSLESS = 1e-9
 """Part of the mean size of a torque below which its mean is that of a machine without losses."""
 STANDS = 1e-9
 """A way [m] or an angle [rad] over which a part moves, below which it stands."""
+_ROUNDING = 1e-12
+"""Size of a place [m] or an angle [rad] below which it is what rounding leaves of 0."""
 
 
 @declaration
@@ -229,7 +231,7 @@ def _findings(machine: Machine, speed: float) -> LinkageFindings:
             description.variable("joint" if isinstance(motion, Stroke) else "link", name): back
             for name, motion, back in motions
         },
-        {name: (-top[f"-{name}"], top[name]) for name in moving},
+        {name: (_plain(-top[f"-{name}"]), _plain(top[name])) for name in moving},
     )
 
 
@@ -283,9 +285,9 @@ def _motions(
         whole = 2.0 * math.pi
         forth = float(places[high] - places[low]) % whole if turns else None
         motion = of(
-            least=float(course[low]),
+            least=_plain(course[low]),
             least_at=_folded(float(places[low]), turns),
-            largest=float(course[high]),
+            largest=_plain(course[high]),
             largest_at=_folded(float(places[high]), turns),
             range=float(course[high] - course[low]),
             forth=forth,
@@ -298,3 +300,8 @@ def _folded(q: float, turns: bool) -> float:
     """A place of the driver; the angle of one that turns from 0 to a whole turn."""
     folded = q % (2.0 * math.pi) if turns else q
     return 0.0 if turns and min(folded, 2.0 * math.pi - folded) < STANDS else folded
+
+
+def _plain(place: float) -> float:
+    """A place [m] or an angle [rad]; 0 where it is rounding."""
+    return 0.0 if abs(place) < _ROUNDING else float(place)

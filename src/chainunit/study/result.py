@@ -14,6 +14,7 @@ from ..reading.text import entries, entry, shown_in
 from .given import given_sections
 from .heading import Heading
 from .judgement import MotorVerdict, motor_verdict
+from .line.rigid_line import RigidLine
 from .line.shaft import driveline_of
 from .line.shaft_runs import shaft_findings
 from .measures import Answers, measures_of
@@ -97,6 +98,9 @@ class StudyData:
     slips: tuple[UnusualValue, ...] = part("given values of an unusual size")
     driver: str = part("the noun of the link that the motor turns")
     speed_loop: Mapping[str, Loop] = part("the linearised speed loop, by inertia")
+    rigid_line: RigidLine | None = part(
+        "whether a rigid model of the drive holds; of a drive with an elastic line", optional=True
+    )
     control: Tuning | str = part("the tuned gains of the speed control, or words on it")
     runs: RunData = part(inline=True)
     fmus: Mapping[str, str] = part("origin of each FMU")
@@ -121,6 +125,7 @@ def _data(study: StudyRecord) -> StudyData:
         slips=study.config.file.unusual,
         driver=study.driver_noun,
         speed_loop=study.statics.loops,
+        rigid_line=study.statics.rigid_line,
         control=drive.tuning
         or (
             drive.motor.control

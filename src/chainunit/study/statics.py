@@ -12,6 +12,7 @@ from ..core.errors import InputError
 from ..drives.speed_control import Loop
 from .cycle import Cycle
 from .drive import Drive
+from .line.rigid_line import RigidLine
 from .line.shaft import LineModes, line_modes
 
 
@@ -25,6 +26,8 @@ class DriveStatics:
     """the linearised speed loop of a controlled motor, by the inertia that is used (mean, least, largest)"""
     modes: LineModes | None = None
     """the modes of the driveline, if there is one"""
+    rigid_line: RigidLine | None = None
+    """whether a rigid model of the drive holds, of a drive with a driveline"""
 
     @property
     def normal(self) -> Cycle:
@@ -40,11 +43,14 @@ def statics(drive: Drive, turns: Mapping[str, Cycle], step: float) -> DriveStati
     InputError
         where the communication `step` [s] is too long for the driveline.
     """
-    inertia = next(iter(turns.values())).inertia_at(drive.ratio)
+    turn = next(iter(turns.values()))
+    inertia = turn.inertia_at(drive.ratio)
+    modes = None if drive.line.part("driveline") is None else _modes(drive, inertia, step)
     return DriveStatics(
         cycles=turns,
         loops={} if drive.foreign else _loops(drive, inertia),
-        modes=None if drive.line.part("driveline") is None else _modes(drive, inertia, step),
+        modes=modes,
+        rigid_line=None if modes is None else RigidLine(modes.k_least, turn.crank_speed),
     )
 
 

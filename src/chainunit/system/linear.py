@@ -74,6 +74,7 @@ class LinearModel:
     """The linear model of a model at a point. Its outputs are the states and the outputs of the model, as its FMU has
     them, without counts and switches."""
 
+    title: str = part("title of the study or the machine, or the name of the model")
     model: str = part("name of the model")
     description: str = part("description of the model")
     at: str = part("the point in words")
@@ -211,6 +212,7 @@ def linearize(
     states: Mapping[str, float] | None = None,
     *,
     at: str = "",
+    title: str = "",
 ) -> LinearModel:
     """The linear model of `model` at a point.
 
@@ -220,6 +222,7 @@ def linearize(
     inputs : values by name; all others have their start values
     states : values by name; all others have the values of the model's own start with these inputs
     at : the point in words
+    title : the title of what it models; by default the name of the model
 
     Raises
     ------
@@ -247,6 +250,7 @@ def linearize(
     ]
     columns = [LinearSignal(v.name, v.unit, v.description, v0) for v, v0 in equations.columns_at(point)]
     return LinearModel(
+        title or model.name,
         model.name,
         model.description,
         at,

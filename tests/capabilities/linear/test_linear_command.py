@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import io
 import json
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from command import chainunit
+from rich.console import Console
 
 from chainunit import Study, linearize
+from chainunit.report import blocks, terminal
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 DRIVE = EXAMPLES / "jam_with_driveline.toml"
@@ -77,6 +81,36 @@ def test_the_poles_are_printed_and_shown(done):
     for said in ("Frequency response of motor.w by motor.w_ref", "natural frequency"):
         assert said in page and said in text
     assert sorted(path.name for path in (folder / "out").glob("*.png")) == ["bode_1.png", "bode_2.png"]
+
+
+def test_the_page_has_the_title_of_the_study(done, tmp_path):
+    """Not that of the compiled system, which every study has; of a linkage the title of its file, and of a model by
+    its name that name."""
+    folder, _ = done
+    data = json.loads((folder / "out" / "linear.json").read_text())
+    title = "A lump, with a cardan shaft between gear and crank"
+    assert (data["title"], data["model"]) == (title, "System")
+    assert f"<h1>Linear model: {title}</h1>" in (folder / "out" / "report.html").read_text()
+    own = linearize(Study.from_file(DRIVE), "start_up:0.4 s")
+    assert own.title == title and own.state_space().name == "System"
+    press = linearize(EXAMPLES / "linkages" / "slider_crank_press.toml")
+    assert press.title == "Slider-crank press with an offset guide"
+    assert linearize("DcMotor").title == "DcMotor"
+
+
+def test_texts_in_a_table_of_numbers_begin_at_the_left(done):
+    """The descriptions on the page; names are at the left, values at the right as before."""
+    page = (done[0] / "out" / "report.html").read_text()
+    (head,) = set(re.findall(r'<th scope="col"[^>]*>description</th>', page))
+    assert 'class="text"' in head and '<td class="text">' in page
+    css = re.search(r"table[.]numbers td[.]text[^}]*", page)[0]
+    assert "text-align: left" in css
+    stream = io.StringIO()
+    columns = (blocks.Column("name"), blocks.Column("words", of_text=True), blocks.Column("value"))
+    rows = tuple(blocks.TableRow(row) for row in (("a", "short", "1"), ("b", "a longer text", "12345.6")))
+    terminal._show_table(blocks.Table(rows, columns), Console(file=stream, width=80), {})
+    first = next(line for line in stream.getvalue().splitlines() if "short" in line)
+    assert re.fullmatch(r"│ a    │ short         │       1 │", first), first
 
 
 def test_a_later_model_replaces_all_files(tmp_path):

@@ -25,7 +25,7 @@ def linear_report(found: LinearResult) -> b.Report:
     if found.responses:
         sections.insert(0, b.Section("bode", "Frequency responses", tuple(_responses(found))))
     return b.Report(
-        f"Linear model of {result['model']}",
+        f"Linear model: {result['title']}",
         "Linear model",
         result,
         tuple(_opening(s, found)),
@@ -96,7 +96,9 @@ def _point(s: b.Source) -> Iterator[b.Block]:
             )
             for k, each in own
         )
-        heads = b.heads("name", "description", "value", *(["time derivative"] if kind == "states" else []))
+        description = b.Column("description", of_text=True)
+        rate = b.heads("time derivative") if kind == "states" else ()
+        heads = (*b.heads("name"), description, *b.heads("value"), *rate)
         if own:
             yield b.Table(tuple(rows), heads, title=f"{title}, at the point", form="long")
 

@@ -31,7 +31,7 @@ from ...mechanism.expressions import expression, value_of
 from ...mechanism.extremes import MotionExtreme
 from ...mechanism.linkage import Linkage
 from ...mechanism.machine import MachineState, Mechanism, derived_numbers
-from ...mechanism.models import InverseMachine
+from ...mechanism.models import InverseMachine, words_on_motion
 from .declarations import LinkageMotion, LinkBody, common_parameters, field_of
 from .following import LEAST_MARGIN, FollowedLinkage
 from .geometry import LinkGeometry
@@ -301,8 +301,10 @@ class LinkageDescription(LinkageOutputs):
         states = [MachineState(MATH, Mechanism(MATH, linkage, q, derived), 0.0) for q in self.places()]
         mass = max(state.J for state in states)
         low, high = self.span
-        # a driver that nothing loads still stops its own weight
-        force = max(mass * STANDARD_GRAVITY, *(abs(state.bias) for state in states))
+        bodies = sum(body.m for body in states[0].m.bodies.values())
+        # a driver that nothing loads still stops its own weight, one that swings at its radius of gyration
+        arm = 1.0 if self.way.linear or not bodies else math.sqrt(mass / bodies)
+        force = max(mass * STANDARD_GRAVITY / arm, *(abs(state.bias) for state in states))
         return usual_stops(force, mass, high - low, EndStops if self.way.linear else SwingStops)
 
     def model(self) -> type[InverseMachine]:
@@ -338,6 +340,7 @@ class LinkageDescription(LinkageOutputs):
             noun = data["title"] or data["name"]
             driver_noun = data["driver"]["link"]
             description = data["title"] or f"linkage {data['name']}"
+            direct_description = words_on_motion(f"{noun}, moving by itself", described.port)
             made = Making(f"machine_of({described.text!r})", machine_of, (described.text,))
             fmu_data = FmuData(described.notes, About(**data.get("about", {})))
             repeated = repeated_outputs(described.structure, described.variable)

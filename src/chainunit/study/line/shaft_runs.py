@@ -19,6 +19,7 @@ from ...system import rigid
 from ..analysis import Analysis, Findings, Work, is_examined
 from ..drive import Drive
 from ..record import Amount, StudyRecord
+from .rigid_line import HOLDS_FROM, RigidLine
 from .shaft import (
     AMPLIFIED,
     UNEVEN,
@@ -138,6 +139,8 @@ def remark(study: StudyRecord) -> None:
             antiresonance=(modes.antiresonance, "rad/s"),
             **ends,
         )
+    if study.statics.rigid_line is not None:
+        _on_rigid_line(study, study.statics.rigid_line)
     _, i, _ = two_joints(numpy_(), line, np.linspace(0.0, np.pi, 361))
     unevenness = float(np.ptp(i))
     if unevenness > UNEVEN:
@@ -160,3 +163,24 @@ def remark(study: StudyRecord) -> None:
                 title=study.title_of(name),
                 amplification=(shaft.amplification, "1"),
             )
+
+
+def _on_rigid_line(study: StudyRecord, rigid_line: RigidLine) -> None:
+    """Warn of a line that swings too slowly for a rigid model of the drive."""
+    if rigid_line.holds:
+        return
+    taken = ["the turn at constant speed"]
+    taken += ["the speed loop"] if study.statics.loops else []
+    taken += ["the choice of the drive"] if study.proposal is not None else []
+    study.warn(
+        "no rigid line",
+        "The lowest natural frequency of the line, {natural_frequency}, is only {ratio} times the frequency of the "
+        "{driver}'s turns, {driver_frequency}; below {least} times (VDI 2149) a rigid model of the drive does not "
+        "hold. The runs have the elastic line; it is rigid in {taken}. Stiffer shafts or a slower {driver} raise the "
+        "ratio.",
+        natural_frequency=(rigid_line.natural_frequency, "rad/s", "frequency"),
+        driver_frequency=(rigid_line.driver_frequency, "rad/s", "frequency"),
+        ratio=(rigid_line.ratio, "1"),
+        least=f"{HOLDS_FROM:g}",
+        taken=" and ".join(filter(None, (", ".join(taken[:-1]), taken[-1]))),
+    )
