@@ -11,7 +11,6 @@ import numpy as np
 from ..core.engines import numpy_
 from ..core.errors import InputError
 from ..core.quantities import Variable, complaint
-from ..mechanism.equilibria import Rest, rest_of
 from ..mechanism.machine import MachineState, Mechanism
 from ..mechanism.models import InverseMachine
 
@@ -196,24 +195,6 @@ class Machine:
         u = self.inputs({"phi": phi})
         linkage = self.model.linkage(_XP, self.p, u)
         return Mechanism(_XP, linkage, u.phi / self.p.ratio, getattr(self.p, "derived", ()))
-
-    def at_rest(self, feed: Any = None) -> Rest:
-        """The equilibria of the machine and the effort that holds it elsewhere, with the loads `feed`, an instance of
-        `model.Feed`, by default those of normal running; places and efforts count at the driver.
-
-        Raises
-        ------
-        InputError
-            see the class.
-        TypeError
-            see `state`.
-        """
-        loads = self._feed(feed)
-
-        def state(q: Any, w: Any) -> MachineState:
-            return self.state(self.inputs({"phi": q * self.ratio, "w": w * self.ratio, **loads}))
-
-        return rest_of(state, self.model.span, self.model.turns)
 
     @property
     def stored_per_unit(self) -> Mapping[str, Callable[[Mapping[str, Any]], Any]]:

@@ -12,8 +12,7 @@ from ..core.engines import MATH
 from ..core.errors import InputError, RunError, near_name, refusal_prefix, shown
 from ..core.model import Model
 from ..core.quantities import Quantity, Variable
-from ..machines.machine import Machine
-from ..mechanism.models import DirectMachine, InverseMachine
+from ..mechanism.models import DirectMachine
 from ..models import model_named
 from ..reading.tables import to_number
 from ..system.compiled_simulation import CompiledSystem
@@ -37,7 +36,6 @@ At = str | Mapping[str, Any] | None
 """A point: RUN:TIME of a study, or values of states and inputs by name, as a text NAME=VALUE,.. or a mapping."""
 _USUAL_SPEED = 2.0 * np.pi
 """Speed of the driver of a linkage that turns [rad/s]: 60 rev/min, as of the command ``chainunit linkage``."""
-_EQUILIBRIUM = "equilibrium"
 _USUAL_WAY_SPEED = 0.1
 """That of one that slides [m/s]."""
 
@@ -71,8 +69,7 @@ def linearize(
         ``"DcMotor"``
     at : the point. Of a study: ``"RUN:TIME"``, such as ``"start_up:0.4 s"`` or ``"jam_left:3.2 s"``, the time of the
         run as its rows have it; by default steady running, at the end of the run of start-up and steady running. Or
-        values of states and inputs by name, ``"phi=30 deg, w=60 rpm"`` or a mapping; of a linkage also
-        ``"equilibrium"``, the stable one of the least energy, or ``"equilibrium:2"``. All others are those of steady
+        values of states and inputs by name, ``"phi=30 deg, w=60 rpm"`` or a mapping; all others are those of steady
         running, of the start of a model, or of a linkage whose driver goes at 60 rev/min (0.1 m/s) at the angle 0,
         one with a range in its middle. A direct model has the torque at which its speed is constant, unless
         ``tau`` is given
@@ -164,9 +161,7 @@ def holding_torque(
 
 
 def _point_of_linkage(machine: Any, at: At, inverse: bool) -> LinearPoint:
-    """The point of a linkage at the angle (place) and speed of its driver, or at an equilibrium."""
-    if isinstance(at, str) and at.partition(":")[0].strip() == _EQUILIBRIUM:
-        return _at_equilibrium(machine, at, inverse)
+    """The point of a linkage at the angle (place) and speed of its driver."""
     low, high = machine.span
     ratio = float(machine.Parameters().ratio)
     middle = 0.0 if machine.turns else 0.5 * (low + high)
@@ -178,36 +173,6 @@ def _point_of_linkage(machine: Any, at: At, inverse: bool) -> LinearPoint:
         unit = ("m", "m/s") if machine.slides else ("rad", "rad/s")
         point = point._replace(words=f"phi = {phi:g} {unit[0]}, w = {w:g} {unit[1]}")
     return point._replace(title=machine.noun)
-
-
-def _at_equilibrium(machine: type[InverseMachine], at: str, inverse: bool) -> LinearPoint:
-    """The point of a linkage at rest without effort: at the stable equilibrium of the least energy, or at the one of
-    a number."""
-    made = Machine(machine)
-    rest, number = made.at_rest(), at.partition(":")[2].strip()
-    known = [str(k) for k in range(1, len(rest.equilibria) + 1)]
-    if number and number not in known:
-        known_words = (
-            f"1 to {len(known)}, as chainunit linkage numbers them" if known else "none, as it rests nowhere"
-        )
-        raise InputError(f"--at {shown(at)}: the number of an equilibrium must be {known_words}")
-    found = rest.equilibria[int(number) - 1] if number else rest.stable
-    if found is None:
-        kinds = ", ".join(f"{k} {kind}" for k, kind in zip(known, rest.kinds, strict=True)) or "none"
-        raise InputError(
-            f"--at {shown(at)}: the linkage has no stable equilibrium clear of its end stops; it has {kinds}: name "
-            f'one by its number, "{_EQUILIBRIUM}:1", or a place, "phi=..., w=0"'
-        )
-    if found.end_stop is not None:
-        raise InputError(
-            f"--at {shown(at)}: there the driver rests on its end stop, whose spring bends; name the place, "
-            '"phi=..., w=0"'
-        )
-    phi = found.at * made.ratio
-    start = {"phi": phi, "w": 0.0} if inverse else {"phi_start": phi, "w_start": 0.0}
-    unit = "m" if machine.slides else "rad"
-    point = _at_values(machine if inverse else machine.direct(), start, None)
-    return point._replace(words=f"equilibrium at phi = {phi:.6g} {unit}")
 
 
 def _values(model: type[Model], at: At) -> dict[str, float]:

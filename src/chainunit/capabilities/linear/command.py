@@ -24,7 +24,7 @@ def linearize(
         typer.Option(
             "--at",
             help='Point: of a study a run and its time, "jam_left:9.5 s", steady running by default; or values of '
-            'states and inputs, "phi=30 deg, w=60 rpm"; of a linkage also "equilibrium", or "equilibrium:2".',
+            'states and inputs, "phi=30 deg, w=60 rpm".',
         ),
     ] = None,
     pairs: Annotated[

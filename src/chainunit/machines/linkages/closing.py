@@ -37,17 +37,6 @@ def dead_group(links: Sequence[str], where: str) -> InputError:
     )
 
 
-def change_point(group: Any, where: str) -> InputError:
-    """The refusal of a group of the structure that comes to a change point."""
-    pins = "its three pins lie on one line there, so that" if group.kind == "RRR" else "there"
-    return InputError(
-        f"the group of {', '.join(group.links)} comes to a change point at {where}, a dead position: {pins} it could "
-        "go on in either of its two assemblies, as a parallelogram may turn into a crossed one, and its forces have "
-        "no limit; change a length, or keep clear of it by a range",
-        key=f"links.{group.links[0]}",
-    )
-
-
 def gap_hint(
     linkage: Linkage, number: int, derived: Sequence[Any], q: float, span: tuple[float, float]
 ) -> str:
