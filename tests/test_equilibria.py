@@ -18,12 +18,19 @@ from random_rest import resting
 from scipy.integrate import solve_ivp
 
 from chainunit.core.engines import MATH
+from chainunit.core.errors import InputError
 from chainunit.machines.equilibria import INDIFFERENT, SADDLE, STABLE, STOP, UNSTABLE
 from chainunit.machines.linkages.file import description_of, read_linkage
 from chainunit.machines.linkages.model import machine_of
 from chainunit.machines.machine import Machine
 from chainunit.mechanism.zeros import sampled, zeros
 from chainunit.models import MODELS
+from chainunit.report.figure import Figure
+from chainunit.report.html import render
+from chainunit.report.linkage_report import linkage_report
+from chainunit.report.terminal import plain
+from chainunit.study.linear import linear_point
+from chainunit.study.linkage_turn import linkage_findings
 
 LINKAGES = Path(__file__).parents[1] / "examples" / "linkages"
 TURN = 2.0 * math.pi
@@ -230,7 +237,7 @@ def test_a_crank_alone_with_weight_is_a_pendulum():
     assert below.frequency == below.natural_frequency / TURN and above.frequency is None
     assert above.potential == pytest.approx(2.0 * M * G * S, rel=1e-12) and below.potential == 0.0
     assert abs(found.summary.peak) == pytest.approx(M * G * S, rel=1e-4) and found.summary.work == 0.0
-    assert found.conservative and found.repeats and found.summary.friction == 0.0
+    assert found.driven == () and found.repeats and found.summary.friction == 0.0
     np.testing.assert_allclose(found.rest.holding, M * G * S * np.cos(found.rest.q), atol=1e-12)
     assert found.rest.q[0] == 0.5 and np.all(np.diff(found.rest.q) > 0.0)
     assert found.rest.q[-1] == pytest.approx(0.5 + TURN, abs=1e-12)
@@ -269,7 +276,7 @@ def test_a_torque_that_touches_zero_has_a_saddle():
     found = four_bar(gravity=0.0, loads={"own": {**TORQUE, "torque": "-(1 + sin(phi)) * t"}},
                      parameters={"t": "5 N m"}).equilibria()  # fmt: skip
     assert kinds(found) == [SADDLE] and found.places[0].place == pytest.approx(1.5 * math.pi, abs=1e-7)
-    assert not found.conservative and found.summary.work == pytest.approx(TURN * 5.0, rel=1e-9)
+    assert found.driven == ("loads.own",) and found.summary.work == pytest.approx(TURN * 5.0, rel=1e-9)
     # a turn takes work: no potential belongs to a place
     assert found.places[0].potential is None and found.rest.potential is None
     nearly = four_bar(gravity=0.0, loads={"own": {**TORQUE, "torque": "-(0.9999999 + sin(phi)) * t"}},
@@ -355,6 +362,149 @@ def test_packaged_machines_have_equilibria(name):
     (stable,) = found.stable
     assert abs(math.remainder(stable.place - lowest, TURN)) < 1e-6
     np.testing.assert_allclose(found.rest.holding, machine.outputs(found.rest.q, 0.0).tau, atol=1e-9)
+
+
+# -- the linear model
+
+
+HANGING = """
+[ground]
+O1 = [0, 0]
+O2 = [0.6, 0.1]
+[driver]
+link = "crank"
+[links.crank]
+points = { O1 = [0, 0], A = [0.1, 0] }
+mass = 3
+inertia = 0.02
+[links.coupler]
+points = { A = [0, 0], B = [0.5, 0], P = [0.3, -0.2] }
+masses = { P = 4 }
+[links.rocker]
+points = { O2 = [0, 0], B = [0.4, 0] }
+mass = 2
+inertia = 0.04
+centroid = [0.2, 0.0]
+[start]
+points = { B = [0.5, 0.35] }
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "at", "number"),
+    [
+        ("watt_six_bar", "equilibrium", 3),
+        ("watt_six_bar", " equilibrium : 4 ", 4),
+        ("", "equilibrium", 2),
+        ("", "equilibrium:1", 1),
+    ],
+)
+def test_poles_at_an_equilibrium_have_its_natural_frequency(name, at, number, tmp_path):
+    """The product of both poles is its square, whatever damps; without friction and loads by the speed they are a
+    pair without damping, or about an unstable one of opposite signs."""
+    file = LINKAGES / f"{name}.toml" if name else tmp_path / "hanging.toml"
+    if not name:
+        file.write_text(HANGING, "utf-8")
+    own = Machine(read_linkage(file)).equilibria().places[number - 1]
+    point = linear_point(str(file), at)
+    assert point.words == f"equilibrium {number} ({own.kind}, {own.place:.6g} rad)"
+    assert (
+        point.states == {"phi": pytest.approx(own.place, rel=1e-12), "w": 0.0} and point.inputs["tau"] == 0.0
+    )
+    linear = point.linear()
+    assert abs(linear.states[1].rate.value) < 1e-9
+    poles = np.sort_complex(np.linalg.eigvals(linear.A))
+    assert np.prod(poles).real == pytest.approx(own.stiffness / own.inertia, rel=1e-9)
+    if not name:
+        root = np.sqrt(complex(-own.stiffness / own.inertia))
+        np.testing.assert_allclose(poles, np.sort_complex([-root, root]), atol=1e-9 * abs(root))
+        assert linear.poles[0].natural_frequency == pytest.approx(
+            own.natural_frequency or abs(root), rel=1e-9
+        )
+
+
+def test_the_linear_model_of_a_machine_at_its_equilibrium():
+    """By the name of the model, at the motor behind a gear; and of the inverse model."""
+    point = linear_point("ChainUnit", "equilibrium")
+    assert point.states["phi"] == pytest.approx(math.pi, abs=1e-9)
+    inverse = linear_point(str(LINKAGES / "pump_jack.toml"), "equilibrium:2", inverse=True)
+    own = Machine(read_linkage(LINKAGES / "pump_jack.toml")).equilibria().places[1]
+    assert inverse.inputs["phi"] == pytest.approx(own.place) and inverse.inputs["w"] == 0.0
+    D = inverse.linear()
+    assert D.D[[y.name for y in D.outputs].index("tau"), 0] == pytest.approx(own.stiffness, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "at", "words"),
+    [
+        ("tipper.toml", "equilibrium", r"no stable equilibrium; its equilibria are 1 \(on its stop, 0.2 m\)"),
+        ("tipper.toml", "equilibrium:1", "the equilibrium 1 is on an end stop"),
+        ("pump_jack.toml", "equilibrium:5", "must be equilibrium:N with N from 1 to 4; its equilibria are 1"),
+        ("pump_jack.toml", "equilibrium:two", "must be equilibrium:N with N from 1 to 4"),
+        ("DcMotor", "equilibrium", "DcMotor has no equilibria that are known"),
+        ("ChainUnitFlexible", "equilibrium", "ChainUnitFlexible has no equilibria that are known"),
+        ("jam_with_driveline.toml", "equilibrium", "is of a linkage file, or of a machine by its name"),
+    ],
+)
+def test_an_equilibrium_that_is_not_there_is_refused(name, at, words):
+    folder = LINKAGES.parent if name.startswith("jam") else LINKAGES
+    with pytest.raises(InputError, match=words):
+        linear_point(str(folder / name) if name.endswith(".toml") else name, at)
+
+
+# -- the report
+
+
+def report_of(machine, speed=1.0):
+    found = linkage_findings(machine, speed)
+    report = linkage_report(found, "file.toml")
+    assert len(figure_of(report).panels) == (1 if found.rest.rest.potential is None else 2)
+    return report.result["rest"], plain(report), render(report)
+
+
+def figure_of(report):
+    (section,) = (each for each in report.sections if each.name == "rest")
+    (figure,) = (each for each in section.blocks if isinstance(each, Figure))
+    return figure
+
+
+def test_equilibria_are_told():
+    """In the data, in words, and on the page; those of a slider have its units."""
+    data, words, page = report_of(Machine(read_linkage(LINKAGES / "pump_jack.toml")))
+    own = Machine(read_linkage(LINKAGES / "pump_jack.toml")).equilibria()
+    for entry, each in zip(data["equilibria"], own.places, strict=True):
+        assert entry["kind"] == each.kind and entry["place"] == {"value": each.place, "unit": "rad"}
+        assert entry["stiffness"] == {"value": each.stiffness, "unit": "N.m/rad"}
+        assert entry["frequency"] == {"value": each.frequency, "unit": "Hz"}
+        assert entry["natural_frequency"]["value"] == each.natural_frequency
+    assert data["summary"]["peak"] == {"value": own.summary.peak, "unit": "N.m"}
+    assert data["by_speed"] == data["without_potential"] == ["fluid"]
+    assert data["over_the_way"]["potential"]["value"] == own.rest.potential.tolist()
+    assert "2: stable" in words and "1.26 rad/s (0.201 Hz)" in words and "fluid depends on the speed" in words
+    assert 'id="rest"' in page and "held by friction" in page
+
+    data, words, _ = report_of(Machine(read_linkage(LINKAGES / "tipper.toml")), 0.1)
+    (entry,) = data["equilibria"]
+    assert entry["holding"]["unit"] == data["over_the_way"]["holding"]["unit"] == "N"
+    assert entry["place"] == {"value": 0.2, "unit": "m"} and entry["inertia"]["unit"] == "kg"
+    assert entry["stiffness"] == {"value": None, "unit": "N/m"}
+    assert "On its stop at 0.200 m the driver rests with 56.4 kN on it" in words
+
+
+def test_a_machine_without_a_potential_or_a_torque_is_told():
+    lifting = four_bar(loads={"own": {**TORQUE, "torque": -1.0}})
+    data, words, _ = report_of(lifting)
+    assert "A turn takes 6.28 J from the driver, without friction: no potential belongs to a place" in words
+    assert data["equilibria"][0]["potential"] == {"value": None, "unit": "J"}
+    assert "potential" not in data["over_the_way"] and data["without_potential"] == ["own"]
+    winding = four_bar(parameters={"k": "2 N m"}, loads={"own": {**TORQUE, "torque": "-k * phi"}})
+    _, words, _ = report_of(winding)
+    assert (
+        "The loads are not the same after a turn: the way is half a turn to either side of the start" in words
+    )
+    found = linkage_report(linkage_findings(four_bar(gravity=0.0), 1.0), "file.toml")
+    assert "No load has a torque at the driver: at rest the machine stays wherever it is." in plain(found)
+    assert found.result["rest"]["indifferent"] is True
 
 
 # -- zeros

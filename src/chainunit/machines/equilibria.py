@@ -53,7 +53,9 @@ class Equilibrium:
     holding: Value = quantity("N.m", "holding torque there: 0, or at a stop the torque that the stop takes")
     stiffness: Value = quantity("N.m/rad", "stiffness: slope of the holding torque; none at a stop")
     inertia: Value = quantity("kg.m2", "reflected inertia there")
-    natural_frequency: Value = quantity("rad/s", "natural frequency of a small swing, undamped")
+    natural_frequency: Value = quantity(
+        "rad/s", "natural frequency of a small swing, undamped", kind="frequency"
+    )
     frequency: Value = quantity("Hz", "the same in swings per second")
     potential: Value = quantity(
         "J", "potential above its least one over the way; none where it does not close"
@@ -70,10 +72,10 @@ class Equilibrium:
 class Holding:
     """The torque that holds a machine at rest over the way of its driver."""
 
-    peak: Value = quantity("N.m", "largest holding torque in size")
-    peak_at: Value = quantity("rad", "place of the driver there")
-    work: Value = quantity("J", "work of the holding torque over the way")
-    friction: Value = quantity("N.m", "largest torque that friction of pins and guides holds")
+    peak: Value = quantity("N.m", "largest in size")
+    peak_at: Value = quantity("rad", "at")
+    work: Value = quantity("J", "work over the way")
+    friction: Value = quantity("N.m", "largest that friction of pins and guides holds")
 
 
 class Rest(NamedTuple):
@@ -96,8 +98,8 @@ class Equilibria:
     summary: Holding
     rest: Rest
     """over the way, closer where the holding torque changes sharply"""
-    conservative: bool
-    """whether all loads have a potential; else that of the others is the integral of their torque over the way"""
+    driven: tuple[str, ...]
+    """names of the loads without a potential of their own; theirs is the integral of their torque over the way"""
     repeats: bool
     """whether the loads of a driver that turns are the same again after a turn"""
 
@@ -150,6 +152,11 @@ class _AtRest:
         """The part of the holding torque without a potential [N m]."""
         return np.broadcast_to(self.state(q).lost_torque, q.shape)
 
+    def loads_without_potential(self, q: Any, nothing: float) -> tuple[str, ...]:
+        """The names of the loads that have such a part at any of the places, of a size above `nothing`."""
+        effects = self.state(q).effects
+        return tuple(name for name, each in effects.items() if np.max(np.abs(each.dissipative)) > nothing)
+
 
 def equilibria(machine: Resting, feed: Any = None) -> Equilibria:
     """All equilibria of a machine under its weight, its springs and its loads at rest, over the way of its driver: a
@@ -191,9 +198,9 @@ def equilibria(machine: Resting, feed: Any = None) -> Equilibria:
     curve = sampled(at.torque, low, high)
     # a driver on its stop is pushed back by it
     found = _zeros(at, curve, nothing, None if model.turns else (-1.0, 1.0))
-    conservative = not np.any(np.abs(at.driven(curve.x)) > nothing)
+    driven = at.loads_without_potential(curve.x, nothing)
     places = np.array([x for zero in found for x in (zero.begin, zero.end)])
-    rest, work = _rest(at, curve, places, conservative, model.turns and repeats)
+    rest, work = _rest(at, curve, places, not driven, model.turns and repeats)
     closes = not (model.turns and repeats) or abs(work) <= _CLOSES * size * _TURN
     rest = rest._replace(potential=rest.potential if closes else None)
     limits = nothing, _FLAT * size / (high - low), _LIGHT * float(np.max(inertia))
@@ -210,9 +217,7 @@ def equilibria(machine: Resting, feed: Any = None) -> Equilibria:
         work=0.0 if abs(work) <= _CLOSES * size * (high - low) else work,
         friction=float(np.max(rest.friction)),
     )
-    return Equilibria(
-        tuple(sorted(listed, key=lambda each: each.place)), summary, rest, conservative, repeats
-    )
+    return Equilibria(tuple(sorted(listed, key=lambda each: each.place)), summary, rest, driven, repeats)
 
 
 def _size(state: MachineState, q: Any) -> float:
