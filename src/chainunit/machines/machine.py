@@ -17,6 +17,8 @@ from ..mechanism.models import InverseMachine
 if TYPE_CHECKING:
     import xarray as xr
 
+    from .equilibria import Equilibria
+
 _XP = numpy_()
 
 
@@ -175,6 +177,21 @@ class Machine:
         from ..batch import evaluate
 
         return evaluate(self.model, values, outputs, parameters=self.p, **options)
+
+    def equilibria(self, feed: Any = None) -> Equilibria:
+        """All equilibria under its weight, its springs and the loads `feed` over the way of the driver, with
+        stiffness and natural frequency, and the holding torque elsewhere; see
+        `chainunit.machines.equilibria.equilibria`.
+
+        Examples
+        --------
+        >>> from chainunit.machines.knife_drive import KnifeDrive
+        >>> [each.kind for each in Machine(KnifeDrive).equilibria().places]
+        ['unstable', 'stable']
+        """
+        from .equilibria import equilibria
+
+        return equilibria(self, feed)
 
     def pin_turns(self, run: Mapping[str, Any]) -> dict[str, Any]:
         """Relative angle in each of the model's joints over a `run`, by output, up to a constant [rad], shape (n,).

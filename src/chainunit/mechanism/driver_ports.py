@@ -187,7 +187,7 @@ SLIDING = DriverPort(
         "at a dead point nothing else carries the force; give the link a mass, or J_added",
     ),
     DriverWords("force on the driver", "way"),
-    MappingProxyType({unit: _UNITS[unit] for unit in ("rad", "rad/s", "N.m", "kg.m2")}),
+    MappingProxyType({unit: _UNITS[unit] for unit in ("rad", "rad/s", "N.m", "kg.m2", "N.m/rad")}),
     "end_stop_force",
 )
 """A driver that a cylinder pushes."""

@@ -17,13 +17,15 @@ from ..reading.text import array_entry
 from ..study.linkage_turn import GroupTurn, JointTurn, LinkageFindings, linkage_findings
 from . import blocks as b
 from . import figure as fig
-from . import linkage, linkage_loads
+from . import linkage, linkage_loads, linkage_rest
 from .drawing import drawing
 from .lines import Name, Number, capital, join, line
 from .motion import Animation, Clip, Reading
 from .task import Task, no_check
 
-PICTURES = ("linkage.svg", "linkage.png", "linkage_reactions.png", "linkage_stroke.png")
+PICTURES = (
+    "linkage.svg", "linkage.png", "linkage_reactions.png", "linkage_stroke.png", "linkage_rest.png"
+)  # fmt: skip
 _PICTURES = 120
 """Pictures of a turn, or of the way there and back."""
 
@@ -49,6 +51,7 @@ def linkage_report(findings: LinkageFindings, source: str) -> b.Report:
         (
             b.Section("motion", "Motion", tuple(_motion(s, findings))),
             b.Section("forces", "Effort, inertia and reactions", tuple(_forces(s, findings))),
+            b.Section("rest", "At rest", tuple(linkage_rest.at_rest(s, findings, PICTURES[4]))),
             b.Section("outputs", "Parameters, inputs and outputs", tuple(_variables(findings))),
         ),
         source=s.line("Linkage file: {source} · chainunit {chainunit}"),
@@ -99,6 +102,7 @@ def _result(f: LinkageFindings, source: str) -> dict[str, Any]:
         "angles": angles,
         "points": points,
         "over_the_way": {"driver": array_entry(f.q, unit("rad")), **_over_the_way(f)},
+        "rest": linkage_rest.rest_data(f),
         **({"back": _forces_of(f.back) | {"over_the_way": _over_the_way(f.back)}} if f.back else {}),
     }
 

@@ -12,7 +12,7 @@ from ..core.engines import MATH
 from ..core.errors import InputError, RunError, near_name, refusal_prefix, shown
 from ..core.model import Model
 from ..core.quantities import Quantity, Variable
-from ..mechanism.models import DirectMachine
+from ..mechanism.models import DirectMachine, InverseMachine
 from ..models import model_named
 from ..reading.tables import to_number
 from ..system.compiled_simulation import CompiledSystem
@@ -23,6 +23,7 @@ from ..system.simulation import Simulation
 from . import config as study_files
 from .config import Config
 from .drive import Drive
+from .equilibrium_point import asks_for_equilibrium, equilibrium_point, place_words
 from .event import Event
 from .operation import OperatingConditions
 from .package import drive_to_export, is_study_file, model_and_start
@@ -33,7 +34,8 @@ from .transients import follow, lead_times
 from .verdict import START, STEADY
 
 At = str | Mapping[str, Any] | None
-"""A point: RUN:TIME of a study, or values of states and inputs by name, as a text NAME=VALUE,.. or a mapping."""
+"""A point: RUN:TIME of a study, equilibrium:N of a machine, or values of states and inputs by name, as a text
+NAME=VALUE,.. or a mapping."""
 _USUAL_SPEED = 2.0 * np.pi
 """Speed of the driver of a linkage that turns [rad/s]: 60 rev/min, as of the command ``chainunit linkage``."""
 _USUAL_WAY_SPEED = 0.1
@@ -72,7 +74,8 @@ def linearize(
         values of states and inputs by name, ``"phi=30 deg, w=60 rpm"`` or a mapping; all others are those of steady
         running, of the start of a model, or of a linkage whose driver goes at 60 rev/min (0.1 m/s) at the angle 0,
         one with a range in its middle. A direct model has the torque at which its speed is constant, unless
-        ``tau`` is given
+        ``tau`` is given. Of a linkage or a machine: ``"equilibrium"``, at rest in its stable equilibrium with the
+        least potential, or ``"equilibrium:2"`` by its number in the table of ``chainunit linkage``
     config : a study file whose machine, feed or motor gives the values of a named model
     inverse : of a linkage file: the model that takes motion and gives torque and reactions, which has D alone, in
         place of the direct one
@@ -118,9 +121,15 @@ def linear_point(
     if whole:
         return _point_of_study(study_files.load(Path(name)), at, progress)
     if is_file:
-        return _point_of_linkage(model_named(name), at, inverse)
+        machine = model_named(name)
+        if isinstance(at, str) and asks_for_equilibrium(at):
+            assert issubclass(machine, InverseMachine)
+            return _at_equilibrium(machine if inverse else machine.direct(), {}, at)
+        return _point_of_linkage(machine, at, inverse)
     loaded = None if values is None else study_files.load(values)
     model, start = model_and_start(name, loaded, progress=progress)
+    if isinstance(at, str) and asks_for_equilibrium(at):
+        return _at_equilibrium(model, start, at)
     return _at_values(model, start, at)
 
 
@@ -145,6 +154,21 @@ def _at_values(model: type[Model], start: Mapping[str, float], at: At) -> Linear
         inputs["tau"] = holding_torque(model, p, inputs, states)
     words = ", ".join(f"{k} = {x:g}" for k, x in given.items())
     return LinearPoint(model, p, inputs, states, words or "start of the model")
+
+
+def _at_equilibrium(model: type[Model], start: Mapping[str, float], at: str) -> LinearPoint:
+    """The point of a machine at rest in an equilibrium, with these start values."""
+    inverse = model.inverse if issubclass(model, DirectMachine) else model
+    if not issubclass(inverse, InverseMachine) or inverse.States is not None:
+        raise InputError(
+            f"--at {shown(at)}: {model.name} has no equilibria that are known; they are of linkages and machines "
+            "without states of their own; give states and inputs, NAME=VALUE, .."
+        )
+    number, own = equilibrium_point(inverse, start, at)
+    phi = own.place * float(start.get("ratio", inverse.Parameters().ratio))
+    rest = {"phi_start": phi, "w_start": 0.0} if model is not inverse else {"phi": phi, "w": 0.0}
+    point = _at_values(model, {**start, **rest}, {"tau": 0.0} if model is not inverse else None)
+    return point._replace(words=f"equilibrium {number} ({place_words(inverse, own)})")
 
 
 def holding_torque(
@@ -242,6 +266,11 @@ def drive_point(
     with refusal_prefix("linear model: "):
         system = CompiledSystem(rig.graph)
     run, time, given = STEADY, None, {}
+    if asks_for_equilibrium(at):
+        raise InputError(
+            f"--at {shown(at)}: is of a linkage file, or of a machine by its name; a study has runs: {START}, "
+            f"{', '.join([STEADY, *events])}"
+        )
     if isinstance(at, str) and "=" not in at:
         run, time = _run_and_time(at, [START, STEADY, *events])
     else:

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..core.engines import numpy_
 from ..core.quantities import Value, declaration, quantity
+from ..machines.equilibria import Equilibria
 from ..machines.linkages.model import LinkageDescription
 from ..machines.linkages.structure import CYLINDER
 from ..machines.machine import Machine
@@ -107,6 +108,8 @@ class LinkageFindings:
     """places of the driver at which each of these joints and links turns back, by the name of its variables"""
     limits: dict[str, tuple[float, float]]
     """least and largest value of the angle of each link and of each place of a point, by output"""
+    rest: Equilibria
+    """the machine at rest"""
     back: LinkageFindings | None = None
     """the findings on the way back, at the same places, of a driver that swings"""
 
@@ -157,12 +160,13 @@ class _Way:
 def linkage_findings(machine: Machine, speed: float) -> LinkageFindings:
     """The linkage over its way at a constant `speed` of the driver [rad/s, m/s], with the loads of normal running; of
     a driver that swings there and, as `back`, at the opposite speed."""
+    rest = machine.equilibria()
     if machine.model.turns or machine.model.slides:
-        return _findings(machine, speed)
-    return replace(_findings(machine, abs(speed)), back=_findings(machine, -abs(speed)))
+        return _findings(machine, speed, rest)
+    return replace(_findings(machine, abs(speed), rest), back=_findings(machine, -abs(speed), rest))
 
 
-def _findings(machine: Machine, speed: float) -> LinkageFindings:
+def _findings(machine: Machine, speed: float, rest: Equilibria) -> LinkageFindings:
     """The linkage over its way in one direction."""
     description: LinkageDescription = machine.model.described_by  # type: ignore[attr-defined]
     q = np.linspace(*description.span, PLACES)
@@ -232,6 +236,7 @@ def _findings(machine: Machine, speed: float) -> LinkageFindings:
             for name, motion, back in motions
         },
         {name: (_plain(-top[f"-{name}"]), _plain(top[name])) for name in moving},
+        rest,
     )
 
 

@@ -12,7 +12,7 @@ from ...core.engines import MATH
 from ...core.errors import InputError
 from ...groups.triad import Triad
 from ...mechanism.machine import Mechanism, derived_numbers
-from .closing import dead_group, gap_hint, open_group
+from .closing import dead_group, gap_hint, just_closes, open_group
 from .narrow import check_triads, lows
 from .outputs import DescribedLinkage
 from .probes import description_axis
@@ -88,14 +88,13 @@ class FollowedLinkage:
             margins_over_way.append(self._margins(m))
             for each, margin in zip(self.structure.groups, margins_over_way[-1], strict=True):
                 if not margin > LEAST_MARGIN:
-                    raise dead_group(each.links, self.way.words(q))
+                    raise dead_group(each, self.way.words(q), margin, LEAST_MARGIN)
             self._add_angles(angles, m)
         for k, q, least in lows(self._margins_at, margins_over_way, places):
             if not least > LEAST_MARGIN:
-                links, where = self.structure.groups[k].links, self.way.words(q)
                 if math.isnan(least):
-                    raise open_group(links, where, self._gap(k, derived, q))
-                raise dead_group(links, where)
+                    raise self._open_group(k, derived, q)
+                raise dead_group(self.structure.groups[k], self.way.words(q), least, LEAST_MARGIN)
         turns = {}
         for name, (_, *samples) in angles.items():
             rate = self.way.rate(samples)
@@ -111,10 +110,16 @@ class FollowedLinkage:
             before = angles.setdefault(name, [self.structure.poses[name][2]])
             before.append(before[-1] + math.remainder(angle - before[-1], WHOLE))
 
-    def _gap(self, k: int, derived: Sequence[float], q: float) -> str:
-        """Words on the gap in the group `k` of the structure; see `gap_hint`."""
+    def _open_group(self, k: int, derived: Sequence[float], q: float) -> InputError:
+        """The refusal of the group `k` of the structure, which does not close at the place `q`; a change point, at
+        which it fails to close by rounding, is a dead position."""
+        group, where = self.structure.groups[k], self.way.words(q)
         number = k - (len(self.structure.groups) - len(self.linkage.groups))
-        return gap_hint(self.linkage, number, derived, q, self.way.span) if number >= 0 else ""
+        if number < 0:
+            return open_group(group.links, where)
+        if just_closes(self.linkage, number, derived, q):
+            return dead_group(group, where, 0.0, LEAST_MARGIN)
+        return open_group(group.links, where, gap_hint(self.linkage, number, derived, q, self.way.span))
 
     def _open_at(self, q: float, derived: Sequence[float]) -> int | None:
         """The number of the first group of the structure that does not close at a place; None where all close."""
@@ -134,8 +139,7 @@ class FollowedLinkage:
         for q in self.way.places():
             k = self._open_at(q, derived)
             if k is not None:
-                links = self.structure.groups[k].links
-                return open_group(links, self.way.words(q), self._gap(k, derived, q))
+                return self._open_group(k, derived, q)
         return InputError("the linkage does not close: change its lengths", key="links")
 
     # the range in which it closes
