@@ -38,6 +38,14 @@ GALLERY = Path(__file__).parents[1] / "examples" / "linkages"
 LINKAGES = sorted(file.stem for file in GALLERY.glob("*.toml"))
 QUICK = ["ChamberForces", "ChainUnit", "DcMotor", "InductionMotor", "slider_crank_press", "tipper.direct"]
 REST = [name for name in (*MODELS, *LINKAGES, *(f"{name}.direct" for name in LINKAGES)) if name not in QUICK]
+OFTEN = {
+    "andrews_squeezer.direct",
+    "blake_jaw_crusher",
+    "crank_shaper.direct",
+    "level_luffing_crane",
+    "scissor_lift.direct",
+}
+"""Machines of the gallery that the second stage looks at; the slow tests look at all."""
 node = pytest.mark.skipif(NODE is None, reason="no node, which runs the modules as a browser does")
 wasmtime = pytest.mark.skipif(not HAS_WASMTIME, reason="no wasmtime, which is in the extra clients")
 engines = pytest.mark.parametrize(
@@ -214,7 +222,13 @@ def test_random_states_are_those_of_python(name, engine):
 
 @node
 @pytest.mark.second
-@pytest.mark.parametrize("name", [*QUICK, *REST])
+@pytest.mark.parametrize(
+    "name",
+    [
+        *QUICK,
+        *(n if n in OFTEN or n in MODELS else pytest.param(n, marks=pytest.mark.slow) for n in REST),
+    ],
+)
 def test_a_thousand_states_of_every_model(name):
     check_points(name, 1000, "node")
 
@@ -223,7 +237,14 @@ def test_a_thousand_states_of_every_model(name):
 @wasmtime
 @pytest.mark.second
 @pytest.mark.parametrize(
-    "name", [*QUICK, "CardanDriveline", "KnifeDrive", "LoadObserver", "knife_drive.direct"]
+    "name",
+    [
+        *QUICK,
+        "CardanDriveline",
+        "KnifeDrive",
+        "LoadObserver",
+        pytest.param("knife_drive.direct", marks=pytest.mark.slow),
+    ],
 )
 def test_engines_have_the_same_bits(name):
     points = Points(name, 300)
