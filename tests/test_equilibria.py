@@ -236,7 +236,11 @@ def test_a_crank_alone_with_weight_is_a_pendulum():
     assert below.natural_frequency == pytest.approx(math.sqrt(M * G * S / INERTIA), rel=1e-12)
     assert below.frequency == below.natural_frequency / TURN and above.frequency is None
     assert above.potential == pytest.approx(2.0 * M * G * S, rel=1e-12) and below.potential == 0.0
-    assert abs(found.summary.peak) == pytest.approx(M * G * S, rel=1e-4) and found.summary.work == 0.0
+    # the largest torque lies between two places
+    assert abs(found.summary.peak) == pytest.approx(M * G * S, rel=1e-12) and found.summary.work == 0.0
+    assert found.summary.peak_at % math.pi == pytest.approx(0.0, abs=1e-5) or math.pi - (
+        found.summary.peak_at % math.pi
+    ) == pytest.approx(0.0, abs=1e-5)
     assert found.driven == () and found.repeats and found.summary.friction == 0.0
     np.testing.assert_allclose(found.rest.holding, M * G * S * np.cos(found.rest.q), atol=1e-12)
     assert found.rest.q[0] == 0.5 and np.all(np.diff(found.rest.q) > 0.0)
@@ -268,7 +272,7 @@ def test_two_springs_in_balance_are_indifferent():
         gravity=0.0, loads={"one": {**spring, "on": "crank.A"}, "other": {**spring, "on": "crank.Z"}}
     )
     found = machine.equilibria()
-    assert found.indifferent
+    assert found.indifferent and found.places[0].place == 0.5
     assert not machine.replace({"crank.mass": 2.0, "g": 9.81}).equilibria().indifferent
 
 

@@ -22,6 +22,7 @@ from ..core.quantities import Value, declaration, quantity
 from ..groups.loads import GuideLosses, PinLosses
 from ..mechanism.machine import MachineState
 from ..mechanism.models import InverseMachine
+from ..mechanism.sampled_quantities import largest
 from ..mechanism.zeros import SampledCurve, Zero, sampled, zeros
 from ..reading.results import part, result
 
@@ -191,7 +192,8 @@ def equilibria(machine: Resting, feed: Any = None) -> Equilibria:
         repeats = bool(np.all(np.abs(later - bias[::60]) <= 1e3 * nothing))
         if repeats:
             # no zero lies at the begin of the turn
-            low = float(q[np.argmax(np.abs(bias))])
+            first = int(np.argmax(np.abs(bias)))
+            low = float(q[first]) if abs(bias[first]) > nothing else low
             high = low + _TURN
         else:
             low, high = low - 0.5 * _TURN, low + 0.5 * _TURN
@@ -209,11 +211,14 @@ def equilibria(machine: Resting, feed: Any = None) -> Equilibria:
     if model.turns and repeats:
         rest = _from_start(rest, model.span[0])
         listed = [_folded(each) for each in listed]
-    peak = int(np.argmax(np.abs(rest.holding)))
-    none = abs(rest.holding[peak]) <= nothing
+    at_peak, _ = largest(
+        lambda x: np.abs(at.torque(x)[0])[None], np.linspace(low, high, 361), around=model.turns and repeats
+    )
+    peak = float(at.torque(at_peak)[0][0])
+    peak_at = float(at_peak[0])
     summary = Holding(
-        peak=0.0 if none else float(rest.holding[peak]),
-        peak_at=float(rest.q[peak]),
+        peak=0.0 if abs(peak) <= nothing else peak,
+        peak_at=peak_at % _TURN if model.turns and repeats else peak_at,
         work=0.0 if abs(work) <= _CLOSES * size * (high - low) else work,
         friction=float(np.max(rest.friction)),
     )
