@@ -467,6 +467,40 @@ def test_without_losses_it_rebounds_with_its_energy():
     assert gained == pytest.approx(states[2], rel=1e-5, abs=1e-3)
 
 
+GRAVITY = 9.81
+
+
+@pytest.mark.parametrize(
+    ("mass", "inertia", "effort", "slides"),
+    [
+        (3.0, 0.2, GRAVITY * math.sqrt(3.0 * 0.2), False),  # the weight at the radius of gyration
+        (0.0, 0.0, 1.0, False),
+        (3.0, 0.0, GRAVITY * 3.0, True),
+        (0.0, 0.0, 1.0, True),
+    ],
+)
+def test_the_usual_end_stops(mass, inertia, effort, slides):
+    """They take the energy of the effort over the range in a hundredth of it, at half of the critical damping; with
+    them a driver without masses has a direct model, too, as soon as there is an inertia on its shaft."""
+    link = {"points": {"O": [0, 0]}, **({"mass": mass, "inertia": inertia} if mass else {})}
+    if slides:
+        data = {
+            "ground": {"G": [0, 0], "X": [1, 0]}, "driver": {"joint": "guide", "range": [0.0, 2.0]},
+            "links": {"ram": {k: v for k, v in link.items() if k != "inertia"}},
+            "joints": {"guide": {"on": "ram.O", "by": "ground.G", "toward": "X"}}, "start": {"phi": 1.0},
+        }  # fmt: skip
+    else:
+        data = {
+            "ground": {"O": [0, 0]}, "driver": {"link": "arm", "range": [0.0, 2.0]},
+            "links": {"arm": {**link, "points": {"O": [0, 0], "T": [0.5, 0]}}}, "start": {"phi": 1.0},
+        }  # fmt: skip
+    direct = machine_of(description_of(data, "bare")).direct()
+    p = direct.check(replace(direct.Parameters(), J_added=1.0))
+    stiffness, moved = p.end_stops.stiffness, mass if slides else inertia
+    assert 0.5 * stiffness * (0.01 * 2.0) ** 2 == pytest.approx(effort * 2.0, rel=1e-12)
+    assert p.end_stops.damping == pytest.approx(math.sqrt(stiffness * moved), rel=1e-12)
+
+
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_the_direct_fmu_rests_on_its_stop(fmi, tmp_path):

@@ -305,6 +305,8 @@ class LinkageDescription(LinkageOutputs):
         # a driver that nothing loads still stops its own weight, one that swings at its radius of gyration
         arm = math.sqrt(mass / bodies) if mass and bodies and not self.way.linear else 1.0
         force = max(mass * STANDARD_GRAVITY / arm, *(abs(state.bias) for state in states))
+        # without masses and loads no effort is known: one of 1 N or 1 N m
+        force = force or 1.0
         return usual_stops(force, mass, high - low, EndStops if self.way.linear else SwingStops)
 
     def model(self) -> type[InverseMachine]:
