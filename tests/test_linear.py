@@ -345,6 +345,12 @@ def test_poles_of_known_matrices():
     assert slow.state == "T" and slow.time_constant == pytest.approx(4.0) and slow.damping_ratio == 1.0
     assert fast.real == pytest.approx(-1.0)
     assert poles_of(np.zeros((0, 0)), []) == ()
+    for square in np.random.default_rng(3).uniform(0.1, 50.0, 40):
+        grows, decays = poles_of([[0.0, 1.0], [square, 0.0]], ["x", "v"])
+        assert grows.real == pytest.approx(-decays.real) and grows.real > 0.0
+        (swings,) = poles_of([[0.0, 1.0], [-square, 0.0]], ["x", "v"])
+        # both states have equal parts in each
+        assert grows.state == decays.state == swings.state == "x"
     (unstable,) = poles_of([[2.0]], ["x"])
     assert unstable.damping_ratio == -1.0 and unstable.time_constant == -0.5
 

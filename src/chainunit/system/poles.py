@@ -14,7 +14,9 @@ from scipy.sparse.csgraph import connected_components
 from ..reading.results import derived, part, result
 
 _ROUNDING = 1e-13
-"""Size of a pole over the largest of its block up to which it is 0."""
+"""Size of a pole over the largest of its block up to which it is 0, and its real part."""
+_EQUAL = 1e-9
+"""Part of the largest share of a state in a pole up to which another one is as large."""
 
 
 @result
@@ -44,7 +46,8 @@ class Pole:
 
 
 def poles_of(A: Any, names: Sequence[str]) -> tuple[Pole, ...]:
-    """The poles of the matrix `A` [1/s], shape (n, n), of the states with these names; the slowest first.
+    """The poles of the matrix `A` [1/s], shape (n, n), of the states with these names; the slowest first, of
+    two that are equally slow the one that grows. Equal means to nine digits, so that rounding does not decide.
 
     The states are divided into groups that act on each other both ways; A is block triangular in them, and has
     the eigenvalues of the blocks. So an integral on which nothing depends, such as an angle or an energy, has a
@@ -60,6 +63,11 @@ def poles_of(A: Any, names: Sequence[str]) -> tuple[Pole, ...]:
         shares = np.abs(left.conj() * right)
         for value, share in zip(values, shares.T, strict=True):
             if value.imag >= 0.0:
-                state = names[own[int(np.argmax(share))]]
-                found.append(Pole(float(value.real), float(value.imag), state))
-    return tuple(sorted(found, key=lambda pole: (pole.natural_frequency, pole.state)))
+                state = names[own[int(np.argmax(share >= (1.0 - _EQUAL) * np.max(share)))]]
+                real = 0.0 if abs(value.real) <= _ROUNDING * np.max(np.abs(values)) else float(value.real)
+                found.append(Pole(real, float(value.imag), state))
+
+    def order(pole: Pole) -> tuple[float, float, str]:
+        return float(f"{pole.natural_frequency:.9e}"), -float(f"{pole.real:.9e}"), pole.state
+
+    return tuple(sorted(found, key=order))
