@@ -273,6 +273,8 @@ def test_two_springs_in_balance_are_indifferent():
     )
     found = machine.equilibria()
     assert found.indifferent and found.places[0].place == 0.5
+    # no last bit decides on the place of the largest torque, and none is a potential
+    assert (found.summary.peak, found.summary.peak_at, found.places[0].potential) == (0.0, 0.5, 0.0)
     assert not machine.replace({"crank.mass": 2.0, "g": 9.81}).equilibria().indifferent
 
 
@@ -288,6 +290,21 @@ def test_a_torque_that_touches_zero_has_a_saddle():
     low, high = (each.place for each in nearly.places)
     assert kinds(nearly) == [UNSTABLE, STABLE]
     assert high - low == pytest.approx(2.0 * math.acos(0.9999999), rel=1e-6)
+
+
+@pytest.mark.parametrize(("start", "ends"), [(0.0, (0.5, 0.0)), (0.0, (0.0, 0.5)), (0.5, (0.5, 0.0))])
+def test_a_torque_that_jumps_over_zero_has_no_stiffness(start, ends):
+    """The ends of a compressed spring meet, also at a round angle: its force turns round there, and that it depends
+    on the last bits of the place does not let the loads of a turn differ from those of the next."""
+    arm = {"points": {"O": [0, 0], "T": [0.5, 0]}, "mass": 3.0, "inertia": 0.2, "centroid": [0.4, 0]}
+    spring = {"type": "spring", "on": "arm.T", "by": "ground.P", "stiffness": 1000.0, "length": 0.1}
+    data = {"ground": {"O": [0, 0], "P": list(ends)}, "driver": {"link": "arm"}, "links": {"arm": arm},
+            "loads": {"spring": spring}, "start": {"phi": start}}  # fmt: skip
+    found = Machine(machine_of(description_of(data, "meeting"))).equilibria()
+    assert found.repeats and kinds(found).count(UNSTABLE) == kinds(found).count(STABLE) == 2
+    met = min(found.places, key=lambda each: abs(each.place - math.atan2(ends[1], ends[0])))
+    assert met.kind == UNSTABLE and (met.stiffness is None or met.stiffness < 0.0)
+    assert all(0.0 <= each.place < TURN for each in found.places)
 
 
 def test_a_flat_minimum_has_no_frequency():

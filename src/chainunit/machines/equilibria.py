@@ -36,7 +36,11 @@ _CLOSES = 1e-6
 """Work of a turn in parts of the largest torque, below which it is none."""
 _SLIDING = 1e6
 """Speed of the driver [rad/s, m/s] at which smoothed friction has its full size."""
+_LEVEL = 1e-13
+"""Potential in parts of the largest torque of a load over the way, below which it is rounding."""
 _TURN = 2.0 * math.pi
+_ODD = 0.8971
+"""Angle [rad] between the places at which a load is compared with that a turn later."""
 _SAME = 1e-9
 """Angle [rad] within which two places are one."""
 
@@ -52,7 +56,9 @@ class Equilibrium:
     place: Value = quantity("rad", "place of the driver")
     end: Value = quantity("rad", "end of the range, where it is indifferent; else the place")
     holding: Value = quantity("N.m", "holding torque there: 0, or at a stop the torque that the stop takes")
-    stiffness: Value = quantity("N.m/rad", "stiffness: slope of the holding torque; none at a stop")
+    stiffness: Value = quantity(
+        "N.m/rad", "stiffness: slope of the holding torque; none at a stop, and where it jumps"
+    )
     inertia: Value = quantity("kg.m2", "reflected inertia there")
     natural_frequency: Value = quantity(
         "rad/s", "natural frequency of a small swing, undamped", kind="frequency"
@@ -187,9 +193,10 @@ def equilibria(machine: Resting, feed: Any = None) -> Equilibria:
     bias, inertia = (np.broadcast_to(x, q.shape) for x in (state.bias, state.J))
     nothing, repeats = _NOTHING * size, True
     if model.turns:
-        # the same place of another turn
-        later = at.torque(q[::60] + _TURN)[0]
-        repeats = bool(np.all(np.abs(later - bias[::60]) <= 1e3 * nothing))
+        # the same place of another turn; no round angle, at which a torque may jump
+        odd = low + _ODD * np.arange(1, 8)
+        gap = at.torque(odd + _TURN)[0] - at.torque(odd)[0]
+        repeats = bool(np.all(np.abs(gap) <= 1e3 * nothing))
         if repeats:
             # no zero lies at the begin of the turn
             first = int(np.argmax(np.abs(bias)))
@@ -205,7 +212,8 @@ def equilibria(machine: Resting, feed: Any = None) -> Equilibria:
     rest, work = _rest(at, curve, places, not driven, model.turns and repeats)
     closes = not (model.turns and repeats) or abs(work) <= _CLOSES * size * _TURN
     rest = rest._replace(potential=rest.potential if closes else None)
-    limits = nothing, _FLAT * size / (high - low), _LIGHT * float(np.max(inertia))
+    level = _LEVEL * size * (high - low)
+    limits = nothing, _FLAT * size / (high - low), _LIGHT * float(np.max(inertia)), level
     way = _Judged(low, high, not model.turns, *limits)
     listed = [_equilibrium(at, zero, rest, way) for zero in found]
     if model.turns and repeats:
@@ -214,10 +222,11 @@ def equilibria(machine: Resting, feed: Any = None) -> Equilibria:
     at_peak, _ = largest(
         lambda x: np.abs(at.torque(x)[0])[None], np.linspace(low, high, 361), around=model.turns and repeats
     )
-    peak = float(at.torque(at_peak)[0][0])
-    peak_at = float(at_peak[0])
+    peak, peak_at = float(at.torque(at_peak)[0][0]), float(at_peak[0])
+    if abs(peak) <= nothing:
+        peak, peak_at = 0.0, model.span[0]
     summary = Holding(
-        peak=0.0 if abs(peak) <= nothing else peak,
+        peak=peak,
         peak_at=peak_at % _TURN if model.turns and repeats else peak_at,
         work=0.0 if abs(work) <= _CLOSES * size * (high - low) else work,
         friction=float(np.max(rest.friction)),
@@ -284,7 +293,7 @@ def _rest(
 
 class _Judged(NamedTuple):
     """What counts as none on a way from `low` to `high`, with `stops` at both or without: a torque of `nothing`
-    [N m], a `flat` stiffness [N m/rad], a `light` inertia [kg m2]."""
+    [N m], a `flat` stiffness [N m/rad], a `light` inertia [kg m2], a `level` potential [J]."""
 
     low: float
     high: float
@@ -292,6 +301,7 @@ class _Judged(NamedTuple):
     nothing: float
     flat: float
     light: float
+    level: float
 
 
 def _equilibrium(at: _AtRest, zero: Zero, rest: Rest, way: _Judged) -> Equilibrium:
@@ -304,9 +314,15 @@ def _equilibrium(at: _AtRest, zero: Zero, rest: Rest, way: _Judged) -> Equilibri
         kind, stiffness = INDIFFERENT, 0.0
     elif way.stops and zero.begin in (way.low, way.high) and abs(holding) > way.nothing:
         kind, stiffness = STOP, None
+    elif stiffness and kind in (STABLE, UNSTABLE) and (stiffness > 0.0) != (kind == STABLE):
+        # the torque jumps over zero, as that of a spring whose ends meet
+        stiffness = None
     inertia, w = float(rest.inertia[k]), None
     if kind == STABLE and stiffness and stiffness > 0.0 and inertia > way.light:
         w = math.sqrt(stiffness / inertia)
+    potential = None if rest.potential is None else float(rest.potential[k])
+    if potential is not None and potential <= way.level:
+        potential = 0.0
     return Equilibrium(
         kind=kind,
         place=zero.begin,
@@ -316,7 +332,7 @@ def _equilibrium(at: _AtRest, zero: Zero, rest: Rest, way: _Judged) -> Equilibri
         inertia=inertia,
         natural_frequency=w,
         frequency=None if w is None else w / _TURN,
-        potential=None if rest.potential is None else float(rest.potential[k]),
+        potential=potential,
         friction=float(rest.friction[k]),
     )
 
