@@ -433,6 +433,7 @@ def test_poles_at_an_equilibrium_have_its_natural_frequency(name, at, number, tm
         point.states == {"phi": pytest.approx(own.place, rel=1e-12), "w": 0.0} and point.inputs["tau"] == 0.0
     )
     linear = point.linear()
+    assert linear.title == linear_point(str(file)).title == read_linkage(file).noun
     assert abs(linear.states[1].rate.value) < 1e-9
     poles = np.sort_complex(np.linalg.eigvals(linear.A))
     assert np.prod(poles).real == pytest.approx(own.stiffness / own.inertia, rel=1e-9)

@@ -124,7 +124,8 @@ def linear_point(
         machine = model_named(name)
         if isinstance(at, str) and asks_for_equilibrium(at):
             assert issubclass(machine, InverseMachine)
-            return _at_equilibrium(machine if inverse else machine.direct(), {}, at)
+            point = _at_equilibrium(machine if inverse else machine.direct(), {}, at)
+            return point._replace(title=machine.noun)
         return _point_of_linkage(machine, at, inverse)
     loaded = None if values is None else study_files.load(values)
     model, start = model_and_start(name, loaded, progress=progress)
