@@ -99,7 +99,7 @@ def _table(s: b.Source, f: LinkageFindings) -> Iterator[b.Block]:
         (b.Column("inertia", form="long"), "inertia"),
         (b.Column("natural frequency"), "frequency"),
         (b.Column("energy above the lowest"), "energy"),
-        (b.Column("force of the stop" if f.machine.model.slides else "torque of the stop"), "end_stop"),
+        (b.Column(f"{'force' if f.machine.model.slides else 'torque'} against the stop"), "end_stop"),
     ]
     shown = [
         (head, name)
