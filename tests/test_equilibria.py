@@ -405,13 +405,24 @@ def test_the_linear_model_at_an_equilibrium(shown):
     (pole,) = found.poles
     frequency = result["equilibria"]["1"]["frequency"]["value"]
     assert pole.imaginary / (2.0 * math.pi) == pytest.approx(frequency, rel=1e-9) and abs(pole.real) < 1e-9
-    with pytest.raises(InputError, match=r'"equilibrium:4": the number of an equilibrium must be 1 to 1'):
+    with pytest.raises(
+        InputError, match=r'"equilibrium:4": the number of an equilibrium must be 1, the only one'
+    ):
         linearize(folder / "swing.toml", "equilibrium:4")
     with pytest.raises(
-        InputError, match=r"no stable equilibrium clear of its end stops; it has 1 on its stop"
+        InputError, match=r"no stable equilibrium clear of its end stops; it has 1 on its stop: name a place"
     ):
         linearize(GALLERY / "cylinder_lift.toml", "equilibrium")
     with pytest.raises(InputError, match=r"there the driver rests on its end stop"):
         linearize(GALLERY / "cylinder_lift.toml", "equilibrium:1")
     unstable = linearize(GALLERY / "watt_six_bar.toml", "equilibrium:2", inverse=False)
     assert max(pole.real for pole in unstable.poles) > 1.0
+    assert found.title == "Swing" and unstable.title == linearize(GALLERY / "watt_six_bar.toml").title
+
+
+def test_a_point_beyond_the_range_is_told():
+    beyond = linearize(GALLERY / "toggle_clamp.toml", "phi=95 deg, w=0").at
+    assert beyond == "phi = 1.65806 rad, w = 0 rad/s, beyond the range of the driver, on its upper end stop"
+    assert linearize(GALLERY / "toggle_clamp.toml", "phi=-0.01").at.endswith("on its lower end stop")
+    assert linearize(GALLERY / "toggle_clamp.toml", "phi=10 deg").at == "phi = 0.174533 rad"
+    assert linearize(GALLERY / "watt_six_bar.toml", "phi=-10 deg").at == "phi = -0.174533 rad"

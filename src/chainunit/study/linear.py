@@ -146,7 +146,7 @@ def _at_values(model: type[Model], start: Mapping[str, float], at: At) -> Linear
         states |= {k: v for k, v in given.items() if k in states}
     if issubclass(model, DirectMachine) and "tau" not in given:
         inputs["tau"] = holding_torque(model, p, inputs, states)
-    words = ", ".join(f"{k} = {x:g}" for k, x in given.items())
+    words = _in_words(model, given)
     return LinearPoint(model, p, inputs, states, words or "start of the model")
 
 
@@ -177,6 +177,10 @@ def _point_of_linkage(machine: Any, at: At, inverse: bool) -> LinearPoint:
     if at is None:
         unit = ("m", "m/s") if machine.slides else ("rad", "rad/s")
         point = point._replace(words=f"phi = {phi:g} {unit[0]}, w = {w:g} {unit[1]}")
+    driver_at = (point.inputs if inverse else point.states)["phi"] / ratio
+    if not machine.turns and not low <= driver_at <= high:
+        end = "lower" if driver_at < low else "upper"
+        point = point._replace(words=f"{point.words}, beyond the range of the driver, on its {end} end stop")
     return point._replace(title=machine.noun)
 
 
@@ -187,16 +191,20 @@ def _at_equilibrium(machine: type[InverseMachine], at: str, inverse: bool) -> Li
     rest, number = made.at_rest(), at.partition(":")[2].strip()
     known = [str(k) for k in range(1, len(rest.equilibria) + 1)]
     if number and number not in known:
-        known_words = (
-            f"1 to {len(known)}, as chainunit linkage numbers them" if known else "none, as it rests nowhere"
+        if not known:
+            raise InputError(f'--at {shown(at)}: the linkage rests nowhere; name a place, "phi=..., w=0"')
+        numbers = "1, the only one" if len(known) == 1 else f"1 to {len(known)}"
+        raise InputError(
+            f"--at {shown(at)}: the number of an equilibrium must be {numbers}, as chainunit linkage numbers them"
         )
-        raise InputError(f"--at {shown(at)}: the number of an equilibrium must be {known_words}")
     found = rest.equilibria[int(number) - 1] if number else rest.stable
     if found is None:
         kinds = ", ".join(f"{k} {kind}" for k, kind in zip(known, rest.kinds, strict=True)) or "none"
+        free = [k for k, each in zip(known, rest.equilibria, strict=True) if each.end_stop is None]
+        by_number = f'name one by its number, "{_EQUILIBRIUM}:{free[0]}", or' if free else "name"
         raise InputError(
-            f"--at {shown(at)}: the linkage has no stable equilibrium clear of its end stops; it has {kinds}: name "
-            f'one by its number, "{_EQUILIBRIUM}:1", or a place, "phi=..., w=0"'
+            f"--at {shown(at)}: the linkage has no stable equilibrium clear of its end stops; it has {kinds}: "
+            f'{by_number} a place, "phi=..., w=0"'
         )
     if found.end_stop is not None:
         raise InputError(
@@ -207,14 +215,24 @@ def _at_equilibrium(machine: type[InverseMachine], at: str, inverse: bool) -> Li
     start = {"phi": phi, "w": 0.0} if inverse else {"phi_start": phi, "w_start": 0.0}
     unit = "m" if machine.slides else "rad"
     point = _at_values(machine if inverse else machine.direct(), start, None)
-    return point._replace(words=f"equilibrium at phi = {phi:.6g} {unit}")
+    return point._replace(words=f"equilibrium at phi = {phi:.6g} {unit}", title=machine.noun)
+
+
+def _in_words(model: type[Model], given: Mapping[str, float]) -> str:
+    """The values that a point gives to states and inputs, with their units."""
+    units = {v.name: v.unit for v in _states_and_inputs(model)}
+    return ", ".join(f"{name} = {x:g} {units[name]}".removesuffix(" 1") for name, x in given.items())
+
+
+def _states_and_inputs(model: type[Model]) -> tuple[Variable, ...]:
+    return *(model.state_layout.variables if model.state_layout else ()), *model.input_layout.variables
 
 
 def _values(model: type[Model], at: At) -> dict[str, float]:
     """The values that a point gives to states and inputs."""
     if at is None:
         return {}
-    variables = (*(model.state_layout.variables if model.state_layout else ()), *model.input_layout.variables)
+    variables = _states_and_inputs(model)
     if isinstance(at, str):
         pairs = {}
         for each in at.split(","):
@@ -222,7 +240,8 @@ def _values(model: type[Model], at: At) -> dict[str, float]:
             if not sign:
                 raise InputError(
                     f"--at {shown(at)}: must be NAME=VALUE, .. of states and inputs of {model.name}, such as "
-                    f'"{variables[0].name}={_EXAMPLES.get(variables[0].unit, "0.5")}"; RUN:TIME is of a study'
+                    f'"{variables[0].name}={_EXAMPLES.get(variables[0].unit, "0.5")}"; RUN:TIME is of a study, '
+                    f'"{_EQUILIBRIUM}" of a linkage file'
                 )
             pairs[name] = text
         at = pairs
@@ -305,7 +324,7 @@ def drive_point(
         system.p,
         inputs,
         states,
-        ", ".join([words, *(f"{name} = {x:g}" for name, x in given.items())]),
+        ", ".join(filter(None, (words, _in_words(system.model, given)))),
     )
 
 
