@@ -262,3 +262,23 @@ points = { B = ["300 mm", "250 mm"] }
     )
     (group,) = linkage_findings(Machine(read_linkage(tmp_path / "rocker.toml")), 1.0).groups.values()
     assert group.margin == pytest.approx(0.6) and group.margin_at == 0.0
+
+
+def test_a_driver_that_slides_is_shown_there_and_back(tmp_path):
+    """Friction adds to the force of a lift on its way up, and carries a part of it on the way down."""
+    done = run(
+        "linkage", str(PRESS.with_name("scissor_lift.toml")), "-o", "out", "--speed", "0.05 m/s", cwd=tmp_path
+    )
+    assert "there and back over its range" in done.stdout and "Reactions, on the way back" in done.stdout
+    result = json.loads((tmp_path / "out" / "linkage.json").read_text("utf-8"))
+    machine = Machine(read_linkage(PRESS.with_name("scissor_lift.toml")))
+    for part, w in ((result, 0.05), (result["back"], -0.05)):
+        q, tau = (
+            np.array(result["over_the_way"]["driver"]["value"]),
+            np.array(part["over_the_way"]["tau"]["value"]),
+        )
+        assert tau == pytest.approx(machine.outputs(q, w).tau, rel=1e-12)
+        held = np.interp(
+            q, *(np.array(result["holding_over_the_way"][k]["value"]) for k in ("driver", "torque"))
+        )
+        assert np.all((tau - held) * w > 0.0)

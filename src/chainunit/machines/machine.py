@@ -201,6 +201,13 @@ class Machine:
         """The equilibria of the machine and the effort that holds it elsewhere, with the loads `feed`, an instance of
         `model.Feed`, by default those of normal running; places and efforts count at the driver.
 
+        Returns
+        -------
+        `equilibria` in the order of their places, each with its place `at` [rad, m], `stiffness` [N m/rad, N/m],
+        `inertia` [kg m2, kg], natural `frequency` [Hz], `energy` above the lowest [J], and `end_stop`, the effort
+        against a stop [N m, N]; a quantity that it has not is None. `kinds` says which are stable; `q` and `torque`
+        are places and the efforts that hold the driver there, shape (n,).
+
         Raises
         ------
         InputError

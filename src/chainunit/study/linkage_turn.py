@@ -161,9 +161,9 @@ class _Way:
 
 def linkage_findings(machine: Machine, speed: float) -> LinkageFindings:
     """The linkage over its way at a constant `speed` of the driver [rad/s, m/s], with the loads of normal running; of
-    a driver that swings there and, as `back`, at the opposite speed."""
+    a driver with a range there and, as `back`, at the opposite speed."""
     rest = machine.at_rest()
-    if machine.model.turns or machine.model.slides:
+    if machine.model.turns:
         return _findings(machine, speed, rest)
     return replace(_findings(machine, abs(speed), rest), back=_findings(machine, -abs(speed), rest))
 
