@@ -444,7 +444,8 @@ def test_a_direct_model_has_the_torque_that_holds_its_speed():
         ("DcMotor", {"inverse": True}, "--inverse: is of linkage files"),
         (EXAMPLES / "jam_with_driveline.toml", {"at": "jam:2 s"}, "there is no run"),
         (EXAMPLES / "jam_with_driveline.toml", {"at": "start_up:2 kg"}, "--at"),
-        (EXAMPLES / "jam_with_driveline.toml", {"at": "start_up"}, "RUN:TIME"),
+        (EXAMPLES / "jam_with_driveline.toml", {"at": "start_up"}, '--at "start_up": must be RUN:TIME'),
+        (EXAMPLES / "jam_with_driveline.toml", {"at": "steady:1 s"}, "steady running begins at "),
         (EXAMPLES / "jam_with_driveline.toml", {"at": "jam_left:1 s"}, "the run of jam_left goes from"),
         (
             EXAMPLES / "jam_with_driveline.toml",

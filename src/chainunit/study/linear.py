@@ -304,7 +304,7 @@ def drive_point(
     simulation: Any  # of the compiled system, which has no FMUs to close
     with rig.from_rest() as simulation:
         if run in (START, STEADY):
-            simulation = _from_rest(rig, simulation, time)
+            simulation = _from_rest(rig, simulation, time, steady=run == STEADY)
         elif events[run].from_rest:
             assert time is not None
             simulation = rig.from_rest(events[run])
@@ -337,6 +337,8 @@ def _run_and_time(at: str, runs: list[str]) -> tuple[str, float | None]:
         )
     if not sign and name == STEADY:
         return name, None
+    if not text:
+        raise InputError(f'--at {shown(at)}: must be RUN:TIME, such as "{name}:0.4 s"; the time is missing')
     try:
         return name, to_number(
             Variable("--at", "time of the run", Quantity("s", "", low=0.0, high=1e6)), text
@@ -370,13 +372,19 @@ def _silent(time: float) -> None:
     """Report no time of a run."""
 
 
-def _from_rest(rig: Rig, simulation: Any, time: float | None) -> Any:
-    """The simulation of start-up and steady running at the time [s], by default at its end."""
-    if time is None or rig.operation.empty_start:
+def _from_rest(rig: Rig, simulation: Any, time: float | None, steady: bool) -> Any:
+    """The simulation of start-up and steady running at the time [s], by default at its end; a time in `steady`
+    running lies behind the start-up."""
+    if time is None or steady or rig.operation.empty_start:
         started = start_up(rig, simulation, _silent, rig.guards)
         _refuse_opened(simulation, started.stop - 0.5 * rig.step)
         if time is None:
             return simulation
+        if steady and time < started.steady_from:
+            raise InputError(
+                f'--at "{STEADY}:{time:g} s": steady running begins at {started.steady_from:.4g} s; before it name '
+                f'"{START}:{time:g} s"'
+            )
         rig = started.rig
         simulation = rig.from_rest()
     _run(simulation, rig, time)
