@@ -417,6 +417,7 @@ def test_the_linear_model_at_an_equilibrium(shown):
         linearize(GALLERY / "cylinder_lift.toml", "equilibrium:1")
     unstable = linearize(GALLERY / "watt_six_bar.toml", "equilibrium:2", inverse=False)
     assert max(pole.real for pole in unstable.poles) > 1.0
+    assert found.at == "equilibrium, phi = -1.5708 rad"
     assert found.title == "Swing" and unstable.title == linearize(GALLERY / "watt_six_bar.toml").title
 
 

@@ -215,7 +215,7 @@ def _at_equilibrium(machine: type[InverseMachine], at: str, inverse: bool) -> Li
     start = {"phi": phi, "w": 0.0} if inverse else {"phi_start": phi, "w_start": 0.0}
     unit = "m" if machine.slides else "rad"
     point = _at_values(machine if inverse else machine.direct(), start, None)
-    return point._replace(words=f"equilibrium at phi = {phi:.6g} {unit}", title=machine.noun)
+    return point._replace(words=f"equilibrium, phi = {phi:.6g} {unit}", title=machine.noun)
 
 
 def _in_words(model: type[Model], given: Mapping[str, float]) -> str:
