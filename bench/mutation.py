@@ -24,7 +24,6 @@ import hashlib
 import json
 import os
 import random
-import re
 import shutil
 import signal
 import subprocess
@@ -32,10 +31,11 @@ import sys
 import tempfile
 import time
 from collections import Counter, deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
@@ -249,10 +249,12 @@ def distances(module: str) -> dict[str, int]:
 # %%
 @dataclass(frozen=True)
 class Outcome:
-    """What pytest said of a run: the first test that failed, or none; a run without end counts as noticed."""
+    """What pytest said of a run: the first test that failed, or none, and all that did; a run without end counts as
+    noticed."""
 
     failed: str
     seconds: float
+    tests: tuple[str, ...] = ()
 
 
 class Bench:
@@ -282,10 +284,14 @@ class Bench:
         for compiled in (file.parent / "__pycache__").glob(f"{file.stem}.*.pyc"):
             compiled.unlink()
 
-    def run(self, marks: str, files: list[str], workers: int) -> Outcome:
-        """The tests of `files`, or all without any, that have these `marks`, up to the first that fails."""
-        options = f"-m pytest -x -q -p no:cacheprovider --tb=no -rfE -n {workers} --dist loadfile".split()
-        command = [sys.executable, *options, "-m", marks]
+    def run(self, marks: str, files: Sequence[str], workers: int, *, to_the_end: bool = False) -> Outcome:
+        """The tests of `files`, or all without any, that have these `marks`, up to the first that fails or to the
+        end."""
+        options = f"-m pytest -q -p no:cacheprovider --tb=no -rfE -n {workers} --dist loadfile".split()
+        report = self.tree.parent / "report.xml"
+        report.unlink(missing_ok=True)
+        options += ["--junitxml", str(report), "-o", "junit_family=xunit1"]
+        command = [sys.executable, *options, *([] if to_the_end else ["-x"]), "-m", marks]
         began = time.perf_counter()
         process = subprocess.Popen(
             [*command, *files], env=self.environment, cwd=self.tree, text=True, start_new_session=True,
@@ -303,8 +309,18 @@ class Bench:
             sys.exit(said)
         if process.returncode in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED):
             return Outcome("", seconds)
-        first = re.search(r"^(?:FAILED|ERROR) (\S+)", said, re.MULTILINE)
-        return Outcome(first[1] if first else said.strip().splitlines()[-1][:200], seconds)
+        tests = tuple(_failed(report)) if report.exists() else ()
+        return Outcome(tests[0] if tests else said.strip().splitlines()[-1][:200], seconds, tests)
+
+
+def _failed(report: Path) -> Iterator[str]:
+    """The tests of a report that failed, by the names that pytest takes; a file that cannot be read by its own."""
+    for case in ElementTree.parse(report).iter("testcase"):
+        if case.find("failure") is not None or case.find("error") is not None:
+            file = case.get("file")
+            yield (
+                f"{file}::{case.get('name')}" if file else f"{(case.get('name') or '').replace('.', '/')}.py"
+            )
 
 
 def without_overlap(chosen: list[Mutant]) -> list[Mutant]:
@@ -351,30 +367,30 @@ def judged(bench: Bench, mutant: Mutant, near: list[str]) -> dict[str, object]:
 
 def noticed(bench: Bench, marks: str, left: list[Mutant]) -> Iterator[tuple[Mutant, str]]:
     """The mutants that a whole stage notices, each with the test that fails. They stand in one tree until no test
-    fails; a test that fails is run on each alone, which tells whom it notices."""
+    fails; the tests that fail are run on each alone, which tells whom they notice."""
     while left:
         together = without_overlap(left)
         with changed(bench, together):
-            failed = bench.run(marks, [], bench.workers).failed
-        if not failed:
+            outcome = bench.run(marks, [], bench.workers, to_the_end=True)
+        if not outcome.failed:
             left = [mutant for mutant in left if mutant not in together]
             continue
-        by_it = []
+        by_it = {}
         for mutant in together:
             with changed(bench, [mutant]):
-                if bench.run(marks, [failed] if "::" in failed else [], 0).failed:
-                    by_it.append(mutant)
-        if not by_it:
+                by_it[mutant] = bench.run(marks, outcome.tests, 0).failed if outcome.tests else ""
+        found = {mutant: test for mutant, test in by_it.items() if test}
+        if not found:
             # only several of them make it fail
-            by_it = [mutant for mutant in together if _alone(bench, marks, mutant)]
+            found = {mutant: test for mutant in together if (test := _alone(bench, marks, mutant))}
             left = [mutant for mutant in left if mutant not in together]
-        yield from ((mutant, failed) for mutant in by_it)
-        left = [mutant for mutant in left if mutant not in by_it]
+        yield from found.items()
+        left = [mutant for mutant in left if mutant not in found]
 
 
-def _alone(bench: Bench, marks: str, mutant: Mutant) -> bool:
+def _alone(bench: Bench, marks: str, mutant: Mutant) -> str:
     with changed(bench, [mutant]):
-        return bool(bench.run(marks, [], bench.workers).failed)
+        return bench.run(marks, [], bench.workers).failed
 
 
 # %% [markdown]

@@ -442,6 +442,16 @@ def test_a_direct_model_has_the_torque_that_holds_its_speed():
         ("DcMotor", {"at": {"w": math.inf}}, "--at: w"),
         ("DcMotors", {}, "DcMotors: no such model"),
         ("DcMotor", {"inverse": True}, "--inverse: is of linkage files"),
+        (
+            EXAMPLES / "linkages" / "cylinder_lift.toml",
+            {"at": "equilibrium"},
+            'give a place, "phi=.., w=0"',
+        ),
+        (
+            EXAMPLES / "linkages" / "toggle_clamp.toml",
+            {"at": "equilibrium:3"},
+            'give the number of one, as in "equilibrium:1", or a place, "phi=.., w=0"',
+        ),
         (EXAMPLES / "jam_with_driveline.toml", {"at": "jam:2 s"}, "there is no run"),
         (EXAMPLES / "jam_with_driveline.toml", {"at": "start_up:2 kg"}, "--at"),
         (EXAMPLES / "jam_with_driveline.toml", {"at": "start_up"}, '--at "start_up": must be RUN:TIME'),
@@ -458,6 +468,16 @@ def test_a_wrong_point_is_refused(of, more, words):
     with pytest.raises(InputError) as refused:
         linearize(of, **more)
     assert words in str(refused.value)
+
+
+def test_a_point_has_units_and_tells_a_place_beyond_the_range():
+    clamp = EXAMPLES / "linkages" / "toggle_clamp.toml"
+    beyond = linearize(clamp, "phi=95 deg, w=0").at
+    assert beyond == "phi = 1.65806 rad, w = 0 rad/s, beyond the range of the driver, on its upper end stop"
+    assert linearize(clamp, "phi=-0.01").at.endswith("on its lower end stop")
+    assert linearize(clamp, "equilibrium").title == linearize(clamp).title == "Toggle clamp with a hand lever"
+    assert linearize(clamp, "phi=10 deg").at == "phi = 0.174533 rad"
+    assert linearize(clamp.with_name("watt_six_bar.toml"), "phi=-10 deg").at == "phi = -0.174533 rad"
 
 
 def test_the_examples_of_docstrings():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 
+import numpy as np
 import pytest
 
 from chainunit.core.errors import InputError
@@ -92,3 +93,63 @@ def test_names_with_another_number_do_not_look_alike():
     with pytest.raises(InputError, match="too many degrees of freedom") as caught:
         machine(text)
     assert "alike" not in str(caught.value)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_change_point_is_a_dead_position_with_its_reason(seed):
+    """Parallelograms and kites close all the way round but for rounding: coupler and rocker come into line."""
+    rng = np.random.default_rng(seed)
+    r, g, start = rng.uniform(0.05, 0.5), rng.uniform(0.55, 1.5), rng.uniform(0.2, 2.9)
+    parallel = seed % 2 == 0
+    length, rocker = (g, r) if parallel else (r, g)
+    # the fourth corner of the parallelogram, or its mirror image about the line A-O2
+    a, o2 = r * np.exp(1j * start), complex(g)
+    b = a + o2 if parallel else a + np.conj(-a / (o2 - a)) * (o2 - a)
+    data = {
+        "ground": {"O1": [0, 0], "O2": [g, 0]},
+        "driver": {"link": "crank"},
+        "links": {
+            "crank": {"points": {"O1": [0, 0], "A": [r, 0]}},
+            "coupler": {"points": {"A": [0, 0], "B": [length, 0]}},
+            "rocker": {"points": {"O2": [0, 0], "B": [rocker, 0]}},
+        },
+        "start": {"phi": start, "points": {"B": [b.real, b.imag]}},
+    }
+    with pytest.raises(InputError, match=r"comes to a dead position at (180|0|360) deg of crank") as caught:
+        machine_of(description_of(data, "change_point"))
+    words = str(caught.value)
+    assert "there coupler and rocker are in line, and its two ways of closing meet" in words
+    assert "its margin is 0 and must be > 0.001" in words and "cannot close" not in words
+    assert "around its start the linkage closes from" in words
+    # a gap that is no rounding is one
+    data["links"]["rocker"]["points"]["B"] = [rocker * (1.0 - 1e-6), 0]
+    with pytest.raises(InputError, match="cannot close"):
+        machine_of(description_of(data, "gap"))
+
+
+def test_a_rod_that_just_reaches_its_line_is_square_to_it():
+    with pytest.raises(InputError, match="comes to a dead position at 270 deg of crank") as caught:
+        machine(SLIDER, l=0.07)
+    assert "there coupler is square to the guide of ram, and its two ways of closing meet" in str(
+        caught.value
+    )
+
+
+def test_guides_that_become_parallel_are_a_dead_position():
+    """A yoke whose slot turns into its guide: the crank carries a slot, a block slides in it and along the ground."""
+    data = {
+        "ground": {"O1": [0, 0], "G": [0.1, 0.3], "G2": [1.0, 0.3]},
+        "driver": {"link": "crank"},
+        "links": {
+            "crank": {"points": {"O1": [0, 0], "S": [0, 0.1], "S2": [0.5, 0.1]}},
+            "block": {"points": {"C": [0, 0]}},
+            "slide": {"points": {"C": [0, 0]}},
+        },
+        "joints": {
+            "slot": {"on": "block.C", "by": "crank.S", "toward": "S2", "angle": 0},
+            "guide": {"on": "slide.C", "by": "ground.G", "toward": "G2", "angle": 0},
+        },
+        "start": {"phi": 1.0, "points": {"C": [0.1, 0.3]}},
+    }
+    with pytest.raises(InputError, match="its two guides are parallel, so that its forces have no limit"):
+        machine_of(description_of(data, "parallel"))

@@ -279,6 +279,6 @@ def test_a_driver_that_slides_is_shown_there_and_back(tmp_path):
         )
         assert tau == pytest.approx(machine.outputs(q, w).tau, rel=1e-12)
         held = np.interp(
-            q, *(np.array(result["holding_over_the_way"][k]["value"]) for k in ("driver", "torque"))
+            q, *(np.array(result["rest"]["over_the_way"][k]["value"]) for k in ("driver", "holding"))
         )
         assert np.all((tau - held) * w > 0.0)

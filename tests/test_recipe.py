@@ -11,11 +11,12 @@ import pytest
 
 import chainunit
 from chainunit.core.model import Model, Part, Terminal
+from chainunit.core.native.kernels import frequent_outputs
 from chainunit.core.ports import NO_LOAD, LoadPort, PortSlopes, PortValues, flanges, load_terminal
 from chainunit.core.quantities import Value, declaration, group, quantity
 from chainunit.fmu import export as python
 from chainunit.fmu.description import Interface
-from chainunit.fmu.recipe import frequent_outputs, icon, script_of
+from chainunit.fmu.recipe import icon, script_of
 from chainunit.fmu.reference import excitation
 from chainunit.fmu.script import Script
 from chainunit.models import MODELS

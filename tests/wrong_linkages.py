@@ -211,7 +211,7 @@ CHANGES = [
     ([('"80 mm", min', '"500 mm", min'), ('"200 mm"', '"2 m"')],
      [(21, "links.rod", "cannot close at 20 deg of crank")]),
     ([('"80 mm", min', '"360 mm", min'), ('"200 mm"', '"2 m"'), ('["25 mm"', "[0"), ('["25 mm"', "[0")],
-     [(21, "links.rod", "comes to a change point at")]),
+     [(21, "links.rod", "comes to a dead position at")]),
     ([('"80 mm", min', '"360.5 mm", min'), ('"200 mm"', '"2 m"'), ('["25 mm"', "[0"), ('["25 mm"', "[0")],
      [(21, "links.rod", "cannot close at")]),
     ([(ROUGH, "")], [(35, "start", "does not place the links rod, ram: give the angle of rod")]),

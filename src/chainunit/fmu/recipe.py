@@ -65,11 +65,6 @@ def _script(file: Path) -> type[Script]:
     return own
 
 
-def frequent_outputs(model: type[Model]) -> set[str]:
-    """The outputs that are read at every step: the members of the terminals."""
-    return {name for terminal in model.terminals for name in terminal.members.values()}
-
-
 def icon(model: type[Model], kind: str, sketch: Sketch | None) -> bytes:
     """The icon of a model, "svg" or "png": for a user's machine its `sketch`; else the file in `data/icons` with the
     model's name, else the general icon of a motor (the model takes a load port), of a line (it takes one and gives

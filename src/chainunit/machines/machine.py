@@ -11,12 +11,13 @@ import numpy as np
 from ..core.engines import numpy_
 from ..core.errors import InputError
 from ..core.quantities import Variable, complaint
-from ..mechanism.equilibria import Rest, rest_of
 from ..mechanism.machine import MachineState, Mechanism
 from ..mechanism.models import InverseMachine
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from .equilibria import Equilibria
 
 _XP = numpy_()
 
@@ -177,6 +178,21 @@ class Machine:
 
         return evaluate(self.model, values, outputs, parameters=self.p, **options)
 
+    def equilibria(self, feed: Any = None) -> Equilibria:
+        """All equilibria under its weight, its springs and the loads `feed` over the way of the driver, with
+        stiffness and natural frequency, and the holding torque elsewhere; see
+        `chainunit.machines.equilibria.equilibria`.
+
+        Examples
+        --------
+        >>> from chainunit.machines.knife_drive import KnifeDrive
+        >>> [each.kind for each in Machine(KnifeDrive).equilibria().places]
+        ['unstable', 'stable']
+        """
+        from .equilibria import equilibria
+
+        return equilibria(self, feed)
+
     def pin_turns(self, run: Mapping[str, Any]) -> dict[str, Any]:
         """Relative angle in each of the model's joints over a `run`, by output, up to a constant [rad], shape (n,).
         The `run` has outputs and states of the model by name, each of shape (n,). The caller sums the turning to and
@@ -196,31 +212,6 @@ class Machine:
         u = self.inputs({"phi": phi})
         linkage = self.model.linkage(_XP, self.p, u)
         return Mechanism(_XP, linkage, u.phi / self.p.ratio, getattr(self.p, "derived", ()))
-
-    def at_rest(self, feed: Any = None) -> Rest:
-        """The equilibria of the machine and the effort that holds it elsewhere, with the loads `feed`, an instance of
-        `model.Feed`, by default those of normal running; places and efforts count at the driver.
-
-        Returns
-        -------
-        `equilibria` in the order of their places, each with its place `at` [rad, m], `stiffness` [N m/rad, N/m],
-        `inertia` [kg m2, kg], natural `frequency` [Hz], `energy` above the lowest [J], and `end_stop`, the effort
-        against a stop [N m, N]; a quantity that it has not is None. `kinds` says which are stable; `q` and `torque`
-        are places and the efforts that hold the driver there, shape (n,).
-
-        Raises
-        ------
-        InputError
-            see the class.
-        TypeError
-            see `state`.
-        """
-        loads = self._feed(feed)
-
-        def state(q: Any, w: Any) -> MachineState:
-            return self.state(self.inputs({"phi": q * self.ratio, "w": w * self.ratio, **loads}))
-
-        return rest_of(state, self.model.span, self.model.turns)
 
     @property
     def stored_per_unit(self) -> Mapping[str, Callable[[Mapping[str, Any]], Any]]:

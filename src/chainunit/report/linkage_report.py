@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,11 +20,12 @@ from . import figure as fig
 from . import linkage, linkage_loads, linkage_rest
 from .drawing import drawing
 from .lines import Line, Name, Number, capital, join, line
-from .linkage_rest import values_of, with_unit
 from .motion import Animation, Clip, Reading
 from .task import Task, no_check
 
-PICTURES = ("linkage.svg", "linkage.png", "linkage_reactions.png", "linkage_stroke.png", linkage_rest.PICTURE)
+PICTURES = (
+    "linkage.svg", "linkage.png", "linkage_reactions.png", "linkage_stroke.png", "linkage_rest.png"
+)  # fmt: skip
 _PICTURES = 120
 """Pictures of a turn, or of the way there and back."""
 
@@ -49,8 +50,8 @@ def linkage_report(findings: LinkageFindings, source: str) -> b.Report:
         tuple(_opening(s, findings)),
         (
             b.Section("motion", "Motion", tuple(_motion(s, findings))),
-            b.Section("rest", "Equilibria and holding effort", tuple(linkage_rest.blocks_of(s, findings))),
             b.Section("forces", "Effort, inertia and reactions", tuple(_forces(s, findings))),
+            b.Section("rest", "At rest", tuple(linkage_rest.at_rest(s, findings, PICTURES[4]))),
             b.Section("outputs", "Parameters, inputs and outputs", tuple(_variables(findings))),
         ),
         source=s.line("Linkage file: {source} · chainunit {chainunit}"),
@@ -58,18 +59,31 @@ def linkage_report(findings: LinkageFindings, source: str) -> b.Report:
     )
 
 
+def _entry(value: Any, unit: str) -> dict[str, Any]:
+    return {"value": value, "unit": unit}
+
+
+def _of(f: LinkageFindings, instance: Any, at_driver: Collection[str]) -> dict[str, Any]:
+    """The values of an instance; those with a name in `at_driver` are in the units of the driver."""
+    layout, unit = Layout(type(instance)), f.machine.model.driver_port.unit
+    return {
+        v.name: _entry(x, unit(v.unit) if v.name in at_driver else v.unit)
+        for v, x in zip(layout.variables, layout.values(instance), strict=True)
+    }
+
+
 def _result(f: LinkageFindings, source: str) -> dict[str, Any]:
     description, unit = f.description, f.machine.model.driver_port.unit
     points = {
         f"{link}.{point}": {
-            axis: with_unit(list(f.limits[f"{description.variable('link', link)}.{point}.{axis}"]), "m")
+            axis: _entry(list(f.limits[f"{description.variable('link', link)}.{point}.{axis}"]), "m")
             for axis in ("x", "y")
         }
         for link, entry in description.structure.links.items()
         for point in entry.points
     }
     angles = {
-        link: with_unit(list(f.limits[f"{description.variable('link', link)}.angle"]), "rad")
+        link: _entry(list(f.limits[f"{description.variable('link', link)}.angle"]), "rad")
         for link in description.structure.links
     }
     at_driver = ("least_at", "largest_at", "forth")
@@ -79,16 +93,16 @@ def _result(f: LinkageFindings, source: str) -> dict[str, Any]:
         "title": f.machine.model.description,
         "groups_in_words": f.sentence,
         "degrees_of_freedom": 1,
-        "speed": with_unit(f.speed, unit("rad/s")),
-        **linkage_rest.entries(f),
+        "speed": _entry(f.speed, unit("rad/s")),
         **_forces_of(f),
-        "groups": {name: values_of(f, each, ("margin_at",)) for name, each in f.groups.items()},
-        "strokes": {name: values_of(f, each, at_driver) for name, each in f.strokes.items()},
-        "swings": {name: values_of(f, each, at_driver) for name, each in f.swings.items()},
-        "dead_centres": {name: with_unit(places, unit("rad")) for name, places in f.dead_centres.items()},
+        "groups": {name: _of(f, each, ("margin_at",)) for name, each in f.groups.items()},
+        "strokes": {name: _of(f, each, at_driver) for name, each in f.strokes.items()},
+        "swings": {name: _of(f, each, at_driver) for name, each in f.swings.items()},
+        "dead_centres": {name: _entry(places, unit("rad")) for name, places in f.dead_centres.items()},
         "angles": angles,
         "points": points,
         "over_the_way": {"driver": array_entry(f.q, unit("rad")), **_over_the_way(f)},
+        "rest": linkage_rest.rest_data(f),
         **({"back": _forces_of(f.back) | {"over_the_way": _over_the_way(f.back)}} if f.back else {}),
     }
 
@@ -96,8 +110,8 @@ def _result(f: LinkageFindings, source: str) -> dict[str, Any]:
 def _forces_of(f: LinkageFindings) -> dict[str, Any]:
     """Effort at the driver, and reactions."""
     return {
-        "turn": values_of(f, f.turn, Layout(type(f.turn)).names),
-        "joints": {name: values_of(f, each, ("peak_at",)) for name, each in f.joints.items()},
+        "turn": _of(f, f.turn, Layout(type(f.turn)).names),
+        "joints": {name: _of(f, each, ("peak_at",)) for name, each in f.joints.items()},
     }
 
 

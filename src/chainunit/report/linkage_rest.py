@@ -1,4 +1,4 @@
-"""The report on a linkage at rest: its equilibria, and the effort that holds it elsewhere."""
+"""A linkage at rest: its equilibria, the torque that holds it elsewhere, and its potential, for page and data."""
 
 from __future__ import annotations
 
@@ -7,150 +7,198 @@ from typing import Any
 
 import numpy as np
 
-from ..core.quantities import Layout
+from ..machines.equilibria import INDIFFERENT, SADDLE, STABLE, STOP, UNSTABLE, Holding
+from ..machines.linkages.loads import loads_by_speed
+from ..reading.results import as_data
 from ..reading.text import array_entry
 from ..study.linkage_turn import LinkageFindings
 from . import blocks as b
 from . import figure as fig
-from .lines import Name, join, line
+from .lines import Line, Name, join, line
 
-PICTURE = "linkage_rest.png"
-_AT_DRIVER = ("at", "torque_peak", "torque_peak_at", "stiffness", "inertia", "end_stop")
+_KINDS = {
+    STABLE: "stable",
+    UNSTABLE: "unstable",
+    SADDLE: "unstable to one side",
+    INDIFFERENT: "indifferent",
+    STOP: "rests on its stop",
+}
+_MARKERS = {STABLE: "o", STOP: "s", UNSTABLE: "x", SADDLE: "+"}
+_AT_DRIVER = frozenset(("place", "end", "holding", "stiffness", "inertia", "friction", "peak", "peak_at"))
+"""The quantities whose units are those of the driver."""
 
 
-def with_unit(value: Any, unit: str) -> dict[str, Any]:
-    """A value with its unit, as a result has it."""
-    return {"value": value, "unit": unit}
+def rest_data(f: LinkageFindings) -> dict[str, Any]:
+    """The data of a linkage at rest."""
+    found, unit = f.rest, f.machine.model.driver_port.unit
 
+    def data(x: Any) -> dict[str, Any]:
+        return {
+            name: each | {"unit": unit(each["unit"])} if name in _AT_DRIVER else each
+            for name, each in as_data(x).items()
+        }
 
-def values_of(f: LinkageFindings, instance: Any, at_driver: Collection[str]) -> dict[str, Any]:
-    """The values of an instance; those with a name in `at_driver` are in the units of the driver."""
-    layout, unit = Layout(type(instance)), f.machine.model.driver_port.unit
+    rest = found.rest
+    columns = (
+        ("driver", rest.q, "rad"),
+        ("holding", rest.holding, "N.m"),
+        ("friction", rest.friction, "N.m"),
+    )
+    potential = {} if rest.potential is None else {"potential": array_entry(rest.potential, "J")}
     return {
-        v.name: with_unit(x, unit(v.unit) if v.name in at_driver else v.unit)
-        for v, x in zip(layout.variables, layout.values(instance), strict=True)
+        "equilibria": [data(each) for each in found.places],
+        "summary": data(found.summary),
+        "indifferent": found.indifferent,
+        "repeats": found.repeats,
+        "without_potential": [name.removeprefix("loads.") for name in found.driven],
+        "by_speed": loads_by_speed(f.description.data["loads"]),
+        "over_the_way": {name: array_entry(x, unit(of)) for name, x, of in columns} | potential,
     }
 
 
-def entries(f: LinkageFindings) -> dict[str, Any]:
-    """What the result of a linkage has on its rest; equilibria are numbered from 1 on."""
-    rest, unit = f.rest, f.machine.model.driver_port.unit
-    numbered = enumerate(zip(rest.kinds, rest.equilibria, strict=True), 1)
-    return {
-        "holding": values_of(f, rest.holding, _AT_DRIVER),
-        "equilibria": {str(k): {"kind": kind, **values_of(f, each, _AT_DRIVER)} for k, (kind, each) in numbered},
-        "balanced": {
-            str(k): with_unit(list(ends), unit("rad")) for k, ends in enumerate(rest.balanced, 1)
-        },
-        "holding_over_the_way": {
-            "driver": array_entry(rest.q, unit("rad")), "torque": array_entry(rest.torque, unit("N.m"))
-        },
-    }  # fmt: skip
+def at_rest(s: b.Source, f: LinkageFindings, file: str) -> Iterator[b.Block]:
+    """The section of the report; `file` is the name of its picture."""
+    found = f.rest
+    effort = "force" if f.machine.model.slides else "torque"
+    if found.indifferent:
+        yield b.Text(f"No load has a {effort} at the driver: at rest the machine stays wherever it is.")
+        return
+    yield b.Text(
+        f"Where the holding {effort} is zero, the machine is in equilibrium. It is stable where the potential has a "
+        "minimum; about it a small swing has the natural frequency, at the driver and undamped.",
+        "lead",
+        "long",
+    )
+    yield _table(s, f, effort)
+    yield b.Table(s.rows(Holding, "rest.summary"), title=f"Holding {effort} over the way of the driver")
+    yield from _notes(s, f, effort)
+    yield _figure(f, effort, file)
 
 
-def blocks_of(s: b.Source, f: LinkageFindings) -> Iterator[b.Block]:
-    """Sentences, the table of the equilibria, and the figure of the holding effort."""
-    rest, slides = f.rest, f.machine.model.slides
-    effort = "force" if slides else "torque"
-    everywhere = bool(rest.balanced) and rest.balanced[0] == (rest.q[0], rest.q[-1])
-    lead = "At rest, with the loads of normal running and without friction"
-    if everywhere:
+def _table(s: b.Source, f: LinkageFindings, effort: str) -> b.Table:
+    rows = []
+    for k, each in enumerate(f.rest.places):
+        path = f"rest.equilibria.{k}"
+        place: Line = s.number(f"{path}.place")
+        if each.kind == INDIFFERENT:
+            place = line(place, " to ", s.number(f"{path}.end"))
+        keys = ("stiffness", "natural_frequency", "inertia", "potential", "friction")
+        name = f"{k + 1}: {_KINDS[each.kind]}"
+        rows.append(b.TableRow((name, place, *(s.number(f"{path}.{key}") for key in keys))))
+    columns = (
+        *b.heads("equilibrium", "at", "stiffness", "natural frequency"),
+        b.Column("mass" if f.machine.model.slides else "inertia", form="long"),
+        b.Column("potential"),
+        b.Column(f"friction holds a {effort} of", form="long"),
+    )
+    return b.Table(tuple(rows), columns, title="Equilibria")
+
+
+def _names(names: Collection[str]) -> Line:
+    return join(map(Name, names))
+
+
+def _notes(s: b.Source, f: LinkageFindings, effort: str) -> Iterator[b.Block]:
+    """What the numbers do not say by themselves."""
+    data, found = s.result["rest"], f.rest
+    for k, each in enumerate(found.places):
+        if each.kind == STOP:
+            path = f"rest.equilibria.{k}"
+            yield b.Text(
+                s.line(f"On its stop at {{{path}.place}} the driver rests with {{{path}.holding}} on it.")
+            )
+    if data["by_speed"]:
+        depend = "depends" if len(data["by_speed"]) == 1 else "depend"
         yield b.Text(
-            line(f"{lead}, the loads balance over the whole way: the linkage rests anywhere."), "lead"
+            line(
+                _names(data["by_speed"]),
+                f" {depend} on the speed: here with the value at the speed 0; a step by the speed has half its size "
+                "there.",
+            ),
+            "note",
+        )
+    if data["without_potential"]:
+        yield b.Text(
+            line(
+                "The potential is the energy of weights and springs and, of ",
+                _names(data["without_potential"]),
+                f", the integral of the holding {effort} over the way.",
+            ),
+            "note",
+            "long",
+        )
+    if not found.repeats:
+        yield b.Text(
+            "The loads are not the same after a turn: the way is half a turn to either side of the start.",
+            "note",
+        )
+    elif found.rest.potential is None:
+        yield b.Text(
+            s.line(
+                "A turn takes {rest.summary.work} from the driver, without friction: no potential belongs to a place."
+            ),
+            "note",
+        )
+    if found.summary.friction:
+        yield b.Text(
+            s.line(
+                f"The holding {effort} is without friction. Where friction of pins and guides holds more, at most "
+                "{rest.summary.friction}, the machine stands still, too. The smoothed friction of the models is zero "
+                "at rest and holds nothing."
+            ),
+            "note",
+            "long",
         )
     else:
-        yield b.Text(
-            s.line(
-                f"{lead}, the {effort} that holds the driver is {{holding.torque_peak}} at most, at "
-                "{holding.torque_peak_at}."
-            ),
-            "lead",
-        )
-        for k in s.result["balanced"]:
-            yield b.Text(
-                line("From ", s.number(f"balanced.{k}", 0), " to ", s.number(f"balanced.{k}", 1),
-                     " the loads balance: the linkage rests anywhere there.")
-            )  # fmt: skip
-        yield from _table(s, f)
-    if rest.holding.work:
-        yield b.Text(
-            s.line(
-                "Over a whole turn at rest the loads take {holding.work}, so that no place has an energy of its own."
-            ),
-        )
-    if rest.by_speed:
-        names = join(Name(name.removeprefix("loads.")) for name in rest.by_speed)
-        yield b.Text(
-            line("A load that depends on the speed has its value at speed 0 here, half of it where ", Name("step"),
-                 " switches it: ", names, ".")
-        )  # fmt: skip
-    if not everywhere:
-        yield _figure(f, effort)
+        yield b.Text("The file has no friction.", "note", "long")
 
 
-def _table(s: b.Source, f: LinkageFindings) -> Iterator[b.Block]:
-    rest = f.rest
-    if not rest.equilibria:
-        if not rest.balanced:
-            yield b.Text("Without effort the linkage rests nowhere.")
-        return
-    columns = [
-        (b.Column("stiffness"), "stiffness"),
-        (b.Column("inertia", form="long"), "inertia"),
-        (b.Column("natural frequency"), "frequency"),
-        (b.Column("energy above the lowest"), "energy"),
-        (b.Column(f"{'force' if f.machine.model.slides else 'torque'} against the stop"), "end_stop"),
-    ]
-    shown = [
-        (head, name)
-        for head, name in columns
-        if any(getattr(each, name) is not None for each in rest.equilibria)
-        and (name != "energy" or len(rest.equilibria) > 1)
-    ]
-    rows = (
-        b.TableRow((k, s.number(f"equilibria.{k}.at"), kind,
-                    *(s.number(f"equilibria.{k}.{name}") for _, name in shown)))
-        for k, kind in zip(s.result["equilibria"], rest.kinds, strict=True)
-    )  # fmt: skip
-    yield b.Table(
-        tuple(rows),
-        (
-            *b.heads("no.", "place of the driver"),
-            b.Column("equilibrium", of_text=True),
-            *(head for head, _ in shown),
-        ),
-        title="Equilibria of the driver without effort",
-    )
-    if any(each.frequency for each in rest.equilibria):
-        yield b.Text(
-            "Natural frequency: of small motion without losses, with the shaft free.", "note", "long"
-        )
-
-
-def _figure(f: LinkageFindings, effort: str) -> fig.Figure:
-    """The holding effort over the way, with the equilibria."""
-    model, rest = f.machine.model, f.rest
-    unit = model.driver_port.unit
-    angle = fig.Axis(
+def _figure(f: LinkageFindings, effort: str, file: str) -> fig.Figure:
+    model, unit, rest = f.machine.model, f.machine.model.driver_port.unit, f.rest.rest
+    place = fig.Axis(
         "way of the driver" if model.slides else "angle of the driver",
         unit("rad"),
+        low=float(rest.q[0]),
+        high=float(rest.q[-1]),
         step=45.0 if model.turns else None,
     )
-    low, high = model.span
-    points = []
-    for kind, marker, look in (("stable", "o", 1), ("unstable", "x", 2), ("on its stop", "s", 3)):
-        places = [e.at for e, k in zip(rest.equilibria, rest.kinds, strict=True) if k == kind]
-        if places:
-            # a turn may begin at another angle than 0
-            places = [low + (q - low) % (high - low) if model.turns else q for q in places]
-            heights = np.interp(places, rest.q, rest.torque)
-            points.append(fig.Curve(kind, np.array(places), heights, look, marker=marker, has_line=False))
-    curve = fig.Curve(f"holding {effort}", rest.q, rest.torque)
-    axis = fig.Axis(f"{effort} that holds the driver", unit("N.m"))
+    panels = [(fig.Axis(f"holding {effort}", unit("N.m")), rest.holding)]
+    if rest.potential is not None:
+        panels.append((fig.Axis("potential", "J"), rest.potential))
+    items: list[tuple[fig.Axis, tuple[fig.Item, ...]]] = []
+    for k, (axis, values) in enumerate(panels):
+        band: tuple[fig.Item, ...] = ()
+        if k == 0 and f.rest.summary.friction:
+            band = (fig.Between("held by friction", rest.q, -rest.friction, rest.friction, "pale"),)
+        curve = fig.Curve(axis.label, rest.q, values, in_legend=False)
+        items.append((axis, (*band, curve, *_marks(f, values, k == 0))))
     return fig.Figure(
         "linkage-rest",
-        f"Holding {effort} over the way of the driver",
-        f"The {effort} that holds the driver at rest over its way, and the equilibria.",
-        fig.stacked(angle, ((axis, (curve, fig.Mark(0.0, axis="y"), *points)),)),
-        file=PICTURE,
+        f"Holding {effort} and equilibria over the way of the driver",
+        f"The {effort} that holds the driver at rest over its way, with the equilibria; below it the potential.",
+        fig.stacked(place, items),
+        file=file,
     )
+
+
+def _marks(f: LinkageFindings, values: Any, named: bool) -> Iterator[fig.Item]:
+    """The equilibria on a curve, a kind at a time."""
+    rest = f.rest.rest
+    low, high = float(rest.q[0]), float(rest.q[-1])
+    for look, kind in enumerate(_MARKERS, 1):
+        places = [each.place for each in f.rest.places if each.kind == kind]
+        if f.machine.model.turns:  # on the turn that is drawn
+            places = [low + (x - low) % (high - low) for x in places]
+        if places:
+            yield fig.Curve(
+                _KINDS[kind],
+                np.array(places),
+                np.interp(places, rest.q, values),
+                look,
+                marker=_MARKERS[kind],
+                has_line=False,
+                in_legend=named,
+            )
+    for each in f.rest.places:
+        if each.kind == INDIFFERENT:
+            yield fig.Shade(each.place, each.end, _KINDS[INDIFFERENT] if named else "")

@@ -12,7 +12,6 @@ from ..core.engines import MATH
 from ..core.errors import InputError, RunError, near_name, refusal_prefix, shown
 from ..core.model import Model
 from ..core.quantities import Quantity, Variable
-from ..machines.machine import Machine
 from ..mechanism.models import DirectMachine, InverseMachine
 from ..models import model_named
 from ..reading.tables import to_number
@@ -24,6 +23,7 @@ from ..system.simulation import Simulation
 from . import config as study_files
 from .config import Config
 from .drive import Drive
+from .equilibrium_point import asks_for_equilibrium, equilibrium_point, place_words
 from .event import Event
 from .operation import OperatingConditions
 from .package import drive_to_export, is_study_file, model_and_start
@@ -34,10 +34,10 @@ from .transients import follow, lead_times
 from .verdict import START, STEADY
 
 At = str | Mapping[str, Any] | None
-"""A point: RUN:TIME of a study, or values of states and inputs by name, as a text NAME=VALUE,.. or a mapping."""
+"""A point: RUN:TIME of a study, equilibrium:N of a machine, or values of states and inputs by name, as a text
+NAME=VALUE,.. or a mapping."""
 _USUAL_SPEED = 2.0 * np.pi
 """Speed of the driver of a linkage that turns [rad/s]: 60 rev/min, as of the command ``chainunit linkage``."""
-_EQUILIBRIUM = "equilibrium"
 _USUAL_WAY_SPEED = 0.1
 """That of one that slides [m/s]."""
 
@@ -71,11 +71,11 @@ def linearize(
         ``"DcMotor"``
     at : the point. Of a study: ``"RUN:TIME"``, such as ``"start_up:0.4 s"`` or ``"jam_left:3.2 s"``, the time of the
         run as its rows have it; by default steady running, at the end of the run of start-up and steady running. Or
-        values of states and inputs by name, ``"phi=30 deg, w=60 rpm"`` or a mapping; of a linkage also
-        ``"equilibrium"``, the stable one of the least energy, or ``"equilibrium:2"``. All others are those of steady
+        values of states and inputs by name, ``"phi=30 deg, w=60 rpm"`` or a mapping; all others are those of steady
         running, of the start of a model, or of a linkage whose driver goes at 60 rev/min (0.1 m/s) at the angle 0,
         one with a range in its middle. A direct model has the torque at which its speed is constant, unless
-        ``tau`` is given
+        ``tau`` is given. Of a linkage or a machine: ``"equilibrium"``, at rest in its stable equilibrium with the
+        least potential, or ``"equilibrium:2"`` by its number in the table of ``chainunit linkage``
     config : a study file whose machine, feed or motor gives the values of a named model
     inverse : of a linkage file: the model that takes motion and gives torque and reactions, which has D alone, in
         place of the direct one
@@ -121,9 +121,16 @@ def linear_point(
     if whole:
         return _point_of_study(study_files.load(Path(name)), at, progress)
     if is_file:
-        return _point_of_linkage(model_named(name), at, inverse)
+        machine = model_named(name)
+        if isinstance(at, str) and asks_for_equilibrium(at):
+            assert issubclass(machine, InverseMachine)
+            point = _at_equilibrium(machine if inverse else machine.direct(), {}, at)
+            return point._replace(title=machine.noun)
+        return _point_of_linkage(machine, at, inverse)
     loaded = None if values is None else study_files.load(values)
     model, start = model_and_start(name, loaded, progress=progress)
+    if isinstance(at, str) and asks_for_equilibrium(at):
+        return _at_equilibrium(model, start, at)
     return _at_values(model, start, at)
 
 
@@ -150,6 +157,21 @@ def _at_values(model: type[Model], start: Mapping[str, float], at: At) -> Linear
     return LinearPoint(model, p, inputs, states, words or "start of the model")
 
 
+def _at_equilibrium(model: type[Model], start: Mapping[str, float], at: str) -> LinearPoint:
+    """The point of a machine at rest in an equilibrium, with these start values."""
+    inverse = model.inverse if issubclass(model, DirectMachine) else model
+    if not issubclass(inverse, InverseMachine) or inverse.States is not None:
+        raise InputError(
+            f"--at {shown(at)}: {model.name} has no equilibria that are known; they are of linkages and machines "
+            "without states of their own; give states and inputs, NAME=VALUE, .."
+        )
+    number, own = equilibrium_point(inverse, start, at)
+    phi = own.place * float(start.get("ratio", inverse.Parameters().ratio))
+    rest = {"phi_start": phi, "w_start": 0.0} if model is not inverse else {"phi": phi, "w": 0.0}
+    point = _at_values(model, {**start, **rest}, {"tau": 0.0} if model is not inverse else None)
+    return point._replace(words=f"equilibrium {number} ({place_words(inverse, own)})")
+
+
 def holding_torque(
     model: type[DirectMachine], p: Any, inputs: Mapping[str, float], states: Mapping[str, float]
 ) -> float:
@@ -164,9 +186,7 @@ def holding_torque(
 
 
 def _point_of_linkage(machine: Any, at: At, inverse: bool) -> LinearPoint:
-    """The point of a linkage at the angle (place) and speed of its driver, or at an equilibrium."""
-    if isinstance(at, str) and at.partition(":")[0].strip() == _EQUILIBRIUM:
-        return _at_equilibrium(machine, at, inverse)
+    """The point of a linkage at the angle (place) and speed of its driver."""
     low, high = machine.span
     ratio = float(machine.Parameters().ratio)
     middle = 0.0 if machine.turns else 0.5 * (low + high)
@@ -182,40 +202,6 @@ def _point_of_linkage(machine: Any, at: At, inverse: bool) -> LinearPoint:
         end = "lower" if driver_at < low else "upper"
         point = point._replace(words=f"{point.words}, beyond the range of the driver, on its {end} end stop")
     return point._replace(title=machine.noun)
-
-
-def _at_equilibrium(machine: type[InverseMachine], at: str, inverse: bool) -> LinearPoint:
-    """The point of a linkage at rest without effort: at the stable equilibrium of the least energy, or at the one of
-    a number."""
-    made = Machine(machine)
-    rest, number = made.at_rest(), at.partition(":")[2].strip()
-    known = [str(k) for k in range(1, len(rest.equilibria) + 1)]
-    if number and number not in known:
-        if not known:
-            raise InputError(f'--at {shown(at)}: the linkage rests nowhere; name a place, "phi=..., w=0"')
-        numbers = "1, the only one" if len(known) == 1 else f"1 to {len(known)}"
-        raise InputError(
-            f"--at {shown(at)}: the number of an equilibrium must be {numbers}, as chainunit linkage numbers them"
-        )
-    found = rest.equilibria[int(number) - 1] if number else rest.stable
-    if found is None:
-        kinds = ", ".join(f"{k} {kind}" for k, kind in zip(known, rest.kinds, strict=True)) or "none"
-        free = [k for k, each in zip(known, rest.equilibria, strict=True) if each.end_stop is None]
-        by_number = f'name one by its number, "{_EQUILIBRIUM}:{free[0]}", or' if free else "name"
-        raise InputError(
-            f"--at {shown(at)}: the linkage has no stable equilibrium clear of its end stops; it has {kinds}: "
-            f'{by_number} a place, "phi=..., w=0"'
-        )
-    if found.end_stop is not None:
-        raise InputError(
-            f"--at {shown(at)}: there the driver rests on its end stop, whose spring bends; name the place, "
-            '"phi=..., w=0"'
-        )
-    phi = found.at * made.ratio
-    start = {"phi": phi, "w": 0.0} if inverse else {"phi_start": phi, "w_start": 0.0}
-    unit = "m" if machine.slides else "rad"
-    point = _at_values(machine if inverse else machine.direct(), start, None)
-    return point._replace(words=f"equilibrium, phi = {phi:.6g} {unit}", title=machine.noun)
 
 
 def _in_words(model: type[Model], given: Mapping[str, float]) -> str:
@@ -241,7 +227,7 @@ def _values(model: type[Model], at: At) -> dict[str, float]:
                 raise InputError(
                     f"--at {shown(at)}: must be NAME=VALUE, .. of states and inputs of {model.name}, such as "
                     f'"{variables[0].name}={_EXAMPLES.get(variables[0].unit, "0.5")}"; RUN:TIME is of a study, '
-                    f'"{_EQUILIBRIUM}" of a linkage file'
+                    '"equilibrium" of a machine'
                 )
             pairs[name] = text
         at = pairs
@@ -296,6 +282,11 @@ def drive_point(
     with refusal_prefix("linear model: "):
         system = CompiledSystem(rig.graph)
     run, time, given = STEADY, None, {}
+    if asks_for_equilibrium(at):
+        raise InputError(
+            f"--at {shown(at)}: is of a linkage file, or of a machine by its name; a study has runs: {START}, "
+            f"{', '.join([STEADY, *events])}"
+        )
     if isinstance(at, str) and "=" not in at:
         run, time = _run_and_time(at, [START, STEADY, *events])
     else:

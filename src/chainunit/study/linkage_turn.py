@@ -14,11 +14,11 @@ import numpy as np
 
 from ..core.engines import numpy_
 from ..core.quantities import Value, declaration, quantity
+from ..machines.equilibria import Equilibria
 from ..machines.linkages.model import LinkageDescription
 from ..machines.linkages.structure import CYLINDER
 from ..machines.machine import Machine
 from ..mechanism.assur import PRISMATIC
-from ..mechanism.equilibria import Rest
 from ..mechanism.sampled_quantities import largest, means, roots
 
 PLACES = 361
@@ -110,8 +110,8 @@ class LinkageFindings:
     """places of the driver at which each of these joints and links turns back, by the name of its variables"""
     limits: dict[str, tuple[float, float]]
     """least and largest value of the angle of each link and of each place of a point, by output"""
-    rest: Rest
-    """its equilibria, and the effort that holds it elsewhere"""
+    rest: Equilibria
+    """the machine at rest"""
     back: LinkageFindings | None = None
     """the findings on the way back, at the same places, of a driver that swings"""
 
@@ -162,13 +162,13 @@ class _Way:
 def linkage_findings(machine: Machine, speed: float) -> LinkageFindings:
     """The linkage over its way at a constant `speed` of the driver [rad/s, m/s], with the loads of normal running; of
     a driver with a range there and, as `back`, at the opposite speed."""
-    rest = machine.at_rest()
+    rest = machine.equilibria()
     if machine.model.turns:
         return _findings(machine, speed, rest)
     return replace(_findings(machine, abs(speed), rest), back=_findings(machine, -abs(speed), rest))
 
 
-def _findings(machine: Machine, speed: float, rest: Rest) -> LinkageFindings:
+def _findings(machine: Machine, speed: float, rest: Equilibria) -> LinkageFindings:
     """The linkage over its way in one direction."""
     description: LinkageDescription = machine.model.described_by  # type: ignore[attr-defined]
     q = np.linspace(*description.span, PLACES)

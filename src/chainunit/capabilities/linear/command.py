@@ -23,8 +23,9 @@ def linearize(
         str | None,
         typer.Option(
             "--at",
-            help='Point: of a study a run and its time, "jam_left:9.5 s", steady running by default; or values of '
-            'states and inputs, "phi=30 deg, w=60 rpm"; of a linkage also "equilibrium", or "equilibrium:2".',
+            help='Point: of a study a run and its time, "jam_left:9.5 s", steady running by default; of a linkage '
+            '"equilibrium", or "equilibrium:2" by its number; or values of states and inputs, '
+            '"phi=30 deg, w=60 rpm".',
         ),
     ] = None,
     pairs: Annotated[

@@ -1,18 +1,16 @@
 """C functions of symbolic expressions, in which each operation stands once.
 
 CasADi would write a function for each group of outputs, with all its operations. Here the groups share operations: a
-`Program` is divided into parts, each with the operations that the same groups need, and calls the parts that the
-requested groups need. Values that one part passes to another lie in memory. The length of a part is limited, as the
-time of a compiler grows faster than the length.
+`Program` calls the parts of a `Division` that the requested groups need.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Any
 
+from .division import Division
 from .operations import ARGUMENT, NUMBER, Operation, Operations
 
 _LONGEST = 2500
@@ -82,15 +80,17 @@ class Program:
             more
         """
         self.name, self._frequency = name, frequency
-        self._collect(arguments, groups)
-        self._divide()
+        operations = Operations(arguments, groups)
+        self._collect(operations)
+        division = Division(operations.items, operations.results, _LONGEST)
+        self._parts, self._needed_by, self._slots = division.parts, division.needed_by, division.slots
+        self.room = len(self._slots)
         lines = [line for k, part in enumerate(self._parts) for line in self._part(k, part)]
         self.text = "\n".join([*lines, *self._function(offsets)]) + "\n"
 
-    def _collect(self, arguments: Sequence[Any], groups: Sequence[Any]) -> None:
+    def _collect(self, operations: Operations) -> None:
         """Collect all operations: the form of each in C, and the places of its operands. A number and an argument are
         operations without operands."""
-        operations = Operations(arguments, groups)
         in_c = forms()
 
         def form(operation: Operation) -> str:
@@ -103,36 +103,6 @@ class Program:
         self._operands = [each.operands for each in operations.items]
         self._arguments = {k: each.entry for k, each in enumerate(operations.items) if each.kind == ARGUMENT}
         self._results = operations.results
-
-    def _divide(self) -> None:
-        """Divide the operations into parts, each with the groups that need it, and assign slots in memory to values
-        that pass from one part to another or are results."""
-        users = [0] * len(self._forms)
-        for bit, places in enumerate(self._results):
-            for place in places:
-                users[place] |= 1 << bit
-        for place in reversed(range(len(users))):
-            for operand in self._operands[place]:
-                users[operand] |= users[place]
-        alike: dict[int, list[int]] = {}
-        for place, groups in enumerate(users):
-            if self._operands[place]:
-                alike.setdefault(groups, []).append(place)
-        self._parts: list[list[int]] = []
-        self._needed_by: list[int] = []
-        # parts that more groups need come first: they do not depend on parts that fewer groups need
-        for groups in sorted(alike, key=lambda g: (-g.bit_count(), g)):
-            places = alike[groups]
-            count = -(-len(places) // _LONGEST)
-            cuts = [n * len(places) // count for n in range(count + 1)]
-            self._parts += [places[begin:end] for begin, end in pairwise(cuts)]
-            self._needed_by += [groups] * count
-        part_of = {place: k for k, part in enumerate(self._parts) for place in part}
-        crossing = {place for places in self._results for place in places if self._operands[place]}
-        for place, k in part_of.items():
-            crossing.update(i for i in self._operands[place] if part_of.get(i, k) != k)
-        self._slots = {place: slot for slot, place in enumerate(sorted(crossing))}
-        self.room = len(self._slots)
 
     def _part(self, k: int, part: list[int]) -> list[str]:
         """The definition of a part."""

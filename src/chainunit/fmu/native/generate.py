@@ -12,33 +12,12 @@ from string import Formatter
 from typing import Any
 
 from ...core import integrators, messages
-from ...core.engines import casadi_
 from ...core.integrators import MAX_STEPS
 from ...core.native.code import Program, constant, number
+from ...core.native.kernels import difference_groups, output_groups
+from ...core.native.kernels import kernels as kernels_of
 from ...core.quantities import Variable
-from .. import recipe
 from ..description import Interface
-
-
-def groups(interface: Interface) -> list[list[int]]:
-    """Outputs that are evaluated together, as places among the declared outputs: last all discrete ones."""
-    lists: list[list[int]] = []
-    discrete = interface.discrete
-    terminal_outputs, at = recipe.frequent_outputs(interface.model), 0
-    for part in interface.model.parts:
-        places = {name: at + i for i, name in enumerate(part.layout.names) if at + i not in discrete}
-        at += len(part.layout.names)
-        often = [i for name, i in places.items() if name in terminal_outputs - part.by_differences]
-        apart = [i for name, i in places.items() if name in part.by_differences]
-        rest = [i for i in places.values() if i not in often and i not in apart]
-        lists += [group for group in (often, rest, apart) if group]
-    return [*lists, discrete] if discrete else lists
-
-
-def difference_groups(interface: Interface) -> set[int]:
-    """The groups without code for their derivatives, see `Part`."""
-    names = {name for part in interface.model.parts for name in part.by_differences}
-    return {g for g, group in enumerate(groups(interface)) if interface.others[group[0]].name in names}
 
 
 def kernels(interface: Interface) -> tuple[str, int]:
@@ -50,53 +29,8 @@ def kernels(interface: Interface) -> tuple[str, int]:
 
 
 def _programs(interface: Interface) -> Iterator[Program]:
-    import casadi
-
-    model = interface.model
-    t = interface.trace
-    (ps, us, xs, ks), p, u, x, outputs = t.symbols, t.p, t.u, t.x, list(t.outputs)
-    # derived values come last, and only if the model has them
-    more = [ks] if model.derived_count else []
-    point = [ps, us, xs, *more]
-
-    def one(name: str, arguments: list[Any], results: list[Any], frequency: str = "ONCE") -> Program:
-        return Program(name, arguments, [casadi.vertcat(*map(casadi.SX, results))], [0], frequency)
-
-    places = groups(interface)
-    offsets = [sum(map(len, places[:g])) for g in range(len(places))]
-    values = [casadi.vertcat(*(outputs[k] for k in group)) for group in places]
-    yield Program("values", point, values, offsets, "OFTEN")
-    du, dx = casadi.SX.sym("du", us.shape[0]), casadi.SX.sym("dx", xs.shape[0])
-    apart = difference_groups(interface)
-    if interface.discrete:
-        apart.add(len(values) - 1)
-    smooth = [casadi.SX(0, 1) if g in apart else group for g, group in enumerate(values)]
-    smooth.append(casadi.vertcat(*t.derivatives))
-    slopes = [casadi.jtimes(row, casadi.vertcat(us, xs), casadi.vertcat(du, dx)) for row in smooth]
-    yield Program("forward", [ps, us, xs, du, dx, *more], slopes, [*offsets, len(outputs)], "SELDOM")
-    if interface.states:
-        yield one("derivatives", point, t.derivatives, "OFTEN")
-        assert model.state_layout is not None
-        unknowns = casadi.SX.sym("z", model.start_problem.unknowns)
-        z = casadi.vertsplit(unknowns) if model.start_problem.unknowns else []
-        if z:
-            yield one("guess", [ps, us], model.start_guess(casadi_(), p, u))
-            yield one("improved", [ps, us, unknowns], model.improve_start(casadi_(), p, u, z))
-        yield one(
-            "initial", [ps, us, unknowns], model.state_layout.values(model.start_states(casadi_(), p, u, z))
-        )
-        if model.start_problem.required:
-            yield one(
-                "start_limits", point, [v for row in model.start_limits(casadi_(), p, u, x) for v in row]
-            )
-        yield one("internal_step", [ps], [model.internal_step(casadi_(), p)])
-        if model.controlled:
-            yield one("tolerance", [ps], [model.tolerance(casadi_(), p)])
-            yield one("closed", point, model.constrained_states(casadi_(), p, u, x), "OFTEN")
-    if limits := [v for row in model.requirements(casadi_(), p) for v in row]:
-        yield one("requirements", [ps, *more], limits)
-    if model.derived_count:
-        yield one("derive", [ps], interface.derived)
+    for each in kernels_of(interface.trace, interface.derived):
+        yield Program(each.name, each.arguments, each.groups, each.offsets, each.frequency)
 
 
 _BEFORE_KERNELS = """\
@@ -180,7 +114,7 @@ def tables(interface: Interface, guid: str, room: int) -> str:
     place, group_of = {}, {}
     first = 0
     group_rows = []
-    for g, group in enumerate(groups(interface)):
+    for g, group in enumerate(output_groups(interface.model)):
         group_rows.append(f"{{{first}, {len(group)}}}")
         for k, output in enumerate(group):
             place[output], group_of[output] = first + k, g
@@ -224,7 +158,7 @@ def tables(interface: Interface, guid: str, room: int) -> str:
         "n_z": model.start_problem.unknowns,
         "n_w": room,
         "n_groups": len(group_rows),
-        "differenced": f"{sum(1 << g for g in difference_groups(interface))}u",
+        "differenced": f"{sum(1 << g for g in difference_groups(interface.model))}u",
         "n_required": len(model.required),
         "n_start_required": len(model.start_problem.required),
         "start": "starts",

@@ -11,11 +11,15 @@ from ...core.engines import MATH
 from ...core.errors import InputError
 from ...groups.dyad import Dyad
 from ...groups.sliding import RRP
+from ...mechanism.assur import AssurGroup
 from ...mechanism.linkage import Linkage
 from ...mechanism.machine import Mechanism
 
 PLACES = 720
 """Places over the span at which a group is looked at."""
+_ROUNDING = 1e-12
+"""Gap in parts of the lengths that is rounding: the group just closes, in a dead position."""
+_NO_MARGIN = 1e-6
 _ROUNDED = 2e-3
 """Part of a length by which its two limits, rounded towards each other, may come closer."""
 
@@ -28,24 +32,49 @@ def open_group(links: Sequence[str], where: str, hint: str = "") -> InputError:
     )
 
 
-def dead_group(links: Sequence[str], where: str) -> InputError:
-    """The refusal of a group that comes to a dead position."""
-    return InputError(
-        f"the group of {', '.join(links)} comes to a dead position at {where}: there its forces have no limit; "
-        "change its lengths",
-        key=f"links.{links[0]}",
-    )
+_MEET = ", and its two ways of closing meet"
+_DEAD = {
+    "RRR": f"{{0}} and {{1}} are in line{_MEET}",
+    "RRP": f"{{0}} is square to the guide of {{1}}{_MEET}",
+    "RPR": f"the line of its outer pins is square to its guide{_MEET}",
+    "PRP": "its two guides are parallel",
+    "RPP": "its two guides are parallel",
+    "cylinder": f"the cylinder and {{2}} are in line{_MEET}",
+    "triad": "the lines of its three legs meet in one point or are parallel",
+}
+"""What holds in the dead position of a group, by its kind and with its links."""
 
 
-def change_point(group: Any, where: str) -> InputError:
-    """The refusal of a group of the structure that comes to a change point."""
-    pins = "its three pins lie on one line there, so that" if group.kind == "RRR" else "there"
+def dead_group(group: AssurGroup, where: str, margin: float, least: float) -> InputError:
+    """The refusal of a group that comes to a dead position, where its `margin` is not above the `least` one."""
+    reason = _DEAD[group.kind].format(*group.links)
+    size = f"{margin:.1g}" if margin > _NO_MARGIN else "0"
     return InputError(
-        f"the group of {', '.join(group.links)} comes to a change point at {where}, a dead position: {pins} it could "
-        "go on in either of its two assemblies, as a parallelogram may turn into a crossed one, and its forces have "
-        "no limit; change a length, or keep clear of it by a range",
+        f"the group of {', '.join(group.links)} comes to a dead position at {where}: there {reason}, so that its "
+        f"forces have no limit (its margin is {size} and must be > {least:g}); change its lengths",
         key=f"links.{group.links[0]}",
     )
+
+
+def just_closes(linkage: Linkage, number: int, derived: Sequence[Any], q: float) -> bool:
+    """Whether a group that does not close at the place `q` of the driver does so by rounding alone: its links are in
+    line there, as those of a parallelogram at its change point. The arguments are those of `gap_hint`."""
+    group, before = linkage.groups[number], linkage.before(number)
+    if not isinstance(group, Dyad | RRP):
+        return False
+    try:
+        gap, size = _gap(group, _apart(group, Mechanism(MATH, before, q, derived[: before.derived_count])))
+    except (ArithmeticError, ValueError, IndexError):
+        return False
+    return gap <= _ROUNDING * size
+
+
+def _gap(group: Dyad | RRP, apart: float) -> tuple[float, float]:
+    """By how much a group does not close whose outer joints are `apart`, and its size [m]."""
+    if isinstance(group, RRP):
+        return apart - group.first.length, group.first.length
+    one, other = group.first.length, group.second.length
+    return max(apart - (one + other), abs(one - other) - apart), one + other
 
 
 def gap_hint(
@@ -69,9 +98,9 @@ def gap_hint(
         ]
     except (ArithmeticError, ValueError, IndexError):
         return ""
+    gap, _ = _gap(group, apart[0])
     if isinstance(group, RRP):
         rod = group.first
-        gap = apart[0] - rod.length
         wanted = [(rod.name, rod.length, max(apart), math.inf)]
         words = (
             f": its line is {_mm(apart[0])} from the pin {rod.pin}, {_mm(gap)} more than {rod.name} is long"
@@ -79,7 +108,6 @@ def gap_hint(
     else:
         one, other = group.first, group.second
         near, far = abs(one.length - other.length), one.length + other.length
-        gap = apart[0] - far if apart[0] > far else near - apart[0]
         missing = (
             f"more than both are long ({_mm(far)})"
             if apart[0] > far

@@ -11,9 +11,8 @@ from typing import NamedTuple
 from ...core.engines import MATH
 from ...core.errors import InputError
 from ...groups.triad import Triad
-from ...mechanism.assur import AssurGroup
 from ...mechanism.machine import Mechanism, derived_numbers
-from .closing import change_point, dead_group, gap_hint, open_group
+from .closing import dead_group, gap_hint, just_closes, open_group
 from .narrow import check_triads, lows
 from .outputs import DescribedLinkage
 from .probes import description_axis
@@ -89,12 +88,13 @@ class FollowedLinkage:
             margins_over_way.append(self._margins(m))
             for each, margin in zip(self.structure.groups, margins_over_way[-1], strict=True):
                 if not margin > LEAST_MARGIN:
-                    raise self._dead(each, q)
+                    raise dead_group(each, self.way.words(q), margin, LEAST_MARGIN)
             self._add_angles(angles, m)
         for k, q, least in lows(self._margins_at, margins_over_way, places):
             if not least > LEAST_MARGIN:
-                dead = self.structure.groups[k]
-                raise self._open(k, derived, q) if math.isnan(least) else self._dead(dead, q)
+                if math.isnan(least):
+                    raise self._open_group(k, derived, q)
+                raise dead_group(self.structure.groups[k], self.way.words(q), least, LEAST_MARGIN)
         turns = {}
         for name, (_, *samples) in angles.items():
             rate = self.way.rate(samples)
@@ -110,10 +110,16 @@ class FollowedLinkage:
             before = angles.setdefault(name, [self.structure.poses[name][2]])
             before.append(before[-1] + math.remainder(angle - before[-1], WHOLE))
 
-    def _gap(self, k: int, derived: Sequence[float], q: float) -> str:
-        """Words on the gap in the group `k` of the structure; see `gap_hint`."""
+    def _open_group(self, k: int, derived: Sequence[float], q: float) -> InputError:
+        """The refusal of the group `k` of the structure, which does not close at the place `q`; a change point, at
+        which it fails to close by rounding, is a dead position."""
+        group, where = self.structure.groups[k], self.way.words(q)
         number = k - (len(self.structure.groups) - len(self.linkage.groups))
-        return gap_hint(self.linkage, number, derived, q, self.way.span) if number >= 0 else ""
+        if number < 0:
+            return open_group(group.links, where)
+        if just_closes(self.linkage, number, derived, q):
+            return dead_group(group, where, 0.0, LEAST_MARGIN)
+        return open_group(group.links, where, gap_hint(self.linkage, number, derived, q, self.way.span))
 
     def _open_at(self, q: float, derived: Sequence[float]) -> int | None:
         """The number of the first group of the structure that does not close at a place; None where all close."""
@@ -133,32 +139,8 @@ class FollowedLinkage:
         for q in self.way.places():
             k = self._open_at(q, derived)
             if k is not None:
-                return self._open(k, derived, q)
+                return self._open_group(k, derived, q)
         return InputError("the linkage does not close: change its lengths", key="links")
-
-    def _open(self, k: int, derived: Sequence[float], q: float) -> InputError:
-        """The refusal of the group `k`, which does not close at a place."""
-        group, where = self.structure.groups[k], self.way.words(q)
-        if self._is_change_point(q):
-            return change_point(group, where)
-        return open_group(group.links, where, self._gap(k, derived, q))
-
-    def _dead(self, group: AssurGroup, q: float) -> InputError:
-        """The refusal of a group of the structure that comes to a dead position at a place."""
-        where = self.way.words(q)
-        return change_point(group, where) if self._is_change_point(q) else dead_group(group.links, where)
-
-    def _is_change_point(self, q: float) -> bool:
-        """Whether the linkage closes on both sides of a place at which it hardly closes: its two assemblies only
-        touch there."""
-        low, high = self.way.span
-        beside = [q + sense * (high - low) / _PLACES for sense in (-1.0, 1.0)]
-        try:
-            for place in beside:
-                self.at(place)
-        except (ArithmeticError, ValueError):
-            return False
-        return True
 
     # the range in which it closes
 

@@ -70,6 +70,13 @@ def requirement_of_width(key: str, width: Width, sign: float, parameters: Collec
     return Requirement(subject, "1", "the function cannot change over it", given)
 
 
+def loads_by_speed(loads: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The names of the forces and torques that depend on the speed: at rest they have their value at the speed 0."""
+    speeds = {"w", "vx", "vy", "angle_rate"}
+    found = {key.split(".")[1] for key, text in _texts(loads) if speeds & set(expression(text).names)}
+    return [load["name"] for load in loads if load["name"] in found]
+
+
 def _texts(loads: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, str]]:
     """The expressions of forces and torques, each behind its key."""
     for load in loads:

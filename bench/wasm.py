@@ -1,0 +1,95 @@
+# %% [markdown]
+# Models as WebAssembly
+#
+# The size of a model's module without slopes, packed by zlib too, the time to write it, and for all outputs at one
+# state in node; and the time of a jam of the packaged drive over 4 s with a row every millisecond.
+
+# %%
+from __future__ import annotations
+
+import sys
+import time
+import zlib
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from chainunit.core.model import Model
+from chainunit.core.symbolic_trace import trace
+from chainunit.core.wasm.module import WasmModule, wasm_module
+from chainunit.drives.dc_motor import DcMotor
+from chainunit.models import MODELS, model_named
+from chainunit.study.config import parse
+from chainunit.study.drive import Drive
+from chainunit.system import Profile, compiled
+
+ROOT = Path(__file__).parents[1]
+sys.path.append(str(ROOT / "tests"))
+from wasm_hosts import in_node, numbers, run_steps  # noqa: E402
+
+GALLERY = ("chain_unit", "knife_drive", "slider_crank_press", "stephenson_six_bar")
+CALLS, ROUNDS = 20_000, 8
+
+
+def prepared(module: WasmModule, values: list[float], inputs: list[float]) -> list[tuple]:
+    """The steps to a state: parameters, inputs, and all that follows from them."""
+    d = module.description
+    return [
+        ("write", d["parameters"]["address"], numbers(values)),
+        ("write", d["inputs"]["address"], numbers(inputs)),
+        *(("call", name, []) for name in ("derive", "start") if name in d["functions"]),
+    ]
+
+
+def row(name: str, model: type[Model]) -> list[str]:
+    trace(model)
+    began = time.perf_counter()
+    module = wasm_module(model, slopes=False)
+    written = time.perf_counter() - began
+    starts = [
+        [v.quantity.start or 0.0 for v in of.variables] for of in (model.parameter_layout, model.input_layout)
+    ]
+    every = (1 << len(module.description["groups"])) - 1
+    timed = ("time", "values", [every], ROUNDS, CALLS)
+    state = in_node(module.content, [*prepared(module, *starts), timed])[-1]
+    size, packed = len(module.content), len(zlib.compress(module.content, 9))
+    outputs = str(len(module.description["outputs"]["names"]))
+    return [name, outputs, f"{size / 1e3:.1f}", f"{packed / 1e3:.1f}", f"{written:.2f}", f"{state:.2f}"]
+
+
+def jam() -> None:
+    config = parse("")
+    drive = Drive(DcMotor, config.motor.parameters, config.machine)
+    whole = compiled(drive.graph)
+    model = whole.model
+    module = wasm_module(model, slopes=False)
+    inputs = model.input_layout.values(model.input_layout.from_names(drive.loads(config.feed)))
+    signals = {
+        "motor.w_ref": Profile(0.0, ((0.0, 0.6, 3.0 * drive.ratio),)),
+        "machine.left.processing_force": Profile(10.0, ((2.0, 0.02, 1500.0), (2.4, 0.02, 10.0))),
+    }
+    names = ["motor.tau", "machine.rocker.tau", "motor.w", "motor.armature.i"]
+    steps = run_steps(module.description, signals, names, begin=0.0, step=1e-3, rows=4001)
+    run = next(step for step in steps if step[:2] == ("call", "run"))
+    start = prepared(module, model.parameter_layout.values(whole.parameters), inputs)
+    timed = ("time", "run", run[2], ROUNDS, 1)
+    least = in_node(module.content, [*start, *steps[: steps.index(run)], run, timed])[-1]
+    print(
+        f"DC motor on the chain unit, one module of {len(module.content) / 1e3:.1f} kB: 4 s of a jam with 4001 rows "
+        f"in {least / 1e3:.0f} ms."
+    )
+
+
+def main() -> None:
+    table = Table("model", "outputs", "kB", "packed, kB", "written in, s", "all outputs, us")
+    for name, model in MODELS.items():
+        table.add_row(*row(name, model))
+    for name in GALLERY:
+        table.add_row(*row(f"{name}.toml", model_named(str(ROOT / "examples" / "linkages" / f"{name}.toml"))))
+    Console().print(table)
+    jam()
+
+
+if __name__ == "__main__":
+    main()

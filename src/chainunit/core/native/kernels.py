@@ -1,0 +1,128 @@
+"""The functions of a model that native code computes, as groups of symbolic results.
+
+C code and WebAssembly modules are made from the same list.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..engines import casadi_
+from ..model import Model
+from ..symbolic_trace import Trace
+
+
+@dataclass(frozen=True, eq=False)
+class ModelFunction:
+    """Groups of results of the same arguments.
+
+    `arguments` are the symbols of its arguments, as casadi vectors, and `takes` their letters: ``p`` parameters,
+    ``u`` inputs, ``x`` states, ``k`` derived values, ``z`` unknowns of the start, ``d`` and ``e`` changes of inputs
+    and states. `groups` are the results, as casadi vectors, with their `offsets` among all results. `frequency`
+    says how often it is called, "OFTEN", "SELDOM" or "ONCE": for rare calls the time of the compiler counts more.
+    """
+
+    name: str
+    takes: str
+    arguments: list[Any]
+    groups: list[Any]
+    offsets: list[int]
+    frequency: str
+
+
+def frequent_outputs(model: type[Model]) -> set[str]:
+    """The outputs that are read at every step: the members of the terminals."""
+    return {name for terminal in model.terminals for name in terminal.members.values()}
+
+
+def output_groups(model: type[Model]) -> list[list[int]]:
+    """Outputs that are evaluated together, as places among the declared outputs: last all discrete ones."""
+    lists: list[list[int]] = []
+    terminal_outputs, discrete, at = frequent_outputs(model), [], 0
+    for part in model.parts:
+        real: dict[str, int] = {}
+        for i, v in enumerate(part.layout.variables, at):
+            if v.type == "Real":
+                real[v.name] = i
+            else:
+                discrete.append(i)
+        at += len(part.layout.names)
+        often = [i for name, i in real.items() if name in terminal_outputs - part.by_differences]
+        apart = [i for name, i in real.items() if name in part.by_differences]
+        rest = [i for i in real.values() if i not in often and i not in apart]
+        lists += [group for group in (often, rest, apart) if group]
+    return [*lists, discrete] if discrete else lists
+
+
+def difference_groups(model: type[Model]) -> set[int]:
+    """The groups without code for their derivatives, see `chainunit.core.model.Part`."""
+    places = [name for part in model.parts for name in part.layout.names]
+    names = {name for part in model.parts for name in part.by_differences}
+    return {g for g, group in enumerate(output_groups(model)) if places[group[0]] in names}
+
+
+def kernels(t: Trace, derived: Sequence[Any], slopes: bool = True) -> Iterator[ModelFunction]:
+    """The functions of a traced model: its outputs and their derivatives in a direction (``values``, ``forward``),
+    and where it has such, the ``derivatives`` of its states and all for their start, the requirements on its
+    parameters, and the values `derived` from them."""
+    import casadi
+
+    model, (ps, us, xs, ks) = t.model, t.symbols
+    zs = casadi.SX.sym("z", model.start_problem.unknowns)
+    du, dx = casadi.SX.sym("du", us.shape[0]), casadi.SX.sym("dx", xs.shape[0])
+    symbols = {"p": ps, "u": us, "x": xs, "k": ks, "z": zs, "d": du, "e": dx}
+    # derived values come last, and only if the model has them
+    more = "k" if model.derived_count else ""
+
+    def kernel(name: str, takes: str, groups: list[Any], offsets: list[int], frequency: str) -> ModelFunction:
+        return ModelFunction(name, takes, [symbols[each] for each in takes], groups, offsets, frequency)
+
+    def one(name: str, takes: str, results: Sequence[Any], frequency: str = "ONCE") -> ModelFunction:
+        return kernel(name, takes, [casadi.vertcat(*map(casadi.SX, results))], [0], frequency)
+
+    outputs, places = list(t.outputs), output_groups(model)
+    offsets = [sum(map(len, places[:g])) for g in range(len(places))]
+    values = [casadi.vertcat(*(outputs[k] for k in group)) for group in places]
+    yield kernel("values", f"pux{more}", values, offsets, "OFTEN")
+    if slopes:
+        apart = groups_without_slopes(model)
+        smooth = [casadi.SX(0, 1) if g in apart else group for g, group in enumerate(values)]
+        smooth.append(casadi.vertcat(*t.derivatives))
+        along = [casadi.jtimes(row, casadi.vertcat(us, xs), casadi.vertcat(du, dx)) for row in smooth]
+        yield kernel("forward", f"puxde{more}", along, [*offsets, len(outputs)], "SELDOM")
+    if model.state_layout:
+        yield one("derivatives", f"pux{more}", t.derivatives, "OFTEN")
+        yield from _start(t, zs, one, more)
+        yield one("internal_step", "p", [model.internal_step(casadi_(), t.p)])
+        if model.controlled:
+            yield one("tolerance", "p", [model.tolerance(casadi_(), t.p)])
+            yield one("closed", f"pux{more}", model.constrained_states(casadi_(), t.p, t.u, t.x), "OFTEN")
+    if limits := [v for row in model.requirements(casadi_(), t.p) for v in row]:
+        yield one("requirements", f"p{more}", limits)
+    if model.derived_count:
+        yield one("derive", "p", derived)
+
+
+def groups_without_slopes(model: type[Model]) -> set[int]:
+    """The groups of outputs whose derivatives ``forward`` does not have: those by differences, and discrete ones."""
+    places = [v for part in model.parts for v in part.layout.variables]
+    groups = output_groups(model)
+    return difference_groups(model) | {g for g, group in enumerate(groups) if places[group[0]].type != "Real"}
+
+
+def _start(t: Trace, zs: Any, one: Any, more: str) -> Iterator[ModelFunction]:
+    """The functions that give the states at the start."""
+    import casadi
+
+    model = t.model
+    assert model.state_layout is not None
+    z = casadi.vertsplit(zs) if model.start_problem.unknowns else []
+    if z:
+        yield one("guess", "pu", model.start_guess(casadi_(), t.p, t.u))
+        yield one("improved", "puz", model.improve_start(casadi_(), t.p, t.u, z))
+    yield one("initial", "puz", model.state_layout.values(model.start_states(casadi_(), t.p, t.u, z)))
+    if model.start_problem.required:
+        limits = [v for row in model.start_limits(casadi_(), t.p, t.u, t.x) for v in row]
+        yield one("start_limits", f"pux{more}", limits)

@@ -1,0 +1,133 @@
+"""Functions of basic operations, written down as a list of operations from which code is printed.
+
+CasADi would simplify sums that are only there to catch what a rounding lost; here each operation is kept as it
+stands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
+
+from .operations import ARGUMENT, NUMBER, Operation
+
+NEAREST, CHOOSE, EXPONENT, POWER2 = "NEAREST", "CHOOSE", "EXPONENT", "POWER2"
+"""Kinds of operations beside those of CasADi: the nearest whole number, of two the even one; the second operand where
+the first one is not 0, else the third; the exponent of 2 of a number; and 2 to the power of a whole number."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """Operations, each after its operands, and the places of the results."""
+
+    items: list[Operation]
+    results: list[int]
+
+
+@dataclass(slots=True)
+class Recorder:
+    """An engine whose values are places in the list `items`, in which equal operations stand once."""
+
+    items: list[Operation] = field(default_factory=list)
+    _places: dict[str, int] = field(default_factory=dict)
+
+    def add(self, operation: Operation) -> Noted:
+        """The value of an operation."""
+        key = repr(operation)  # 0 and -0 are equal, but not the same
+        if key not in self._places:
+            self._places[key] = len(self.items)
+            self.items.append(operation)
+        return Noted(self, self._places[key])
+
+    def operation(self, kind: str, *operands: Any) -> Noted:
+        """The value of an operation of this `kind` on values and numbers."""
+        return self.add(Operation(kind, tuple(self._noted(x).place for x in operands)))
+
+    def _noted(self, x: Any) -> Noted:
+        return x if isinstance(x, Noted) else self.add(Operation(NUMBER, value=float(x)))
+
+    def sqrt(self, x: Any) -> Noted:
+        """The square root."""
+        return self.operation("SQRT", x)
+
+    def abs(self, x: Any) -> Noted:
+        """The size."""
+        return self.operation("FABS", x)
+
+    def minimum(self, a: Any, b: Any) -> Noted:
+        """The smaller number; NaN where one is."""
+        return self.operation("FMIN", a, b)
+
+    def maximum(self, a: Any, b: Any) -> Noted:
+        """The larger number; NaN where one is."""
+        return self.operation("FMAX", a, b)
+
+    def floor(self, x: Any) -> Noted:
+        """The whole number below or equal."""
+        return self.operation("FLOOR", x)
+
+    def copysign(self, a: Any, b: Any) -> Noted:
+        """The size of `a` with the sign of `b`."""
+        return self.operation("COPYSIGN", a, b)
+
+    def nearest(self, x: Any) -> Noted:
+        """The nearest whole number, of two the even one."""
+        return self.operation(NEAREST, x)
+
+    def choose(self, condition: Any, a: Any, b: Any) -> Noted:
+        """`a` where the condition holds, else `b`."""
+        return self.operation(CHOOSE, condition, a, b)
+
+    def exponent(self, x: Any) -> Noted:
+        """The exponent of 2 of a positive normal number."""
+        return self.operation(EXPONENT, x)
+
+    def power2(self, k: Any) -> Noted:
+        """2 to the power of a whole number from -1022 to 1023."""
+        return self.operation(POWER2, k)
+
+
+class Noted:
+    """A value of a `Recorder`, by its place."""
+
+    __slots__ = ("place", "recorder")
+
+    def __init__(self, recorder: Recorder, place: int) -> None:
+        self.recorder, self.place = recorder, place
+
+    def __neg__(self) -> Noted:
+        return self.recorder.operation("NEG", self)
+
+    def __lt__(self, other: Any) -> Noted:
+        return self.recorder.operation("LT", self, other)
+
+    def __gt__(self, other: Any) -> Noted:
+        return self.recorder.operation("LT", other, self)
+
+
+def _operator(name: str, kind: str) -> None:
+    def forward(self: Noted, other: Any) -> Noted:
+        return self.recorder.operation(kind, self, other)
+
+    def reflected(self: Noted, other: Any) -> Noted:
+        return self.recorder.operation(kind, other, self)
+
+    setattr(Noted, f"__{name}__", forward)
+    setattr(Noted, f"__r{name}__", reflected)
+
+
+for _name, _kind in {"add": "ADD", "sub": "SUB", "mul": "MUL", "truediv": "DIV"}.items():
+    _operator(_name, _kind)
+
+
+@cache
+def recorded(function: Callable[..., Any], arguments: int) -> Recorded:
+    """The operations of ``function(xp, *arguments)``, which returns a value or several; argument k is entry (0,
+    k)."""
+    recorder = Recorder()
+    given = [recorder.add(Operation(ARGUMENT, entry=(0, k))) for k in range(arguments)]
+    results = function(recorder, *given)
+    values = results if isinstance(results, tuple) else (results,)
+    return Recorded(recorder.items, [each.place for each in values])

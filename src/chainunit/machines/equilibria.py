@@ -1,0 +1,340 @@
+"""The equilibria of a machine under its loads, the torque that holds it elsewhere, and its natural frequency about a
+stable equilibrium.
+
+At rest, J(q) a = -tau_bias(q, 0): the torque at constant speed is the torque that holds the machine, and the slope of
+its effective potential U(q), the integral of the holding torque over the way. An equilibrium is a zero of the holding
+torque. It is stable where U has a minimum. The stiffness k there is the curvature of U, d tau_bias/dq, an exact
+derivative; a small swing about a minimum has the frequency sqrt(k/J). All quantities are those at the driver, with
+its inertia alone, without friction and damping, which are zero at rest.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from ..core.engines import numpy_
+from ..core.quantities import Value, declaration, quantity
+from ..groups.loads import GuideLosses, PinLosses
+from ..mechanism.machine import MachineState
+from ..mechanism.models import InverseMachine
+from ..mechanism.sampled_quantities import largest
+from ..mechanism.zeros import SampledCurve, Zero, sampled, zeros
+from ..reading.results import part, result
+
+STABLE, UNSTABLE, SADDLE, INDIFFERENT, STOP = "stable", "unstable", "saddle", "indifferent", "stop"
+_NOTHING = 1e-11
+"""Holding torque in parts of the largest torque of a single load, below which it is rounding."""
+_FLAT, _LIGHT = 1e-7, 1e-12
+"""Stiffness in parts of the largest torque of a load over the way, and inertia in parts of the largest inertia, below
+which they are none."""
+_CLOSES = 1e-6
+"""Work of a turn in parts of the largest torque, below which it is none."""
+_SLIDING = 1e6
+"""Speed of the driver [rad/s, m/s] at which smoothed friction has its full size."""
+_TURN = 2.0 * math.pi
+_SAME = 1e-9
+"""Angle [rad] within which two places are one."""
+
+
+@result
+class Equilibrium:
+    """An equilibrium of a machine under its loads; in units of a driver that turns."""
+
+    kind: str = part(
+        "stable (the potential has a minimum), unstable (a maximum), saddle (the machine leaves it to one side and "
+        "comes back from the other), indifferent (no torque over a range), stop (the driver rests on its end stop)"
+    )
+    place: Value = quantity("rad", "place of the driver")
+    end: Value = quantity("rad", "end of the range, where it is indifferent; else the place")
+    holding: Value = quantity("N.m", "holding torque there: 0, or at a stop the torque that the stop takes")
+    stiffness: Value = quantity("N.m/rad", "stiffness: slope of the holding torque; none at a stop")
+    inertia: Value = quantity("kg.m2", "reflected inertia there")
+    natural_frequency: Value = quantity(
+        "rad/s", "natural frequency of a small swing, undamped", kind="frequency"
+    )
+    frequency: Value = quantity("Hz", "the same in swings per second")
+    potential: Value = quantity(
+        "J", "potential above its least one over the way; none where it does not close"
+    )
+    friction: Value = quantity("N.m", "torque that friction of pins and guides holds there")
+
+    @property
+    def stable(self) -> bool:
+        """Whether the machine swings about it after a small push."""
+        return self.kind == STABLE
+
+
+@declaration
+class Holding:
+    """The torque that holds a machine at rest over the way of its driver."""
+
+    peak: Value = quantity("N.m", "largest in size")
+    peak_at: Value = quantity("rad", "at")
+    work: Value = quantity("J", "work over the way")
+    friction: Value = quantity("N.m", "largest that friction of pins and guides holds")
+
+
+class Rest(NamedTuple):
+    """A machine at rest at places of its driver, arrays of shape (n,) in units of a driver that turns: the place `q`
+    [rad], the `holding` torque and that which `friction` of pins and guides holds [N m], the `inertia` [kg m2], and
+    the `potential` above its least one [J], None where it does not close in a turn."""
+
+    q: Any
+    holding: Any
+    friction: Any
+    inertia: Any
+    potential: Any
+
+
+@dataclass(frozen=True)
+class Equilibria:
+    """All equilibria of a machine over the way of its driver, in rising order, and its holding torque."""
+
+    places: tuple[Equilibrium, ...]
+    summary: Holding
+    rest: Rest
+    """over the way, closer where the holding torque changes sharply"""
+    driven: tuple[str, ...]
+    """names of the loads without a potential of their own; theirs is the integral of their torque over the way"""
+    repeats: bool
+    """whether the loads of a driver that turns are the same again after a turn"""
+
+    @property
+    def stable(self) -> tuple[Equilibrium, ...]:
+        """Those about which the machine swings."""
+        return tuple(each for each in self.places if each.stable)
+
+    @property
+    def indifferent(self) -> bool:
+        """Whether the machine stays wherever it is, as no load has a torque at the driver."""
+        return len(self.places) == 1 and self.places[0].kind == INDIFFERENT and not self.summary.peak
+
+
+class Resting(Protocol):
+    """A machine as its equilibria need it, see `chainunit.machines.machine.Machine`."""
+
+    model: type[InverseMachine]
+
+    @property
+    def ratio(self) -> float:
+        """Motor turns per turn of the driver."""
+
+    def inputs(self, values: Mapping[str, Any]) -> Any:
+        """Inputs from values by name."""
+
+    def state(self, u: Any) -> MachineState:
+        """The linkage with the inputs."""
+
+
+class _AtRest:
+    """A machine at rest at places of its driver."""
+
+    def __init__(self, machine: Resting, feed: Any) -> None:
+        self.machine = machine
+        self.feed = machine.model.feed_layout.by_name(machine.model.Feed() if feed is None else feed)
+
+    def state(self, q: Any) -> MachineState:
+        """The linkage at the places `q` [rad, m]."""
+        machine = self.machine
+        return machine.state(machine.inputs({"phi": q * machine.ratio, "w": 0.0, **self.feed}))
+
+    def torque(self, q: Any) -> tuple[Any, Any]:
+        """The holding torque [N m] and its slope [N m/rad], each of the shape of `q`."""
+        state = self.state(q)
+        slope, _ = state.slopes()
+        return np.broadcast_to(state.bias, q.shape), np.broadcast_to(slope, q.shape)
+
+    def driven(self, q: Any) -> Any:
+        """The part of the holding torque without a potential [N m]."""
+        return np.broadcast_to(self.state(q).lost_torque, q.shape)
+
+    def loads_without_potential(self, q: Any, nothing: float) -> tuple[str, ...]:
+        """The names of the loads that have such a part at any of the places, of a size above `nothing`."""
+        effects = self.state(q).effects
+        return tuple(name for name, each in effects.items() if np.max(np.abs(each.dissipative)) > nothing)
+
+
+def equilibria(machine: Resting, feed: Any = None) -> Equilibria:
+    """All equilibria of a machine under its weight, its springs and its loads at rest, over the way of its driver: a
+    whole turn, or its range.
+
+    The holding torque is taken at places that lie close enough for all its zeros and extremes (see
+    `chainunit.mechanism.zeros`), so that no equilibrium is missed. A force that depends on the speed has its value at
+    the speed 0. Where the loads of a driver that turns do not repeat themselves, the way is half a turn to either
+    side of its start.
+
+    Parameters
+    ----------
+    machine : a machine whose outputs do not depend on states
+    feed : its loads, an instance of `machine.model.Feed`; by default those of normal running
+
+    Raises
+    ------
+    InputError
+        for a load out of its bounds.
+    TypeError
+        for a machine whose outputs depend on states.
+    """
+    at, model = _AtRest(machine, feed), machine.model
+    low, high = model.span
+    q = np.linspace(low, high, 361)
+    size, state = _size(at.state(q), q), at.state(q)
+    bias, inertia = (np.broadcast_to(x, q.shape) for x in (state.bias, state.J))
+    nothing, repeats = _NOTHING * size, True
+    if model.turns:
+        # the same place of another turn
+        later = at.torque(q[::60] + _TURN)[0]
+        repeats = bool(np.all(np.abs(later - bias[::60]) <= 1e3 * nothing))
+        if repeats:
+            # no zero lies at the begin of the turn
+            first = int(np.argmax(np.abs(bias)))
+            low = float(q[first]) if abs(bias[first]) > nothing else low
+            high = low + _TURN
+        else:
+            low, high = low - 0.5 * _TURN, low + 0.5 * _TURN
+    curve = sampled(at.torque, low, high)
+    # a driver on its stop is pushed back by it
+    found = _zeros(at, curve, nothing, None if model.turns else (-1.0, 1.0))
+    driven = at.loads_without_potential(curve.x, nothing)
+    places = np.array([x for zero in found for x in (zero.begin, zero.end)])
+    rest, work = _rest(at, curve, places, not driven, model.turns and repeats)
+    closes = not (model.turns and repeats) or abs(work) <= _CLOSES * size * _TURN
+    rest = rest._replace(potential=rest.potential if closes else None)
+    limits = nothing, _FLAT * size / (high - low), _LIGHT * float(np.max(inertia))
+    way = _Judged(low, high, not model.turns, *limits)
+    listed = [_equilibrium(at, zero, rest, way) for zero in found]
+    if model.turns and repeats:
+        rest = _from_start(rest, model.span[0])
+        listed = [_folded(each) for each in listed]
+    at_peak, _ = largest(
+        lambda x: np.abs(at.torque(x)[0])[None], np.linspace(low, high, 361), around=model.turns and repeats
+    )
+    peak = float(at.torque(at_peak)[0][0])
+    peak_at = float(at_peak[0])
+    summary = Holding(
+        peak=0.0 if abs(peak) <= nothing else peak,
+        peak_at=peak_at % _TURN if model.turns and repeats else peak_at,
+        work=0.0 if abs(work) <= _CLOSES * size * (high - low) else work,
+        friction=float(np.max(rest.friction)),
+    )
+    return Equilibria(tuple(sorted(listed, key=lambda each: each.place)), summary, rest, driven, repeats)
+
+
+def _size(state: MachineState, q: Any) -> float:
+    """The largest torque of a single load, or of the weight of a single body, at the places `q` [N m]."""
+    sizes = [np.abs(each.field) * body.m * np.abs(body.c.p1.y)
+             for each in state.effects.values() for body in state.m.bodies.values()]  # fmt: skip
+    sizes += [np.abs(each.conservative) + np.abs(each.dissipative)
+              for each in state.effects.values()]  # fmt: skip
+    return max((float(np.max(np.broadcast_to(each, q.shape))) for each in sizes), default=0.0)
+
+
+def _zeros(
+    at: _AtRest, curve: SampledCurve, nothing: float, beyond: tuple[float, float] | None
+) -> list[Zero]:
+    """The zeros of the holding torque; one over the whole way where no load has a torque."""
+    if np.all(np.abs(curve.values) <= nothing):
+        return [Zero(float(curve.x[0]), float(curve.x[-1]), 0.0, 0.0)]
+    return zeros(at.torque, curve, nothing, beyond)
+
+
+def friction_torque(state: MachineState) -> Any:
+    """The torque that friction of pins and guides holds at the driver [N m], of the shape of the state: each slips
+    with its reaction at rest, which is without friction."""
+    losses = [each for each in state.m.linkage.loads.values() if isinstance(each, PinLosses | GuideLosses)]
+    return sum(
+        each._replace(damping=0.0)
+        .effect(numpy_(), state.m, _SLIDING, state.steady.reactions)
+        .dissipative
+        for each in losses
+    )  # fmt: skip
+
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
+
+
+def _rest(
+    at: _AtRest, curve: SampledCurve, places: Any, conservative: bool, around: bool
+) -> tuple[Rest, float]:
+    """The machine at rest at the places of the curve and at further `places`, and the work of the holding torque over
+    the way [J]. The potential is the energy of weights and springs with the integral of all other torque."""
+    x = np.unique(np.concatenate([curve.x, places]))
+    state = at.state(x)
+    bias, inertia, energy, friction = (
+        np.broadcast_to(each, x.shape).copy()
+        for each in (state.bias, state.J, state.potential_energy, friction_torque(state))
+    )
+    potential = energy
+    if not conservative:
+        half = 0.5 * np.diff(x)
+        nodes = 0.5 * (x[1:] + x[:-1])[:, None] + half[:, None] * _NODES
+        parts = (at.driven(nodes.ravel()).reshape(nodes.shape) @ _WEIGHTS) * half
+        potential = energy + np.concatenate([[0.0], np.cumsum(parts)])
+    elif around:
+        potential[-1] = potential[0]
+    return Rest(x, bias, friction, inertia, potential - np.min(potential)), float(
+        potential[-1] - potential[0]
+    )
+
+
+class _Judged(NamedTuple):
+    """What counts as none on a way from `low` to `high`, with `stops` at both or without: a torque of `nothing`
+    [N m], a `flat` stiffness [N m/rad], a `light` inertia [kg m2]."""
+
+    low: float
+    high: float
+    stops: bool
+    nothing: float
+    flat: float
+    light: float
+
+
+def _equilibrium(at: _AtRest, zero: Zero, rest: Rest, way: _Judged) -> Equilibrium:
+    """The equilibrium at a zero of the holding torque."""
+    kind = {(-1.0, 1.0): STABLE, (1.0, -1.0): UNSTABLE}.get((zero.before, zero.behind), SADDLE)
+    (holding,), (slope,) = at.torque(np.array([zero.begin]))
+    k = int(np.searchsorted(rest.q, zero.begin))
+    stiffness: float | None = float(slope) if abs(slope) > way.flat else 0.0
+    if zero.end > zero.begin:
+        kind, stiffness = INDIFFERENT, 0.0
+    elif way.stops and zero.begin in (way.low, way.high) and abs(holding) > way.nothing:
+        kind, stiffness = STOP, None
+    inertia, w = float(rest.inertia[k]), None
+    if kind == STABLE and stiffness and stiffness > 0.0 and inertia > way.light:
+        w = math.sqrt(stiffness / inertia)
+    return Equilibrium(
+        kind=kind,
+        place=zero.begin,
+        end=zero.end,
+        holding=float(holding) if kind == STOP else 0.0,
+        stiffness=stiffness,
+        inertia=inertia,
+        natural_frequency=w,
+        frequency=None if w is None else w / _TURN,
+        potential=None if rest.potential is None else float(rest.potential[k]),
+        friction=float(rest.friction[k]),
+    )
+
+
+def _folded(each: Equilibrium) -> Equilibrium:
+    """An equilibrium of a driver that turns, with its place from 0 to a whole turn."""
+    place = each.place % _TURN
+    place = 0.0 if min(place, _TURN - place) < _SAME else place
+    return replace(each, place=place, end=place + (each.end - each.place))
+
+
+def _from_start(rest: Rest, start: float) -> Rest:
+    """A turn from the `start` on, in place of one that begins elsewhere; the last place is the first one again."""
+    q = start + (rest.q[:-1] - start + _SAME) % _TURN - _SAME
+    order = np.argsort(q)
+    q = q[order]
+    q[0] = start if abs(q[0] - start) < 2.0 * _SAME else q[0]
+    columns = [
+        None if each is None else np.append(each[:-1][order], each[:-1][order[0]]) for each in rest[1:]
+    ]
+    return Rest(np.append(q, q[0] + _TURN), *columns)

@@ -1,0 +1,224 @@
+"""The own sine, arcsine, arctangent, exponential and logarithm: against 64-bit mantissas of the C library, at special
+arguments, and the same bits from arrays, from the list of operations, and from C printed from it."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+
+import numpy as np
+import pytest
+
+from chainunit.core.native import elementary
+from chainunit.core.native.code import forms, number
+from chainunit.core.native.compilers import compile_code, compiler
+from chainunit.core.native.operations import ARGUMENT, NUMBER
+from chainunit.core.native.recorder import CHOOSE, EXPONENT, NEAREST, POWER2
+
+XP = elementary.numpy_basic()
+LONG = np.longdouble
+long_doubles = pytest.mark.skipif(np.finfo(LONG).nmant < 63, reason="long doubles have no 64 bits here")
+pytestmark = pytest.mark.filterwarnings("ignore::RuntimeWarning")
+
+
+def sine(xp, x):
+    return elementary.sine_and_cosine(xp, x)[0]
+
+
+def cosine(xp, x):
+    return elementary.sine_and_cosine(xp, x)[1]
+
+
+def near(at, rng, n):
+    """Numbers near `at`, as near as doubles are."""
+    return at + rng.choice([-1.0, 1.0], n) * 10.0 ** rng.uniform(-17.0, -1.0, n)
+
+
+def spread(rng, n, low, high):
+    """Numbers of both signs whose sizes are spread over decades."""
+    return rng.choice([-1.0, 1.0], n) * 10.0 ** rng.uniform(low, high, n)
+
+
+def multiples(rng, n):
+    """The doubles around multiples of pi/2, where a result is small."""
+    k = rng.integers(1, 8_270_000, n) * (0.5 * np.pi)
+    return np.nextafter(k, k * rng.choice([0.0, 1.0, 2.0], n))
+
+
+def unit(rng, n):
+    return rng.uniform(-1.0, 1.0, n)
+
+
+ONE = {
+    # function: reference, its arguments, the largest error in units in the last place
+    "sine": (sine, np.sin, (
+        lambda rng, n: rng.uniform(-10.0, 10.0, n), lambda rng, n: rng.uniform(-1.3e7, 1.3e7, n), multiples,
+        lambda rng, n: spread(rng, n, -300.0, 7.0),
+    ), 0.82),
+    "cosine": (cosine, np.cos, (
+        lambda rng, n: rng.uniform(-10.0, 10.0, n), lambda rng, n: rng.uniform(-1.3e7, 1.3e7, n), multiples,
+        lambda rng, n: spread(rng, n, -300.0, 7.0),
+    ), 0.82),
+    "arcsine": (elementary.arcsine, np.arcsin, (
+        unit, lambda rng, n: np.clip(near(1.0, rng, n), -1.0, 1.0), lambda rng, n: near(-0.5, rng, n),
+        lambda rng, n: spread(rng, n, -300.0, 0.0),
+    ), 0.67),
+    "arccosine": (elementary.arccosine, np.arccos, (
+        unit, lambda rng, n: np.clip(near(1.0, rng, n), -1.0, 1.0), lambda rng, n: near(0.5, rng, n),
+        lambda rng, n: np.clip(near(-1.0, rng, n), -1.0, 1.0), lambda rng, n: spread(rng, n, -300.0, 0.0),
+    ), 0.67),
+    "exponential": (elementary.exponential, np.exp, (
+        lambda rng, n: rng.uniform(-708.0, 709.7, n), unit, lambda rng, n: spread(rng, n, -300.0, 2.0),
+    ), 0.95),
+    "logarithm": (elementary.logarithm, np.log, (
+        lambda rng, n: np.abs(spread(rng, n, -307.6, 308.2)), lambda rng, n: rng.uniform(0.4, 2.5, n),
+        lambda rng, n: near(1.0, rng, n),
+    ), 0.83),
+}  # fmt: skip
+TWO = {
+    "anywhere": lambda rng, n: (rng.normal(size=n), rng.normal(size=n)),
+    "sizes": lambda rng, n: (spread(rng, n, -140.0, 140.0), spread(rng, n, -140.0, 140.0)),
+    "diagonal": lambda rng, n: (near(1.0, rng, n), near(1.0, rng, n) * rng.choice([-1.0, 1.0], n)),
+    "switch": lambda rng, n: (near(math.tan(math.pi / 8.0), rng, n), near(1.0, rng, n)),
+    "small": lambda rng, n: (spread(rng, n, -280.0, -250.0), spread(rng, n, -280.0, -250.0)),
+}
+
+
+def error(got, exact):
+    """The largest deviation in units in the last place."""
+    return float(np.max(np.abs((got - exact) / np.spacing(np.abs(exact.astype(float))))))
+
+
+def check_one(name, n):
+    function, reference, arguments, most = ONE[name]
+    rng = np.random.default_rng(5)
+    for draw in arguments:
+        x = draw(rng, n)
+        assert error(function(XP, x).astype(LONG), reference(x.astype(LONG))) < most
+
+
+def check_two(draw, n):
+    y, x = TWO[draw](np.random.default_rng(6), n)
+    exact = np.arctan2(y.astype(LONG), x.astype(LONG))
+    assert error(elementary.arctangent2(XP, y, x).astype(LONG), exact) < 0.72
+
+
+@long_doubles
+@pytest.mark.parametrize("name", ONE)
+def test_every_result_is_within_one_unit_in_the_last_place(name):
+    check_one(name, 40_000)
+
+
+@long_doubles
+@pytest.mark.parametrize("draw", TWO)
+def test_every_angle_of_a_vector_is_within_one_unit_in_the_last_place(draw):
+    check_two(draw, 40_000)
+
+
+@long_doubles
+@pytest.mark.second
+def test_a_million_arguments_each():
+    for name in ONE:
+        check_one(name, 1_000_000)
+    for draw in TWO:
+        check_two(draw, 1_000_000)
+
+
+def test_a_large_angle_is_rounded_once_more():
+    """Behind 2**23 quarters of a turn the result is that of an angle within a unit in the last place, of size 1 at
+    most; behind 2**40 rad there is none."""
+    x = np.random.default_rng(7).uniform(2e7, 2.0**40, 20_000)
+    s, c = elementary.sine_and_cosine(XP, x)
+    off = np.abs(np.arctan2(s, c) - np.arctan2(np.sin(x), np.cos(x)))
+    assert np.all(np.minimum(off, 2.0 * np.pi - off) < 1.01 * np.spacing(x) + 1e-15)
+    np.testing.assert_allclose(s * s + c * c, 1.0, rtol=1e-15)
+    for beyond in (2.0**40, 1e300, np.inf, -np.inf, np.nan):
+        assert np.isnan(elementary.sine_and_cosine(XP, np.array(beyond))).all()
+
+
+def test_special_arguments():
+    def values(function, *x):
+        return [float(v) for v in function(XP, np.array(x))]
+
+    inf, nan = math.inf, math.nan
+    np.testing.assert_array_equal(values(sine, 0.0, np.pi / 6.0), [0.0, math.sin(math.pi / 6.0)])
+    np.testing.assert_array_equal(values(cosine, 0.0), [1.0])
+    half = math.pi / 2.0
+    np.testing.assert_array_equal(
+        values(elementary.arcsine, 1.0, -1.0, 0.0, 1.0 + 1e-15, nan), [half, -half, 0.0, nan, nan]
+    )
+    np.testing.assert_array_equal(
+        values(elementary.arccosine, 1.0, -1.0, 0.0, 1.0 + 1e-15, nan), [0.0, math.pi, half, nan, nan]
+    )
+    np.testing.assert_array_equal(
+        values(elementary.exponential, -inf, inf, nan, 0.0, 710.0, -746.0), [0.0, inf, nan, 1.0, inf, 0.0]
+    )
+    # results with fewer digits are rounded once
+    assert values(elementary.exponential, -745.0, -730.0) == [math.exp(-745.0), math.exp(-730.0)]
+    np.testing.assert_array_equal(
+        values(elementary.logarithm, 0.0, -0.0, -1.0, -inf, inf, nan, 1.0),
+        [-inf, -inf, nan, nan, inf, nan, 0.0],
+    )
+    y, x = (
+        np.array([[0.0, -0.0, 1.0, -1.0, 5e-324, nan]] * 6),
+        np.array([[0.0, -0.0, 1.0, -1.0, 5e-324, nan]] * 6).T,
+    )
+    got, exact = elementary.arctangent2(XP, y, x), np.arctan2(y, x)
+    np.testing.assert_array_equal(got, exact)
+    known = ~np.isnan(exact)  # before and behind the cut
+    np.testing.assert_array_equal(np.signbit(got)[known], np.signbit(exact)[known])
+
+
+EXTRA = {
+    NEAREST: "rint({0})",
+    CHOOSE: "({0}?{1}:{2})",
+    EXPONENT: "exponent({0})",
+    POWER2: "power2({0})",
+}
+HEAD = """
+#include <math.h>
+#include <string.h>
+static inline double exponent(double x) {
+  long long b; memcpy(&b, &x, 8); return (double)(b >> 52 & 0x7ff) - 1023.0; }
+static inline double power2(double k) {
+  long long b = (long long)(k + 1023.0) << 52; double x; memcpy(&x, &b, 8); return x; }
+static inline double least(double a, double b) { return a != a ? a : b != b ? b : fmin(a, b); }
+static inline double most(double a, double b) { return a != a ? a : b != b ? b : fmax(a, b); }
+#define fmin least
+#define fmax most
+"""
+
+
+def in_c(kind):
+    """A recorded function as C, operation by operation; the name is the kind."""
+    of, texts = elementary.recording(kind), forms() | EXTRA
+    lines = []
+    for k, each in enumerate(of.items):
+        if each.kind == ARGUMENT:
+            text = f"a[{each.entry[1]}]"
+        elif each.kind == NUMBER:
+            text = number(each.value)
+        else:
+            text = texts[each.kind].format(*(f"v{i}" for i in each.operands))
+        lines.append(f"const double v{k}={text};")
+    results = [f"r[{n}]=v{place};" for n, place in enumerate(of.results)]
+    return f"void f_{kind}(const double *a, double *r) {{ {' '.join([*lines, *results])} }}"
+
+
+@pytest.mark.skipif(compiler() is None, reason="no C compiler")
+def test_c_and_arrays_have_the_same_bits(tmp_path):
+    """One definition, two printers: C without contraction gives the bits of numpy."""
+    source = HEAD + "\n".join(map(in_c, elementary.OWN))
+    flags = ("-std=c99", "-O2", "-fPIC", "-ffp-contract=off", "-shared", "f.c", "-o", "f.so", "-lm")
+    (tmp_path / "f.so").write_bytes(compile_code(compiler(), flags, {"f.c": source.encode()}, "f.so"))
+    library, rng = ctypes.CDLL(str(tmp_path / "f.so")), np.random.default_rng(8)
+    arguments = {"ATAN2": spread(rng, 2000, -3.0, 3.0), "ASIN": unit(rng, 2000), "ACOS": unit(rng, 2000)}
+    for kind, (function, count, place) in elementary.OWN.items():
+        x = arguments.get(kind, spread(rng, 2000, -3.0, 2.5)).reshape(-1, count)
+        x = np.abs(x) if kind == "LOG" else x
+        want = function(XP, *x.T)
+        want = want[place] if isinstance(want, tuple) else want
+        results = (ctypes.c_double * 2)()
+        for row, exact in zip(x, want, strict=True):
+            getattr(library, f"f_{kind}")((ctypes.c_double * count)(*row), results)
+            assert results[place] == exact, (kind, row)
