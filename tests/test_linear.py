@@ -315,6 +315,47 @@ def test_kinks_and_bends_are_told():
     assert not linearize("Accelerator").bends
 
 
+class Meshing(Model):
+    """An angle with a force that bends once in a turn."""
+
+    name, description = "Meshing", "a stop in each turn"
+
+    @declaration
+    class Parameters:
+        stiffness: float = quantity("N.m", "stiffness", default=1.0)
+
+    @declaration
+    class Inputs:
+        torque: float = quantity("N.m", "torque", default=0.0)
+
+    @declaration
+    class States:
+        phi: float = quantity("rad", "angle")
+
+    @declaration
+    class Outputs:
+        stop: float = quantity("N.m", "torque of the stop")
+
+    @staticmethod
+    def derivatives(xp, p, u, x):
+        return [u.torque]
+
+    @staticmethod
+    def _outputs(xp, p, u, x, shared):
+        return Meshing.Outputs(stop=p.stiffness * xp.maximum(xp.sin(x.phi), 0.0))
+
+
+Meshing.parts = (Part(Meshing.Outputs, Meshing._outputs),)
+
+
+def test_an_angle_of_many_turns_has_no_bend_of_another_turn():
+    """A thousandth of 1e4 turns would be ten turns."""
+    turns = 2.0 * math.pi * 1e4
+    assert not linearize_model(Meshing, None, {}, {"phi": turns + 1.0}).bends
+    (bend,) = linearize_model(Meshing, None, {}, {"phi": turns + 3e-4}).bends
+    assert bend.by == "phi" and bend.within.value == pytest.approx(2e-3 * math.pi)
+
+
 def test_a_slope_that_is_not_defined_is_told():
     found = linearize_model(Kinks, None, {}, {"x": 0.0, "v": 1.0})
     assert not np.isfinite(found.C[3, 0])
@@ -390,7 +431,7 @@ def test_a_model_without_states_has_d_alone():
 
 def test_a_direct_model_has_the_torque_that_holds_its_speed():
     found = linearize("ChainUnit", "phi=30 deg, w=60 rpm")
-    assert found.at == "phi = 0.523599, w = 6.28319"
+    assert found.at == "phi = 0.523599 rad, w = 6.28319 rad/s"
     assert {s.name: s.rate.value for s in found.states} == {
         "phi": pytest.approx(2.0 * math.pi), "w": pytest.approx(0.0, abs=1e-9)
     }  # fmt: skip
@@ -407,9 +448,20 @@ def test_a_direct_model_has_the_torque_that_holds_its_speed():
         ("DcMotor", {"at": {"w": math.inf}}, "--at: w"),
         ("DcMotors", {}, "DcMotors: no such model"),
         ("DcMotor", {"inverse": True}, "--inverse: is of linkage files"),
+        (
+            EXAMPLES / "linkages" / "cylinder_lift.toml",
+            {"at": "equilibrium"},
+            'give a place, "phi=.., w=0"',
+        ),
+        (
+            EXAMPLES / "linkages" / "toggle_clamp.toml",
+            {"at": "equilibrium:3"},
+            'give the number of one, as in "equilibrium:1", or a place, "phi=.., w=0"',
+        ),
         (EXAMPLES / "jam_with_driveline.toml", {"at": "jam:2 s"}, "there is no run"),
         (EXAMPLES / "jam_with_driveline.toml", {"at": "start_up:2 kg"}, "--at"),
-        (EXAMPLES / "jam_with_driveline.toml", {"at": "start_up"}, "RUN:TIME"),
+        (EXAMPLES / "jam_with_driveline.toml", {"at": "start_up"}, '--at "start_up": must be RUN:TIME'),
+        (EXAMPLES / "jam_with_driveline.toml", {"at": "steady:1 s"}, "steady running begins at "),
         (EXAMPLES / "jam_with_driveline.toml", {"at": "jam_left:1 s"}, "the run of jam_left goes from"),
         (
             EXAMPLES / "jam_with_driveline.toml",
@@ -422,6 +474,16 @@ def test_a_wrong_point_is_refused(of, more, words):
     with pytest.raises(InputError) as refused:
         linearize(of, **more)
     assert words in str(refused.value)
+
+
+def test_a_point_has_units_and_tells_a_place_beyond_the_range():
+    clamp = EXAMPLES / "linkages" / "toggle_clamp.toml"
+    beyond = linearize(clamp, "phi=95 deg, w=0").at
+    assert beyond == "phi = 1.65806 rad, w = 0 rad/s, beyond the range of the driver, on its upper end stop"
+    assert linearize(clamp, "phi=-0.01").at.endswith("on its lower end stop")
+    assert linearize(clamp, "equilibrium").title == linearize(clamp).title == "Toggle clamp with a hand lever"
+    assert linearize(clamp, "phi=10 deg").at == "phi = 0.174533 rad"
+    assert linearize(clamp.with_name("watt_six_bar.toml"), "phi=-10 deg").at == "phi = -0.174533 rad"
 
 
 def test_the_examples_of_docstrings():

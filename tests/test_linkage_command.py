@@ -12,13 +12,19 @@ import numpy as np
 import pytest
 from command import chainunit
 from linkage_files import MACHINES, pressed_both_ways
+from reports import pictures
 
 from chainunit.core.errors import GeometryError
 from chainunit.core.native.compilers import compiler
 from chainunit.fmu.native.export import export
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
+from chainunit.report.blocks import Table
+from chainunit.report.lines import Name, line
+from chainunit.report.linkage_report import linkage_report
+from chainunit.report.motion import Animation
 from chainunit.study import config
+from chainunit.study.linkage_turn import linkage_findings
 
 PRESS = Path(__file__).parents[1] / "examples" / "linkages" / "slider_crank_press.toml"
 
@@ -182,3 +188,97 @@ def test_a_native_fmu_refuses_lengths_that_do_not_close(tmp_path, capsys):
             str(file), stop_time=0.01, start_values={"l": 0.1, "phi": 1.0}, fmi_type="CoSimulation"
         )
     assert "least margin of the group of rod, ram" in capsys.readouterr().out
+
+
+GATE = """
+[ground]
+H = [0, 0]
+G = ["-50 mm", "-350 mm"]
+[driver]
+link = "gate"
+range = ["-80 deg", "80 deg"]
+[links.gate]
+points = { H = [0, 0], S = ["300 mm", 0], handle = ["1 m", 0] }
+mass = 25
+centroid = ["500 mm", 0]
+[links.tube]
+points = { G = [0, 0], G2 = [1, 0] }
+[links.rod]
+points = { S = [0, 0] }
+[joints.gas]
+on = "rod.S"
+by = "tube.G"
+toward = "G2"
+angle = 0
+[loads.up]
+type = "follower"
+on = "rod.S"
+force = [700, 0]
+[loads.down]
+type = "follower"
+on = "tube.G"
+force = [-700, 0]
+[start]
+angles = { tube = "45 deg" }
+"""
+
+
+def test_a_load_at_a_pin_moves_with_the_pin(tmp_path):
+    """The pictures have a point of a link that lies in a pin under the name of the pin. Names of links and points
+    keep their letters, in tables of the page, too."""
+    (tmp_path / "gate.toml").write_text(GATE, "utf-8")
+    made = linkage_report(linkage_findings(Machine(read_linkage(tmp_path / "gate.toml")), 1.0), "gate.toml")
+    blocks = [each for section in made.sections for each in section.blocks]
+    (animation,) = [each for each in blocks if isinstance(each, Animation)]
+    (run,) = pictures(animation)["runs"]
+    at = {force["title"]: force["at"] for force in run["forces"]}
+    assert at["down"] == "G" and at["up"] == "rod.S" and set(at.values()) <= set(run["joints"])
+    names = {row.cells[0] for each in blocks if isinstance(each, Table) for row in each.rows}
+    assert {Name("gate"), Name("tube.G2"), line(Name("gas"), ": rod along tube")} <= names
+
+
+def test_a_least_margin_stands_at_zero(tmp_path):
+    """Of a double rocker whose least transmission angle lies at phi = 0."""
+    (tmp_path / "rocker.toml").write_text(
+        """
+[ground]
+O1 = [0, 0]
+O2 = ["500 mm", 0]
+[driver]
+link = "left"
+range = ["-70 deg", "70 deg"]
+[links.left]
+points = { O1 = [0, 0], A = ["300 mm", 0] }
+mass = 3
+[links.bar]
+points = { A = [0, 0], B = ["200 mm", 0] }
+[links.right]
+points = { O2 = [0, 0], B = ["320 mm", 0] }
+[start]
+phi = "50 deg"
+points = { B = ["300 mm", "250 mm"] }
+""",
+        "utf-8",
+    )
+    (group,) = linkage_findings(Machine(read_linkage(tmp_path / "rocker.toml")), 1.0).groups.values()
+    assert group.margin == pytest.approx(0.6) and group.margin_at == 0.0
+
+
+def test_a_driver_that_slides_is_shown_there_and_back(tmp_path):
+    """Friction adds to the force of a lift on its way up, and carries a part of it on the way down."""
+    done = run(
+        "linkage", str(PRESS.with_name("scissor_lift.toml")), "-o", "out", "--speed", "0.05 m/s", cwd=tmp_path
+    )
+    assert "there and back over its range" in done.stdout and "Reactions, on the way back" in done.stdout
+    result = json.loads((tmp_path / "out" / "linkage.json").read_text("utf-8"))
+    machine = Machine(read_linkage(PRESS.with_name("scissor_lift.toml")))
+    for part, w in ((result, 0.05), (result["back"], -0.05)):
+        q, tau = (
+            np.array(result["over_the_way"]["driver"]["value"]),
+            np.array(part["over_the_way"]["tau"]["value"]),
+        )
+        assert tau == pytest.approx(machine.outputs(q, w).tau, rel=1e-12)
+        held = np.interp(
+            q, *(np.array(result["rest"]["over_the_way"][k]["value"]) for k in ("driver", "holding"))
+        )
+        assert np.all((tau - held) * w > 0.0)

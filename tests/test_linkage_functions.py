@@ -252,6 +252,7 @@ WORK = {
     "Pump": 50e-4 * (12e5 + 0.2e5) * STROKE,
     "Cam": None,
     "Spring": 0.0,
+    "Gas spring": 0.0,
     "Ratchet": 30.0 * SWING,
 }
 """The work of each recipe in a turn [J], where it has a closed form."""
@@ -276,6 +277,13 @@ def test_a_recipe_of_the_page_does_its_work(name):
         assert work == pytest.approx(np.trapezoid(value, phi), rel=0.1)
     else:
         assert work == pytest.approx(WORK[name], rel=2e-3, abs=1e-4)
+    if name == "Gas spring":  # between two places of T it gives its mean force times the way
+        bare = Machine(machine_of(description_of(toml(f"{body}\n{START}"), "bare"))).outputs(q, 60.0)
+        given = bare.potential_energy - out.potential_energy
+        apart = np.hypot(out.ram.T.x - 0.025, out.ram.T.y + 0.2)
+        force = 700.0 + 180.0 * (0.6 - apart) / 0.48
+        mean = 0.5 * (force + force[0])
+        assert given - given[0] == pytest.approx(mean * (apart - apart[0]), rel=1e-9, abs=1e-9)
     if name == "Spring":  # on its way up the ram gives it the energy of 20 mm
         rising = out.ram.C.vy > 0.0
         assert -np.sum(out.load_power[rising]) * (q[1] - q[0]) / 60.0 == pytest.approx(

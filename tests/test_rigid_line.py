@@ -76,7 +76,7 @@ def test_on_both_sides_of_ten(place):
         words = plain_line(shown.line)
         assert shown.severity == ("good" if holds else "partly")
         assert words.startswith(
-            f"A rigid model of the drive {'holds' if holds else 'does not hold'} (VDI 2149"
+            f"In steady running a rigid model of the drive {'holds' if holds else 'does not hold'} (VDI 2149"
         )
         assert "the frequency of the crank's turns" in words
 

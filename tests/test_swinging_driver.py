@@ -293,6 +293,8 @@ def test_a_driver_that_slides_is_told_its_range_too():
     span, groups = closing(data)
     assert span == ["0.1 m", "0.499999 m"] and groups == ["rod, top"]
     model({**data, "driver": {"joint": "cylinder", "range": span}})
+    outside = {**data, "start": {**data["start"], "phi": "0 m"}}
+    assert "; around cylinder = 0.1 m the linkage closes from 0.1 m to 0.499999 m" in refusal(outside)
 
 
 def test_a_parallelogram_has_the_range_between_its_change_points():

@@ -11,6 +11,7 @@ import numpy as np
 from ..machines.linkages.loads import ForceLaw, SpringDamper
 from ..mechanism.linkage import Linkage
 from ..mechanism.machine import MachineState
+from ..mechanism.sketch import shown_pins
 from . import figure as fig
 from .motion import Arrow
 
@@ -22,6 +23,7 @@ def has_loads(linkage: Linkage) -> bool:
 
 def load_arrows(state: MachineState) -> Iterator[Arrow]:
     """An arrow for each force and each end of a spring that a linkage file describes."""
+    shown = shown_pins(state.m.linkage)
     for name, effect in state.effects.items():
         load, title = state.m.linkage.loads[name], name.removeprefix("loads.")
         points: dict[str, str] = {}
@@ -31,9 +33,10 @@ def load_arrows(state: MachineState) -> Iterator[Arrow]:
             points = {link: pin for link, pin in load.ends if link is not None}
         for wrench in effect.wrenches:
             if wrench.link in points:
-                yield Arrow(
-                    title, points[wrench.link], wrench.force.x, wrench.force.y, short=title, load=True
-                )
+                at = points[wrench.link]
+                # a further point of a link at a pin has its place under the name of the pin
+                at = at if at in shown else at.rpartition(".")[2]
+                yield Arrow(title, at, wrench.force.x, wrench.force.y, short=title, load=True)
 
 
 def loads_on_slides(state: MachineState) -> dict[str, tuple[Any, Any]]:

@@ -19,7 +19,7 @@ from . import blocks as b
 from . import figure as fig
 from . import linkage, linkage_loads, linkage_rest
 from .drawing import drawing
-from .lines import Name, Number, capital, join, line
+from .lines import Line, Name, Number, capital, join, line
 from .motion import Animation, Clip, Reading
 from .task import Task, no_check
 
@@ -153,7 +153,12 @@ def _motion(s: b.Source, f: LinkageFindings) -> Iterator[b.Block]:
         if links:
             yield b.Text(line(join(map(Name, links)), f" {words[len(links) > 1]}."))
     names = Layout(GroupTurn).names
-    rows = (b.TableRow((name, *(s.number(f"groups.{name}.{each}") for each in names))) for name in f.groups)
+    rows = (
+        b.TableRow(
+            (join(map(Name, name.split(", "))), *(s.number(f"groups.{name}.{each}") for each in names))
+        )
+        for name in f.groups
+    )
     if f.groups:
         yield b.Table(
             tuple(rows),
@@ -161,7 +166,7 @@ def _motion(s: b.Source, f: LinkageFindings) -> Iterator[b.Block]:
             title="Margins: the sine of the transmission angle, or its like; 0 is a dead position",
         )
     rows = (
-        b.TableRow((name, *(s.number(f"points.{name}.{axis}", k) for axis in "xy" for k in (0, 1))))
+        b.TableRow((Name(name), *(s.number(f"points.{name}.{axis}", k) for axis in "xy" for k in (0, 1))))
         for name in s.result["points"]
     )
     heads = b.heads("point", "x from", "x to", "y from", "y to")
@@ -177,7 +182,7 @@ def _ends(s: b.Source, f: LinkageFindings, path: str, head: str, whole: str, way
         (whole, "range"), *((("forth over", "forth"), ("time ratio", "time_ratio")) if turns else ()),
     )  # fmt: skip
     rows = tuple(
-        b.TableRow((_along(f, name) if path == "strokes" else name,
+        b.TableRow((_along(f, name) if path == "strokes" else Name(name),
                     *(s.number(f"{path}.{name}.{key}") for _, key in columns)))
         for name in s.result[path]
     )  # fmt: skip
@@ -342,15 +347,15 @@ def _figures(f: LinkageFindings, effort: str, inertia_word: str) -> Iterator[b.B
     )  # fmt: skip
 
 
-def _title(f: LinkageFindings, name: str) -> str:
+def _title(f: LinkageFindings, name: str) -> Line:
     joint = f.description.structure.joints[name]
     kind = "guide" if joint.kind == PRISMATIC else "pin"
-    return f"{name}: {kind}, on {joint.on[0]} from {joint.by[0]}"
+    return line(Name(name), f": {kind}, on {joint.on[0]} from {joint.by[0]}")
 
 
-def _along(f: LinkageFindings, name: str) -> str:
+def _along(f: LinkageFindings, name: str) -> Line:
     joint = f.description.structure.joints[name]
-    return f"{name}: {joint.on[0]} along {joint.by[0]}"
+    return line(Name(name), f": {joint.on[0]} along {joint.by[0]}")
 
 
 def _variables(f: LinkageFindings) -> Iterator[b.Block]:

@@ -228,7 +228,11 @@
       row.className = colour(force.group);
       const head = document.createElement("th");
       head.scope = "row";
-      head.textContent = force.title;
+      // the name of a joint or load of a file keeps its letters
+      const title = document.createElement("span");
+      title.className = force.short === force.title ? "as-is" : "";
+      title.textContent = force.title;
+      head.appendChild(title);
       row.appendChild(head);
       return row.insertCell();
     });

@@ -37,7 +37,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
 def _rigid(s: b.Source) -> b.Judgement:
     """The verdict on a rigid model of the drive, with its two numbers."""
     holds = s.result["rigid_line"]["holds"]
-    verdict = f"A rigid model of the drive {'holds' if holds else 'does not hold'}"
+    verdict = f"In steady running a rigid model of the drive {'holds' if holds else 'does not hold'}"
     text = s.line(
         f"{verdict} (VDI 2149: from {HOLDS_FROM:g} times on): the lowest natural frequency of the line, "
         "{rigid_line.natural_frequency}, is {rigid_line.ratio} times the frequency of the {driver}'s turns, "

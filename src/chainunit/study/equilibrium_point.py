@@ -44,8 +44,8 @@ def equilibrium_point(
     if own.kind in (STOP, INDIFFERENT):
         where = "on an end stop" if own.kind == STOP else "indifferent over a range"
         raise InputError(
-            f"--at {shown(at)}: the equilibrium {number} is {where}; {_listed(found, machine)}; give another one, "
-            'or "phi=.., w=0"'
+            f"--at {shown(at)}: the equilibrium {number} is {where}; {_listed(found, machine)}; "
+            f"give {_others(found)}"
         )
     return number, own
 
@@ -56,8 +56,8 @@ def _number(at: str, found: Equilibria, machine: Machine) -> int:
     if text is None:
         if not found.stable:
             raise InputError(
-                f"--at {shown(at)}: there is no stable equilibrium; {_listed(found, machine)}; give the number of "
-                'one, as in "equilibrium:1", or "phi=.., w=0"'
+                f"--at {shown(at)}: there is no stable equilibrium; {_listed(found, machine)}; "
+                f"give {_others(found)}"
             )
         lowest = min(found.stable, key=lambda each: each.potential or 0.0)
         return found.places.index(lowest) + 1
@@ -67,6 +67,13 @@ def _number(at: str, found: Equilibria, machine: Machine) -> int:
             f"{_listed(found, machine)}"
         )
     return int(text)
+
+
+def _others(found: Equilibria) -> str:
+    """The points that are left, in words: equilibria that are no stop and no range, by number, and places."""
+    free = [k for k, each in enumerate(found.places, 1) if each.kind not in (STOP, INDIFFERENT)]
+    by_number = f'the number of one, as in "equilibrium:{free[0]}", or ' if free else ""
+    return f'{by_number}a place, "phi=.., w=0"'
 
 
 def _listed(found: Equilibria, machine: Machine) -> str:

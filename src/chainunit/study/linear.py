@@ -153,7 +153,7 @@ def _at_values(model: type[Model], start: Mapping[str, float], at: At) -> Linear
         states |= {k: v for k, v in given.items() if k in states}
     if issubclass(model, DirectMachine) and "tau" not in given:
         inputs["tau"] = holding_torque(model, p, inputs, states)
-    words = ", ".join(f"{k} = {x:g}" for k, x in given.items())
+    words = _in_words(model, given)
     return LinearPoint(model, p, inputs, states, words or "start of the model")
 
 
@@ -197,14 +197,28 @@ def _point_of_linkage(machine: Any, at: At, inverse: bool) -> LinearPoint:
     if at is None:
         unit = ("m", "m/s") if machine.slides else ("rad", "rad/s")
         point = point._replace(words=f"phi = {phi:g} {unit[0]}, w = {w:g} {unit[1]}")
+    driver_at = (point.inputs if inverse else point.states)["phi"] / ratio
+    if not machine.turns and not low <= driver_at <= high:
+        end = "lower" if driver_at < low else "upper"
+        point = point._replace(words=f"{point.words}, beyond the range of the driver, on its {end} end stop")
     return point._replace(title=machine.noun)
+
+
+def _in_words(model: type[Model], given: Mapping[str, float]) -> str:
+    """The values that a point gives to states and inputs, with their units."""
+    units = {v.name: v.unit for v in _states_and_inputs(model)}
+    return ", ".join(f"{name} = {x:g} {units[name]}".removesuffix(" 1") for name, x in given.items())
+
+
+def _states_and_inputs(model: type[Model]) -> tuple[Variable, ...]:
+    return *(model.state_layout.variables if model.state_layout else ()), *model.input_layout.variables
 
 
 def _values(model: type[Model], at: At) -> dict[str, float]:
     """The values that a point gives to states and inputs."""
     if at is None:
         return {}
-    variables = (*(model.state_layout.variables if model.state_layout else ()), *model.input_layout.variables)
+    variables = _states_and_inputs(model)
     if isinstance(at, str):
         pairs = {}
         for each in at.split(","):
@@ -212,7 +226,8 @@ def _values(model: type[Model], at: At) -> dict[str, float]:
             if not sign:
                 raise InputError(
                     f"--at {shown(at)}: must be NAME=VALUE, .. of states and inputs of {model.name}, such as "
-                    f'"{variables[0].name}={_EXAMPLES.get(variables[0].unit, "0.5")}"; RUN:TIME is of a study'
+                    f'"{variables[0].name}={_EXAMPLES.get(variables[0].unit, "0.5")}"; RUN:TIME is of a study, '
+                    '"equilibrium" of a machine'
                 )
             pairs[name] = text
         at = pairs
@@ -280,7 +295,7 @@ def drive_point(
     simulation: Any  # of the compiled system, which has no FMUs to close
     with rig.from_rest() as simulation:
         if run in (START, STEADY):
-            simulation = _from_rest(rig, simulation, time)
+            simulation = _from_rest(rig, simulation, time, steady=run == STEADY)
         elif events[run].from_rest:
             assert time is not None
             simulation = rig.from_rest(events[run])
@@ -300,7 +315,7 @@ def drive_point(
         system.p,
         inputs,
         states,
-        ", ".join([words, *(f"{name} = {x:g}" for name, x in given.items())]),
+        ", ".join(filter(None, (words, _in_words(system.model, given)))),
     )
 
 
@@ -313,6 +328,8 @@ def _run_and_time(at: str, runs: list[str]) -> tuple[str, float | None]:
         )
     if not sign and name == STEADY:
         return name, None
+    if not text:
+        raise InputError(f'--at {shown(at)}: must be RUN:TIME, such as "{name}:0.4 s"; the time is missing')
     try:
         return name, to_number(
             Variable("--at", "time of the run", Quantity("s", "", low=0.0, high=1e6)), text
@@ -346,13 +363,19 @@ def _silent(time: float) -> None:
     """Report no time of a run."""
 
 
-def _from_rest(rig: Rig, simulation: Any, time: float | None) -> Any:
-    """The simulation of start-up and steady running at the time [s], by default at its end."""
-    if time is None or rig.operation.empty_start:
+def _from_rest(rig: Rig, simulation: Any, time: float | None, steady: bool) -> Any:
+    """The simulation of start-up and steady running at the time [s], by default at its end; a time in `steady`
+    running lies behind the start-up."""
+    if time is None or steady or rig.operation.empty_start:
         started = start_up(rig, simulation, _silent, rig.guards)
         _refuse_opened(simulation, started.stop - 0.5 * rig.step)
         if time is None:
             return simulation
+        if steady and time < started.steady_from:
+            raise InputError(
+                f'--at "{STEADY}:{time:g} s": steady running begins at {started.steady_from:.4g} s; before it name '
+                f'"{START}:{time:g} s"'
+            )
         rig = started.rig
         simulation = rig.from_rest()
     _run(simulation, rig, time)

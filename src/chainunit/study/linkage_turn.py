@@ -26,6 +26,8 @@ _LOSSLESS = 1e-9
 """Part of the mean size of a torque below which its mean is that of a machine without losses."""
 STANDS = 1e-9
 """A way [m] or an angle [rad] over which a part moves, below which it stands."""
+_SOUGHT = 1e-7
+"""Accuracy [rad, m] to which the place of a smooth extreme is found: nearer to 0 it is 0."""
 _ROUNDING = 1e-12
 """Size of a place [m] or an angle [rad] below which it is what rounding leaves of 0."""
 
@@ -159,9 +161,9 @@ class _Way:
 
 def linkage_findings(machine: Machine, speed: float) -> LinkageFindings:
     """The linkage over its way at a constant `speed` of the driver [rad/s, m/s], with the loads of normal running; of
-    a driver that swings there and, as `back`, at the opposite speed."""
+    a driver with a range there and, as `back`, at the opposite speed."""
     rest = machine.equilibria()
-    if machine.model.turns or machine.model.slides:
+    if machine.model.turns:
         return _findings(machine, speed, rest)
     return replace(_findings(machine, abs(speed), rest), back=_findings(machine, -abs(speed), rest))
 
@@ -302,9 +304,10 @@ def _motions(
 
 
 def _folded(q: float, turns: bool) -> float:
-    """A place of the driver; the angle of one that turns from 0 to a whole turn."""
+    """A place of the driver, 0 where it is rounding; the angle of one that turns from 0 to a whole turn."""
     folded = q % (2.0 * math.pi) if turns else q
-    return 0.0 if turns and min(folded, 2.0 * math.pi - folded) < STANDS else folded
+    from_zero = min(folded, 2.0 * math.pi - folded) if turns else abs(folded)
+    return 0.0 if from_zero < _SOUGHT else folded
 
 
 def _plain(place: float) -> float:

@@ -345,7 +345,7 @@ class _Derivatives:
 
     def bends(self, point: tuple[Any, ...], values: np.ndarray, slopes: np.ndarray) -> list[Bend]:
         """The places near the point where slopes change faster than those of smooth powers."""
-        sizes = np.array([max(v.quantity.nominal or 1.0, abs(at)) for v, at in self.columns_at(point)])
+        sizes = np.array([_size(v, at) for v, at in self.columns_at(point)])
         least = _SLIGHT * (
             np.array([[v.quantity.nominal or 1.0] for v in self.rows]) + np.abs(values)[:, None]
         )
@@ -379,6 +379,13 @@ class _Derivatives:
         )
         jumps = np.abs([high - low, high - here, here - low])
         return np.max(jumps, axis=0), np.max(np.abs([low, high, here]), axis=0)
+
+
+def _size(v: Variable, at: float) -> float:
+    """The size of a state or input: its value, or its nominal one where that is larger; of an angle, which may have
+    many turns, one turn at most."""
+    size = max(v.quantity.nominal or 1.0, abs(at))
+    return min(size, 2.0 * np.pi) if v.unit == "rad" else size
 
 
 @lru_cache(maxsize=8)

@@ -276,7 +276,11 @@ class _LinkageReader(LoadReader):
             else:
                 for each in ("toward", "angle", "length"):
                     if each in given:
-                        self.fault(f"{key}.{each}", "belongs to a prismatic joint")
+                        self.fault(
+                            f"{key}.{each}",
+                            "belongs to a prismatic joint, and this one is a pin: for a cylinder or a guide give it "
+                            f"`toward` with a further point of {ends[1][0]}, on the line of the way",
+                        )
             joints.append(joint)
         more, clashes = shared_pins(self.points, joints, self.table("driver"))
         for name, message in clashes:
@@ -345,10 +349,12 @@ class _LinkageReader(LoadReader):
                 raise InputError(f"must be the least and the most {place} of the driver, such as {example}")
             span = [self.number("driver.range", each, unit) for each in given]
             if not span[0] < span[1]:
-                raise InputError("must rise")
+                raise InputError(f"is {shown(given)}; must rise, from the least to the most {place}")
             if unit == "rad" and span[1] - span[0] > WHOLE * (1.0 + 1e-12):
+                plain = any(isinstance(each, int | float) for each in given)
                 raise InputError(
                     f"is {shown(given)}, more than a turn; for a driver that turns all the way round leave it out"
+                    + '; a number without a unit is in radians, write degrees as "10 deg"' * plain
                 )
         return span
 
@@ -364,9 +370,11 @@ class _LinkageReader(LoadReader):
         sliding = {j["name"]: j for j in joints if j["type"] == PRISMATIC}
         joint = sliding.get(table["joint"]) if isinstance(table["joint"], str) else None
         if joint is None:
+            pin = any(j["name"] == table["joint"] for j in joints)
             self.fault(
                 "driver.joint",
-                f"is {shown(table['joint'])}; must be a prismatic joint: {', '.join(sliding) or 'there is none'}",
+                f"is {shown(table['joint'])}{', which is a pin' * pin}; must be a prismatic joint, a table "
+                f"[joints.NAME] with `toward`: {', '.join(sliding) or 'there is none'}",
             )
             return {}, None
         link = joint["by"][0] if joint["on"][0] == GROUND else joint["on"][0]

@@ -160,17 +160,24 @@ class FollowedLinkage:
             words.append((f"{place} {unit}", group))
         (low, of_low), (high, of_high) = words
         for_whom = "for a driver that swings, " if self.way.turns else ""
+        start = self._start_in_range()
+        around = "its start" if start == self.way.start else self.way.words(start)
         return (
-            f"; around its start the linkage closes from {low}{of_low} to {high}{of_high}: {for_whom}write "
+            f"; around {around} the linkage closes from {low}{of_low} to {high}{of_high}: {for_whom}write "
             f'range = ["{low}", "{high}"] in [driver], or less, as the forces grow without limit towards such an end'
         )
+
+    def _start_in_range(self) -> float:
+        """The start, or the end of the range that is nearest to it: that of a slide may lie outside."""
+        low, high = self.way.limits or (-math.inf, math.inf)
+        return min(max(self.way.start, low), high)
 
     def closing_range(self) -> tuple[RangeEnd, RangeEnd] | None:
         """The ends of the range around the start in which all groups close, clear of dead positions; None where they
         do not at the start."""
-        start, (low, high) = self.way.start, self.way.limits or (-math.inf, math.inf)
+        start, (low, high) = self._start_in_range(), self.way.limits or (-math.inf, math.inf)
         self._signs = []
-        if not low <= start <= high or not self._good(start):
+        if not self._good(start):
             return None
         ends = []
         for limit, sense in ((low, -1.0), (high, 1.0)):

@@ -73,7 +73,8 @@ class DriverWay:
         if self.linear:
             return f"{self.name} = {q:.6g} m"
         degrees = math.degrees(q)
-        return f"{degrees % 360.0 if self.turns else degrees:.4g} deg of {self.name}"
+        degrees = round(degrees % 360.0 if self.turns else degrees, 4) + 0.0  # which makes -0 a 0
+        return f"{degrees:.4g} deg of {self.name}"
 
     def inside(self, q: float, sense: float) -> str:
         """A place as a file has it, without its unit, rounded upward where `sense` is +1, downward where it is -1,
