@@ -115,7 +115,8 @@ def test_an_interrupt_while_files_are_written_names_those_that_are_there(happens
 
     monkeypatch.setattr(files, "markdown", interrupted)
     done = chainunit("linkage", PRESS, "-o", "out", cwd=tmp_path)
-    there = ["linkage.json", "linkage.svg", "linkage.png", "linkage_stroke.png", "linkage_reactions.png"]
+    there = ["linkage.json"]
+    there += [f"linkage{name}" for name in (".svg", ".png", "_stroke.png", "_reactions.png", "_rest.png")]
     there += ["linkage.md", "report.html"] if happens is _swallowed else []
     assert done.returncode == 130
     assert done.stderr == f"chainunit: interrupted; written: {', '.join(f'out/{name}' for name in there)}\n"
