@@ -278,35 +278,6 @@ def test_a_machine_that_counts_no_energies_has_the_certificate_of_the_shaft(mach
 # -- a system of terminals
 
 
-def test_joints_that_do_not_fit_are_named(file, machine):
-    motor = foreign_component(file, "motor")
-    parts = {"machine": machine, "motor": motor}
-    for joints, said in (
-        (
-            [("motor.shaft", "machine.flange")],
-            r"motor\.shaft: no such terminal; motor \(ForeignMotor\.fmu\) has flange, load",
-        ),
-        (
-            [("gear.flange", "machine.flange")],
-            r'gear\.flange: there is no component "gear"; there are machine, motor',
-        ),
-        (
-            [("motor.flange", "machine.flange"), ("machine.flange", "motor.flange")],
-            r"machine\.flange: is joined to motor\.flange and to motor\.flange",
-        ),
-        (
-            [("motor.flange", "machine.load")],
-            r"motor\.flange \(org\.chainunit\.flange\) cannot be joined to machine\.load \(org\.chainunit\.load\)",
-        ),
-    ):
-        with pytest.raises(InputError, match=said):
-            System(parts, joints)
-    with pytest.raises(
-        InputError, match=r"motor\.flange and second\.flange both give the angle: one must give it"
-    ):
-        System({"motor": motor, "second": motor}, [("motor.flange", "second.flange")])
-
-
 def test_units_that_differ_are_named(machine, file):
     motor = foreign_component(file, "motor")
     turned = FmuComponent(

@@ -16,6 +16,7 @@ from fmpy.validation import validate_fmu
 from lxml import etree
 from systems import component, pair
 
+from chainunit.core.errors import InputError
 from chainunit.core.model import Model, Part, Terminal
 from chainunit.core.ports import driven_flanges, flanges
 from chainunit.core.quantities import declaration, quantity
@@ -271,3 +272,32 @@ def test_a_line_is_joined_by_the_flanges_of_modelica():
     joints = [("line.flange_b", "machine.flange_a"), ("motor.flange_a", "line.flange_a")]
     system = System({name: ModelComponent(c.model, c.parameters) for name, c in parts.items()}, joints)
     assert system.connections == [("line.driven.phi", "machine.phi"), ("motor.phi", "line.phi")]
+
+
+def test_joints_that_do_not_fit_are_named():
+    machine, motor = component("ChamberForces"), component("DcMotor")
+    parts = {"machine": machine, "motor": motor}
+    for joints, said in (
+        (
+            [("motor.shaft", "machine.flange")],
+            r"motor\.shaft: no such terminal; motor \(DcMotor\) has flange, ",
+        ),
+        (
+            [("gear.flange", "machine.flange")],
+            r'gear\.flange: there is no component "gear"; there are machine, motor',
+        ),
+        (
+            [("motor.flange", "machine.flange"), ("machine.flange", "motor.flange")],
+            r"machine\.flange: is joined to motor\.flange and to motor\.flange",
+        ),
+        (
+            [("motor.flange", "machine.load")],
+            r"motor\.flange \(org\.chainunit\.flange\) cannot be joined to machine\.load \(org\.chainunit\.load\)",
+        ),
+    ):
+        with pytest.raises(InputError, match=said):
+            System(parts, joints)
+    with pytest.raises(
+        InputError, match=r"motor\.flange and second\.flange both give the angle: one must give it"
+    ):
+        System({"motor": motor, "second": motor}, [("motor.flange", "second.flange")])
