@@ -16,9 +16,7 @@ from chainunit.core.ports import (
     PortValues,
     ShaftInput,
     Start,
-    driven_flanges,
-    flanges,
-    load_terminal,
+    line_terminals,
     shaft_motion,
 )
 from chainunit.core.quantities import Layout, Value, declaration, group, quantity
@@ -109,12 +107,7 @@ class PlanetaryGear(Model):
     name = "PlanetaryGear"
     description = "Planetary gear with stiffness, damping and backlash: takes a load port and shows one"
     Parameters, Inputs, States = Parameters, ShaftInput, States
-    terminals = (
-        *flanges("inflow"),
-        load_terminal(),
-        *driven_flanges(),
-        load_terminal("load.", "machine"),
-    )
+    terminals = line_terminals()
     input_rates = MappingProxyType({"phi": "w", "w": "a"})
     shared = Point
     parts = (Part(Outputs, _outputs),)

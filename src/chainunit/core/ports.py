@@ -130,6 +130,12 @@ def driven_flanges() -> tuple[Terminal, Terminal]:
     return own, _as_modelica(own, "flange_b")
 
 
+def line_terminals() -> tuple[Terminal, ...]:
+    """The terminals of a part between motor and machine: its shaft and load port to the motor, and those to the
+    machine."""
+    return *flanges("inflow"), load_terminal(), *driven_flanges(), load_terminal("load.", "machine")
+
+
 def _as_modelica(own: Terminal, name: str) -> Terminal:
     """The terminal of a shaft as Modelica's flange: of angle and torque alone. Every one is of the kind Flange_a,
     as tools join terminals of equal kinds, and Modelica's Flange_a and Flange_b differ in their icon alone."""

@@ -30,9 +30,7 @@ from ..core.ports import (
     PortValues,
     ShaftInput,
     Start,
-    driven_flanges,
-    flanges,
-    load_terminal,
+    line_terminals,
     shaft_motion,
 )
 from ..core.quantities import Value, declaration, group, quantity
@@ -193,12 +191,7 @@ class CardanDriveline(Model):
     Parameters = Parameters
     Inputs = ShaftInput
     States = States
-    terminals = (
-        *flanges("inflow"),
-        load_terminal(),
-        *driven_flanges(),
-        load_terminal("load.", "machine"),
-    )
+    terminals = line_terminals()
     input_rates = MappingProxyType({"phi": "w", "w": "a"})
     required = tuple(
         Requirement(name, "rad", "a Hooke joint turns only with a bend below 90 deg") for name in BENDS

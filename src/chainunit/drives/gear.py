@@ -9,10 +9,8 @@ from ..core.ports import (
     PortSlopes,
     PortValues,
     ShaftInput,
-    driven_flanges,
-    flanges,
+    line_terminals,
     load_inertia,
-    load_terminal,
     load_torque,
 )
 from ..core.quantities import Value, declaration, group, quantity
@@ -74,10 +72,5 @@ class Gear(Model):
     )
     Parameters = GearParameters
     Inputs = ShaftInput
-    terminals = (
-        *flanges("inflow"),
-        load_terminal(),
-        *driven_flanges(),
-        load_terminal("load.", "machine"),
-    )
+    terminals = line_terminals()
     parts = (Part(GearOutputs, _outputs),)

@@ -18,9 +18,7 @@ from ..core.ports import (
     PortValues,
     ShaftInput,
     Start,
-    driven_flanges,
-    flanges,
-    load_terminal,
+    line_terminals,
     shaft_motion,
 )
 from ..core.quantities import Value, declaration, group, quantity
@@ -90,12 +88,7 @@ class SlipClutch(Model):
     Parameters = Parameters
     Inputs = ShaftInput
     States = States
-    terminals = (
-        *flanges("inflow"),
-        load_terminal(),
-        *driven_flanges(),
-        load_terminal("load.", "machine"),
-    )
+    terminals = line_terminals()
     input_rates = MappingProxyType({"phi": "w", "w": "a"})
 
     @staticmethod

@@ -189,7 +189,8 @@ def equilibria(machine: Resting, feed: Any = None) -> Equilibria:
     at, model = _AtRest(machine, feed), machine.model
     low, high = model.span
     q = np.linspace(low, high, 361)
-    size, state = _size(at.state(q), q), at.state(q)
+    state = at.state(q)
+    size = _size(state, q)
     bias, inertia = (np.broadcast_to(x, q.shape) for x in (state.bias, state.J))
     nothing, repeats = _NOTHING * size, True
     if model.turns:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from typing import TypeGuard
 
 from ..core.errors import InputError, shown
 from ..machines.equilibria import INDIFFERENT, STOP, Equilibria, Equilibrium
@@ -13,7 +14,7 @@ from ..mechanism.models import InverseMachine
 _FORM = re.compile(r"equilibrium\s*(?::\s*(.*))?")
 
 
-def asks_for_equilibrium(at: object) -> bool:
+def asks_for_equilibrium(at: object) -> TypeGuard[str]:
     """Whether a point is given as an equilibrium."""
     return isinstance(at, str) and at.strip().partition(":")[0].strip() == "equilibrium"
 
@@ -39,24 +40,24 @@ def equilibrium_point(
         {name: x for name, x in values.items() if name in model.feed_layout.names}
     )
     found = machine.equilibria(feed)
-    number = _number(at, found, machine)
+    number = _number(at, found, model)
     own = found.places[number - 1]
     if own.kind in (STOP, INDIFFERENT):
         where = "on an end stop" if own.kind == STOP else "indifferent over a range"
         raise InputError(
-            f"--at {shown(at)}: the equilibrium {number} is {where}; {_listed(found, machine)}; "
+            f"--at {shown(at)}: the equilibrium {number} is {where}; {_listed(found, model)}; "
             f"give {_others(found)}"
         )
     return number, own
 
 
-def _number(at: str, found: Equilibria, machine: Machine) -> int:
+def _number(at: str, found: Equilibria, model: type[InverseMachine]) -> int:
     match = _FORM.fullmatch(at.strip())
     text = match[1] if match else at
     if text is None:
         if not found.stable:
             raise InputError(
-                f"--at {shown(at)}: there is no stable equilibrium; {_listed(found, machine)}; "
+                f"--at {shown(at)}: there is no stable equilibrium; {_listed(found, model)}; "
                 f"give {_others(found)}"
             )
         lowest = min(found.stable, key=lambda each: each.potential or 0.0)
@@ -64,7 +65,7 @@ def _number(at: str, found: Equilibria, machine: Machine) -> int:
     if not text.isdecimal() or not 1 <= int(text) <= len(found.places):
         raise InputError(
             f"--at {shown(at)}: must be equilibrium:N with N from 1 to {len(found.places)}; "
-            f"{_listed(found, machine)}"
+            f"{_listed(found, model)}"
         )
     return int(text)
 
@@ -76,18 +77,17 @@ def _others(found: Equilibria) -> str:
     return f'{by_number}a place, "phi=.., w=0"'
 
 
-def _listed(found: Equilibria, machine: Machine) -> str:
+def _listed(found: Equilibria, model: type[InverseMachine]) -> str:
     """The equilibria in words."""
     if not found.places:
         return "it has no equilibrium"
     return "its equilibria are " + ", ".join(
-        f"{k} ({place_words(machine, each)})" for k, each in enumerate(found.places, 1)
+        f"{k} ({place_words(model, each)})" for k, each in enumerate(found.places, 1)
     )
 
 
-def place_words(machine: Machine | type[InverseMachine], each: Equilibrium) -> str:
+def place_words(model: type[InverseMachine], each: Equilibrium) -> str:
     """Kind and place of an equilibrium in words."""
-    model = machine.model if isinstance(machine, Machine) else machine
     unit = "m" if model.slides else "rad"
     on = "on its stop" if each.kind == STOP else each.kind
     return f"{on}, {each.place:.6g} {unit}"

@@ -122,14 +122,14 @@ def linear_point(
         return _point_of_study(study_files.load(Path(name)), at, progress)
     if is_file:
         machine = model_named(name)
-        if isinstance(at, str) and asks_for_equilibrium(at):
+        if asks_for_equilibrium(at):
             assert issubclass(machine, InverseMachine)
             point = _at_equilibrium(machine if inverse else machine.direct(), {}, at)
             return point._replace(title=machine.noun)
         return _point_of_linkage(machine, at, inverse)
     loaded = None if values is None else study_files.load(values)
     model, start = model_and_start(name, loaded, progress=progress)
-    if isinstance(at, str) and asks_for_equilibrium(at):
+    if asks_for_equilibrium(at):
         return _at_equilibrium(model, start, at)
     return _at_values(model, start, at)
 
@@ -251,6 +251,11 @@ def _point_of_study(
     config: Config, at: At, progress: Callable[[str], None] = lambda what: None
 ) -> LinearPoint:
     """The point of the whole drive of a study."""
+    if asks_for_equilibrium(at):
+        raise InputError(
+            f"--at {shown(at)}: is of a linkage file, or of a machine by its name; a study has runs: {START}, "
+            f"{', '.join([STEADY, *config.events])}"
+        )
     drive = drive_to_export(config, progress=progress)
     point = drive_point(drive, config.operation, config.events, at, progress)
     return point._replace(title=config.title)
@@ -282,11 +287,6 @@ def drive_point(
     with refusal_prefix("linear model: "):
         system = CompiledSystem(rig.graph)
     run, time, given = STEADY, None, {}
-    if asks_for_equilibrium(at):
-        raise InputError(
-            f"--at {shown(at)}: is of a linkage file, or of a machine by its name; a study has runs: {START}, "
-            f"{', '.join([STEADY, *events])}"
-        )
     if isinstance(at, str) and "=" not in at:
         run, time = _run_and_time(at, [START, STEADY, *events])
     else:
