@@ -412,6 +412,7 @@ def test_the_command_shows_the_motion_there_and_back(tmp_path):
     assert done.returncode == 0, done.stderr
     assert "there and back over its range" in done.stdout
     assert "Reactions, on the way forth" in done.stdout and "Reactions, on the way back" in done.stdout
+    assert "Swing" in done.stdout and "dead centres" not in done.stdout  # its ends are those of the range
     result = json.loads((tmp_path / "out" / "linkage.json").read_text("utf-8"))
     forth, back = (np.array(r["over_the_way"]["tau"]["value"]) for r in (result, result["back"]))
     q = np.array(result["over_the_way"]["driver"]["value"])

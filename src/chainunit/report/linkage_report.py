@@ -187,7 +187,7 @@ def _ends(s: b.Source, f: LinkageFindings, path: str, head: str, whole: str, way
         for name in s.result[path]
     )  # fmt: skip
     heads = [b.Column(words, form="long" if key == "forth" else "both") for words, key in columns]
-    return b.Table(rows, (b.Column(head), *heads), title=f"{capital(whole)} and dead centres")
+    return b.Table(rows, (b.Column(head), *heads), title=f"{capital(whole)}{' and dead centres' * turns}")
 
 
 def _reversals(s: b.Source, f: LinkageFindings, path: str) -> Iterator[b.Block]:

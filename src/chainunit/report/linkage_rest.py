@@ -25,7 +25,7 @@ _KINDS = {
 }
 _MARKERS = {STABLE: "o", STOP: "s", UNSTABLE: "x", SADDLE: "+"}
 _AT_DRIVER = frozenset(("place", "end", "holding", "stiffness", "inertia", "friction", "peak", "peak_at"))
-"""The quantities whose units are those of the driver."""
+"""The quantities in the units of the driver."""
 
 
 def rest_data(f: LinkageFindings) -> dict[str, Any]:

@@ -222,7 +222,7 @@ def linearize(
     inputs : values by name; all others have their start values
     states : values by name; all others have the values of the model's own start with these inputs
     at : the point in words
-    title : the title of what it models; by default the name of the model
+    title : the title of the study or the machine; by default the name of the model
 
     Raises
     ------

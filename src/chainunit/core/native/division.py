@@ -17,8 +17,8 @@ class Division:
     """Parts of `items`, each of `longest` operations at most.
 
     `parts` are the places of the operations by part, without numbers and arguments, in an order in which each part
-    stands after those that it depends on; `needed_by` has for each part a bit for each of the groups `results` that
-    need it; `slots` are the places in memory of values that pass from one part to another or are results.
+    stands after the parts on which it depends; `needed_by` has for each part a bit for each of the groups `results`
+    that need it; `slots` are the places in memory of values that pass from one part to another or are results.
     """
 
     def __init__(self, items: Sequence[Operation], results: Sequence[Sequence[int]], longest: int) -> None:

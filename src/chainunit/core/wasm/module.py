@@ -64,7 +64,7 @@ def wasm_module(model: type[Model], slopes: bool = True) -> WasmModule:
     Raises
     ------
     InputError
-        for an equation with a function that is not among those of the engines.
+        for an equation with a function that the engines do not have.
     """
     t = trace(model)
     derived = model.derive(casadi_(), t.p) if model.derived_count else []
@@ -83,7 +83,7 @@ def wasm_module(model: type[Model], slopes: bool = True) -> WasmModule:
 def _kernel(
     kernel: ModelFunction, groups: list[list[int]], memory: Places, module: Module, own: OwnFunctions
 ) -> Function:
-    """Write a kernel: a function for each part of its operations, and one that calls those that are needed."""
+    """Write a kernel: a function for each part of its operations, and one that calls the needed parts."""
     operations = Operations(kernel.arguments, kernel.groups)
     items, results = operations.items, operations.results
     division = Division(items, results, _LONGEST)

@@ -5,7 +5,7 @@
 the begin. It writes fewer where the states leave all bounds or a step takes more than ``solver.max_steps`` substeps.
 A model with error control has that (`controlled`); its next substep [s] is in memory at the address ``pace``, which
 ``start()`` sets to 0, as none is known. All others have equal substeps (`rk4`). Substeps are at most `longest` [s],
-or, where that is 0, as long as the model allows. At the end, the states are those of the last row.
+or, where that is 0, as long as the model allows. At the end, the memory has the states of the last row.
 
 ``signals`` is the address of a table, or 0: the number of signals, and from the next 8 bytes on 24 bytes for each:
 the address of an input, the kind of the signal, its number of points or changes, the address of its numbers, and a
