@@ -13,16 +13,14 @@ from html import escape
 from importlib import resources
 from itertools import groupby
 from pathlib import Path
-
-from plotly.io.json import to_json_plotly  # type: ignore[import-untyped]
-from plotly.offline import get_plotlyjs  # type: ignore[import-untyped]
+from typing import Any
 
 from .. import __version__
 from ..core.errors import InputError
 from ..core.files import PAGE, atomic_file
 from ..reading.text import Units, forms
 from . import blocks as b
-from . import motion, page_figures
+from . import motion
 from .figure import Figure
 from .lines import Aside, Line, Name, Number, Piece, Strong, Words, pieces
 from .live_block import Live, LiveMachine
@@ -67,11 +65,7 @@ def render(report: b.Report) -> str:
         if (content := page.blocks(b.of_form(section.blocks, "long")))
     ]
     title = report.title or report.kind
-    figures = {
-        figure.name: json.loads(to_json_plotly(page_figures.page_figure(figure, report.units)))
-        for figure in report.figures
-        if figure.on_page
-    }
+    figures = _figures(report)
     animation = next((block for block in report.blocks("long") if isinstance(block, motion.Animation)), None)
     result = json.dumps(report.result, allow_nan=False, ensure_ascii=False)
     data = {
@@ -126,9 +120,24 @@ def _laid_out(section: b.Section, content: str) -> str:
     return f'<div class="asked">{content}</div>' if section.beside else content
 
 
+def _figures(report: b.Report) -> dict[str, Any]:
+    """The figures of the page by name, as plotly.js takes them."""
+    figures = [figure for figure in report.figures if figure.on_page]
+    if not figures:
+        return {}
+    # a page without figures is written at once
+    from plotly.io.json import to_json_plotly  # type: ignore[import-untyped]
+
+    from .page_figures import page_figure
+
+    return {figure.name: json.loads(to_json_plotly(page_figure(figure, report.units))) for figure in figures}
+
+
 @cache
 def _packed_plotly() -> str:
     """plotly.js, packed."""
+    from plotly.offline import get_plotlyjs  # type: ignore[import-untyped]
+
     return packed_bytes(get_plotlyjs().encode())
 
 
@@ -355,12 +364,13 @@ class _Page:
         return f'<abbr class="from" title="{escape(_origin_words(value.origin))}">{value.origin[0]}</abbr>'
 
     def _figure(self, figure: Figure) -> str:
-        height = page_figures.height(figure)
+        from .page_figures import height
+
         return (
             f'<figure class="plot-box{" half" if figure.half else ""}">'
             f'<h3 id="{figure.name}-title">{escape(figure.title)}</h3>'
             f'<div class="plot" id="plot-{figure.name}" data-figure="{figure.name}" role="img" '
-            f'aria-label="{escape(figure.alt)}" style="height:{height}px"></div>'
+            f'aria-label="{escape(figure.alt)}" style="height:{height(figure)}px"></div>'
             f"<figcaption>{self.line(figure.caption)}</figcaption></figure>"
         )
 
