@@ -122,6 +122,27 @@ def fmu_type(fmu, name):
     return next(v.tag for v in fmu.description.find("ModelVariables") if v.get("name") == name)
 
 
+def test_counts_and_switches_have_their_types(tmp_path):
+    """Pole pairs and the switch of the inverter: set, read, and felt by the motor."""
+    from component_host import FailedError
+
+    fmu = opened(export_native(MODELS["InductionMotor"], tmp_path / "motor.fmu", fmi=3, wasm=True))
+    pairs, inverter = (fmu.references[name] for name in ("pole_pairs", "inverter.on"))
+    speeds = []
+    for count in (1, 2):
+        unit = fmu.made("co-simulation", False, False, [])
+        unit.set_int32([pairs], [count])
+        assert unit.get_boolean([inverter]) == [False]
+        unit.set_boolean([inverter], [True])
+        assert unit.get_boolean([inverter, inverter]) == [True, True] and unit.get_int32([pairs]) == [count]
+        unit.set_boolean([inverter], [False])
+        with pytest.raises(FailedError):
+            unit.set_float64([pairs], [2.0])
+        run(begin(unit), 100, 1e-3, {}, ["w"])
+        speeds += unit.get("w")
+    assert speeds[0] != speeds[1] and all(np.isfinite(speeds))
+
+
 def test_model_exchange_equals_the_native_library(motor):
     fmu = opened(motor)
     unit, native = fmu.made("model-exchange"), Native(motor, FMU3Model)
