@@ -314,14 +314,14 @@ STATES("get-continuous-states", ContinuousStates, (size_t)model.n_x)
 STATES("get-nominals-of-continuous-states", NominalsOfContinuousStates, (size_t)model.n_x)
 STATES("get-event-indicators", EventIndicators, 0)
 
-#define NUMBER(name, function)                                               \
+#define SIZE_OF(name, function)                                              \
     CALL(name) const void *component_##function(fmi3Instance c) {            \
         size_t n = 0;                                                        \
         const fmi3Status status = fmi3Get##function(c, &n);                  \
         return number_or(status, n);                                         \
     }
-NUMBER("get-number-of-event-indicators", NumberOfEventIndicators)
-NUMBER("get-number-of-continuous-states", NumberOfContinuousStates)
+SIZE_OF("get-number-of-event-indicators", NumberOfEventIndicators)
+SIZE_OF("get-number-of-continuous-states", NumberOfContinuousStates)
 
 CALL("completed-integrator-step") const void *component_completed(fmi3Instance c, int no_set) {
     static struct {

@@ -18,16 +18,9 @@ _PRIMITIVE = {name: bytes([0x7F - k]) for k, name in enumerate(_NUMBERS)}
 _OF_TYPES = {"list": b"\x70", "tuple": b"\x6f", "option": b"\x6b", "result": b"\x6a"}
 _HANDLES = {"own": b"\x69", "borrow": b"\x68"}
 
-CORE_FUNCTION, CORE_MEMORY, CORE_MODULE, CORE_INSTANCE = (
-    "core function",
-    "core memory",
-    "core module",
-    "core instance",
-)
+CORE_FUNCTION, CORE_MEMORY = "core function", "core memory"
 FUNCTION, TYPE, INSTANCE = "function", "type", "instance"
-_SORTS = {
-    CORE_FUNCTION: b"\x00\x00", CORE_MEMORY: b"\x00\x02", FUNCTION: b"\x01", TYPE: b"\x03", INSTANCE: b"\x05",
-}  # fmt: skip
+_SORTS = {FUNCTION: b"\x01", TYPE: b"\x03", INSTANCE: b"\x05"}
 _CORE_SORTS = {CORE_FUNCTION: b"\x00", CORE_MEMORY: b"\x02"}
 
 
@@ -162,7 +155,7 @@ class Component(Scope):
 
     def module(self, content: bytes) -> int:
         """A core module."""
-        return self._part(1, content, CORE_MODULE)
+        return self._part(1, content, "core module")
 
     def component(self, content: Component) -> int:
         """A component inside."""
@@ -171,12 +164,12 @@ class Component(Scope):
     def core_instance(self, module: int, imports: Mapping[str, int]) -> int:
         """An instance of a core module, with the core instances for its imports, by the name of their module."""
         given = [name_of(name) + b"\x12" + unsigned(index) for name, index in imports.items()]
-        return self._one(2, b"\x00" + unsigned(module) + vector(given), CORE_INSTANCE)
+        return self._one(2, b"\x00" + unsigned(module) + vector(given), "core instance")
 
     def core_functions(self, functions: Mapping[str, int]) -> int:
         """A core instance of core functions."""
         exports = [name_of(name) + b"\x00" + unsigned(index) for name, index in functions.items()]
-        return self._one(2, b"\x01" + vector(exports), CORE_INSTANCE)
+        return self._one(2, b"\x01" + vector(exports), "core instance")
 
     def core_export(self, instance: int, name: str, kind: str = CORE_FUNCTION) -> int:
         """A function or memory that a core instance exports."""

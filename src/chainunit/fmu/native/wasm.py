@@ -221,15 +221,8 @@ def component(core: bytes) -> bytes:
     def lift(function: int, of_type: int) -> int:
         return whole.lifted(function, of_type, memory, of_main("realloc"), of_main("done"))
 
-    version = whole.function_type({}, "string")
-    common = Component()
-    imported = common.imported_function("get-version", common.function_type({}, "string"))
-    common.exported("get-version", FUNCTION, imported, common.function_type({}, "string"))
-    inner = whole.component(common)
-    common_instance = whole.instance(
-        inner, {"get-version": (FUNCTION, lift(of_main("get-version"), version))}
-    )
-    whole.exported(_PACKAGE.format("common"), INSTANCE, common_instance)
+    version = {"get-version": (FUNCTION, lift(of_main("get-version"), whole.function_type({}, "string")))}
+    whole.exported(_PACKAGE.format("common"), INSTANCE, whole.instance(whole.component(_common()), version))
     for kind, (making, record, fields, functions) in _INTERFACES.items():
         resource = f"{kind}-instance"
         whole.named |= {resource: resources[kind], record: whole.record(_split(fields))}
@@ -246,6 +239,14 @@ def component(core: bytes) -> bytes:
         named = whole.component(_named(resource, record, fields, every))
         whole.exported(_PACKAGE.format(kind), INSTANCE, whole.instance(named, inside))
     return whole.content
+
+
+def _common() -> Component:
+    """The component that names the function of the interface without instances."""
+    inside = Component()
+    of_type = inside.function_type({}, "string")
+    inside.exported("get-version", FUNCTION, inside.imported_function("get-version", of_type), of_type)
+    return inside
 
 
 def _shared_types(scope: Scope) -> Iterator[str]:
