@@ -297,6 +297,7 @@
   };
   const whole = data.runs || data.without_runs ? "study" : "file";
   for (const each of document.querySelectorAll(".live-whole")) each.textContent = whole;
+  if (!data.turn.turns) byId("live-turn-title").textContent = `Over the way of the ${data.turn.driver}, forth at constant speed`;
   const ofTurn = data.turn.results.filter((r) => !r.group), ofPins = data.turn.results.filter((r) => r.group);
   const cells = tableOf("live-results", ["", "now", `the ${whole}'s`, "change"], ofTurn);
   const pinCells = tableOf("live-pins", ["largest force in a pin", "now", `the ${whole}'s`, "change"], ofPins);
@@ -311,23 +312,23 @@
     });
   const baseTurn = model.turn(study), base = model.results(baseTurn);
   const placeUnit = data.turn.place;
-  // every third place, and the begin of the next turn, are enough for a plot
-  const EVERY = 3;
-  const xs = (turn) => {
-    const x = Array.from({ length: Math.ceil(turn.count / EVERY) }, (_, k) => placeUnit.factor * turn.place[EVERY * k] + placeUnit.offset);
+  // one of so many places, and the begin of the next turn
+  const xs = (turn, every) => {
+    const x = Array.from({ length: Math.ceil(turn.count / every) }, (_, k) => placeUnit.factor * turn.place[every * k] + placeUnit.offset);
     return data.turn.turns ? [...x, 2 * Math.PI * placeUnit.factor] : x;
   };
-  const ys = (turn, column, by, offset) => {
-    const y = Array.from({ length: Math.ceil(turn.count / EVERY) }, (_, k) => by * column[EVERY * k] + offset);
+  const ys = (turn, every, column, by, offset) => {
+    const y = Array.from({ length: Math.ceil(turn.count / every) }, (_, k) => by * column[every * k] + offset);
     return data.turn.turns ? [...y, y[0]] : y;
   };
   const angleTicks = (low, high) => (high - low > 350 ? [0, 45, 90, 135, 180, 225, 270, 315, 360] : nice(low, high, 7));
   const turnPlots = data.turn.curves.map((c) => new Plot(byId("live-turn-plots"), c.title, `${data.turn.driver} ${data.turn.effort === "force" ? "place" : "angle"} in ${placeUnit.unit}`, placeUnit.unit === "°" ? angleTicks : null));
   const curvesOf = (c, turn, behind) => {
     const list = c.curves === "forces" ? ofPins.map((r) => ({ title: r.title, of: r.of, by: "" })) : c.curves;
+    const every = list.length > 2 ? 3 : 1;
     return list.map((each, look) => {
       const by = c.factor * model.factorOf(each.by, turn), column = turn.columns[each.of];
-      return { title: behind ? "" : each.title, look, x: xs(turn), y: ys(turn, column, by, c.offset), behind };
+      return { title: behind ? "" : each.title, look, x: xs(turn, every), y: ys(turn, every, column, by, c.offset), behind };
     });
   };
   const showTurn = (turn, isStudy) => {

@@ -21,7 +21,7 @@ from ...study.drive_tables import DriveTables
 from ...study.event import Event
 from ...study.parts import LENGTHS
 from ...study.proposal import DriveProposal
-from ...study.registry import registered
+from ...study.registry import parts_of_line, registered
 from ...study.sections import Run
 from ...study.study_file import changed_tables
 from ..live_block import LiveMachine
@@ -184,6 +184,9 @@ def _copied(
         copied["start"] = tables.start
         if drive.added_inertia:
             copied.setdefault("flywheel", {})["J"] = drive.added_inertia
+    for part in parts_of_line():
+        if (placed := drive.line.part(part.name)) is not None:
+            copied = part.settled(copied, placed)
     copied["event"] = [_entry(event) for event in config.events.values()]
     return copied
 

@@ -35,7 +35,8 @@ const liveModel = async (data, bytes) => {
   const quantities = data.quantities, study = quantities.map((q) => q.value);
   const placeOf = (role) => quantities.findIndex((q) => q.role === role);
   const speedAt = placeOf("speed"), ratioAt = placeOf("ratio");
-  const baseRatio = turnKernel.has("ratio") ? turnKernel.get("ratio") : 1;
+  for (const [name, value] of Object.entries(data.turn.parameters)) turnKernel.set(name, value);
+  const baseRatio = data.turn.parameters.ratio ?? 1;
 
   /* numbers as people read them */
   const digits = (x, n = 3) => {

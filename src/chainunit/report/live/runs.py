@@ -74,11 +74,9 @@ def live_runs(
     inputs = {v.name: float(v.quantity.start or 0.0) for v in model.input_layout.variables}
     inputs |= input_starts(rig.graph, model) | rig.normal
     bond = drive.machine_bond
-    torques = {
-        f"{name}.{flange.members['tau']}": None
-        for name, flange in zip((bond.machine, bond.driver), bond.flanges, strict=True)
-        if "tau" in flange.members
-    }
+    driver, driven = bond.flanges
+    sides = ((bond.machine, driven), (bond.driver, driver))
+    torques = (f"{name}.{flange.members['tau']}" for name, flange in sides if "tau" in flange.members)
     torque = next(name for name in torques if name in columns)
     run = operation.run
     data = {

@@ -67,6 +67,7 @@ def live_turn(machine: Machine, speed: float, units: Units) -> LiveTurn:
     )
     driver = whole.linkage.driver
     data = {
+        "parameters": machine.by_name,
         "turns": bool(model.turns),
         "span": [low, high],
         "places": ANGLES if model.turns else _ON_THE_WAY,
