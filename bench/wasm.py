@@ -2,27 +2,33 @@
 # Models as WebAssembly
 #
 # The size of a model's module without slopes, packed by zlib too, the time to write it, and for all outputs at one
-# state in node; and the time of a jam of the packaged drive over 4 s with a row every millisecond.
+# state in node; and the time of a jam of the packaged drive over 4 s with a row every millisecond: in node, and from
+# Python where there is no C compiler, by wasmtime and by FMUs in Python.
 
 # %%
 from __future__ import annotations
 
 import sys
+import tempfile
 import time
 import zlib
 from pathlib import Path
+from typing import Any
 
+from figures import least
 from rich.console import Console
 from rich.table import Table
 
+from chainunit.batch import transients
 from chainunit.core.model import Model
+from chainunit.core.native.compilers import compiler
 from chainunit.core.symbolic_trace import trace
 from chainunit.core.wasm.module import WasmModule, wasm_module
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.models import MODELS, model_named
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
-from chainunit.system import Profile, compiled
+from chainunit.system import CompiledSimulation, CoSimulation, Profile, Simulation, System, compiled, export
 
 ROOT = Path(__file__).parents[1]
 sys.path.append(str(ROOT / "tests"))
@@ -74,11 +80,40 @@ def jam() -> None:
     run = next(step for step in steps if step[:2] == ("call", "run"))
     start = prepared(module, model.parameter_layout.values(whole.parameters), inputs)
     timed = ("time", "run", run[2], ROUNDS, 1)
-    least = in_node(module.content, [*start, *steps[: steps.index(run)], run, timed])[-1]
+    fastest = in_node(module.content, [*start, *steps[: steps.index(run)], run, timed])[-1]
     print(
         f"DC motor on the chain unit, one module of {len(module.content) / 1e3:.1f} kB: 4 s of a jam with 4001 rows "
-        f"in {least / 1e3:.0f} ms."
+        f"in {fastest / 1e3:.0f} ms in node."
     )
+    ways = from_python(drive, drive.loads(config.feed) | signals, names)
+    print("From Python: " + ", ".join(f"{name} {1e3 * took:.0f} ms" for name, took in ways.items()))
+    print(f"wasmtime is {ways['FMUs in Python'] / ways['wasmtime']:.0f} times as fast as FMUs in Python")
+
+
+def from_python(drive: Drive, signals: dict[str, Any], names: list[str]) -> dict[str, float]:
+    """The least time of the jam by each way [s]."""
+    times = {}
+
+    def timed(way: str, kind: type[Simulation], system: System, rounds: int) -> None:
+        with kind(system, signals) as simulation:
+            simulation.save()
+
+            def whole() -> None:
+                simulation.restore()
+                simulation.run(4.0, 1e-3, names=names)
+
+            times[way] = least(whole, rounds).wall
+
+    with tempfile.TemporaryDirectory() as folder:
+        for way, backend, rounds in (("native FMUs", "native", ROUNDS), ("FMUs in Python", "python", 2)):
+            if backend == "python" or compiler():
+                system, _ = export(drive.graph, Path(folder) / backend, backend)
+                timed(way, CoSimulation, system, rounds)
+    if compiler():
+        timed("native code as one system", CompiledSimulation, drive.graph, ROUNDS)
+    transients.compiler = lambda: None
+    timed("wasmtime", CompiledSimulation, drive.graph, ROUNDS)
+    return times
 
 
 def main() -> None:

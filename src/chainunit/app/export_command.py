@@ -45,6 +45,12 @@ def export(
             help="Comma-separated, of linux64, win64, darwin64, aarch64-linux, or all; this machine's by default.",
         ),
     ] = None,
+    wasm: Annotated[
+        bool,
+        typer.Option(
+            "--wasm", help="With --fmi 3: for WebAssembly too, by zig, as the draft FMI-LS-WASM says."
+        ),
+    ] = False,
     rods: Annotated[
         int | None,
         typer.Option(
@@ -85,6 +91,7 @@ def export(
             backend=kind,
             fmi=fmi,
             platforms=_platforms(platforms, fmi),
+            wasm=wasm,
             progress=status.update,
         )
     print(f"{file}: {model.name}, {made}")

@@ -1,4 +1,5 @@
 """Transients of a model in blocks: many runs side by side, in one native loop without Python between the steps.
+Without a C compiler its WebAssembly module makes them, where ``wasmtime`` is installed.
 
 Runs differ in parameters, states at the start, signals, and end. Each is integrated by the method of the model's FMU,
 with equal steps or with error control of its own (`chainunit.core.integrators`), and its signals are evaluated at
@@ -35,6 +36,7 @@ from ..core.symbolic_trace import outputs_of, trace
 from .equations import arguments_of, find, names_of
 from .native import load, threads
 from .vector_code import VectorCode, c_file
+from .wasm_loop import WasmLoop, has_wasmtime
 
 _NUMBERS = (
     "RK4_NODES RK4_WEIGHTS NODES STAGES ERRORS SHORTEST FIRST SAFETY ERROR_POWER LEAST_GROWTH MOST_GROWTH NO_ERROR"
@@ -101,11 +103,40 @@ class Runs:
         )
 
 
-def _filled(x: Any, runs: int, *shape: int) -> Any:
-    """The values of all runs, filled up to whole vectors by the values of the last run; a new array of the shape
-    (*shape, lanes)."""
-    full = np.broadcast_to(np.asarray(x, float), (*shape, runs))
-    return np.ascontiguousarray(np.concatenate([full, np.repeat(full[..., -1:], -runs % _LANES, -1)], -1))
+def can_run() -> bool:
+    """Whether there is a loop for runs: a C compiler, or ``wasmtime``."""
+    return compiler() is not None or has_wasmtime()
+
+
+def only_wasm() -> bool:
+    """Whether ``wasmtime`` is the only loop for runs."""
+    return compiler() is None and has_wasmtime()
+
+
+class _NativeLoop:
+    """The compiled loop, with the `digest` of its source; `names` are its uniform arguments, and the number of runs
+    is filled up to a multiple of `lanes`."""
+
+    lanes = _LANES
+
+    def __init__(self, digest: str, library: ctypes.CDLL, names: Sequence[str]) -> None:
+        self.digest, self.names, self._library = digest, names, library
+
+    def __call__(
+        self,
+        runs: tuple[int, int],
+        numbers: Sequence[float],
+        arrays: Sequence[Any],
+        x: Any,
+        out: Any,
+        count: Any,
+    ) -> None:
+        """See `WasmLoop`."""
+        self._library.transients(
+            *map(ctypes.c_long, (*runs, *out.shape[1:])),
+            *map(ctypes.c_double, numbers),
+            *(ctypes.c_void_p(array.ctypes.data) for array in (*arrays, x, out, count)),
+        )
 
 
 class Transients:
@@ -123,7 +154,8 @@ class Transients:
     Raises
     ------
     InputError
-        for an unknown name, a model without states, and where there is no C compiler.
+        for an unknown name, a model without states, where there is neither a C compiler nor ``wasmtime``, and for
+        directions without a C compiler.
     """
 
     def __init__(
@@ -142,12 +174,18 @@ class Transients:
         self.model, self.outputs = model, tuple(outputs)
         self._varying, self._driven, self._guarded = tuple(varying), tuple(driven), tuple(guarded)
         self._changes, self._by = changes, tuple(by)
-        own = compiler()
-        if own is None:
-            raise InputError("no C compiler (cc, gcc, clang, or zig by pip install 'chainunit[cross]') found")
-        self.digest, self._library, self._inputs = _compiled(
-            model, self.outputs, self._varying, self._driven, self._guarded, self._by, changes, own
-        )
+        chosen = self.outputs, self._varying, self._driven, self._guarded
+        self._loop: _NativeLoop | WasmLoop
+        if own := compiler():
+            self._loop = _compiled(model, *chosen, self._by, changes, own)
+        elif has_wasmtime() and not by:
+            self._loop = WasmLoop(model, *chosen, changes)
+        else:
+            wasm = "" if by else ", and no wasmtime (pip install 'chainunit[wasm]')"
+            raise InputError(
+                f"no C compiler (cc, gcc, clang, or zig by pip install 'chainunit[cross]'){wasm} found"
+            )
+        self.digest = self._loop.digest
 
     def run(
         self,
@@ -188,15 +226,15 @@ class Transients:
         begin = np.broadcast_to(np.asarray(begin, float), runs)
         rows = 1 + max(0, math.ceil(float(np.max(stop - begin)) / step - 1e-9))
         x = np.asarray(states, float)
-        x = _filled(x if x.ndim == 2 else x[:, None], runs, len(x))
+        x = self._filled(x if x.ndim == 2 else x[:, None], runs, len(x))
         room = x.shape[-1]
         arrays = [
             self._uniform(parameters, inputs),
             self._given(varying, directions, runs),
-            _filled(signals if self._driven else 0.0, runs, len(self._driven), 1 + 3 * self._changes),
-            _filled(begin, runs),
-            _filled(stop, runs),
-            _filled(np.inf if limits is None or not self._guarded else limits, runs, len(self._guarded)),
+            self._filled(signals if self._driven else 0.0, runs, len(self._driven), 1 + 3 * self._changes),
+            self._filled(begin, runs),
+            self._filled(stop, runs),
+            self._filled(np.inf if limits is None or not self._guarded else limits, runs, len(self._guarded)),
         ]
         out = np.empty((len(self.outputs) * (2 if self._by else 1), room, rows))
         count = np.zeros(room, np.int64)
@@ -209,13 +247,10 @@ class Transients:
         ]
 
         def piece(ends_of: tuple[int, int]) -> None:
-            self._library.transients(
-                *map(ctypes.c_long, (*ends_of, room, rows)),
-                *map(ctypes.c_double, numbers),
-                *(ctypes.c_void_p(array.ctypes.data) for array in (*arrays, x, out, count)),
-            )
+            self._loop(ends_of, numbers, arrays, x, out, count)
 
-        pieces = [(r, r + _LANES) for r in range(0, room, _LANES)]
+        lanes = self._loop.lanes
+        pieces = [(r, r + lanes) for r in range(0, room, lanes)]
         if workers == 1:
             piece((0, room))
         else:
@@ -225,17 +260,24 @@ class Transients:
         table, slopes = out[: len(self.outputs), :runs], out[len(self.outputs) :, :runs]
         return Runs(table, slopes if self._by else None, np.abs(count), count < 0, x[:, :runs], times)
 
+    def _filled(self, x: Any, runs: int, *shape: int) -> Any:
+        """The values of all runs, filled up to whole vectors by the values of the last run; a new array of the shape
+        (*shape, lanes)."""
+        full = np.broadcast_to(np.asarray(x, float), (*shape, runs))
+        more = np.repeat(full[..., -1:], -runs % self._loop.lanes, -1)
+        return np.ascontiguousarray(np.concatenate([full, more], -1))
+
     def _given(self, varying: Any, directions: Any, runs: int) -> Any:
         """The values that runs have for themselves: varying parameters, and directions."""
         parts = [(varying, len(self._varying)), (directions, len(self._by))]
-        return np.concatenate([_filled(x if n else 0.0, runs, n) for x, n in parts])
+        return np.concatenate([self._filled(x if n else 0.0, runs, n) for x, n in parts])
 
     def _uniform(self, parameters: Any, inputs: Mapping[str, float]) -> Any:
         """The uniform arguments in the order of the code."""
         model = self.model
         own = {v.name: v.quantity.start for v in arguments_of(model)}
         own |= model.parameter_layout.by_name(parameters) | dict(inputs)
-        return np.array([own[name] for name in self._inputs] or [0.0], float)
+        return np.array([own[name] for name in self._loop.names] or [0.0], float)
 
 
 @lru_cache(maxsize=32)
@@ -248,8 +290,8 @@ def _compiled(
     by: tuple[str, ...],
     changes: int,
     compiler: Compiler,
-) -> tuple[str, ctypes.CDLL, list[str]]:
-    """A digest of the source of the loop, its library, and the names of its uniform arguments."""
+) -> _NativeLoop:
+    """The compiled loop."""
     operations = _operations(model, outputs, by)
     assert model.state_layout is not None
     sides = 2 if by else 1
@@ -309,7 +351,7 @@ def _compiled(
     names = [v.name for v in arguments_of(model)]
     starts = (0, sizes[0], sum(sizes))
     digest = hashlib.sha256(source.encode()).hexdigest()
-    return digest, load(source, compiler), [names[starts[kind] + k] for kind, k in code.inputs]
+    return _NativeLoop(digest, load(source, compiler), [names[starts[kind] + k] for kind, k in code.inputs])
 
 
 def _method(model: type[Model], operations: Operations) -> str:

@@ -35,6 +35,7 @@ def export(
     backend: Backend | None = None,
     fmi: int = 2,
     platforms: Sequence[str] = (),
+    wasm: bool = False,
     progress: Callable[[str], None] = lambda what: None,
 ) -> Origin:
     """Write `model` as an FMU; the result tells which backend made it, and why.
@@ -44,7 +45,7 @@ def export(
     model, file, start : see `chainunit.fmu.export.export`
     backend : "native" or "python"; by default native where a C compiler is found and works
     fmi : 2 or 3; 3 only by the native backend
-    platforms, progress : see `chainunit.fmu.native.export.export`; platforms only by the native backend
+    platforms, wasm, progress : see `chainunit.fmu.native.export.export`; the first two only by the native backend
 
     Raises
     ------
@@ -55,17 +56,19 @@ def export(
         raise InputError(f"fmi = {fmi}: must be 2 or 3")
     if backend not in (None, *get_args(Backend)):
         raise InputError(f"backend = {shown(backend)}: must be {one_of(backend, get_args(Backend))}")
+    if wasm and backend == "python":
+        raise InputError("--wasm needs the native backend; leave out --backend python")
     if backend == "python":
         return _by_python(model, file, start, fmi, platforms, "")
-    if backend is None and not platforms and not targets.compiles(fmi):
+    if backend is None and not platforms and not wasm and not targets.compiles(fmi):
         return _by_python(model, file, start, fmi, platforms, ", no C compiler for this machine found")
     names, compiler = targets.choose(platforms, fmi)
     try:
-        native.export(model, file, start, fmi=fmi, platforms=platforms, progress=progress)
+        native.export(model, file, start, fmi=fmi, platforms=platforms, wasm=wasm, progress=progress)
     except WriteError:
         raise
     except RunError:
-        if backend or fmi != 2 or platforms:
+        if backend or fmi != 2 or platforms or wasm:
             raise
         return _by_python(model, file, start, fmi, platforms, f", the C compiler {compiler.name} failed")
     words = f"FMI {fmi}.0, Co-Simulation and Model Exchange, native code by {compiler.name}"
@@ -73,6 +76,8 @@ def export(
         words += " for " + ", ".join(f"{name} ({targets.PLATFORMS[name].tests})" for name in names)
     elif backend is None:
         words += ", the C compiler found here"
+    if wasm:
+        words += ", and for WebAssembly (run in wasmtime)"
     return Origin("native", words)
 
 

@@ -107,7 +107,7 @@ class BlockRuns:
     Raises
     ------
     InputError
-        where a component of the system is an FMU, and where there is no C compiler.
+        where a component of the system is an FMU, and where there is neither a C compiler nor ``wasmtime``.
     """
 
     def __init__(

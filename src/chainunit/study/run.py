@@ -18,7 +18,7 @@ from ..fmu.backends import Backend
 from ..reading.text import number, shown_in
 from ..system import Simulation
 from ..work.progress import Progress, TaskProgress, quiet
-from . import verdict
+from . import verdict, without_compiler
 from .analyses import all_analyses
 from .analysis import Work
 from .bearings import pin_loads
@@ -90,13 +90,11 @@ def run_study(
         files, study.fmus = export_drive(
             drive, folder / "fmu", backend, lambda what: progress(what, 0.0, 1.0)
         )
+        rig = Rig(config.operation, drive, files)
         if backend is None and "python" in {origin.backend for origin in study.fmus.values()}:
-            study.note(
-                "no compiler",
-                "No C compiler was found: the FMUs run in Python. With one the runs take about a tenth of the time: "
-                "install gcc or clang, or the compiler that comes with pip install 'chainunit[cross]'.",
-            )
-        runner = Runner(study, Rig(config.operation, drive, files), progress)
+            rig, words = without_compiler.rig_and_note(rig, config.events.values())
+            study.note("no compiler", words)
+        runner = Runner(study, rig, progress)
         with _ending(study):
             runner.run(check, lambda: export_coasting(drive, folder / "fmu", backend))
             work = Work(runner.rig, progress, folder, scheduler, runner.stop)

@@ -1,4 +1,4 @@
-"""A compiled system that runs: the same calls as the co-simulation of its FMUs, in one native loop, without FMUs."""
+"""A compiled system that runs: the same calls as the co-simulation of its FMUs, in one loop, without FMUs."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class CompiledSimulation(Simulation):
     Raises
     ------
     InputError
-        where a component is an FMU, for an unknown input, and where there is no C compiler.
+        where a component is an FMU, for an unknown input, and where there is neither a C compiler nor ``wasmtime``.
     """
 
     def __init__(

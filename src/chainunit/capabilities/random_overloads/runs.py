@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ... import __version__
-from ...core.native.compilers import compiler
+from ...batch.transients import can_run
 from ...core.quantities import Layout, Value, declaration, quantity, variables
 from ...core.temporary_folders import remove_folder, temporary_folder
 from ...machines.chain_unit import SIDES, SideName
@@ -82,8 +82,8 @@ QUANTILES = (0.05, 0.5, 0.95, 0.99)
 class RandomTask:
     """The data that a worker needs: the plan of the runs, the drive with its FMUs, the time of the steady state [s].
 
-    The runs are made on the compiled system; without a C compiler, or if they are to be `cosimulated`, by the
-    co-simulation of the FMUs.
+    The runs are made on the compiled system; without a loop for it (`chainunit.batch.transients.can_run`), or if they
+    are to be `cosimulated`, by the co-simulation of the FMUs.
     """
 
     plan: RandomPlan
@@ -94,7 +94,7 @@ class RandomTask:
     @property
     def is_compiled(self) -> bool:
         """Whether the runs are made on the compiled system."""
-        return not self.cosimulated and compiler() is not None
+        return not self.cosimulated and can_run()
 
     @property
     def files(self) -> Mapping[str, Path]:
@@ -175,7 +175,7 @@ class Parcel:
         Raises
         ------
         InputError
-            where a worker has no C compiler for the compiled system.
+            where a worker has neither a C compiler nor ``wasmtime`` for the compiled system.
         """
         if self.states is not None:
             return self.task.block(self.states)

@@ -12,8 +12,8 @@ import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from ...batch.transients import can_run
 from ...core.errors import InputError
-from ...core.native.compilers import compiler
 from ...drives.catalogue import CatalogueMotor, catalogue
 from ...drives.gear_ratios import UNITS, nearest
 from ...fmu.backends import Backend
@@ -137,9 +137,9 @@ def check_ratios(ratios: Sequence[float], crank_speed: float, motors: Sequence[C
 def _with_files(
     trials: MotorTrials, motor: CatalogueMotor, folder: Path, progress: TaskProgress, backend: Backend | None
 ) -> MotorTrials:
-    """The trials of motors such as this one: on the compiled system where there is a compiler, else by FMUs."""
+    """The trials of motors such as this one: on the compiled system where there is a loop for it, else by FMUs."""
     drive = trials.candidate(motor).drive
-    if compiler() is not None and backend != "python" and not drive.foreign_titles:
+    if can_run() and backend != "python" and not drive.foreign_titles:
         return trials
     files, _ = export_drive(drive, folder, backend, lambda what: progress(what, 0.0, 1.0))
     return dataclasses.replace(trials, files=files)

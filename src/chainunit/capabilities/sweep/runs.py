@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from ...batch.transients import can_run
 from ...core.errors import Faults, InputError
-from ...core.native.compilers import compiler
 from ...core.quantities import Layout
 from ...study.block_runs import BlockRuns, Cause, EventRun, RunPoint
 from ...study.event import Event
@@ -30,7 +30,7 @@ def check_drive(rig: Rig, plan: SweepPlan, event: Event) -> None:
     ------
     InputError
         for an event that the drive cannot have, for a swept quantity that changes no run or is not one number of the
-        drive, and where there is no C compiler.
+        drive, and where there is neither a C compiler nor ``wasmtime``.
     """
     faults = Faults()
     if not rig.takes(event):
@@ -47,14 +47,10 @@ def check_drive(rig: Rig, plan: SweepPlan, event: Event) -> None:
         if words:
             line = f"sweep.parameter: {name} {words}; leave it out, or sweep it without measures"
             faults.add([InputError(line, "sweep.parameter")])
-    if compiler() is None:
-        faults.add(
-            [
-                InputError(
-                    "sweep.measures: need a C compiler, and there is none; leave them out", "sweep.measures"
-                )
-            ]
-        )
+    if not can_run():
+        words = "need a C compiler, or wasmtime (pip install 'chainunit[wasm]'), and there is neither"
+        line = f"sweep.measures: {words}; install one, or leave them out"
+        faults.add([InputError(line, "sweep.measures")])
     faults.refuse()
 
 

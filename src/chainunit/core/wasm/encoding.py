@@ -1,7 +1,8 @@
 """The binary format of WebAssembly: functions from instructions, and a module from functions.
 
-A module needs nothing from its host. It has one memory, which it exports, and uses what every engine has since 2021:
-version 1 of the format, functions with several results, and copies of memory.
+A module has one memory, which it exports, and needs nothing from its host, unless it is written with imports. It
+uses features that every engine has since 2021: version 1 of the format, functions with several results, and copies of
+memory.
 """
 
 from __future__ import annotations
@@ -54,6 +55,11 @@ def signed(n: int) -> bytes:
 def vector(items: Sequence[bytes]) -> bytes:
     """A number of items, and the items."""
     return unsigned(len(items)) + b"".join(items)
+
+
+def name_of(text: str) -> bytes:
+    """A name: its length and its bytes."""
+    return unsigned(len(text.encode())) + text.encode()
 
 
 class Function:
@@ -203,16 +209,23 @@ class Module:
     def __init__(self) -> None:
         self.functions: list[Function] = []
         self.exports: dict[str, Function] = {}
+        self._imports: list[tuple[bytes, Function]] = []
         self._content: list[tuple[int, bytes]] = []
 
     def function(
         self, parameters: Sequence[Type] = (), results: Sequence[Type] = (), export: str = ""
     ) -> Function:
         """A new function without instructions, exported by a name where one is given."""
-        function = Function(len(self.functions), parameters, results)
+        function = Function(len(self._imports) + len(self.functions), parameters, results)
         self.functions.append(function)
         if export:
             self.exports[export] = function
+        return function
+
+    def imported(self, host: str, name: str, parameters: Sequence[Type], results: Sequence[Type]) -> Function:
+        """A function of another module, which is known by the name `host`; all of them before the own functions."""
+        function = Function(len(self._imports), parameters, results)
+        self._imports.append((name_of(host) + name_of(name), function))
         return function
 
     def fill(self, address: int, numbers: Sequence[float]) -> None:
@@ -220,9 +233,14 @@ class Module:
         if numbers:
             self._content.append((address, struct.pack(f"<{len(numbers)}d", *numbers)))
 
-    def bytes_of(self, memory: int) -> bytes:
-        """The module, with so many bytes of memory, filled up to pages."""
-        types = sorted({each.type for each in self.functions})
+    def bytes_of(self, memory: int, memory_host: str = "") -> bytes:
+        """The module, with so many bytes of memory, filled up to pages; the memory is the module's own, or that of
+        the module with the name `memory_host`."""
+        pages = b"\x00" + unsigned(-(-memory // PAGE))
+        types = sorted({each.type for each in (*self.functions, *(each for _, each in self._imports))})
+        imports = [name + b"\x00" + unsigned(types.index(each.type)) for name, each in self._imports]
+        if memory_host:
+            imports.append(name_of(memory_host) + name_of("memory") + b"\x02" + pages)
         exports = [_named(name, 0x00, each.index) for name, each in self.exports.items()]
         content = [
             b"\x00\x41" + signed(address) + b"\x0b" + unsigned(len(data)) + data
@@ -230,9 +248,10 @@ class Module:
         ]
         sections = {
             1: vector(types),
+            **({2: vector(imports)} if imports else {}),
             3: vector([unsigned(types.index(each.type)) for each in self.functions]),
-            5: vector([b"\x00" + unsigned(-(-memory // PAGE))]),
-            7: vector([_named("memory", 0x02, 0), *exports]),
+            5: vector([] if memory_host else [pages]),
+            7: vector([*([] if memory_host else [_named("memory", 0x02, 0)]), *exports]),
             10: vector([each.body for each in self.functions]),
             11: vector(content),
         }
@@ -241,5 +260,4 @@ class Module:
 
 
 def _named(name: str, kind: int, index: int) -> bytes:
-    text = name.encode()
-    return unsigned(len(text)) + text + bytes([kind]) + unsigned(index)
+    return name_of(name) + bytes([kind]) + unsigned(index)

@@ -21,6 +21,7 @@ from ..pack import interface_of, pack, xml_bytes
 from ..recipe import recipes
 from .generate import kernels, rules, tables
 from .platforms import build, choose
+from .wasm import COMPONENT, wasm_compiler, wasm_files
 
 _LAYER = ("model.h", "runtime.c", "fmi.h")
 
@@ -72,6 +73,7 @@ def export(
     *,
     fmi: int = 2,
     platforms: Sequence[str] = (),
+    wasm: bool = False,
     progress: Callable[[str], None] = lambda what: None,
 ) -> Path:
     """Write `model` as a native FMU, Co-Simulation and Model Exchange.
@@ -81,16 +83,18 @@ def export(
     model, file, start : see `chainunit.fmu.export.export`
     fmi : version of FMI, 2 or 3
     platforms : names from `chainunit.fmu.native.platforms.PLATFORMS`; by default the platform of this machine
+    wasm : whether a component for WebAssembly stands beside the libraries, see `chainunit.fmu.native.wasm`; of FMI 3
     progress : is called with texts on the work
 
     Raises
     ------
     KeyError, InputError
-        see `chainunit.fmu.export.export`; also where there is no compiler for a platform.
+        see `chainunit.fmu.export.export`; also where there is no compiler for a platform, and for `wasm` with FMI 2.
     RunError
         where the compiler fails, with its messages.
     """
     names, compiler = choose(platforms, fmi)
+    for_wasm = wasm_compiler(fmi) if wasm else None
     interface = interface_of(model, start)
     file = Path(file)
     folder(file.parent)
@@ -128,6 +132,11 @@ def export(
         slow = ", the first time about a minute" if compiler.zig and name == "win64" else ""
         progress(f"compiling for {name}{slow}")
         contents |= build(compiler, name, fmi, model.name, sources, units)
+    if for_wasm:
+        progress("compiling for WebAssembly")
+        contents |= wasm_files(
+            for_wasm, model.name, sources, (recipes() / "native" / COMPONENT).read_bytes(), units
+        )
     with atomic_file(file) as part:
         pack(contents, part)
     return file

@@ -127,15 +127,35 @@ def _compile(
     files: Sequence[str],
 ) -> bytes:
     own = ("-target", target) if compiler.zig else ("-Wl,--build-id=none", "-DCHAINUNIT_OLD_GLIBC")
-    flags, library = (*own, *_FLAGS), identifier + target_platform.suffix
-    # the kernels take almost all of the time, and are the same for any start values
+    link = (*_SHARED, *target_platform.link_options)
+    library = identifier + target_platform.suffix
+    return compile_with_kernels(compiler, (*own, *_FLAGS), link, sources, files, library)
+
+
+def compile_with_kernels(
+    compiler: Compiler,
+    flags: Sequence[str],
+    link: Sequence[str],
+    sources: Mapping[str, bytes],
+    units: Sequence[str],
+    library: str,
+) -> bytes:
+    """The library of that name from some of the `sources`, with flags of the compiler, and more of the linker.
+
+    The kernels are compiled apart: they take almost all of the time, and are the same for any start values.
+
+    Raises
+    ------
+    RunError
+        where the compiler fails, with its messages.
+    """
     kernels = {name: sources[name] for name in (KERNELS, HEADER)}
     object_code = compile_code(
         compiler, (*flags, "-c", KERNELS, "-o", KERNELS_OBJECT), kernels, KERNELS_OBJECT
     )
     rest = {name: text for name, text in sources.items() if name != KERNELS} | {KERNELS_OBJECT: object_code}
-    others = [name for name in files if name != KERNELS]
-    arguments = (*flags, *_SHARED, *others, KERNELS_OBJECT, "-o", library, *target_platform.link_options)
+    others = [name for name in units if name != KERNELS]
+    arguments = (*flags, *others, KERNELS_OBJECT, "-o", library, *link)
     return compile_code(compiler, arguments, rest, library)
 
 
