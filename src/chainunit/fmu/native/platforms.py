@@ -11,10 +11,11 @@ from dataclasses import dataclass
 
 from ...core.errors import InputError, RunError
 from ...core.native.compilers import Compiler, compile_code, compiler, host, zig_compiler
+from ...core.native.elementary_code import HEADER
 
 _FLAGS = ("-std=c99", "-O2", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off")
 _SHARED = ("-shared", "-s")
-KERNELS, KERNELS_OBJECT, HEADER = "kernels.c", "kernels.o", "model.h"
+KERNELS, KERNELS_OBJECT, HEADERS = "kernels.c", "kernels.o", ("model.h", HEADER)
 
 
 @dataclass(frozen=True)
@@ -129,7 +130,7 @@ def _compile(
     own = ("-target", target) if compiler.zig else ("-Wl,--build-id=none", "-DCHAINUNIT_OLD_GLIBC")
     flags, library = (*own, *_FLAGS), identifier + target_platform.suffix
     # the kernels take almost all of the time, and are the same for any start values
-    kernels = {name: sources[name] for name in (KERNELS, HEADER)}
+    kernels = {name: sources[name] for name in (KERNELS, *HEADERS)}
     object_code = compile_code(
         compiler, (*flags, "-c", KERNELS, "-o", KERNELS_OBJECT), kernels, KERNELS_OBJECT
     )
