@@ -15,12 +15,13 @@ from test_reference import POINTS, deviation
 
 from chainunit import ChainUnitMachine, InputError, SideLoads, batch
 from chainunit.batch import native
-from chainunit.batch.equations import arguments_of, outputs_of
+from chainunit.batch.equations import arguments_of
 from chainunit.batch.reductions import REDUCTIONS
 from chainunit.batch.vector_code import c_file
 from chainunit.core.engines import MATH
 from chainunit.core.native.compilers import Compiler, compiler
 from chainunit.core.quantities import quotient
+from chainunit.core.symbolic_trace import outputs_of
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.machines.machine import Machine
 from chainunit.models import MODELS

@@ -30,6 +30,7 @@ from chainunit.report import html, page_figures, study_motion
 from chainunit.report import study as study_report
 from chainunit.report.blocks import at
 from chainunit.report.figure import Label, Mark, Shade
+from chainunit.report.packing import unpacked
 from chainunit.study import config, judgement
 from chainunit.study.cycle import cycle
 from chainunit.study.result import as_dict
@@ -274,7 +275,7 @@ def test_the_page_needs_nothing_else(written):
 
 
 def test_every_axis_says_what_it_shows_in_which_unit(study, written):
-    figures = json.loads(Reader(written.read_text("utf-8")).scripts["figures"])
+    figures = unpacked(Reader(written.read_text("utf-8")).scripts["figures"])
     assert set(figures) == {
         "torque-speed", "turn", "turn-at-constant-speed", "sides", "speed-loop", "time-start-up", "time-feed-left",
         "time-jam-left", "reactions", "power-turn", "load-histogram",
@@ -312,7 +313,7 @@ def test_every_axis_says_what_it_shows_in_which_unit(study, written):
 
 
 def test_the_moving_machine_is_the_simulated_one(study, written):
-    moving = json.loads(Reader(written.read_text("utf-8")).scripts["pictures"])
+    moving = unpacked(Reader(written.read_text("utf-8")).scripts["pictures"])
     assert [r["name"] for r in moving["runs"]] == ["start_up", "feed_left", "jam_left"]
     p = study.drive.machine.p
     lengths = {("O1", "A"): p.r, ("A", "Bd"): p.l, ("C", "Bd"): p.h, ("Bd", "A2"): p.h - p.e}
@@ -651,7 +652,7 @@ def test_a_run_that_stopped_early_has_a_page(study, tmp_path):
     assert "The run stopped early:" in text and "it &lt;broke&gt;" in text
     assert not any(words["data-path"] == "status" for words in Reader(text).words)
     stopped.runs = {}
-    assert json.loads(Reader(page_of(stopped)).scripts["pictures"]) is None
+    assert unpacked(Reader(page_of(stopped)).scripts["pictures"]) is None
 
 
 def test_the_head_names_project_author_date_and_revision(study):
@@ -768,7 +769,7 @@ def test_chains_stand_beside_two_bars(chains, tmp_path):
         w["data-path"] for w in reader.words
     }
     assert not re.search(r"\d", re.sub(r"\bA2\b", "", reader.rest["chains"]))
-    assert "chains" in json.loads(reader.scripts["figures"])
+    assert "chains" in unpacked(reader.scripts["figures"])
 
     assert "chain_sweep.png" in {file.name for file in write(chains, tmp_path)}
     told = said_of(chains, 140)

@@ -193,13 +193,39 @@ def linkage_command(
     """
     from ..machines.linkages.file import read_linkage
     from ..machines.machine import Machine
-    from ..reading.tables import option_value
     from ..report.linkage_report import TASK, LinkageQuestion
+    from ..report.live.page import speed_of_driver
 
     machine = Machine(read_linkage(file))
-    usual, unit = ("0.1 m/s", "m/s") if machine.model.slides else ("60 rpm", "rad/s")
-    rate = option_value("--speed", speed or usual, unit, "speed of the driver")
-    carry_out(TASK, LinkageQuestion(machine, rate, str(file)), output)
+    carry_out(TASK, LinkageQuestion(machine, speed_of_driver(machine, speed), str(file)), output)
+
+
+@app.command()
+def live(
+    file: Annotated[
+        Path | None,
+        typer.Argument(help="Study file or linkage file (TOML); without one, the packaged example."),
+    ] = None,
+    output: Annotated[Path, typer.Option("-o", "--output", help="The page.")] = Path("live.html"),
+    speed: Annotated[
+        str | None,
+        typer.Option("--speed", help='Speed of the driver of a linkage; "60 rpm" by default, or "0.1 m/s".'),
+    ] = None,
+) -> None:
+    """Write a page in which the machine runs: sliders for its numbers, and at once what follows from them.
+
+    Makes no run: the page computes by itself, in any browser, without a network.
+    """
+    from ..core.files import atomic_file
+    from ..core.temporary_folders import scratch
+    from ..report.html import render
+    from ..report.live.page import live_page
+
+    with scratch() as folder:
+        page = render(live_page(file, speed, folder))
+    with atomic_file(output) as part:
+        part.write_text(page, "utf-8")
+    print(f"{output}: the live page")
 
 
 def main() -> None:

@@ -12,7 +12,7 @@ from ..core.errors import InputError, near_name
 from ..core.model import Model
 from ..core.native.operations import Operations
 from ..core.quantities import Variable, quotient
-from ..core.symbolic_trace import trace
+from ..core.symbolic_trace import outputs_of, trace
 
 
 @dataclass(frozen=True)
@@ -53,11 +53,6 @@ class Equations:
     def place(self, entry: tuple[int, int]) -> int:
         """The place among all arguments of an entry of the parameters (0), inputs (1) or states (2)."""
         return sum(self.sizes[: entry[0]]) + entry[1]
-
-
-def outputs_of(model: type[Model]) -> tuple[Variable, ...]:
-    """All outputs of a model in declared order."""
-    return tuple(v for part in model.parts for v in part.layout.variables)
 
 
 def columns_of(model: type[Model]) -> tuple[Variable, ...]:

@@ -17,9 +17,10 @@ from ..core.errors import InputError, RemarkWarning, RunError
 from ..core.model import Model
 from ..core.native.operations import ARGUMENT
 from ..core.quantities import Variable
+from ..core.symbolic_trace import outputs_of
 from ..core.units import scale
 from . import arrays
-from .equations import Equations, Result, equations, find, names_of, outputs_of
+from .equations import Equations, Result, equations, find, names_of
 from .native import Reductions, aligned, native_kernel
 from .reductions import REDUCTIONS
 

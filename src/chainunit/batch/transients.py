@@ -31,8 +31,8 @@ from ..core.model import Model
 from ..core.native.c_forms import constant
 from ..core.native.compilers import Compiler, compiler
 from ..core.native.operations import ARGUMENT, Operations
-from ..core.symbolic_trace import trace
-from .equations import arguments_of, find, names_of, outputs_of
+from ..core.symbolic_trace import outputs_of, trace
+from .equations import arguments_of, find, names_of
 from .native import load, threads
 from .vector_code import VectorCode, c_file
 

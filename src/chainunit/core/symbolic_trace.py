@@ -8,6 +8,7 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 from .engines import casadi_
+from .errors import InputError, near_name
 from .model import Model
 from .quantities import Variable
 
@@ -34,6 +35,12 @@ class Trace:
         """The quantities beside the outputs, see `Model.further_quantities`."""
         return self.model.further_quantities(casadi_(), self.p, self.u, self.x)
 
+    @cached_property
+    def columns(self) -> dict[str, tuple[Variable, Any]]:
+        """By name, all outputs and further quantities, each with its declaration and its value."""
+        pairs = [*zip(outputs_of(self.model), self.outputs, strict=True), *self.further_quantities]
+        return {variable.name: (variable, value) for variable, value in pairs}
+
     def outputs_at(self, x: Any) -> list[Any]:
         """The outputs with the states `x` in place of the symbols."""
         parts = self.model.evaluate(casadi_(), self.p, self.u, x)
@@ -48,6 +55,25 @@ class Trace:
         p = self.model.parameter_layout.instance(casadi.vertsplit(self.symbols[0]))
         derived = casadi.vertcat(*self.model.derive(casadi_(), p))
         return list(casadi.substitute(list(expressions), [self.symbols[3]], [derived]))
+
+
+def outputs_of(model: type[Model]) -> tuple[Variable, ...]:
+    """All outputs of a model in declared order."""
+    return tuple(v for part in model.parts for v in part.layout.variables)
+
+
+def chosen_columns(t: Trace, names: Sequence[str]) -> tuple[Variable, ...]:
+    """The declarations of outputs and further quantities of a model, by name.
+
+    Raises
+    ------
+    InputError
+        for a name that the model does not have.
+    """
+    for name in names:
+        if name not in t.columns:
+            raise InputError(f"{name}: no such output of the model{near_name(name, list(t.columns))}")
+    return tuple(t.columns[name][0] for name in names)
 
 
 @lru_cache(maxsize=8)

@@ -19,7 +19,7 @@ from typing import Any, ClassVar, Literal, NamedTuple, TypeAlias
 from ..core.model import FmuData, Requirement
 from ..core.planar import ZERO, Link, Vec2
 from ..core.ports import PortValues
-from ..core.quantities import Value, declaration, group, quantity
+from ..core.quantities import Quantity, Value, Variable, declaration, group, quantity
 from ..groups.body import Bar, Mass
 from ..groups.driver import Crank
 from ..groups.dyad import Dyad
@@ -495,3 +495,19 @@ class ChamberForces(InverseMachine):
     def linkage(xp: Any, p: Any, u: Any) -> Linkage:
         """Crank, dyad, and an organ on each side."""
         return drive(p, u, tuple(organ(p, u, side) for side in SIDES), resistances(p, u))
+
+    @classmethod
+    def further_quantities(cls, xp: Any, p: Any, u: Any, x: Any = None) -> list[tuple[Variable, Any]]:
+        """Those of every machine, and the mean pull in each rod of two bars, ``mean_pull(left.web)``: below zero a
+        chain is slack."""
+        columns = super().further_quantities(xp, p, u, x)
+        if cls.States is not None:
+            return columns
+        rocker = cls.evaluate(xp, p, u, x)[0].rocker
+        pulls = organ_pulls(xp, p, u, rocker.psi, rocker.w, rocker.a)
+        for side in SIDES:
+            for rod in RODS:
+                words = f"mean pull of the {rod} of the {side} organ"
+                variable = Variable(f"mean_pull({side}.{rod})", words, Quantity("N", words))
+                columns.append((variable, 0.5 * sum(pulls[side][rod].values())))
+        return columns

@@ -204,8 +204,9 @@ class InverseMachine(LinkageModel, MachineModel):
 
     @classmethod
     def further_quantities(cls, xp: Any, p: Any, u: Any, x: Any = None) -> list[tuple[Variable, Any]]:
-        """The effort at the driver, ``crank_torque``; the size of each force, ``force(pivot)``; and the places of all
-        pins, ``x(A)`` and ``y(A)``. A machine whose outputs depend on states has no places here."""
+        """The effort at the driver, ``crank_torque``; the size of each force, ``force(pivot)``; the places of all
+        pins, ``x(A)`` and ``y(A)``; and the angle of the line of each sliding block, ``line(ram)``. A machine whose
+        outputs depend on states has no places here."""
         outputs = cls.parts[0].layout.by_name(cls.evaluate(xp, p, u, x)[0])
         unit = cls.driver_port.unit("N.m")
         columns = [
@@ -219,10 +220,14 @@ class InverseMachine(LinkageModel, MachineModel):
                     (Variable(f"force({pin})", f"size of the force {pin}", Quantity("N", "")), size)
                 )
         if cls.States is None:
-            for pin, motion in cls.shared(xp, p, u, x).m.pins.items():
+            m = cls.shared(xp, p, u, x).m
+            for pin, motion in m.pins.items():
                 for axis in "xy":
                     place = Variable(f"{axis}({pin})", f"place {axis} of the pin {pin}", Quantity("m", ""))
                     columns.append((place, getattr(motion.p, axis)))
+            for (pin, _), slide in m.slides.items():
+                line = Variable(f"line({pin})", f"angle of the line of the block {pin}", Quantity("rad", ""))
+                columns.append((line, xp.atan2(slide.d.y, slide.d.x)))
         return columns
 
     @classmethod

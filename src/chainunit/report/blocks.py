@@ -16,6 +16,7 @@ from ..core.quantities import Layout
 from ..reading.text import DEFAULT_UNITS, Units
 from .figure import Figure
 from .lines import Aside, Line, Number, Piece, Words, capital, line, pieces
+from .live_block import Live
 from .motion import Animation
 
 Form = Literal["both", "short", "long"]
@@ -150,7 +151,7 @@ class Drawing:
     form: Form = "long"
 
 
-Block: TypeAlias = "Text | Judgement | Cards | Table | Tables | Given | Drawing | Figure | Animation"
+Block: TypeAlias = "Text | Judgement | Cards | Table | Tables | Given | Drawing | Figure | Animation | Live"
 
 
 def of_form(blocks: Iterable[Block], form: Form) -> list[Block]:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol, Self
 
 from ..study.capability import StudyCapability
 from ..study.config import Config
+from ..study.drive import Drive
 from ..study.record import StudyRecord
 from ..study.registry import capabilities as registered
 from .blocks import Block, Source
 from .lines import Line
+from .live.quantities import LiveQuantity
 from .supplement import Supplement
 
 
@@ -65,6 +67,10 @@ class Capability(StudyCapability):
     def warnings(self, s: Source) -> Iterator[Block]:
         """Its warnings beside the warnings of the study, to stand at the head of a report."""
         return iter(())
+
+    def live_quantities(self, plan: Any, drive: Drive) -> Iterable[LiveQuantity]:
+        """The quantities of its table that a reader of a live page may change; `plan` is its plan, or None."""
+        return ()
 
     def supplement(self, study: StudyRecord) -> Supplement | None:
         """Its additions to the machine in motion."""

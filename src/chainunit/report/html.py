@@ -6,8 +6,6 @@ result (``<script id="result">``). Its curves and its animation come from the ti
 
 from __future__ import annotations
 
-import base64
-import gzip
 import json
 from collections.abc import Iterable, Sequence
 from functools import cache
@@ -20,12 +18,15 @@ from plotly.io.json import to_json_plotly  # type: ignore[import-untyped]
 from plotly.offline import get_plotlyjs  # type: ignore[import-untyped]
 
 from .. import __version__
+from ..core.errors import InputError
 from ..core.files import PAGE, atomic_file
 from ..reading.text import Units, forms
 from . import blocks as b
 from . import motion, page_figures
 from .figure import Figure
 from .lines import Aside, Line, Name, Number, Piece, Strong, Words, pieces
+from .live_block import Live, LiveMachine
+from .packing import packed, packed_bytes
 
 NAME = PAGE
 
@@ -33,9 +34,11 @@ _SPACE = "\u00a0"  # before a unit
 _SHORT = 16
 """Rows of a table that does not break across printed pages."""
 _POLICY = (
-    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; "
+    "default-src 'none'; script-src 'unsafe-inline'{}; style-src 'unsafe-inline'; img-src data: blob:; "
     "font-src data:"
 )
+_WASM = " 'wasm-unsafe-eval'"
+"""What a live machine needs beyond it: to compile the WebAssembly that the page holds."""
 _SIGN = {"good": "✓", "partly": "◐", "bad": "✗", "warning": "!"}
 _ORIGIN = {
     "file": "the study file's",
@@ -57,37 +60,44 @@ def write(report: b.Report, folder: Path) -> Path:
 def render(report: b.Report) -> str:
     """The page as a text of HTML."""
     page = _Page(report.units)
+    live = next((page.live(block) for block in report.blocks("long") if isinstance(block, Live)), None)
     sections = [
         (section, content)
         for section in report.sections
         if (content := page.blocks(b.of_form(section.blocks, "long")))
     ]
     title = report.title or report.kind
-    figures = ",".join(
-        f"{json.dumps(figure.name)}:{to_json_plotly(page_figures.page_figure(figure, report.units))}"
+    figures = {
+        figure.name: json.loads(to_json_plotly(page_figures.page_figure(figure, report.units)))
         for figure in report.figures
         if figure.on_page
-    )
-    animation = next((block for block in report.blocks("long") if isinstance(block, motion.Animation)), None)
-    embedded = {
-        "result": json.dumps(report.result, allow_nan=False, ensure_ascii=False),
-        "figures": f"{{{figures}}}",
-        "pictures": json.dumps(
-            animation and motion.pictures(animation, report.units), allow_nan=False, separators=(",", ":")
-        ),
     }
+    animation = next((block for block in report.blocks("long") if isinstance(block, motion.Animation)), None)
+    result = json.dumps(report.result, allow_nan=False, ensure_ascii=False)
+    data = {
+        "figures": packed(figures),
+        "pictures": packed(animation and motion.pictures(animation, report.units)),
+    }
+    styles, scripts = ["page.css"], ["packing.js", "picture.js", "page.js"]
+    if live is not None:
+        styles.append("live/live.css")
+        scripts += ["live/model.js", "live/live.js"]
+        modules = {f"module-{name}": packed_bytes(each) for name, each in live.modules.items()}
+        data |= {"live-data": packed(live.data), **modules}
+    if figures:
+        data["plotly"] = _packed_plotly()
     return "\n".join(
         [
             "<!DOCTYPE html>",
             '<html lang="en">',
             "<head>",
             '<meta charset="utf-8">',
-            f'<meta http-equiv="Content-Security-Policy" content="{escape(_POLICY)}">',
+            f'<meta http-equiv="Content-Security-Policy" content="{escape(_POLICY.format(_WASM if live else ""))}">',
             '<meta name="viewport" content="width=device-width, initial-scale=1">',
             f'<meta name="generator" content="chainunit {__version__}">',
             f"<title>{escape(title)}</title>",
             '<link rel="icon" href="data:,">',
-            f"<style>\n{_resource('page.css')}</style>",
+            f"<style>\n{''.join(map(_resource, styles))}</style>",
             "</head>",
             "<body>",
             page.header(report, title, [section.name for section, _ in sections]),
@@ -99,12 +109,12 @@ def render(report: b.Report) -> str:
             ),
             "</main>",
             # without a "<" no text can end the element early
+            f'<script type="application/json" id="result">{result.replace("<", chr(92) + "u003c")}</script>',
             *(
-                f'<script type="application/json" id="{name}">{text.replace("<", chr(92) + "u003c")}</script>'
-                for name, text in embedded.items()
+                f'<script type="application/octet-stream" id="{name}">{text}</script>'
+                for name, text in data.items()
             ),
-            f'<script type="application/octet-stream" id="plotly">{_packed_plotly()}</script>',
-            f"<script>\n{_resource('page.js')}</script>",
+            *(f"<script>\n{_resource(name)}</script>" for name in scripts),
             "</body>",
             "</html>\n",
         ]
@@ -118,8 +128,8 @@ def _laid_out(section: b.Section, content: str) -> str:
 
 @cache
 def _packed_plotly() -> str:
-    """plotly.js, compressed by gzip, in base64; the page unpacks it."""
-    return base64.b64encode(gzip.compress(get_plotlyjs().encode(), 9, mtime=0)).decode()
+    """plotly.js, packed."""
+    return packed_bytes(get_plotlyjs().encode())
 
 
 def fragment(report: b.Report) -> str:
@@ -158,6 +168,7 @@ class _Page:
 
     def __init__(self, units: Units) -> None:
         self.units = units
+        self._lives: dict[Live, tuple[LiveMachine | None, str]] = {}
 
     # -- pieces
 
@@ -238,6 +249,23 @@ class _Page:
                 return self._figure(block) if block.on_page else ""
             case motion.Animation():
                 return _resource("motion.html").replace("<!-- caption -->", self.line(block.caption))
+            case Live():
+                return self._live(block)
+
+    def live(self, block: Live) -> LiveMachine | None:
+        """The live machine of the page; None where it cannot be made."""
+        if block not in self._lives:
+            try:
+                self._lives[block] = block.make(), ""
+            except InputError as error:
+                self._lives[block] = None, str(error)
+        return self._lives[block][0]
+
+    def _live(self, block: Live) -> str:
+        if self.live(block) is not None:
+            return _resource("live/live.html")
+        why = self._lives[block][1]
+        return f'<p class="note">This machine cannot run in a page: {escape(why)}.</p>'
 
     def _verdict(self, verdict: b.Judgement) -> str:
         text = self.line(verdict.line)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,6 +21,8 @@ from . import figure as fig
 from . import linkage, linkage_loads, linkage_rest
 from .drawing import drawing
 from .lines import Line, Name, Number, capital, join, line
+from .live.machine import of_linkage
+from .live_block import LEAD, Live
 from .motion import Animation, Clip, Reading
 from .task import Task, no_check
 
@@ -50,6 +53,7 @@ def linkage_report(findings: LinkageFindings, source: str) -> b.Report:
         tuple(_opening(s, findings)),
         (
             b.Section("motion", "Motion", tuple(_motion(s, findings))),
+            b.Section("live", "Try it", tuple(_live(findings, source))),
             b.Section("forces", "Effort, inertia and reactions", tuple(_forces(s, findings))),
             b.Section("rest", "At rest", tuple(linkage_rest.at_rest(s, findings, PICTURES[4]))),
             b.Section("outputs", "Parameters, inputs and outputs", tuple(_variables(findings))),
@@ -57,6 +61,11 @@ def linkage_report(findings: LinkageFindings, source: str) -> b.Report:
         source=s.line("Linkage file: {source} · chainunit {chainunit}"),
         opening_title="The linkage",
     )
+
+
+def _live(f: LinkageFindings, source: str) -> Iterator[b.Block]:
+    yield b.Text(LEAD.format("the file"), "lead", "long")
+    yield Live(lambda: of_linkage(f.machine, f.speed, Path(source).name))
 
 
 def _entry(value: Any, unit: str) -> dict[str, Any]:

@@ -1,19 +1,17 @@
 "use strict";
-(function () {
+(async () => {
   const byId = (name) => document.getElementById(name);
-  const read = (name) => JSON.parse(byId(name).textContent);
 
   /* plots */
-  const figures = read("figures");
   const config = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["lasso2d", "select2d"] };
   const plots = [];
   // the page holds the library compressed: it would otherwise be most of the page
+  let figures = {};
   const loadPlotly = async () => {
-    const packed = Uint8Array.from(atob(byId("plotly").textContent), (letter) => letter.charCodeAt(0));
-    const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
     const script = document.createElement("script");
-    script.textContent = await new Response(stream).text();
+    script.textContent = new TextDecoder().decode(await unpackedBytes("plotly"));
     document.head.appendChild(script);
+    figures = await unpackedData("figures");
   };
   // panels that are too narrow beside each other stand below each other
   const isNarrow = (figure, width) => figure.narrow && width < figure.below;
@@ -89,279 +87,30 @@
   markWide();
 
   /* the machine in motion */
-  const motion = read("pictures");
   const stage = byId("stage");
-  if (!motion || !stage) return;
-  const SVG = "http://www.w3.org/2000/svg";
-  const WIDTH = 900;
-  const add = (parent, tag, attributes, text) => {
-    const element = document.createElementNS(SVG, tag);
-    for (const [name, value] of Object.entries(attributes || {})) element.setAttribute(name, value);
-    if (text !== undefined) element.textContent = text;
-    parent.appendChild(element);
-    return element;
-  };
-  const of = (list, i) => list[Math.min(i, list.length - 1)];
-
-  const colour = (group) => "group-" + (motion.groups.indexOf(group) + 1);
-  const labelOf = (joint) => (joint in motion.names ? motion.names[joint] : joint);
-  let run, frame, playTime, playing = false, last = null, parts, scale, origin, perNewton, height;
+  if (!stage) return;
+  const motion = await unpackedData("pictures");
   const select = byId("run"), factor = byId("factor"), arrows = byId("arrows"), slider = byId("slider");
+  let run, frame, playTime, playing = false, last = null;
   motion.runs.forEach((r, i) => select.add(new Option(r.title, i)));
   const factors = [0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 1, 2];
   for (const f of factors) factor.add(new Option("× " + f, f));
   // a crank turn lasts a second at least
   factor.value = factors.filter((f) => f <= 1 && motion.turn / f >= 1).pop() || factors[0];
-
-  const at = (joint) => {
-    const j = run.joints[joint];
-    return [origin[0] + scale * of(j.x, frame), origin[1] - scale * of(j.y, frame)];
-  };
-  const roundForce = (x) => {
-    const power = 10 ** Math.floor(Math.log10(x));
-    return [5, 2, 1].map((m) => m * power).find((y) => y <= x * 1.0001) || power;
-  };
-
-  function build() {
-    stage.replaceChildren();
-    // joints, paths and the tips of arrows of all runs, with room for names
-    const x = [], y = [];
-    const reach = (list, all) => all.push(list.reduce((a, b) => Math.min(a, b)), list.reduce((a, b) => Math.max(a, b)));
-    for (const r of [...motion.runs, { joints: motion.paths }])
-      for (const j of Object.values(r.joints)) {
-        reach(j.x, x);
-        reach(j.y, y);
-      }
-    const ends = (list) => list.reduce((a, b) => Math.max(a, b)) - list.reduce((a, b) => Math.min(a, b));
-    const size = Math.max(ends(x), ends(y)), arrow = 0.26 * size;
-    for (const r of motion.runs)
-      for (const force of r.largest > 0 ? r.forces : [])
-        for (const [list, component, all] of [[r.joints[force.at].x, force.x, x], [r.joints[force.at].y, force.y, y]]) {
-          const count = Math.max(list.length, component.length);
-          reach(Array.from({ length: count }, (_, i) => of(list, i) + (arrow * of(component, i)) / r.largest), all);
-        }
-    const [x0, x1] = [Math.min(...x), Math.max(...x)], [y0, y1] = [Math.min(...y), Math.max(...y)];
-    const left = 0.1 * size, right = left, above = left, below = left;
-    // an upright linkage is not higher than four fifths of the width
-    scale = Math.min(WIDTH / (x1 - x0 + left + right), (0.8 * WIDTH) / (y1 - y0 + above + below));
-    height = Math.round(scale * (y1 - y0 + above + below));
-    const beside = 0.5 * (WIDTH - scale * (x1 - x0 + left + right));
-    origin = [beside + scale * (left - x0), scale * (y1 + above)];
-    stage.setAttribute("viewBox", `0 0 ${WIDTH} ${height}`);
-    parts = { arrow: arrow * scale };
-
-    const ground = add(stage, "g");
-    frame = 0;
-    for (const name of motion.grounds) {
-      const [px, py] = at(name);
-      // a joint from which links hang has its support above it, another one below
-      const up = motion.hanging.includes(name) ? -1 : 1;
-      add(ground, "path", { class: "ground", d: `M${px} ${py} l-14 ${22 * up} h28 z` });
-      add(ground, "path", {
-        class: "hatch",
-        d: `M${px - 22} ${py + 22 * up} h44` + [-18, -8, 2, 12].map((s) => `M${px + s} ${py + 22 * up} l8 ${8 * up}`).join(""),
-      });
-    }
-    if (motion.orbit) {
-      const [[ox, oy], [px, py]] = motion.orbit.map(at);
-      add(stage, "circle", { class: "orbit", cx: ox, cy: oy, r: Math.hypot(px - ox, py - oy) });
-    }
-    for (const ends of motion.rails) {
-      const [ax, ay, bx, by] = ends.map((v, i) => origin[i % 2] + (i % 2 ? -scale : scale) * v);
-      const length = Math.hypot(bx - ax, by - ay) || 1, ux = (bx - ax) / length, uy = (by - ay) / length;
-      for (const side of [13, -13]) {
-        const strokes = [`M${ax - side * uy} ${ay + side * ux} L${bx - side * uy} ${by + side * ux}`];
-        for (let s = 4; s < length; s += 12) {
-          const x = ax + s * ux - side * uy, y = ay + s * uy + side * ux, out = Math.sign(side) * 7;
-          strokes.push(`M${x} ${y} l${-out * uy - 5 * ux} ${out * ux - 5 * uy}`);
-        }
-        add(stage, "path", { class: "rail", d: strokes.join("") });
-      }
-    }
-    parts.loads = motion.links
-      .filter((link) => link.name in run.loads)
-      .map((link) => [link, add(stage, "polyline", { class: "material" })]);
-    parts.links = motion.links.map((link) =>
-      add(stage, link.closed ? "polygon" : "polyline", { class: `link ${link.look}${link.closed ? " closed" : ""}` }));
-    parts.blocks = Object.keys(run.blocks).map((joint) => [joint, add(stage, "rect", {
-      class: "block", x: -20, y: -10, width: 40, height: 20, rx: 2 })]);
-    for (const path of motion.paths) {
-      const points = path.x.map((px, i) => `${origin[0] + scale * px} ${origin[1] - scale * of(path.y, i)}`);
-      add(add(stage, "path", { class: "path", d: "M" + points.join("L") }), "title", {}, path.title);
-    }
-    parts.joints = {};
-    for (const name of Object.keys(run.joints)) {
-      parts.joints[name] = [add(stage, "circle", { class: "joint", r: labelOf(name) ? 5 : 3 })];
-    }
-    parts.forces = run.forces.map((force) => {
-      const group = add(stage, "g", { class: `arrow ${colour(force.group)} ${force.kind}` });
-      add(group, "title", {}, force.title);
-      return {
-        line: add(group, "path", { class: "force" }),
-        head: add(group, "path", { class: "head" }),
-        name: add(group, "text", { "text-anchor": "middle" }),
-      };
-    });
-    // names come last: no arrow covers them
-    for (const [name, part] of Object.entries(parts.joints)) {
-      part.push(add(stage, "text", { "text-anchor": "middle", class: "joint-name" }, labelOf(name)), null);
-    }
-    parts.legend = add(stage, "g", { class: "arrow legend" });
-    parts.legendLine = add(parts.legend, "path", { class: "force" });
-    parts.legendHead = add(parts.legend, "path", { class: "head" });
-    parts.legendText = add(parts.legend, "text", {});
-    parts.caption = add(stage, "text", { x: 16, y: 28, class: "where" });
-
-    const values = byId("read-values");
-    while (values.rows.length > 1) values.deleteRow(1);
-    parts.readings = run.readings.map((reading) => {
-      const row = values.insertRow(), name = document.createElement("th");
-      name.scope = "row";
-      name.textContent = reading.title;
-      row.appendChild(name);
-      return row.insertCell();
-    });
-    const rows = byId("read-forces");
-    rows.replaceChildren();
-    parts.rows = run.forces.map((force) => {
-      const row = rows.insertRow();
-      row.className = colour(force.group);
-      const head = document.createElement("th");
-      head.scope = "row";
-      // the name of a joint or load of a file keeps its letters
-      const title = document.createElement("span");
-      title.className = force.short === force.title ? "as-is" : "";
-      title.textContent = force.title;
-      head.appendChild(title);
-      row.appendChild(head);
-      return row.insertCell();
-    });
-  }
-
-  function head(x, y, dx, dy) {
-    const length = Math.hypot(dx, dy), h = Math.min(13, 0.6 * length), w = 0.38 * h;
-    const ux = dx / length, uy = dy / length, bx = x + dx - h * ux, by = y + dy - h * uy;
-    return [bx, by, `M${x + dx} ${y + dy} L${bx - w * uy} ${by + w * ux} L${bx + w * uy} ${by - w * ux} z`];
-  }
-
-  function arrow(part, x, y, dx, dy, label) {
-    const length = Math.hypot(dx, dy);
-    if (length < 3) {
-      part.line.setAttribute("d", "");
-      part.head.setAttribute("d", "");
-      part.name.textContent = "";
-      return;
-    }
-    const [bx, by, d] = head(x, y, dx, dy);
-    part.line.setAttribute("d", `M${x} ${y} L${bx} ${by}`);
-    part.head.setAttribute("d", d);
-    part.name.textContent = length > 34 ? label : "";
-    // a name is wide: beside a lying arrow it stands further off
-    const half = 4 * part.name.textContent.length;
-    part.name.setAttribute("x", x + dx + ((12 + half) * dx) / length);
-    part.name.setAttribute("y", y + dy + (14 * dy) / length + 5);
-  }
-
-  // the distance of a point from a line between two points
-  const fromLine = (x, y, [ax, ay, bx, by]) => {
-    const dx = bx - ax, dy = by - ay, size = dx * dx + dy * dy || 1;
-    const s = Math.max(0, Math.min(1, ((x - ax) * dx + (y - ay) * dy) / size));
-    return Math.hypot(x - ax - s * dx, y - ay - s * dy);
-  };
-
-  // the name of each joint stands around it, clear of links, arrows and other names; it stays where it is clear
-  function nameJoints() {
-    const lines = [];
-    for (const link of motion.links)
-      link.joints.forEach((joint, i) => i && lines.push([...at(link.joints[i - 1]), ...at(joint)]));
-    const names = [];
-    run.forces.forEach((force, i) => {
-      const [x, y] = at(force.at), dx = perNewton * of(force.x, frame), dy = -perNewton * of(force.y, frame);
-      if (Math.hypot(dx, dy) < 3) return;
-      lines.push([x, y, x + dx, y + dy]);
-      const part = parts.forces[i].name;
-      if (part.textContent) names.push([Number(part.getAttribute("x")), Number(part.getAttribute("y")) - 5]);
-    });
-    for (const joint of motion.grounds) {
-      const [x, y] = at(joint), up = motion.hanging.includes(joint) ? -1 : 1;
-      lines.push([x, y, x, y + 24 * up]);
-    }
-    const letters = parseFloat(getComputedStyle(stage).getPropertyValue("--letters")) || 15;
-    for (const [name, part] of Object.entries(parts.joints)) {
-      const text = part[1];
-      if (!text.textContent) continue;
-      const [x, y] = at(name), half = 0.3 * letters * text.textContent.length;
-      const place = (k) => [x + (13 + half + 4) * Math.cos((k * Math.PI) / 6), y + (13 + 0.5 * letters) * Math.sin((k * Math.PI) / 6)];
-      const room = (k) => {
-        const [px, py] = place(k), ends = [-1, 0, 1].map((s) => px + s * half);
-        const clear = Math.min(...ends.map((ex) => Math.min(...lines.map((each) => fromLine(ex, py, each)))));
-        const apart = Math.min(99, ...names.map(([nx, ny]) => Math.max(Math.abs(nx - px) - half - 8, Math.abs(ny - py) - letters + 8)));
-        const inside = Math.min(px - half, WIDTH - px - half, py - 10, height - py - 10);
-        return Math.min(clear, apart, inside);
-      };
-      let best = part[2];
-      if (best === null || room(best) < 9) {
-        const rooms = Array.from({ length: 12 }, (_, k) => Math.min(room(k), 18));
-        const top = rooms.indexOf(Math.max(...rooms));
-        if (best === null || rooms[top] > rooms[best] + 3) best = top;
-        part[2] = best;
-      }
-      const [px, py] = place(best);
-      names.push([px, py]);
-      text.setAttribute("x", px);
-      text.setAttribute("y", py + 0.36 * letters);
-    }
-  }
-
-  const digits = (x, n) => {
-    const shown = x === 0 ? "0" : Math.abs(x) >= 100 ? x.toFixed(0) : x.toPrecision(n);
-    return shown.replace("-", "−");
-  };
+  const picture = machinePicture(stage, motion, {
+    values: byId("read-values"),
+    kept: 1,
+    forces: byId("read-forces"),
+    factor: () => Number(arrows.value),
+    caption: (r, i) => `${r.title}, ${r.event ? "event" : "start"} ${r.time[i] < 0 ? "−" : "+"} ${Math.abs(r.time[i]).toFixed(2)} s`,
+  });
 
   function draw() {
-    const points = (link) => link.joints.map((joint) => at(joint).join(" ")).join(",");
-    motion.links.forEach((link, i) => parts.links[i].setAttribute("points", points(link)));
-    const heaviest = Math.max(1e-9, ...motion.runs.flatMap((r) => Object.values(r.loads).flat()));
-    for (const [link, band] of parts.loads) {
-      band.setAttribute("points", points(link));
-      band.setAttribute("stroke-width", (34 * of(run.loads[link.name], frame)) / heaviest);
-    }
-    for (const [joint, block] of parts.blocks) {
-      const [x, y] = at(joint);
-      block.setAttribute("transform", `translate(${x} ${y}) rotate(${-of(run.blocks[joint], frame)})`);
-    }
-    for (const [name, [dot]] of Object.entries(parts.joints)) {
-      const [x, y] = at(name);
-      dot.setAttribute("cx", x);
-      dot.setAttribute("cy", y);
-    }
-    perNewton = run.largest > 0 ? (parts.arrow * Number(arrows.value)) / run.largest : 0;
-    run.forces.forEach((force, i) => {
-      const [x, y] = at(force.at), fx = of(force.x, frame), fy = of(force.y, frame);
-      arrow(parts.forces[i], x, y, perNewton * fx, -perNewton * fy, force.short || labelOf(force.at));
-      parts.rows[i].textContent = Math.hypot(fx, fy).toFixed(0) + " N";
-    });
-    nameJoints();
-    if (perNewton) {
-      const newton = roundForce((0.75 * parts.arrow) / perNewton), x = 20, y = height - 18;
-      const [bx, by, d] = head(x, y, newton * perNewton, 0);
-      parts.legendLine.setAttribute("d", `M${x} ${y} L${bx} ${by} M${x} ${y - 6} v12`);
-      parts.legendHead.setAttribute("d", d);
-      parts.legendText.textContent = `${newton} N`;
-      parts.legendText.setAttribute("x", x + newton * perNewton + 8);
-      parts.legendText.setAttribute("y", y + 5);
-    }
-    const time = of(run.time, frame).toFixed(3).replace("-", "−") + " s";
+    picture.draw(frame);
+    const time = run.time[Math.min(frame, run.time.length - 1)].toFixed(3).replace("-", "−") + " s";
     byId("read-time").textContent = time;
-    run.readings.forEach((reading, i) => {
-      const unit = reading.unit === "°" ? "°" : reading.unit ? "\u00a0" + reading.unit : "";
-      parts.readings[i].textContent = digits(of(reading.values, frame), 3) + unit;
-    });
-    parts.caption.textContent = `${run.title}, ${run.event ? "event" : "start"} ${run.time[frame] < 0 ? "−" : "+"} ` +
-      `${Math.abs(run.time[frame]).toFixed(2)} s`;
     slider.value = frame;
     slider.setAttribute("aria-valuetext", time);
-    stage.dataset.frame = frame;
     stage.dataset.run = run.name;
   }
 
@@ -373,7 +122,7 @@
 
   function choose(i) {
     run = motion.runs[i];
-    build();
+    picture.choose(run);
     slider.max = run.time.length - 1;
     byId("time-name").textContent = run.event ? "Time after the event" : "Time";
     const still = Math.min(run.still, run.time.length - 1), tick = byId("tick");

@@ -20,6 +20,8 @@ from .analyses import analysis_sections
 from .capability import Contents, capabilities
 from .drawing import drawing
 from .lines import Line, capital, join, line, spoken
+from .live.machine import of_study
+from .live_block import LEAD, Live
 from .study_motion import motion
 
 DRAWING, QUESTION = "machine.svg", "question"
@@ -147,6 +149,18 @@ def _values(s: b.Source, section: GivenSection, unused_names: Iterable[str]) -> 
         yield b.GivenValue(name, description(name), content, s.origin(name))
 
 
+def _live(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+    """The live machine of the study; none of a machine whose equations are not known."""
+    if study.drive.foreign_machine:
+        return
+    config, drive = study.config, study.drive
+    further = [
+        each for part in capabilities() for each in part.live_quantities(config.plans[part.name], drive)
+    ]
+    yield b.Text(LEAD.format("the study"), "lead", "long")
+    yield Live(lambda: of_study(config, drive, config.drive, study.proposal, further))
+
+
 # -- the basis of the results
 
 
@@ -212,6 +226,7 @@ def _sections() -> Mapping[str, Contents]:
     return {
         "answer": Contents("The answer", answer.blocks),
         QUESTION: Contents("The question", _question),
+        "live": Contents("Try it", _live),
         **{name: each for name, each in analysis_sections().items() if each.before == "runs"},
         "runs": Contents("Every run in numbers", runs.blocks),
         "shaft": Contents("The driveline", shaft.blocks, shaft.PICTURES.files),

@@ -76,8 +76,8 @@ class Lumps(Jam):
         )
 
     @property
-    def _period(self) -> float:
-        return float(2.0 * self.p.rise + self.p.duration + self.p.pause)
+    def _period(self) -> Any:
+        return 2.0 * self.p.rise + self.p.duration + self.p.pause
 
     def _begins(self, at: float) -> list[float]:
         return [at + k * self._period for k in range(int(self.p.number))]

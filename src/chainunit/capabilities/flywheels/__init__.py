@@ -7,9 +7,12 @@ from dataclasses import dataclass
 
 from pydantic import Field
 
+from ...core.quantities import variables
 from ...report.capability import Capability, Contents
+from ...report.live.quantities import LiveQuantity
 from ...study.analysis import Analysis
 from ...study.conditions import has_entries
+from ...study.drive import Drive
 from ...study.entry_values import numbers
 from ...study.file_reading import FileReading
 from ...study.file_section import FileSection
@@ -58,6 +61,11 @@ class FlywheelCapability(Capability):
     def shaft_inertia(self, plan: FlywheelPlan | None) -> float:
         """That of the study's flywheel."""
         return 0.0 if plan is None else float(plan.table.J)
+
+    def live_quantities(self, plan: FlywheelPlan | None, drive: Drive) -> Iterable[LiveQuantity]:
+        """The flywheel on the motor's shaft."""
+        J = next(v for v in variables(FlywheelTable) if v.name == "J")
+        yield LiveQuantity(("flywheel", "J"), J, drive.added_inertia, "drive", role="added")
 
     def not_with_foreign_motor(self, plan: FlywheelPlan | None) -> str:
         """A flywheel is added to the rotor."""

@@ -9,14 +9,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core.files import atomic_file
+from ...core.temporary_folders import scratch
 from ...fmu.backends import Backend
 from ...reading.results import as_data
 from ...reading.text import Units, shown_in
 from ...report import blocks as b
 from ...report import figure as fig
 from ...report.lines import Line, Name, line
+from ...report.live.page import live_of_config
+from ...report.live_block import LEAD, Live, LiveMachine
 from ...report.task import Task, Writer
-from ...study.config import Config, FileContents
+from ...study.config import Config, FileContents, of_tables
 from ...study.heading import Heading
 from ...study.study_file import changed_tables, toml_text
 from ...work.progress import TaskProgress
@@ -30,13 +33,18 @@ FILE = "best.toml"
 """The study file with the best machine."""
 
 
-def optimum_report(best: Best, title: str, file: FileContents, units: Units) -> b.Report:
-    """The report on a search for a study with that title, file and units."""
+def optimum_report(
+    best: Best, title: str, file: FileContents, units: Units, live: tuple[b.Block, ...] = ()
+) -> b.Report:
+    """The report on a search for a study with that title, file and units; `live` are the blocks of the live
+    machine."""
     units = units_of(best, file.tables, units)
     with shown_in(units):
         result = as_data(best_machine(best, Heading.of(title, file)))
     s = b.Source(result)
     sections = [b.Section("parameters", "Parameters and limits", tuple(_machine(s, best)))]
+    if live:
+        sections.append(b.Section("live", "Try it", live))
     if best.met:
         sections.append(b.Section("binding", "What binds", tuple(_binding(s))))
     if best.front:
@@ -70,7 +78,16 @@ class OptimizedStudy(NamedTuple):
     @property
     def report(self) -> b.Report:
         """The report on the search."""
-        return optimum_report(self.best, self.config.title, self.config.file, self.config.units)
+        config = self.config
+        live = (b.Text(LEAD.format("the best machine"), "lead", "long"), Live(self._live))
+        return optimum_report(
+            self.best, config.title, config.file, config.units, live if self.best.met else ()
+        )
+
+    def _live(self) -> LiveMachine:
+        source, tables = self.as_file()
+        with scratch() as folder:
+            return live_of_config(of_tables(tables, str(source)), folder)
 
     @property
     def conflict(self) -> str:

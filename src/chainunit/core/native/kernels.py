@@ -63,10 +63,13 @@ def difference_groups(model: type[Model]) -> set[int]:
     return {g for g, group in enumerate(output_groups(model)) if places[group[0]] in names}
 
 
-def kernels(t: Trace, derived: Sequence[Any], slopes: bool = True) -> Iterator[ModelFunction]:
+def kernels(
+    t: Trace, derived: Sequence[Any], slopes: bool = True, columns: Sequence[str] | None = None
+) -> Iterator[ModelFunction]:
     """The functions of a traced model: its outputs and their derivatives in a direction (``values``, ``forward``),
     and where it has such, the ``derivatives`` of its states and all for their start, the requirements on its
-    parameters, and the values `derived` from them."""
+    parameters, and the values `derived` from them. With `columns`, by name, ``values`` gives these alone, in one
+    group."""
     import casadi
 
     model, (ps, us, xs, ks) = t.model, t.symbols
@@ -82,7 +85,11 @@ def kernels(t: Trace, derived: Sequence[Any], slopes: bool = True) -> Iterator[M
     def one(name: str, takes: str, results: Sequence[Any], frequency: str = "ONCE") -> ModelFunction:
         return kernel(name, takes, [casadi.vertcat(*map(casadi.SX, results))], [0], frequency)
 
-    outputs, places = list(t.outputs), output_groups(model)
+    if columns is None:
+        outputs, places = list(t.outputs), output_groups(model)
+    else:
+        outputs = [t.columns[name][1] for name in columns]
+        places = [list(range(len(outputs)))]
     offsets = [sum(map(len, places[:g])) for g in range(len(places))]
     values = [casadi.vertcat(*(outputs[k] for k in group)) for group in places]
     yield kernel("values", f"pux{more}", values, offsets, "OFTEN")

@@ -36,7 +36,6 @@ class Sizes:
     parameters: int
     inputs: int
     states: int
-    outputs: int
     derived: int
     unknowns: int
 
@@ -47,14 +46,13 @@ class Sizes:
             len(model.parameter_layout.names),
             len(model.input_layout.names),
             len(model.state_layout.names) if model.state_layout else 0,
-            sum(len(part.layout.names) for part in model.parts),
             model.derived_count,
             model.start_problem.unknowns,
         )
 
 
-def reserve(model: type[Model]) -> Places:
-    """The memory of a model: arguments and results of its functions."""
+def reserve(model: type[Model], outputs: int) -> Places:
+    """The memory of a model with so many `outputs`: arguments and results of its functions."""
     n, memory = Sizes.of(model), Places()
     for name, numbers in (
         ("parameters", n.parameters),
@@ -64,9 +62,9 @@ def reserve(model: type[Model]) -> Places:
         ("unknowns", n.unknowns),
         ("input_changes", n.inputs),
         ("state_changes", n.states),
-        ("outputs", n.outputs),
+        ("outputs", outputs),
         ("derivatives", n.states),
-        ("output_slopes", n.outputs),
+        ("output_slopes", outputs),
         ("derivative_slopes", n.states),
         ("improved", n.unknowns),
         ("closed", n.states),

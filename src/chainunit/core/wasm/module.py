@@ -34,7 +34,7 @@ from ..native.division import Division
 from ..native.kernels import ModelFunction, groups_without_slopes, kernels, output_groups
 from ..native.operations import ARGUMENT, NUMBER, Operations
 from ..quantities import Variable
-from ..symbolic_trace import trace
+from ..symbolic_trace import chosen_columns, outputs_of, trace
 from .encoding import Function, Module
 from .expressions import OwnFunctions, Writer
 from .memory import ARGUMENTS, BYTES, Places, reserve
@@ -57,27 +57,37 @@ class WasmModule:
 
 
 @lru_cache(maxsize=16)
-def wasm_module(model: type[Model], slopes: bool = True) -> WasmModule:
-    """The module of a model, deterministic to the byte; without ``forward`` where no `slopes` are wanted, which is
-    the largest part of most.
+def wasm_module(
+    model: type[Model], slopes: bool = True, columns: tuple[str, ...] | None = None, derives: bool = True
+) -> WasmModule:
+    """The module of a model, deterministic to the byte.
+
+    Parameters
+    ----------
+    slopes : whether it has ``forward``, which is the largest part of most
+    columns : outputs, or quantities of `Model.further_quantities`, by name: the module has these alone, as one group,
+        and no slopes; by default all outputs
+    derives : whether it has ``derive``; without it the host writes the derived values
 
     Raises
     ------
     InputError
-        for an equation with a function that the engines do not have.
+        for an equation with a function that the engines do not have, and a column that the model does not have.
     """
     t = trace(model)
     derived = model.derive(casadi_(), t.p) if model.derived_count else []
-    memory, module = reserve(model), Module()
+    outputs = outputs_of(model) if columns is None else chosen_columns(t, columns)
+    groups = output_groups(model) if columns is None else [list(range(len(outputs)))]
+    memory, module = reserve(model, len(outputs)), Module()
     own, written = OwnFunctions(module), {}
-    groups = output_groups(model)
-    for kernel in kernels(t, derived, slopes):
-        written[kernel.name] = _kernel(kernel, groups, memory, module, own)
+    for kernel in kernels(t, derived, slopes and columns is None, columns):
+        if derives or kernel.name != "derive":
+            written[kernel.name] = _kernel(kernel, groups, memory, module, own)
     if model.state_layout:
         _start(model, memory, module, written)
         write_run(model, memory, module, own, written)
     _fill(model, memory, module)
-    return WasmModule(module.bytes_of(memory.size), _description(model, groups, memory, module))
+    return WasmModule(module.bytes_of(memory.size), _description(model, outputs, groups, memory, module))
 
 
 def _kernel(
@@ -189,7 +199,7 @@ def _fill(model: type[Model], memory: Places, module: Module) -> None:
 
 
 def _description(
-    model: type[Model], groups: list[list[int]], memory: Places, module: Module
+    model: type[Model], outputs: Sequence[Variable], groups: list[list[int]], memory: Places, module: Module
 ) -> dict[str, Any]:
     """Names and addresses of all that a host reads and writes."""
 
@@ -203,7 +213,6 @@ def _description(
     def rules(name: str, required: Sequence[Requirement]) -> dict[str, Any]:
         return {"address": memory[name], "rules": [asdict(each) for each in required]}
 
-    outputs = tuple(v for part in model.parts for v in part.layout.variables)
     states = model.state_layout.variables if model.state_layout else ()
     numbers = (
         "derived",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
@@ -142,6 +142,13 @@ class DrivelinePart(PartOfLine):
         masses = masses_of(p, drive.fmu_parameters.rotor.J, inertia)
         damped = with_damping_ratio(masses, plan.damping_ratio)
         return replace(part, parameters=replace(p, d2=damped.d2, d3=damped.d3))
+
+    def settled(self, tables: Mapping[str, Any], placed: PlacedPart) -> dict[str, Any]:
+        """The damping in place of the ratio from which it follows."""
+        table = dict(tables[self.name])
+        if table.pop("damping_ratio", None) is not None:
+            table |= {name: float(getattr(placed.parameters, name)) for name in ("d2", "d3")}
+        return {**tables, self.name: table}
 
     def analyses(self) -> Iterable[type[Analysis]]:
         """The same runs with a rigid shaft."""

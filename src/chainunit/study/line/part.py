@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ...core.model import Model
@@ -25,6 +26,11 @@ class PartOfLine(StudyCapability):
         """The part of a study behind the parts that the `drive` has already, by its `plan`; None where the study has
         none. `turn` is that of the machine in normal running."""
         return None
+
+    def settled(self, tables: Mapping[str, Any], placed: PlacedPart) -> dict[str, Any]:
+        """The tables of a study file with the numbers of the part that follow from the machine written down: with
+        another machine the part stays as it is."""
+        return dict(tables)
 
     def remark(self, study: StudyRecord) -> None:
         """Add to the study the remarks on the part."""

@@ -1,0 +1,215 @@
+"""Live machines of studies and linkages: a page whose reader changes numbers and sees at once what follows.
+
+The page holds the equations of the machine and its drive as WebAssembly, and computes with them alone: results over a
+turn, the machine in motion, and runs with events.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from ...core import messages
+from ...core.quantities import Layout, Quantity, Variable
+from ...core.wasm.module import WasmModule
+from ...machines.machine import Machine
+from ...reading.text import DEFAULT_UNITS, Units
+from ...study.config import Config
+from ...study.drive import Drive
+from ...study.drive_tables import DriveTables
+from ...study.event import Event
+from ...study.parts import LENGTHS
+from ...study.proposal import DriveProposal
+from ...study.registry import parts_of_line, registered
+from ...study.sections import Run
+from ...study.study_file import changed_tables
+from ..live_block import LiveMachine
+from .quantities import LiveQuantity, of_feed, of_machine
+from .runs import LiveRuns, live_runs, reason_without_runs
+from .turn import LiveTurn, live_turn
+
+_TITLE = "with other values"
+
+
+def of_study(
+    config: Config,
+    drive: Drive,
+    tables: DriveTables,
+    proposal: DriveProposal | None = None,
+    quantities: Iterable[LiveQuantity] = (),
+) -> LiveMachine:
+    """The live machine of a study.
+
+    Parameters
+    ----------
+    drive, tables : the drive with the values that follow from it
+    proposal : the choice of the drive, where a capability made it
+    quantities : further quantities of the drive
+
+    Raises
+    ------
+    InputError
+        for an equation with a function that WebAssembly has not.
+    """
+    machine, units, speed = drive.machine, config.units, config.run.crank_speed
+    turn = live_turn(machine, float(speed), units)
+    why, runs = reason_without_runs(drive), None
+    plate = proposal.motor if proposal is not None else config.plate
+    if not why:
+        runs = live_runs(drive, config.operation, config.events, units, plate, tables.gear)
+    known = set(runs.module.description["parameters"]["names"]) if runs else set()
+    inputs = set(runs.module.description["inputs"]["names"]) if runs else set()
+    chosen = [
+        *of_feed(machine, config.feed, inputs),
+        *_speed(config, drive),
+        *_ratio(config, drive, plate is not None),
+        *of_machine(machine, known, without=("ratio",)),
+        *(runs.quantities if runs else ()),
+        *(quantities if runs else ()),
+    ]
+    copied = _copied(config, drive, tables, proposal)
+    return _assembled(turn, runs, why, chosen, copied, units)
+
+
+def without_drive(config: Config, why: str) -> LiveMachine:
+    """The live machine of a study whose drive is not known, with the reason in words."""
+    machine, speed = config.machine, config.run.crank_speed
+    variable = next(v for v in Layout(Run).variables if v.name == "crank_speed")
+    chosen = [
+        *of_feed(machine, config.feed),
+        LiveQuantity(("run", "crank_speed"), variable, float(speed), "drive", role="speed"),
+        *of_machine(machine, without=("ratio",)),
+    ]
+    turn = live_turn(machine, float(speed), config.units)
+    return _assembled(turn, None, why, chosen, _tables(config, _lengths(config)), config.units)
+
+
+def of_linkage(machine: Machine, speed: float, file: str, units: Units = DEFAULT_UNITS) -> LiveMachine:
+    """The live machine of a linkage at the `speed` of its driver [rad/s, m/s]; `file` is the name of its file."""
+    model = machine.model
+    variable = next(v for v in Layout(Run).variables if v.name == "crank_speed")
+    if model.slides:
+        q = Quantity("m/s", "speed of the driver", high=1e3, low=-1e3)
+        variable = Variable("crank_speed", "speed of the driver", q)
+    chosen = [
+        *of_feed(machine, model.Feed()),
+        LiveQuantity(("run", "crank_speed"), variable, speed, "drive", role="speed"),
+        *of_machine(machine, without=("ratio",)),
+    ]
+    copied = None
+    if model.turns and not model.slides:
+        copied = {
+            "title": model.description,
+            "system": {"machine": file},
+            "run": {"crank_speed": float(speed)},
+        }
+    return _assembled(live_turn(machine, speed, units), None, "", chosen, copied, units)
+
+
+def _assembled(
+    turn: LiveTurn,
+    runs: LiveRuns | None,
+    why: str,
+    quantities: Iterable[LiveQuantity],
+    copied: dict[str, Any] | None,
+    units: Units,
+) -> LiveMachine:
+    modules = {"turn": turn.module} | ({"runs": runs.module} if runs else {})
+    data = {
+        "turn": turn.data,
+        "runs": runs.data if runs else None,
+        "without_runs": why,
+        "quantities": [each.data(units, turn.data["driver"]) for each in quantities],
+        "modules": {name: _memory(module) for name, module in modules.items()},
+        "file": copied,
+        "messages": {
+            "requirement": messages.REQUIREMENT,
+            "first": messages.FIRST_PARAMETER,
+            "next": messages.NEXT_PARAMETER,
+        },
+    }
+    return LiveMachine(data, {name: module.content for name, module in modules.items()})
+
+
+def _memory(module: WasmModule) -> dict[str, Any]:
+    """The places in the memory of a module that the page uses."""
+    d = module.description
+    tables = ("parameters", "inputs", "states", "outputs")
+    return {
+        **{name: {"address": d[name]["address"], "names": d[name]["names"]} for name in tables},
+        "derived": d["addresses"]["derived"],
+        "pace": d["addresses"].get("pace"),
+        "requirements": d["requirements"],
+        "free": d["memory"]["free"],
+        "functions": d["functions"],
+    }
+
+
+def _speed(config: Config, drive: Drive) -> Iterable[LiveQuantity]:
+    """The speed of the crank, where the motor follows it."""
+    if drive.follows or drive.foreign is not None:
+        variable = next(v for v in Layout(Run).variables if v.name == "crank_speed")
+        key = ("run", "crank_speed")
+        yield LiveQuantity(key, variable, float(config.run.crank_speed), "drive", role="speed")
+
+
+def _ratio(config: Config, drive: Drive, is_plate: bool) -> Iterable[LiveQuantity]:
+    """The ratio of the gear, where it is one number of the drive."""
+    model = drive.machine.model
+    if not drive.whole_line and "ratio" in model.parameter_layout.names:
+        variable = next(v for v in model.parameter_layout.variables if v.name == "ratio")
+        key = ("gear", "ratio") if is_plate else ("machine", "ratio")
+        yield LiveQuantity(key, variable, drive.ratio, "drive", role="ratio")
+
+
+def _copied(
+    config: Config, drive: Drive, tables: DriveTables, proposal: DriveProposal | None
+) -> dict[str, Any]:
+    """The tables of the study file that a reader copies, with what follows from the machine written down: another
+    machine shall not have another motor, gear or control. Names of other files are as in the study file."""
+    values = {f"motor.{name}": x for name, x in (drive.tuning.parameters if drive.tuning else {}).items()}
+    values |= _lengths(config)
+    plate = proposal.motor if proposal is not None else config.plate
+    if plate is not None:
+        values |= {"gear.ratio": drive.ratio, "gear.efficiency": float(tables.gear.efficiency)}
+        if drive.follows:
+            inverter = tables.starter.inverter
+            values |= {"starter.inverter.boost": inverter.boost, "starter.inverter.slip": inverter.slip}
+    copied = _tables(config, values)
+    if proposal is not None:
+        for part in registered():
+            copied.pop(part.motor_table or "", None)
+        copied.setdefault("system", {})["motor"] = proposal.motor.designation
+        copied["start"] = tables.start
+        if drive.added_inertia:
+            copied.setdefault("flywheel", {})["J"] = drive.added_inertia
+    for part in parts_of_line():
+        if (placed := drive.line.part(part.name)) is not None:
+            copied = part.settled(copied, placed)
+    copied["event"] = [_entry(event) for event in config.events.values()]
+    return copied
+
+
+def _lengths(config: Config) -> dict[str, float]:
+    """All lengths of a chain unit: a file that gives one takes none from its ratios."""
+    own = config.machine.by_name
+    return {f"machine.{name}": own[name] for name in LENGTHS} if config.machine.model.sides else {}
+
+
+def _tables(config: Config, values: Mapping[str, float]) -> dict[str, Any]:
+    return changed_tables(config, values, _TITLE, Path(config.file.source).parent)
+
+
+def _entry(event: Event) -> dict[str, Any]:
+    """An event as a study file has it, with all its quantities."""
+    names = {"type": event.kind, "name": event.name} | ({"side": event.side} if event.side else {})
+    if event.has_input:
+        names["input"] = event.acts_on[0]
+    values = {v.name: (int(x) if v.type == "Integer" else float(x)) for v, x in _values(event)}
+    return names | values
+
+
+def _values(event: Event) -> Iterable[tuple[Any, Any]]:
+    layout = Layout(type(event.p))
+    return zip(layout.variables, layout.values(event.p), strict=True)

@@ -1,0 +1,511 @@
+"use strict";
+/* The machine and the drive of a live page, without a page: everything is computed from the values of the quantities,
+   in SI units, by their places in `data.quantities`. `bytes` has the modules by name. */
+const liveModel = async (data, bytes) => {
+  const TURN = 2 * Math.PI;
+
+  /* a module: its functions, and its memory as numbers by name */
+  const kernel = async (name) => {
+    const places = data.modules[name];
+    const { instance } = await WebAssembly.instantiate(bytes[name], {});
+    const functions = instance.exports, memory = functions.memory;
+    const index = {};
+    for (const table of ["parameters", "inputs", "states", "outputs"])
+      places[table].names.forEach((each, k) => (index[each] = index[each] ?? places[table].address / 8 + k));
+    const own = {
+      functions, memory, places, index,
+      numbers: new Float64Array(memory.buffer),
+      // room for so many bytes behind the memory of the module
+      room(size) {
+        const free = Math.ceil(places.free / 16) * 16, lacking = free + size - memory.buffer.byteLength;
+        if (lacking > 0) memory.grow(Math.ceil(lacking / 65536));
+        own.numbers = new Float64Array(memory.buffer);
+        return free;
+      },
+      set(each, value) {
+        own.numbers[index[each]] = value;
+      },
+      get: (each) => own.numbers[index[each]],
+      has: (each) => each in index,
+    };
+    return own;
+  };
+  const turnKernel = await kernel("turn");
+  const runsKernel = data.runs ? await kernel("runs") : null;
+  const quantities = data.quantities, study = quantities.map((q) => q.value);
+  const placeOf = (role) => quantities.findIndex((q) => q.role === role);
+  const speedAt = placeOf("speed"), ratioAt = placeOf("ratio");
+  for (const [name, value] of Object.entries(data.turn.parameters)) turnKernel.set(name, value);
+  const baseRatio = data.turn.parameters.ratio ?? 1;
+
+  /* numbers as people read them */
+  const digits = (x, n = 3) => {
+    if (x === 0) return "0";
+    if (!Number.isFinite(x)) return x > 0 ? "∞" : x < 0 ? "−∞" : "-";
+    const size = Math.abs(x);
+    let text;
+    if (size >= 1e6 || size < 1e-3) {
+      const [mantissa, exponent] = x.toExponential(n - 1).split("e");
+      text = `${mantissa}\u00a0×\u00a010^${Number(exponent)}`;
+    } else text = size >= 10 ** (n - 1) ? x.toFixed(0) : x.toPrecision(n);
+    return text.replace(/-/g, "−");
+  };
+  const shown = (x, of, n = 3) => {
+    // a small power is in W
+    if (of.unit === "kW" && Math.abs(x) < 100) return shown(x, { factor: 1, offset: 0, unit: "W" }, n);
+    return shownIn(x, of, n);
+  };
+  const shownIn = (x, of, n) => `${digits(of.factor * x + of.offset, n)}${of.unit ? (of.unit === "°" ? "" : "\u00a0") + of.unit : ""}`;
+  const general = (x) => String(Number(x.toPrecision(6))).replace("-", "−");
+
+  /* refusals */
+  class Refusal extends Error {}
+
+  const admits = (q, x) => Number.isFinite(x) && (q.low === null || (q.above ? x > q.low : x >= q.low)) && (q.high === null || x <= q.high);
+  const allowed = (q) =>
+    [q.low === null ? "" : `${q.above ? ">" : "≥"} ${shown(q.low, q, 4)}`, q.high === null ? "" : `≤ ${shown(q.high, q, 4)}`].filter(Boolean).join(" and ") || "a number";
+
+  // the first requirement that a machine does not meet; null where it meets all
+  const unmet = (k) => {
+    const { address, rules } = k.places.requirements;
+    if (!k.functions.requirements) return null;
+    k.functions.requirements();
+    for (let n = 0; n < rules.length; n++) {
+      const [value, low, high] = k.numbers.subarray(address / 8 + 3 * n, address / 8 + 3 * n + 3);
+      if (!(low < value && value < high)) return { rule: rules[n], value, low, high };
+    }
+    return null;
+  };
+  const words = ({ rule, value, low, high }) => {
+    const unit = rule.unit === "1" ? "" : " " + rule.unit.replace(/\./g, " ");
+    const given = rule.context.map((name) => `${name} = ${general(turnKernel.get(name))}`).join(", ");
+    const limits = [Number.isFinite(low) ? `> ${general(low)}` : "", Number.isFinite(high) ? `< ${general(high)}` : ""].filter(Boolean).join(" and ");
+    return `${rule.subject} = ${general(value)}${unit}: ${rule.why}${given ? ` with ${given}` : ""}; ${low < high ? `must be ${limits}${unit}` : `no value fits; ${rule.remedy}`}`;
+  };
+
+  /* the machine over a turn */
+  const ratioOf = (values) => (ratioAt < 0 ? baseRatio : values[ratioAt]);
+  const speedOf = (values) => (speedAt < 0 ? data.turn.speed : values[speedAt]);
+  const prepare = (values) => {
+    quantities.forEach((q, i) => {
+      if (!admits(q, values[i])) throw new Refusal(`${q.title}: must be ${allowed(q)}`);
+      for (const name of q.turn) turnKernel.set(name, values[i]);
+    });
+    if (turnKernel.has("ratio")) turnKernel.set("ratio", ratioOf(values));
+    if (turnKernel.functions.derive) turnKernel.functions.derive();
+    const fault = unmet(turnKernel);
+    if (fault) throw new Refusal(words(fault));
+  };
+  const outputs = data.modules.turn.outputs.names;
+
+  // the columns of a turn by name, each with a number for each place of the driver
+  const turn = (values, count = data.turn.places) => {
+    prepare(values);
+    const ratio = ratioOf(values), speed = speedOf(values), [low, high] = data.turn.span;
+    const columns = outputs.map(() => new Float64Array(count)), place = new Float64Array(count);
+    const { numbers, functions, index } = turnKernel, first = data.modules.turn.outputs.address / 8;
+    numbers[index.w] = speed * ratio;
+    numbers[index.a] = 0;
+    for (let k = 0; k < count; k++) {
+      place[k] = data.turn.turns ? (TURN * k) / count : low + ((high - low) * k) / (count - 1);
+      numbers[index.phi] = place[k] * ratio;
+      functions.values(1);
+      for (let n = 0; n < columns.length; n++) columns[n][k] = numbers[first + n];
+    }
+    const found = { place, ratio, speed, count, columns: Object.fromEntries(outputs.map((name, n) => [name, columns[n]])) };
+    if (!found.columns.crank_torque.every(Number.isFinite)) throw new Refusal("the linkage does not close all the way with these values");
+    return found;
+  };
+
+  const means = (column) => {
+    // of a whole turn the places are even; over a way the ends count half
+    let sum = 0;
+    column.forEach((x) => (sum += x));
+    if (data.turn.turns) return sum / column.length;
+    return (sum - 0.5 * (column[0] + column[column.length - 1])) / (column.length - 1);
+  };
+  const reductions = {
+    peak: (c) => c.reduce((most, x) => Math.max(most, Math.abs(x)), 0),
+    max: (c) => c.reduce((most, x) => Math.max(most, x), -Infinity),
+    min: (c) => c.reduce((least, x) => Math.min(least, x), Infinity),
+    mean: means,
+    rms: (c) => Math.sqrt(means(c.map((x) => x * x))),
+  };
+  const factorOf = (by, at) => (by === "speed" ? at.speed : by === "ratio2" ? at.ratio * at.ratio : 1);
+  const results = (at) => Object.fromEntries(data.turn.results.map((r) => [r.name, reductions[r.reduce](at.columns[r.of]) * factorOf(r.by, at)]));
+  const pulls = (at) =>
+    data.turn.pulls.map((each) => ({ ...each, value: Math.min(...each.columns.map((name) => reductions.min(at.columns[name]))) }));
+
+  // the range of one value in which the machine works, about a value at which it does
+  const range = (values, i) => {
+    const works = (x) => {
+      const other = values.slice();
+      other[i] = x;
+      try {
+        return Boolean(turn(other, 36));
+      } catch (error) {
+        if (!(error instanceof Refusal)) throw error;
+        return false;
+      }
+    };
+    const inside = study[i];
+    if (!works(inside)) return null;
+    return [-1, 1].map((sense) => {
+      let held = inside, out = null;
+      for (let step = 0.02 * (Math.abs(inside) || 0.1), k = 0; k < 40 && out === null; k++, step *= 1.4) {
+        if (works(held + sense * step)) held += sense * step;
+        else out = held + sense * step;
+      }
+      if (out === null) return sense * Infinity;
+      for (let k = 0; k < 24; k++) {
+        const middle = 0.5 * (held + out);
+        if (works(middle)) held = middle;
+        else out = middle;
+      }
+      return held;
+    });
+  };
+
+  // why values are refused, with the range of the value that was changed last; an empty text where they are not
+  const refusal = (values, changed) => {
+    try {
+      turn(values, 36);
+      return "";
+    } catch (error) {
+      if (!(error instanceof Refusal)) throw error;
+      const q = quantities[changed];
+      if (!q || !admits(q, values[changed])) return error.message;
+      const limits = range(values, changed);
+      if (!limits) return error.message;
+      const sides = [
+        Number.isFinite(limits[0]) && (q.low === null || limits[0] > q.low) ? `≥ ${shown(limits[0], q, 4)}` : "",
+        Number.isFinite(limits[1]) && (q.high === null || limits[1] < q.high) ? `≤ ${shown(limits[1], q, 4)}` : "",
+      ];
+      return `${error.message}. With the other values as they are, ${q.title} must be ${sides.filter(Boolean).join(" and ") || "another"}.`;
+    }
+  };
+
+  // how much a tenth of each value changes the results, as a share of them
+  const effects = (values) => {
+    const base = results(turn(values, 90)), kept = data.turn.results.filter((r) => !r.group && base[r.name]);
+    return quantities.map((q, i) => {
+      if (!q.turn.length && q.role !== "speed" && q.role !== "ratio") return 0;
+      const other = values.slice();
+      other[i] += 0.1 * (Math.abs(values[i]) || 0.1);
+      if (!admits(q, other[i])) other[i] = values[i] - 0.1 * Math.abs(values[i]);
+      try {
+        const changed = results(turn(other, 90));
+        return Math.max(...kept.map((r) => Math.abs(changed[r.name] / base[r.name] - 1)));
+      } catch (error) {
+        if (!(error instanceof Refusal)) throw error;
+        return 1;
+      }
+    });
+  };
+
+  /* runs of the drive */
+  const evaluate = (formula, names) => {
+    if (typeof formula === "number") return formula;
+    if (typeof formula === "string") return names(formula);
+    const [sign, a, b] = formula, [x, y] = [evaluate(a, names), evaluate(b, names)];
+    return sign === "+" ? x + y : sign === "-" ? x - y : sign === "*" ? x * y : x / y;
+  };
+
+  // torque at the motor's shaft through a gear, see chainunit.drives.gearing.motor_side
+  const friction = (values) => {
+    const g = data.runs.gear_loss, at = turn(values), torque = at.columns.crank_torque, ratio = ratioOf(values);
+    const mean = means(torque), sizes = means(torque.map(Math.abs));
+    let speed = g.rated_speed, drag = g.drag;
+    for (let k = 0; k < 3; k++) {
+      const shaft = (mean + (1 / g.efficiency - 1) * sizes * Math.sign(speed)) / ratio + g.drag * speed;
+      speed = g.follows ? g.rated_speed : g.synchronous - ((g.synchronous - g.rated_speed) * shaft) / g.rated_torque;
+      drag = (shaft - mean / ratio) / speed;
+    }
+    return g.friction + drag;
+  };
+
+  class Runs {
+    constructor(values) {
+      const of = data.runs, k = (this.k = runsKernel);
+      this.values = values;
+      this.of = of;
+      this.ratio = ratioOf(values);
+      this.speed = speedOf(values);
+      this.turnTime = TURN / this.speed;
+      const role = (name, otherwise) => (placeOf(name) < 0 ? otherwise : values[placeOf(name)]);
+      this.ramp = role("ramp", of.ramp);
+      this.rampEnd = Math.max(this.ramp, of.soft_time);
+      this.trip = role("trip", of.trip);
+      this.inputs = { ...of.inputs };
+      for (const [name, value] of Object.entries(of.parameters)) k.set(name, value);
+      quantities.forEach((q, i) => {
+        for (const name of q.runs) {
+          if (name in this.inputs) this.inputs[name] = values[i];
+          else k.set(name, values[i]);
+        }
+      });
+      if (ratioAt >= 0) k.set("machine.ratio", this.ratio);
+      const rotor = placeOf("rotor"), added = placeOf("added");
+      if (rotor >= 0 || added >= 0) {
+        const own = rotor < 0 ? of.rotor.own : values[rotor];
+        k.set(of.rotor.name, own + of.rotor.rest + (added < 0 ? of.rotor.added : values[added]));
+      }
+      if (of.gear_loss) k.set(of.gear_loss.parameter, friction(values));
+      if (of.derived) {
+        prepare(values);
+        const from = turnKernel.places.derived / 8, to = k.places.derived / 8, count = of.derived;
+        k.numbers.set(turnKernel.numbers.subarray(from, from + count), to);
+      } else if (k.functions.derive) k.functions.derive();
+      this.columns = [...new Set([...of.columns, of.names.angle, of.names.speed, of.names.motor_speed, of.names.current])].filter(k.has);
+    }
+
+    // signals in normal running, with a ramp from rest
+    signals(changes = {}, fromRest = false, fedFrom = null) {
+      const all = {};
+      for (const [name, value] of Object.entries(this.inputs)) all[name] = { start: value, changes: [] };
+      for (const q of quantities)
+        if (q.group === "feed" && fromRest && this.of.empty_start)
+          for (const name of q.runs)
+            all[name] = { start: 0, changes: fedFrom === null ? [] : [[fedFrom, this.of.feed_rise * this.turnTime, this.inputs[name]]] };
+      if (this.of.reference) {
+        const w = this.speed * this.ratio;
+        all[this.of.reference] = fromRest ? { start: 0, changes: [[0, this.ramp, w]] } : { start: w, changes: [] };
+      }
+      return { ...all, ...changes };
+    }
+
+    // from the states in memory on: so many rows, a step apart
+    run(begin, rows, signals, step = this.of.step) {
+      const k = this.k, names = Object.keys(signals), count = this.columns.length;
+      let tail = 0;
+      for (const s of Object.values(signals)) tail += 8 * (1 + 3 * s.changes.length);
+      const table = 8 + 24 * names.length, chosen = 8 + 8 * Math.ceil(count / 2);
+      const at = k.room(table + tail + chosen + 8 * rows * count + 64), whole = new Int32Array(k.memory.buffer);
+      let numbers = at + table;
+      whole[at / 4] = names.length;
+      names.forEach((name, n) => {
+        const s = signals[name], record = (at + 8 + 24 * n) / 4;
+        whole.set([8 * k.index[name], 1, s.changes.length, numbers, 0, 0], record);
+        k.numbers.set([s.start, ...s.changes.flat()], numbers / 8);
+        numbers += 8 * (1 + 3 * s.changes.length);
+      });
+      whole[numbers / 4] = count;
+      this.columns.forEach((name, n) => (whole[numbers / 4 + 2 + n] = 8 * k.index[name]));
+      const into = numbers + chosen;
+      const made = k.functions.run(begin, step, this.of.longest, rows, at, numbers, into, 1);
+      const found = { time: new Float64Array(made), made, wanted: rows };
+      for (const name of this.columns) found[name] = new Float64Array(made);
+      for (let r = 0; r < made; r++) {
+        found.time[r] = begin + r * step;
+        this.columns.forEach((name, n) => (found[name][r] = k.numbers[into / 8 + r * count + n]));
+      }
+      return found;
+    }
+
+    get states() {
+      const { address, names } = this.k.places.states;
+      return this.k.numbers.slice(address / 8, address / 8 + names.length);
+    }
+
+    set states(x) {
+      this.k.numbers.set(x, this.k.places.states.address / 8);
+    }
+
+    setInputs(signals) {
+      for (const [name, s] of Object.entries(signals)) this.k.set(name, s.start);
+    }
+
+    // the time of the step that the integrator took last is no part of the states
+    forget() {
+      this.k.numbers[this.k.places.pace / 8] = 0;
+    }
+
+    rowsOf(time) {
+      return Math.max(2, Math.round(time / this.of.step) + 1);
+    }
+
+    angle(run, row = run.made - 1) {
+      return run[this.of.names.angle][row] / this.crankRatio("angle");
+    }
+
+    crankRatio() {
+      return this.ratio / this.of.line_ratio;
+    }
+
+    crank(run) {
+      const by = this.crankRatio();
+      return {
+        time: run.time,
+        torque: run[this.of.names.torque].map((x) => x * by),
+        speed: run[this.of.names.speed].map((x) => x / by),
+        current: run[this.of.names.current],
+        rocker: this.of.names.rocker ? run[this.of.names.rocker] : null,
+        motor: run[this.of.names.motor_torque],
+      };
+    }
+
+    // start-up, with the feed of an event that is a start
+    start(event = null) {
+      const changes = event ? this.eventSignals(event, 0, () => 0) : {};
+      let signals = this.signals(changes, true);
+      this.setInputs(signals);
+      this.k.functions.start();
+      const fed = this.of.empty_start ? 2 : 1, time = this.rampEnd + fed * this.of.settle_turns * this.turnTime;
+      if (!this.of.empty_start || event) return this.run(0, this.rowsOf(time), signals);
+      const free = this.run(0, this.rowsOf(time), signals), speed = this.crank(free).speed;
+      const row = speed.findIndex((w) => w >= this.of.started * this.speed);
+      const from = row < 0 ? this.rampEnd + this.of.settle_turns * this.turnTime : free.time[row];
+      signals = this.signals({}, true, from);
+      this.setInputs(signals);
+      this.k.functions.start();
+      return this.run(0, this.rowsOf(Math.max(time, from + this.of.settle_turns * this.turnTime)), signals);
+    }
+
+    // the last turns of steady running, from the states in memory on; null where the motor does not settle
+    settle(most = this.of.patience) {
+      const signals = this.signals();
+      for (let k = 0; k < most; k++) {
+        this.forget();
+        const run = this.run(0, this.rowsOf((this.of.turns + 0.1) * this.turnTime), signals);
+        if (run.made < run.wanted) return null;
+        if (this.isSettled(run)) return run;
+      }
+      return null;
+    }
+
+    isSettled(run) {
+      const { speed, torque } = this.crank(run), first = run[this.of.names.angle][0];
+      const goal = first + TURN * this.of.turns * this.crankRatio(), angle = run[this.of.names.angle];
+      const last = angle.findIndex((x) => x >= goal);
+      if (last < 1) return speed.every((w) => Math.abs(w) < 0.01 * this.speed);
+      const share = (goal - angle[last - 1]) / (angle[last] - angle[last - 1]);
+      const end = (x) => x[last - 1] + share * (x[last] - x[last - 1]);
+      const inside = speed.slice(0, last + 1), ripple = reductions.max(inside) - reductions.min(inside);
+      const change = end(speed) - speed[0], size = reductions.peak(inside), most = reductions.peak(torque.slice(0, last + 1));
+      const gap = Math.max(Math.abs(change) / size, Math.abs(end(torque) - torque[0]) / most);
+      return gap <= this.of.closed && (Math.abs(change) <= 1e-4 * size || Math.abs(change) <= this.of.drift * ripple);
+    }
+
+    value(event, name) {
+      const i = quantities.findIndex((q) => q.event === event.name && q.name === name);
+      return i < 0 ? event.values[name] : this.values[i];
+    }
+
+    eventSignals(event, at, state) {
+      const names = (name) => {
+        if (name === "at") return at;
+        const dot = name.indexOf("."), of = name.slice(0, dot), own = name.slice(dot + 1);
+        return of === "p" ? this.value(event, own) : of === "normal" ? this.normal(event.normal[own]) : state(event.reads[own]);
+      };
+      const signals = {};
+      for (const [full, s] of Object.entries(event.signals))
+        signals[full] = { start: evaluate(s.start, names), changes: s.changes.map((c) => c.map((x) => evaluate(x, names))) };
+      return signals;
+    }
+
+    normal(full) {
+      return full === this.of.reference ? this.speed * this.ratio : this.inputs[full] ?? this.k.get(full);
+    }
+
+    // the event, from steady running on: time counts from its begin
+    event(event, steady) {
+      const angleNow = this.angle(steady), wanted = this.value(event, "crank_angle") ?? 0;
+      let ahead = (wanted - angleNow) % TURN;
+      if (ahead < 0) ahead += TURN;
+      if (ahead < 0.125 * TURN) ahead += TURN;
+      const mean = Math.max((this.angle(steady) - this.angle(steady, 0)) / (steady.time[steady.made - 1] - steady.time[0]), 0.5 * this.speed);
+      const limit = (2 * ahead) / mean, before = this.states;
+      this.forget();
+      const wait = this.run(0, this.rowsOf(limit), this.signals());
+      const goal = (angleNow + ahead) * this.crankRatio(), row = wait[this.of.names.angle].findIndex((x) => x >= goal);
+      let time = limit;
+      if (row > 0) {
+        const angle = wait[this.of.names.angle], speed = wait[this.of.names.speed];
+        // the speed hardly changes between two rows
+        time = wait.time[row - 1] + (goal - angle[row - 1]) / (0.5 * (speed[row - 1] + speed[row]) || 1);
+      }
+      this.states = before;
+      this.forget();
+      const lead = this.run(0, 2, this.signals(), time);
+      const state = (full) => lead[full][lead.made - 1];
+      const signals = this.eventSignals(event, 0, state);
+      const lasts = Math.max(0, ...Object.values(signals).flatMap((s) => s.changes.map(([at, duration]) => at + duration)));
+      const turns = this.value(event, "turns") ?? 2;
+      this.forget();
+      const run = this.run(0, this.rowsOf(Math.max((turns + 0.1) * this.turnTime, lasts + this.turnTime)), this.signals(signals));
+      return this.cut(run);
+    }
+
+    // a run up to the opening of the coupling
+    cut(run) {
+      if (this.trip === null) return run;
+      const limit = this.trip / this.ratio, motor = run[this.of.names.motor_torque];
+      const row = motor.findIndex((x) => Math.abs(x) >= limit);
+      if (row < 0) return run;
+      const short = { ...run, made: row + 1, tripped: run.time[row] };
+      for (const name of ["time", ...this.columns]) short[name] = run[name].slice(0, row + 1);
+      if (row > 0) {
+        const [a, b] = [Math.abs(motor[row - 1]), Math.abs(motor[row])];
+        short.tripped = run.time[row - 1] + ((limit - a) / (b - a)) * (run.time[row] - run.time[row - 1]);
+      }
+      return short;
+    }
+
+    // the measures of a run with an event, by the rules of chainunit.study.measures
+    measures(run) {
+      const { time, torque, speed, current, rocker } = this.crank(run);
+      const slow = speed.map((w) => Math.abs(w) < 0.1 * this.speed);
+      let stall = null;
+      if (slow[slow.length - 1]) {
+        const first = slow.lastIndexOf(0) + 1;
+        if (first < 0.9 * slow.length) stall = time[first];
+      }
+      return {
+        crank_torque_peak: reductions.peak(torque),
+        rocker_torque_peak: rocker ? reductions.peak(rocker) : null,
+        current_peak: reductions.peak(current),
+        speed_least: reductions.min(speed),
+        stall_time: stall,
+        coupling_trip_time: run.tripped ?? null,
+      };
+    }
+  }
+
+  /* the study file */
+  const bare = /^[A-Za-z0-9_-]+$/;
+  const keyText = (name) => (bare.test(name) ? name : JSON.stringify(name));
+  const isTable = (x) => x !== null && typeof x === "object" && !Array.isArray(x);
+  const valueText = (x) => {
+    if (Array.isArray(x)) return `[${x.map(valueText).join(", ")}]`;
+    if (isTable(x)) return `{ ${Object.entries(x).map(([name, each]) => `${keyText(name)} = ${valueText(each)}`).join(", ")} }`;
+    return JSON.stringify(x);
+  };
+  const lines = (table, prefix) => {
+    const own = [], later = [];
+    for (const [name, x] of Object.entries(table)) {
+      const full = prefix + keyText(name), many = Array.isArray(x) && x.length > 0 && x.every(isTable);
+      if (!prefix && (isTable(x) || many)) later.push([full, x]);
+      else own.push(`${keyText(name)} = ${valueText(x)}`);
+    }
+    for (const [full, x] of later)
+      for (const each of Array.isArray(x) ? x : [x]) own.push("", Array.isArray(x) ? `[[${full}]]` : `[${full}]`, ...lines(each, full + "."));
+    return own;
+  };
+  const studyFile = (values) => {
+    const tables = JSON.parse(JSON.stringify(data.file));
+    quantities.forEach((q, i) => {
+      if (values[i] === study[i]) return;
+      let at = tables, path = q.key;
+      if (q.role === "event") [at, path] = [tables.event.find((event) => event.name === q.event), [q.name]];
+      for (const name of path.slice(0, -1)) at = isTable(at[name]) ? at[name] : (at[name] = {});
+      at[path[path.length - 1]] = values[i];
+    });
+    return lines(tables, "").join("\n").trim() + "\n";
+  };
+
+  return {
+    Refusal, Runs, data, digits, effects, quantities, pulls, range, reductions, refusal, results, shown, study, studyFile, turn, factorOf,
+    runsOf: (values) => new Runs(values),
+  };
+};
+if (typeof module !== "undefined") module.exports = liveModel;

@@ -1,0 +1,79 @@
+"""The page of a live machine alone: of a study file or a linkage file, without a run of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ... import __version__
+from ...machines.linkages.file import read_linkage
+from ...machines.machine import Machine
+from ...reading.tables import option_value
+from ...study.choice import choose
+from ...study.config import Config
+from ...study.config import load as load_study
+from ...study.package import is_study_file
+from .. import blocks as b
+from ..capability import capabilities
+from ..lines import line
+from ..live_block import LEAD, Live, LiveMachine
+from .machine import of_linkage, of_study, without_drive
+
+USUAL_SPEEDS = {"rad/s": "60 rpm", "m/s": "0.1 m/s"}
+"""Speed of the driver of a linkage where nobody gives one, by its unit."""
+
+
+def speed_of_driver(machine: Machine, given: str | None) -> float:
+    """The speed of the driver of a linkage [rad/s, m/s] from an option, or the usual one.
+
+    Raises
+    ------
+    InputError
+        for a text that is no speed.
+    """
+    unit = "m/s" if machine.model.slides else "rad/s"
+    return option_value("--speed", given or USUAL_SPEEDS[unit], unit, "speed of the driver")
+
+
+def live_of_config(config: Config, folder: Path) -> LiveMachine:
+    """The live machine of a study before any run; a drive that a capability has to choose is not known."""
+    if config.motor is None:
+        return without_drive(config, "the study chooses the motor; chainunit study makes the page with it")
+    choice = choose(config, folder)
+    further = [
+        each
+        for part in capabilities()
+        for each in part.live_quantities(config.plans[part.name], choice.drive)
+    ]
+    return of_study(config, choice.drive, choice.tables, choice.proposal, further)
+
+
+def live_page(file: Path | None, speed: str | None, folder: Path) -> b.Report:
+    """The report with the live machine of a study file or a linkage file, or of the packaged study without a file;
+    `speed` is that of the driver of a linkage.
+
+    Raises
+    ------
+    InputError
+        for a file that is refused, an equation that cannot run in a page, and a speed for a study.
+    """
+    if file is None or is_study_file(str(file)) or file.suffix.lower() != ".toml":
+        config = load_study(file)
+        live = live_of_config(config, folder)
+        return _report(
+            config.title or "Study", "Live study", "the study", live, str(file or "packaged example")
+        )
+    machine = Machine(read_linkage(file))
+    live = of_linkage(machine, speed_of_driver(machine, speed), file.name)
+    return _report(machine.model.description, "Live linkage", "the file", live, str(file))
+
+
+def _report(title: str, kind: str, whole: str, live: LiveMachine, source: str) -> b.Report:
+    blocks: tuple[b.Block, ...] = (b.Text(LEAD.format(whole), "lead", "long"), Live(lambda: live))
+    return b.Report(
+        title,
+        kind,
+        {"chainunit": __version__, "source": source},
+        (),
+        (b.Section("live", "Try it", blocks),),
+        source=line(f"{source} · chainunit {__version__}"),
+    )

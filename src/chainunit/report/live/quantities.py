@@ -1,0 +1,81 @@
+"""The quantities that a live page lets its reader change: their declarations, their values, and their places in the
+modules of the page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from ...core.descriptions import of_driver
+from ...core.quantities import Variable, named_values
+from ...machines.machine import Machine
+from ...reading.text import Units, scales, unit_text
+
+
+@dataclass(frozen=True)
+class LiveQuantity:
+    """A quantity of the page.
+
+    `key` is its name in a study file, or its path, whose whole numbers are places in a list. `turn` and `runs` are
+    the full names of the parameters and inputs of the two modules that have its value. `role` is set where its value
+    takes another way: ``speed``, ``ratio``, ``ramp``, ``added``, ``trip``, or ``event``, a quantity of the event
+    `event`.
+    """
+
+    key: tuple[str | int, ...]
+    variable: Variable
+    value: float
+    group: str
+    turn: tuple[str, ...] = ()
+    runs: tuple[str, ...] = ()
+    role: str = ""
+    event: str = ""
+
+    def data(self, units: Units, driver: str) -> dict[str, Any]:
+        """The quantity as JSON has it, with the noun of the `driver`; bounds are in SI units, as the value."""
+        q = self.variable.quantity
+        return {
+            "key": list(self.key),
+            "name": self.variable.name,
+            "title": of_driver(self.variable.template, driver),
+            **shown_in_unit(self.variable.unit, self.variable.kind, units),
+            "value": self.value,
+            "low": q.low if math.isfinite(q.low) else None,
+            "high": q.high if math.isfinite(q.high) else None,
+            "above": q.open_low,
+            "group": self.group,
+            "turn": list(self.turn),
+            "runs": list(self.runs),
+            "role": self.role,
+            "event": self.event,
+        }
+
+
+def of_machine(
+    machine: Machine, known: Collection[str] = (), without: Collection[str] = ()
+) -> Iterator[LiveQuantity]:
+    """The real parameters of a machine, as its own tables have them; `known` are the parameters of the module of
+    runs, and those `without` are left out."""
+    for v, value in named_values(machine.p):
+        if v.type == "Real" and v.name not in without:
+            full = f"machine.{v.name}"
+            runs = (full,) if full in known else ()
+            yield LiveQuantity(("machine", *v.name.split(".")), v, value, "machine", (v.name,), runs)
+
+
+def of_feed(machine: Machine, feed: Any, known: Collection[str] = ()) -> Iterator[LiveQuantity]:
+    """The loads of a machine in normal running."""
+    for v, value in named_values(feed):
+        if v.type == "Real":
+            full = f"machine.{v.name}"
+            runs = (full,) if full in known else ()
+            yield LiveQuantity(("feed", *v.name.split(".")), v, value, "feed", (v.name,), runs)
+
+
+def shown_in_unit(unit: str, kind: str, units: Units) -> dict[str, Any]:
+    """The unit in which a quantity is shown, with factor and offset, as JSON has it: shown = factor * value +
+    offset."""
+    name, factor, offset = scales(unit, kind, units)[0]
+    return {"unit": unit_text(name), "factor": factor, "offset": offset}

@@ -1,0 +1,195 @@
+"""The machine of a live page over a turn of its driver, or over its way: its module, and the data by which the page
+draws it and reads its results."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...core.engines import MATH
+from ...core.symbolic_trace import trace
+from ...core.wasm.module import WasmModule, wasm_module
+from ...machines.machine import Machine
+from ...mechanism.sketch import places
+from ...reading.text import Units
+from ...study.cycle_quantities import ANGLES
+from ...study.verdict import TOPICS
+from .. import linkage
+from ..lines import capital
+from .quantities import shown_in_unit
+
+_ON_THE_WAY = 361
+"""Places of a driver that does not turn round."""
+_PULLS = (("mean_pull", "pushed", "bad"), ("end_pull", "end pushed", "partly"))
+"""By the kind of the pull in a rod, the topic of the verdict where it is below zero, and its sign."""
+
+
+@dataclass(frozen=True)
+class LiveTurn:
+    """The module of a machine, and the `data` of its turn as JSON has it."""
+
+    module: WasmModule
+    data: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class _Force:
+    """A reaction: its title, its output, the joint at which it acts, and its name in the picture."""
+
+    title: str
+    output: str
+    joint: str
+    short: str
+
+
+def live_turn(machine: Machine, speed: float, units: Units) -> LiveTurn:
+    """The turn of a machine at a constant `speed` of its driver [rad/s, m/s]."""
+    model = machine.model
+    low, high = model.span
+    q = np.linspace(low, high, 121)
+    whole = machine.state(machine.inputs({"phi": q * machine.ratio, "w": speed * machine.ratio})).m
+    forces = list(_forces(machine))
+    known = trace(model).columns
+    results = list(_results(machine, forces, known, units))
+    shown = [pin for pin in places(whole) if f"x({pin})" in known]
+    lines = [name for name in known if name.startswith("line(")]
+    columns = dict.fromkeys(
+        [
+            *(each["of"] for each in results),
+            *(f"{force.output}.{axis}" for force in forces for axis in ("fx", "fy")),
+            *(f"{axis}({pin})" for pin in shown for axis in "xy"),
+            *lines,
+            *(name for each in _pulls(known) for name in each["columns"]),
+        ]
+    )
+    driver = whole.linkage.driver
+    data = {
+        "parameters": machine.by_name,
+        "turns": bool(model.turns),
+        "span": [low, high],
+        "places": ANGLES if model.turns else _ON_THE_WAY,
+        "speed": speed,
+        "driver": model.driver_noun,
+        "effort": "force" if model.slides else "torque",
+        "place": shown_in_unit("m" if model.slides else "rad", "", units),
+        "results": results,
+        "pulls": list(_pulls(known)),
+        "forces": [
+            {"title": force.title, "of": force.output, "at": force.joint, "short": force.short}
+            for force in forces
+        ],
+        "curves": list(_curves(machine, known, units)),
+        "picture": {
+            "links": [
+                {"name": link.name, "look": link.look, "joints": link.joints, "closed": link.closed}
+                for link in linkage.links(whole.linkage, {})
+            ],
+            "grounds": [pin for pin in whole.linkage.ground if pin in shown],
+            "hanging": linkage.hanging(whole),
+            "orbit": (driver.bar.pin, driver.end) if model.turns else None,
+            "names": linkage.labels(whole.linkage),
+            "joints": shown,
+            "blocks": {name[5:-1]: name for name in lines if name[5:-1] in shown},
+            "paths": {
+                title: title.removeprefix("path of ")
+                for title in linkage.paths(whole, "" if model.turns else driver.end)
+            },
+            "rails": list(linkage.rails(whole)),
+        },
+    }
+    return LiveTurn(wasm_module(model, False, tuple(columns)), data)
+
+
+def _forces(machine: Machine) -> Iterator[_Force]:
+    model = machine.model
+    described = getattr(model, "described_by", None)
+    if described is None:
+        for title, output in model.pins.items():
+            if output in model.joints:
+                yield _Force(title, output, model.joints[output][0], "")
+        return
+    receivers = described.parts(MATH, machine.p, model.Inputs()).receivers
+    for name in described.structure.joints:
+        yield _Force(name, described.variable("joint", name), receivers[name][0][0], name)
+
+
+def _results(machine: Machine, forces: list[_Force], known: Any, units: Units) -> Iterator[dict[str, Any]]:
+    """The results of a turn: each is a reduction of a column, ``peak``, ``rms``, ``mean``, ``min`` or ``max``, times
+    the factors ``by``: the speed of the driver, or the square of the ratio."""
+    model = machine.model
+    port, driver = model.driver_port.unit, model.driver_noun
+    effort = "force" if model.slides else "torque"
+    unit, inertia = port("N.m"), port("kg.m2")
+    rows: list[tuple[str, str, str, str, str]] = [
+        (f"{driver} {effort}, peak", "peak", "crank_torque", unit, ""),
+        (f"{driver} {effort}, RMS", "rms", "crank_torque", unit, ""),
+        (f"{driver} {effort}, mean", "mean", "crank_torque", unit, ""),
+        ("power, mean", "mean", "crank_torque", "W", "speed"),
+        (f"inertia reflected to the {driver}, least", "min", "J", inertia, "ratio2"),
+        (f"inertia reflected to the {driver}, largest", "max", "J", inertia, "ratio2"),
+    ]
+    if "rocker.tau" in known:
+        rows.insert(3, ("rocker torque, peak", "peak", "rocker.tau", "N.m", ""))
+    if "margin" in known:
+        rows.append(("margin from a dead position, least", "min", "margin", "1", ""))
+    for title, reduction, column, of, by in rows:
+        yield {
+            "name": f"{reduction}({column})" + (f" {by}" if by else ""),
+            "title": title, "reduce": reduction, "of": column, "by": by, "group": "", **shown_in_unit(of, "", units),
+        }  # fmt: skip
+    for force in forces:
+        column = f"force({force.output})"
+        yield {
+            "name": f"peak({column})", "title": force.title, "reduce": "peak", "of": column, "by": "",
+            "group": "pins", **shown_in_unit("N", "", units),
+        }  # fmt: skip
+
+
+def _pulls(known: Any) -> Iterator[dict[str, Any]]:
+    """The pulls in the rods of organs, by kind of rod: of both sides the columns, and the topic where the least of
+    them is below zero."""
+    for rod in ("web", "wall"):
+        for kind, topic, sign in _PULLS:
+            names = {
+                "mean_pull": [f"mean_pull({side}.{rod})" for side in ("left", "right")],
+                "end_pull": [f"{side}.{rod}_pull" for side in ("left", "right")],
+            }[kind]
+            if all(name in known for name in names):
+                yield {
+                    "title": f"least {'mean' if kind == 'mean_pull' else 'end'} pull in a {rod}",
+                    "columns": names,
+                    "topic": topic,
+                    "words": TOPICS[topic].short,
+                    "sign": sign,
+                }
+
+
+def _curves(machine: Machine, known: Any, units: Units) -> Iterator[dict[str, Any]]:
+    """The plots over the turn: each has curves of one unit."""
+    model = machine.model
+    port, driver = model.driver_port.unit, model.driver_noun
+    effort = "force" if model.slides else "torque"
+    curves = [{"title": capital(f"{effort} at the {driver}"), "of": "crank_torque", "by": ""}]
+    if "rocker.tau" in known:
+        curves.append({"title": "Rocker torque", "of": "rocker.tau", "by": ""})
+    yield {
+        "name": "torque",
+        "title": capital(effort),
+        "curves": curves,
+        **shown_in_unit(port("N.m"), "", units),
+    }
+    yield {
+        "name": "inertia",
+        "title": f"Inertia reflected to the {driver}",
+        "curves": [{"title": "", "of": "J", "by": "ratio2"}],
+        **shown_in_unit(port("kg.m2"), "", units),
+    }
+    yield {
+        "name": "forces",
+        "title": "Forces in the pins",
+        "curves": "forces",
+        **shown_in_unit("N", "", units),
+    }

@@ -1,0 +1,340 @@
+"""The live machine of a page, in node: its turn, its refusals, its runs and the study file that it gives, against
+Python."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from live_pages import OUTCOME, in_node, live_of
+from wasm_hosts import NODE
+
+from chainunit import InputError
+from chainunit.core.quantities import Layout
+from chainunit.machines.admissible import holding_range
+from chainunit.machines.linkages.file import read_linkage
+from chainunit.machines.machine import Machine
+from chainunit.report.live.formulas import event_signals, varied_names
+from chainunit.report.live.machine import of_linkage
+from chainunit.report.live.page import live_page
+from chainunit.study import config as study_files
+from chainunit.study.block_runs import BlockRuns, RunPoint
+from chainunit.study.choice import choose
+from chainunit.study.cycle_quantities import cycle_quantity, evaluate
+from chainunit.study.event import TYPES
+from chainunit.study.measures import read_measure
+from chainunit.study.parts import example
+from chainunit.study.rig import Rig
+from chainunit.study.window import Phase, Trip, Window
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+LINKAGES = sorted((EXAMPLES / "linkages").glob("*.toml"))
+QUICK = ("chain_unit", "slider_crank_press", "scotch_yoke_pump", "toggle_clamp", "cylinder_lift")
+pytestmark = pytest.mark.skipif(
+    NODE is None, reason="no node, which runs the page's script as a browser does"
+)
+
+
+def varied(live, count, seed, of=("machine", "feed")):
+    """Values near those of the study, by key, for quantities that act on the turn."""
+    rng = np.random.default_rng(seed)
+    chosen = [q for q in live.data["quantities"] if q["group"] in of and q["turn"] and q["value"]]
+    some = rng.choice(len(chosen), min(count, len(chosen)), replace=False)
+    return {
+        ".".join(map(str, chosen[k]["key"])): chosen[k]["value"] * rng.uniform(0.998, 1.002) for k in some
+    }
+
+
+def check_turn(live, machine, speed, feed, changed):
+    """Every result of the turn against the cycle quantity of that name, or the same of a way to and fro."""
+    results = in_node(live, f"return model.results(model.turn(values({changed})));")
+    machine = machine.replace(
+        {k.removeprefix("machine."): x for k, x in changed.items() if k.startswith("machine.")}
+    )
+    loads = {k.removeprefix("feed."): x for k, x in changed.items() if k.startswith("feed.")}
+    feed = Layout(type(feed)).from_names(loads, feed)
+    speed = changed.get("run.crank_speed", speed)
+    factors = {"": 1.0, "speed": speed, "ratio2": machine.ratio**2}
+    rows = live.data["turn"]["results"]
+    names = list(dict.fromkeys(row["name"].split(" ")[0] for row in rows))
+    whole = machine.model.turns and evaluate(
+        machine, [cycle_quantity(name, machine.model) for name in names], speed, feed
+    )
+    for row in rows:
+        want = whole[row["name"].split(" ")[0]] if whole else over_the_way(machine, speed, feed, row)
+        assert results[row["name"]] == pytest.approx(float(want) * factors[row["by"]], rel=1e-9, abs=1e-9)
+    return results
+
+
+def over_the_way(machine, speed, feed, row):
+    q = np.linspace(*machine.model.span, 361)
+    out = machine.outputs(q * machine.ratio, speed * machine.ratio, 0.0, feed)
+    columns = type(out).__name__ and machine.model.parts[0].layout.by_name(out)
+    columns["crank_torque"] = columns["tau"] * machine.ratio
+    if row["of"].startswith("force("):
+        pin = row["of"][6:-1]
+        column = np.hypot(columns[f"{pin}.fx"], columns[f"{pin}.fy"])
+    else:
+        column = columns[row["of"]]
+    means = {"mean": np.trapezoid(column) / 360.0, "rms": math.sqrt(np.trapezoid(column**2) / 360.0)}
+    ends = {"peak": np.max(np.abs(column)), "min": np.min(column), "max": np.max(column)}
+    return (means | ends)[row["reduce"]]
+
+
+@pytest.fixture(scope="module")
+def packaged(tmp_path_factory):
+    config = study_files.load()
+    return config, *live_of(config, tmp_path_factory.mktemp("live"))
+
+
+def test_a_turn_of_the_packaged_study_is_that_of_python(packaged):
+    config, live, choice = packaged
+    for seed in range(3):
+        changed = {"run.crank_speed": 2.0 + seed} | varied(live, 12, seed)
+        check_turn(live, choice.drive.machine, float(config.run.crank_speed), config.feed, changed)
+
+
+@pytest.mark.parametrize(
+    "file",
+    [pytest.param(f, id=f.stem, marks=() if f.stem in QUICK else pytest.mark.second) for f in LINKAGES],
+)
+def test_a_turn_of_each_linkage_is_that_of_python(file):
+    machine = Machine(read_linkage(file))
+    speed = 0.1 if machine.model.slides else 5.0
+    live = of_linkage(machine, speed, file.name)
+    check_turn(live, machine, speed, machine.model.Feed(), varied(live, 4, 1))
+
+
+def test_the_most_effective_numbers_come_first(packaged):
+    _, live, choice = packaged
+    effects = in_node(live, "return model.effects(model.study);")
+    by_key = dict(
+        zip((".".join(q["key"]) for q in live.data["quantities"] if not q["event"]), effects, strict=False)
+    )
+    assert by_key["machine.l"] > by_key["machine.r"] > by_key["machine.pin.diameter"] > 0.0
+    assert by_key["machine.pin.w_smooth"] < 1e-3
+    # the mass of the material by finite differences of the results in Python
+    feed = replace(study_files.load().feed, left=replace(study_files.load().feed.left, material_mass=33.0))
+    name = "peak(rocker.tau)"
+    quantity = [cycle_quantity(name, choice.drive.machine.model)]
+    now, then = (
+        float(evaluate(choice.drive.machine, quantity, 3.0, f)[name]) for f in (study_files.load().feed, feed)
+    )
+    assert by_key["feed.left.material_mass"] >= 0.99 * abs(then / now - 1.0)
+
+
+def test_lengths_that_cannot_close_are_refused_with_the_range(packaged):
+    _, live, choice = packaged
+    machine = choice.drive.machine
+    low, high = holding_range(machine.model, machine.by_name, "z")
+    found = in_node(
+        live,
+        f"const z = {1.05 * high};"
+        """const at = model.quantities.findIndex((q) => q.key.join(".") === "machine.z");
+        return [model.refusal(values({"machine.z": z}), at), model.range(model.study, at),
+          model.refusal(model.study, null)];""",
+    )
+    words, limits, none = found
+    assert none == ""
+    with pytest.raises(InputError) as refused:
+        machine.replace(z=1.05 * high)
+    # the same requirement in the same words
+    assert str(refused.value).split(";")[0].replace("-", "−") in words.replace("-", "−")
+    assert limits == pytest.approx([low, high], rel=1e-3)
+    assert f"must be ≥ {limits[0]:.4g}" in words.replace("\u00a0", " ") and f"≤ {limits[1]:.4g}" in words
+
+
+def test_a_value_out_of_its_bounds_is_refused(packaged):
+    _, live, _ = packaged
+    script = """const at = model.quantities.findIndex((q) => q.key.join(".") === "machine.crank.m");
+        return model.refusal(values({"machine.crank.m": -1}), at);"""
+    assert "mass: must be ≥ 0\u00a0kg" in in_node(live, script)
+
+
+def test_pulls_below_zero_are_judged_as_in_a_study(packaged):
+    _, live, choice = packaged
+    pulls = in_node(live, 'return model.pulls(model.turn(values({"run.crank_speed": 9})));')
+    machine, feed = choice.drive.machine, study_files.load().feed
+    means = machine.mean_pulls(9.0, feed.left, feed.right)
+    want = {"web": float(np.min(means[:2])), "wall": float(np.min(means[2:]))}
+    for each in pulls:
+        rod = each["title"].split()[-1]
+        if "mean" in each["title"]:
+            assert each["value"] == pytest.approx(want[rod], rel=1e-9)
+        else:
+            assert each["value"] <= want[rod]
+    assert want["web"] < 0.0, "nothing is judged"
+
+
+# -- runs
+
+
+def measured(config, choice, event):
+    """The measures of an event by the compiled loop of the sweeps."""
+    rig = Rig(config.operation, choice.drive, None).plain
+    limit = rig.guards.get(choice.drive.motor_torque, math.inf)
+    block = BlockRuns(rig, [event])
+    (run,) = block.runs([RunPoint(rig, event, event.time_followed(config.operation.turn), limit=limit)])
+    assert run.fault is None
+    speed = config.run.crank_speed
+    steady = Window(Phase.STEADY, run.steady, choice.drive, (), speed)
+    trip = Trip(float(run.series["time"][-1]), math.nan, None) if run.ended else None
+    window = Window(Phase.EVENT, run.series, choice.drive, (), speed, 0.0, steady, trip)
+    return {name: read_measure(name, window) for name in MEASURES}
+
+
+MEASURES = ("crank_torque_peak", "current_peak", "speed_least", "stall_time", "coupling_trip_time")
+NEAR = {"stall_time": 5e-3, "coupling_trip_time": 2e-3}
+"""Times are read to a row of the page."""
+
+
+def check_event(config, choice, event, found, rel=1e-4):
+    want = measured(config, choice, event)
+    for name in MEASURES:
+        if want[name] is None:
+            assert found[name] is None, name
+        else:
+            assert found[name] == pytest.approx(want[name], rel=rel, abs=NEAR.get(name, 0.0)), name
+
+
+CATALOGUE = """
+start = "{}"
+[system]
+motor = "IE3 4-pole 0.75 kW, 80M"
+[gear]
+torque_limit = 2500
+"""
+STUDIES = {
+    "chain-unit": example("chain-unit"),
+    "knife": example("knife"),
+    "on line": CATALOGUE.format("direct"),
+    "inverter": CATALOGUE.format("inverter"),
+    "soft": CATALOGUE.format("soft"),
+}
+CHANGED = {
+    "chain-unit": (
+        {"machine.r": 0.16, "feed.left.material_mass": 60.0, "event.jam_left.force": 2600.0, "run.crank_speed": 2.5,
+         "event.jam_left.crank_angle": 1.5, "flywheel.J": 0.002, "machine.crank.m": 55.0},
+        "jam_left",
+    ),
+    "knife": ({"machine.knife.m": 95.0, "machine.r": 0.058, "event.hard_cut.force": 7e4}, "hard_cut"),
+    "jam_trips_coupling.toml": ({"coupling.trip_torque": 500.0, "feed.right.processing_force": 30.0}, "jam_left"),
+    "jam_with_driveline.toml": ({"machine.rocker.m": 75.0, "feed.right.processing_force": 30.0}, "jam_left"),
+    "on line": ({"feed.left.processing_force": 60.0, "flywheel.J": 0.005, "gear.ratio": 50.0}, "jam_left"),
+    "inverter": ({"feed.left.processing_force": 60.0, "machine.rocker.m": 75.0, "run.crank_speed": 2.8}, "jam_right"),
+    "soft": ({"feed.left.processing_force": 60.0, "machine.rocker.m": 75.0}, "jam_right"),
+}  # fmt: skip
+
+
+def study_of(name):
+    return study_files.load(EXAMPLES / name) if name.endswith(".toml") else study_files.parse(STUDIES[name])
+
+
+@pytest.mark.parametrize(
+    "name", ["chain-unit", *(pytest.param(n, marks=pytest.mark.second) for n in CHANGED if n != "chain-unit")]
+)
+def test_runs_and_the_copied_study_file_agree(name, tmp_path):
+    """An event in node, and the same event in a study of the file that the page gives."""
+    config = study_of(name)
+    live, _ = live_of(config, tmp_path)
+    changed, run = CHANGED[name]
+    found, text = in_node(
+        live, f'{OUTCOME} return [outcome({changed}, "{run}"), model.studyFile(values({changed}))];'
+    )
+    file = (
+        Path(config.file.source).parent / "copied.toml"
+        if name.endswith(".toml")
+        else tmp_path / "copied.toml"
+    )
+    copied = study_files.parse(text, str(file))
+    choice = choose(copied, tmp_path)
+    for key, x in changed.items():
+        table, _, rest = key.partition(".")
+        if table == "machine":
+            assert choice.drive.machine.by_name[rest] == x
+    # a cut lasts some rows of the page
+    check_event(copied, choice, copied.events[run], found, rel=5e-4 if name == "knife" else 1e-4)
+
+
+def test_the_copied_file_without_a_change_is_the_study(packaged, tmp_path):
+    config, live, choice = packaged
+    copied = study_files.parse(in_node(live, "return model.studyFile(model.study);"))
+    again = choose(copied, tmp_path)
+    assert again.drive.parameters == choice.drive.parameters
+    assert again.drive.machine.p == choice.drive.machine.p
+    assert copied.feed == config.feed and copied.run == config.run and copied.events == config.events
+
+
+def test_the_motor_gives_up_at_the_feed_of_a_sweep(packaged):
+    """With a heavier feed on both sides the crank loses more speed, until the motor does not come to steady running:
+    at the same feed as in the runs of a sweep."""
+    config, live, choice = packaged
+    event = config.events["feed_left"]
+    rig = Rig(config.operation, choice.drive, None)
+    names, forces = ("left.processing_force", "right.processing_force"), (1200.0, 1680.0, 1720.0)
+    points = []
+    for force in forces:
+        feed = Layout(type(config.feed)).from_names(dict.fromkeys(names, force), config.feed)
+        operation = replace(rig.operation, feed=feed)
+        points.append(RunPoint(replace(rig, operation=operation), event, event.time_followed(operation.turn)))
+    runs = BlockRuns(rig, [event]).runs(points)
+    for force, run in zip(forces, runs, strict=True):
+        changed = {f"feed.{name}": force for name in names}
+        found = in_node(live, f'{OUTCOME} return outcome({changed}, "feed_left");')
+        if force == forces[-1]:
+            assert found is None and run.fault is not None
+        else:
+            want = np.min(run.series["motor.w"].values) / choice.drive.ratio
+            assert found["speed_least"] == pytest.approx(want, rel=1e-5)
+
+
+def test_formulas_are_the_signals_of_their_events():
+    rng = np.random.default_rng(5)
+
+    def value(formula, names):
+        if isinstance(formula, str):
+            return names[formula]
+        if not isinstance(formula, list):
+            return formula
+        sign, a, b = formula[0], *(value(each, names) for each in formula[1:])
+        return {"+": a + b, "-": a - b, "*": a * b, "/": a / b if b else math.nan}[sign]
+
+    seen = 0
+    for kind, of in TYPES.items():
+        of = of.of_input("left.processing_force") if of.has_input else of
+        event = of.on("left" if of.has_side else "")
+        p = {name: rng.uniform(0.2, 0.8) for name in varied_names(event)}
+        event = replace(event, p=replace(event.p, **p))
+        inputs = event.inputs(event.side)
+        normal = {name: rng.uniform(1.0, 2.0) for name in (*inputs, *inputs_of_both(inputs))}
+        state = {name: rng.uniform(-1.0, 1.0) for name in event.reads}
+        at = 1.25
+        names = (
+            {"at": at} | {f"p.{n}": x for n, x in p.items()} | {f"normal.{n}": x for n, x in normal.items()}
+        )
+        names |= {f"state.{n}": x for n, x in state.items()}
+        formulas = event_signals(event, lambda name: name)
+        for name, signal in event.signals(normal, at, state).items():
+            seen += 1
+            assert value(formulas[name]["start"], names) == pytest.approx(getattr(signal, "start", signal)), (
+                kind
+            )
+            changes = [[value(x, names) for x in change] for change in formulas[name]["changes"]]
+            assert np.allclose(changes, getattr(signal, "changes", ())), kind
+    assert seen >= 15
+
+
+def inputs_of_both(inputs):
+    return [
+        name.replace("left", "right") if "left" in name else name.replace("right", "left") for name in inputs
+    ]
+
+
+def test_a_page_of_a_wrong_file_is_refused_as_by_its_command(tmp_path):
+    file = tmp_path / "wrong.toml"
+    file.write_text("[run]\ncrank_sped = 3\n")
+    with pytest.raises(InputError, match=r"crank_sped.*crank_speed"):
+        live_page(file, None, tmp_path)
