@@ -21,9 +21,11 @@ from wasm_hosts import NODE, addresses, numbers
 
 from chainunit.core.native.compilers import compiler, host
 from chainunit.core.wasm.module import wasm_module
+from chainunit.fmu.native.export import export
+from chainunit.models import MODELS
 from chainunit.study.choice import drive_of
 from chainunit.study.config import parse
-from chainunit.system import compiled, export_compiled
+from chainunit.system import ModelComponent, compiled
 
 HERE = Path(__file__).parent
 GALLERY = HERE.parent / "examples" / "linkages"
@@ -34,7 +36,7 @@ here = pytest.mark.skipif(host() != "linux64", reason="run on 64-bit Linux")
 zig = pytest.mark.skipif(importlib.util.find_spec("ziglang") is None, reason="ziglang is not installed")
 node = pytest.mark.skipif(NODE is None, reason="no node, which runs the modules as a browser does")
 SYSTEMS = {
-    # study file; by input its lowest and highest value
+    # study file of a compiled drive, or a model; by input its lowest and highest value
     "chain_unit": (
         "",
         {
@@ -47,16 +49,22 @@ SYSTEMS = {
         f'[system]\nmachine = "{GALLERY}/stephenson_six_bar.toml"\n',
         {"motor.w_ref": (2.0, 8.0), "machine.resistance": (0.0, 200.0)},
     ),
+    "equal steps": (
+        MODELS["InductionMotor"],
+        {"w_ref": (20.0, 150.0), "load.tau_bias": (-5.0, 20.0)},
+    ),
 }
 
 
 class Job:
-    """A run of a compiled drive, with inputs that jump at the begin of each piece."""
+    """A run of a model, with inputs that jump at the begin of each piece."""
 
     def __init__(self, name, folder, pieces):
-        text, self.bounds = SYSTEMS[name]
-        self.system = drive_of(parse(text)).graph
-        self.whole = compiled(self.system)
+        what, self.bounds = SYSTEMS[name]
+        drive = isinstance(what, str)
+        self.whole = (
+            compiled(drive_of(parse(what)).graph) if drive else ModelComponent(what, what.Parameters())
+        )
         self.model, self.folder, self.pieces = self.whole.model, folder, pieces
         self.every = max(1, pieces // 10)
         low, high = np.transpose(list(self.bounds.values()))
@@ -66,11 +74,13 @@ class Job:
         own = [v.name for v in outputs if v.type == "Real" and v.name not in self.model.repeated]
         self.results = [*self.model.state_layout.names, *own]
 
-    def native(self, platform="", target="", runner=()):
-        """The digests of an FMU for a platform, in a host for it that `runner` runs."""
+    def native(self, platform="", target="", runner=(), compile_sources=()):
+        """The digests of an FMU for a platform, in a host for it that `runner` runs; or of its sources, compiled by
+        another command."""
         folder = self.folder / (platform or "here")
         folder.mkdir()
-        export_compiled(self.system, folder / "a.fmu", fmi=3, platforms=[platform] if platform else ())
+        platforms = [platform] if platform else ()
+        export(self.model, folder / "a.fmu", self.whole.start, fmi=3, platforms=platforms)
         fmpy.extract(str(folder / "a.fmu"), unzipdir=str(folder))
         description = fmpy.read_model_description(str(folder))
         reference = {v.name: v.valueReference for v in description.modelVariables}
@@ -87,6 +97,10 @@ class Job:
         command += ["-O1", "-I", folder / "sources", HERE / "digest.c", "-o", program]
         subprocess.run([*command, *([] if target else ["-ldl"])], check=True, capture_output=True)
         (library,) = (folder / "binaries").glob("*/*")
+        if compile_sources:
+            files = [folder / "sources" / f"{name}.c" for name in ("kernels", "model", "fmi3")]
+            command = [*compile_sources, "-fPIC", "-shared", *files, "-o", library, "-lm"]
+            subprocess.run(command, check=True, capture_output=True)
         arguments = [*runner, program, library, description.instantiationToken, "job"]
         process = subprocess.run(arguments, cwd=folder, capture_output=True, text=True)
         assert process.returncode == 0, process.stderr[-2000:]
@@ -130,6 +144,16 @@ def test_native_code_and_webassembly_have_the_same_bits(name, tmp_path):
     job = Job(name, tmp_path, 20)
     digests = job.native()
     assert digests == job.in_node() and len(set(digests)) == 10
+
+
+@here
+@zig
+@pytest.mark.second
+@pytest.mark.parametrize("command", [["cc"], ZIG])
+def test_compilers_that_would_contract_have_the_same_bits(command, tmp_path):
+    """The sources of an FMU, compiled by an importer for this processor, which rounds a product and a sum at once."""
+    job = Job("chain_unit", tmp_path, 20)
+    assert job.native(compile_sources=[*command, "-O3", "-march=native"]) == job.in_node()
 
 
 def wine():
