@@ -8,7 +8,7 @@
 
 #include "model.h"
 
-enum { CALLS = 2000, ROUNDS = 300, MOST = 16 };
+enum { CALLS = 2000, ROUNDS = 100, MOST = 16 };
 
 extern const Kernels own_fmi2_kernels, libm_fmi2_kernels;
 

@@ -113,6 +113,7 @@ def from_c(folder: Path) -> list[tuple[str, float]]:
 
 
 GALLERY = Path(__file__).parents[1] / "examples" / "linkages"
+PROCESSES = 7
 LINKAGES = ("slider_crank_press", "stephenson_six_bar")
 FLAGS = ("-std=gnu99", "-O2", "-fPIC", "-ffp-contract=off")
 
@@ -135,8 +136,12 @@ def beside_the_library(model: type[Model], folder: Path) -> dict[str, list[float
     subprocess.run(["cc", *FLAGS, "-I", sources, *files, "-o", program, "-lm"], check=True)
     moved = [v for layout in (model.input_layout, model.state_layout) if layout for v in layout.variables]
     angles = [str(k) for k, v in enumerate(moved) if v.unit == "rad"]
-    text = subprocess.run([program, *angles], check=True, capture_output=True, text=True).stdout
-    own, libm, own_rates, libm_rates = map(float, text.split())
+    # in each process the memory lies elsewhere, which may cost more than the functions
+    texts = [
+        subprocess.run([program, *angles], check=True, capture_output=True, text=True).stdout
+        for _ in range(PROCESSES)
+    ]
+    own, libm, own_rates, libm_rates = np.min([np.fromstring(t, sep=" ") for t in texts], axis=0).tolist()
     costs = {"all outputs": [own, libm]}
     return costs | ({"derivatives of the states": [own_rates, libm_rates]} if model.state_layout else {})
 

@@ -230,13 +230,14 @@ def exponential(xp: Any, x: Any) -> Any:
 def logarithm(xp: Any, x: Any) -> Any:
     """The natural logarithm; -inf of 0, and NaN of a negative number."""
     k, f = xp.exponent(x), xp.mantissa(x) - 1.0
+    beyond = xp.choose(x < 0.0, math.nan, xp.choose(x < _NORMAL, -math.inf, x))
+    k = xp.choose(x > 0.0, xp.choose(x < math.inf, k, x), beyond)
     s = f / (2.0 + f)
     z, half = s * s, 0.5 * f * f
     high, low = _LOG_2
     # log(1 + f) = 2 s + s z P, where 2 s = f - s f and s f = f*f/2 - s f*f/2
-    value = k * high - ((half - (s * (half + z * _polynomial(_LOGARITHM, z)) + k * low)) - f)
-    value = xp.choose(x < math.inf, value, x)
-    return xp.choose(x > 0.0, value, xp.choose(x < 0.0, math.nan, xp.choose(x < _NORMAL, -math.inf, x)))
+    most, lost = _short_sum(f, -half)
+    return k * high + (most + (s * _polynomial((half, *_LOGARITHM), z) + (lost + k * low)))
 
 
 def _sum(a: Any, b: Any) -> tuple[Any, Any]:
