@@ -18,6 +18,8 @@ from chainunit.core.quantities import Layout
 from chainunit.machines.admissible import holding_range
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
+from chainunit.report import html
+from chainunit.report import study as study_report
 from chainunit.report.live.formulas import event_signals, varied_names
 from chainunit.report.live.machine import of_linkage
 from chainunit.report.live.page import live_page
@@ -29,6 +31,7 @@ from chainunit.study.event import TYPES
 from chainunit.study.measures import read_measure
 from chainunit.study.parts import example
 from chainunit.study.rig import Rig
+from chainunit.study.run import run_study
 from chainunit.study.window import Phase, Trip, Window
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -310,6 +313,34 @@ def test_a_motor_that_turns_slower_than_asked_for_settles(tmp_path):
     )
     copied = study_files.parse(text, str(tmp_path / "copied.toml"))
     check_event(copied, choose(copied, tmp_path), copied.events["dip"], found, rel=1e-3)
+
+
+@pytest.mark.second
+@pytest.mark.parametrize("name", ["chain-unit", "knife", "inverter", "jam_with_driveline.toml"])
+def test_every_overload_has_the_peaks_of_the_co_simulation(name, tmp_path):
+    """The page integrates one system; a study couples FMUs, with an error of its step."""
+    config = study_of(name)
+    study = run_study(config, tmp_path)
+    live, _ = live_of(config, tmp_path)
+    names = [each["name"] for each in live.data["runs"]["events"]]
+    found = in_node(live, f"{OUTCOME} return {names}.map((name) => outcome({{}}, name));")
+    assert set(names) == set(config.events)
+    for own, each in zip(names, found, strict=True):
+        answers = study.answers[own]
+        for measure in ("crank_torque_peak", "rocker_torque_peak", "current_peak", "speed_least"):
+            want = getattr(answers, measure)
+            if want is not None and each[measure] is not None:
+                assert each[measure] == pytest.approx(want, rel=1e-3), (own, measure)
+        assert (each["stall_time"] is None) == (answers.stall_time is None)
+    check_size(study)
+
+
+def check_size(study):
+    """The page is small, and the live machine is a small part of it."""
+    report = study_report.report(study)
+    plain = replace(report, sections=tuple(each for each in report.sections if each.name != "live"))
+    whole, without = (len(html.render(each).encode()) for each in (report, plain))
+    assert 50_000 < whole - without < 150_000 and whole < 2_500_000
 
 
 def test_the_copied_file_without_a_change_is_the_study(packaged, tmp_path):

@@ -14,6 +14,7 @@ from pathlib import Path
 import casadi
 import numpy as np
 import pytest
+from browser import CHROMIUM
 from wasm_hosts import ENGINES, HAS_WASMTIME, NODE, numbers, run_steps
 
 from chainunit import InputError
@@ -231,6 +232,13 @@ def test_random_states_are_those_of_python(name, engine):
 )
 def test_a_thousand_states_of_every_model(name):
     check_points(name, 1000, "node")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(CHROMIUM is None, reason="no chromium here")
+@pytest.mark.parametrize("name", [*MODELS, *LINKAGES])
+def test_a_thousand_states_in_chromium(name):
+    check_points(name, 1000, "chromium")
 
 
 @node

@@ -1,4 +1,4 @@
-"""Engines for the WebAssembly modules of models: node, and wasmtime in Python.
+"""Engines for the WebAssembly modules of models: node, wasmtime in Python, and Chromium.
 
 A job is a module and steps: ``("write", address, bytes)``, ``("call", name, arguments)``, ``("read", address,
 count)``. Its results are those of the calls and, as arrays, of the reads.
@@ -13,28 +13,55 @@ import json
 import shutil
 import struct
 import subprocess
+import tempfile
 from pathlib import Path
 
 import numpy as np
+from browser import Page
 
 NODE = shutil.which("node")
 HAS_WASMTIME = importlib.util.find_spec("wasmtime") is not None
 PAGE = 65536
 
 
-def in_node(content, steps):
-    """The results of a job in node."""
+def _job(content, steps):
+    """A job as JSON."""
     coded = [
         (what, first, base64.b64encode(rest[0]).decode()) if what == "write" else (what, first, *rest)
         for what, first, *rest in steps
     ]
-    job = json.dumps({"module": base64.b64encode(content).decode(), "steps": coded})
-    script = Path(__file__).with_name("wasm_host.mjs")
-    run = subprocess.run([NODE, script], input=job + "\n", capture_output=True, text=True, check=True)
+    return json.dumps({"module": base64.b64encode(content).decode(), "steps": coded})
+
+
+def _results(text):
+    """The results of a job from JSON."""
     return [
-        np.frombuffer(base64.b64decode(each)) if isinstance(each, str) else each
-        for each in json.loads(run.stdout)
+        np.frombuffer(base64.b64decode(each)) if isinstance(each, str) else each for each in json.loads(text)
     ]
+
+
+def in_node(content, steps):
+    """The results of a job in node."""
+    script = Path(__file__).with_name("wasm_host.mjs")
+    command, job = [NODE, script], _job(content, steps) + "\n"
+    return _results(subprocess.run(command, input=job, capture_output=True, text=True, check=True).stdout)
+
+
+def in_chromium(content, steps):
+    """The results of a job in a page of Chromium."""
+    script = Path(__file__).with_name("wasm_job.mjs").read_text("utf-8").replace("export ", "")
+    with tempfile.TemporaryDirectory() as name:
+        file = Path(name) / "empty.html"
+        file.write_text("<!DOCTYPE html><title>job</title>", "utf-8")
+        with Page(file, Path(name) / "browser") as page:
+            return _results(
+                page.evaluate(f"""(() => {{
+                  {script}
+                  const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+                  const text = (data) => btoa(Array.from(data, (each) => String.fromCharCode(each)).join(""));
+                  return JSON.stringify(carryOut({_job(content, steps)}, bytes, text));
+                }})()""")
+            )
 
 
 class Wasmtime:
@@ -69,7 +96,7 @@ def in_wasmtime(content, steps):
     return [result for what, result in results if what != "write"]
 
 
-ENGINES = {"node": in_node, "wasmtime": in_wasmtime}
+ENGINES = {"node": in_node, "wasmtime": in_wasmtime, "chromium": in_chromium}
 
 
 def numbers(values):

@@ -91,7 +91,7 @@ def render(report: b.Report) -> str:
             f'<meta name="generator" content="chainunit {__version__}">',
             f"<title>{escape(title)}</title>",
             '<link rel="icon" href="data:,">',
-            f"<style>\n{''.join(map(_resource, styles))}</style>",
+            f"<style>\n{''.join(map(_short, styles))}</style>",
             "</head>",
             "<body>",
             page.header(report, title, [section.name for section, _ in sections]),
@@ -108,7 +108,7 @@ def render(report: b.Report) -> str:
                 f'<script type="application/octet-stream" id="{name}">{text}</script>'
                 for name, text in data.items()
             ),
-            *(f"<script>\n{_resource(name)}</script>" for name in scripts),
+            *(f"<script>\n{_short(name)}</script>" for name in scripts),
             "</body>",
             "</html>\n",
         ]
@@ -150,6 +150,12 @@ def fragment(report: b.Report) -> str:
 
 def _resource(name: str) -> str:
     return (resources.files(__package__) / name).read_text("utf-8")
+
+
+def _short(name: str) -> str:
+    """A script or a style without comments of whole lines and without spaces at the begin of lines."""
+    lines = (line.strip() for line in _resource(name).splitlines())
+    return "".join(f"{line}\n" for line in lines if line and not line.startswith("//"))
 
 
 def _origin_words(origin: str) -> str:
