@@ -213,6 +213,16 @@ def step_rows(f: Any) -> str:
     return table(["call", "us"], ([text, f"{us[key]:.3g}"] for text, key in rows))
 
 
+def own_functions(f: Any) -> str:
+    """The cost of the kernels with the own functions and with those of the C library."""
+    rows = [
+        [f"`{name}`, {what}", f"{own:.0f}", f"{libm:.0f}", f"{own / libm:.2f}"]
+        for name, costs in f["step_cost"]["own"].items()
+        for what, (own, libm) in costs.items()
+    ]
+    return table(["equations", "own functions, ns", "C library, ns", "ratio"], rows)
+
+
 def accuracy_rows(f: Any) -> str:
     rows, before = [], None
     for each in f["accuracy"]:
@@ -294,7 +304,8 @@ def performance(f: Any) -> str:
         rates=own_rates(f), limits=limits(f), engines=engines(f), missing=missing(f), notes=notes(f),
         outputs=small(max(each["outputs"] for each in s["errors"].values())),
         points=s["points"]["points"], values=s["points"]["values"], worst=small(s["points"]["worst"]),
-        steps=step_rows(f), faster=large(faster), study=f"{t['study']:.0f}", again=f"{t['again']:.0f}",
+        steps=step_rows(f), own=own_functions(f), faster=large(faster),
+        study=f"{t['study']:.0f}", again=f"{t['again']:.0f}",
         importing=f"{t['importing']:.1f}", allowed=f"{t['allowed']:.0f}", accuracy=accuracy_rows(f), chains=chains(f),
         rods=c["rods"], speed=f"{c['speed']:g}", error=f"{c['error']:g}", demanded=f"{c['demanded']:g}",
         reached=reached(c),

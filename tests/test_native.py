@@ -38,6 +38,7 @@ from chainunit.fmu.description import Interface
 from chainunit.fmu.export import export as export_python
 from chainunit.fmu.native.export import export
 from chainunit.fmu.native.generate import rules
+from chainunit.fmu.native.platforms import HEADERS, KERNELS
 from chainunit.fmu.recipe import Experiment, script_of
 from chainunit.fmu.reference import INPUTS, READ, REFERENCE, STANDARD, STEPPED, excitation
 from chainunit.fmu.reference import reference_results as reference_results_of
@@ -570,9 +571,9 @@ def test_a_plain_c_host(native, fmi, tmp_path):
 def random_calls(folder, fmi, calls, tmp_path):
     """As many random calls of the unpacked FMU in `folder`, compiled with sanitizers."""
     sources = folder / "sources"
-    # what CasADi wrote is compiled apart, once for both versions of FMI: its warnings are not ours
-    files = {name: (sources / name).read_bytes() for name in ("kernels.c", "model.h")}
-    kernels = compile_code(compiler(), ("-O1", "-c", "kernels.c", "-o", "kernels.o"), files, "kernels.o")
+    # the equations are compiled apart, once for both versions of FMI: its warnings are not ours
+    files = {name: (sources / name).read_bytes() for name in (KERNELS, *HEADERS)}
+    kernels = compile_code(compiler(), ("-O1", "-c", KERNELS, "-o", "kernels.o"), files, "kernels.o")
     files = {file.name: file.read_bytes() for file in sources.iterdir() if file.is_file()}
     files |= {name: (HERE / name).read_bytes() for name in (f"fuzz{fmi}.c", "fuzz.h")}
     arguments = (

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "model.h"
+#include "elementary.h"
 #include "rules.h"
 
 typedef enum { OK = 0, DISCARD = 2, ERROR = 3 } Status;
@@ -717,20 +718,23 @@ static Status controlled_steps(Instance *c, double time, double size, const Cour
         const double h = pace >= left ? left : pace > 0.5 * left ? 0.5 * left : pace;
         int usable = 1;
         for (int s = 0; s < 7 && usable; ++s) {
-            for (int i = 0; i < n_x; ++i) {
-                double sum = 0.0;
-                for (int j = 0; j < s; ++j) sum += STAGES[s][j] * k[j * n_x + i];
+            if (!s) memcpy(at, x, (size_t)n_x * sizeof(double));
+            for (int i = 0; s && i < n_x; ++i) {
+                double sum = STAGES[s][0] * k[i];
+                for (int j = 1; j < s; ++j) sum += STAGES[s][j] * k[j * n_x + i];
                 at[i] = x[i] + h * sum;
             }
             usable = slope(c, u, since + h * NODES[s], at, k + s * n_x);
         }
+        usable = usable && all_finite(at, n_x);
         double error = 0.0;
         for (int i = 0; i < n_x && usable; ++i) {
-            double sum = 0.0;
-            for (int s = 0; s < 7; ++s) sum += ERRORS[s] * k[s * n_x + i];
+            double sum = ERRORS[0] * k[i];
+            for (int s = 1; s < 7; ++s) sum += ERRORS[s] * k[s * n_x + i];
             const double big = fabs(x[i]) > fabs(at[i]) ? fabs(x[i]) : fabs(at[i]);
             const double scale = tolerance * (big > model.nominal[i] ? big : model.nominal[i]);
-            if (fabs(h * sum) > error * scale) error = fabs(h * sum) / scale;
+            const double share = fabs(h * sum) / scale;
+            if (share > error) error = share;
         }
         const int last_resort = h <= SHORTEST * longest;
         if (!usable && last_resort) return astray(c, time);
@@ -739,7 +743,8 @@ static Status controlled_steps(Instance *c, double time, double size, const Cour
             memcpy(x, at, (size_t)n_x * sizeof(double));
             if (!close_states(c, u, since, x, at)) return astray(c, time);
         }
-        const double growth = !usable ? LEAST_GROWTH : error < NO_ERROR ? MOST_GROWTH : SAFETY * pow(error, ERROR_POWER);
+        const double growth = !usable ? LEAST_GROWTH : error < NO_ERROR ? MOST_GROWTH
+                              : SAFETY * exponential(ERROR_POWER * logarithm(error));
         double next = h * (growth < LEAST_GROWTH ? LEAST_GROWTH : growth > MOST_GROWTH ? MOST_GROWTH : growth);
         /* a step that the end of the interval shortened does not shorten the next one */
         if (usable && error <= 1.0 && h < pace && next < pace) next = pace;

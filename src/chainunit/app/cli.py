@@ -94,6 +94,12 @@ def study(
             help="Address of a Dask scheduler whose workers make the random overloads: tcp://10.0.0.5:8786.",
         ),
     ] = None,
+    pdf: Annotated[
+        bool,
+        typer.Option(
+            "--pdf", help="Also write sheet.pdf: the sheet to be signed, with the report as its annex."
+        ),
+    ] = False,
     example: Annotated[
         Example | None,
         typer.Option("--example", help="Print a packaged study file, as a start for your own, and stop."),
@@ -113,9 +119,10 @@ def study(
         print(commented(text) if example is Example.full else f"#:schema {FILE}\n{text}", end="")
         return
     question = study_file(config)
-    from ..report.study_task import TASK
+    from ..report.study_task import SHEET_TASK, TASK
 
-    carry_out(TASK, question, output, check=check, backend=backend and backend.value, scheduler=scheduler)
+    task = SHEET_TASK if pdf else TASK
+    carry_out(task, question, output, check=check, backend=backend and backend.value, scheduler=scheduler)
 
 
 for module in modules("command"):

@@ -1,7 +1,7 @@
 """Batches in native code: one loop over vectors of lanes, in several threads.
 
 The code is compiled at its first use for the processor of this machine. It may contract a product and a sum to one
-rounding, and takes sines from a vector library; FMUs do neither.
+rounding, and takes sines from a vector library; FMUs do neither, and so have the same bits everywhere.
 """
 
 from __future__ import annotations

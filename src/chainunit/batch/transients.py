@@ -29,7 +29,7 @@ from ..core import integrators
 from ..core.engines import MATH, casadi_
 from ..core.errors import InputError, RunError
 from ..core.model import Model
-from ..core.native.code import constant
+from ..core.native.c_forms import constant
 from ..core.native.compilers import Compiler, compiler
 from ..core.native.operations import ARGUMENT, Operations
 from ..core.symbolic_trace import outputs_of, trace

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from functools import cached_property
 from importlib import resources
 
-from ..core.native.code import forms, number
+from ..core.native.c_forms import forms, number
 from ..core.native.operations import ARGUMENT, NUMBER, Operation, Operations
 
 _ARITHMETIC = {"ADD", "SUB", "MUL", "SQ", "TWICE", "NEG", "ASSIGN"}

@@ -27,10 +27,11 @@ Content: TypeAlias = "Number | Words | str"
 
 @dataclass(frozen=True)
 class Text:
-    """A paragraph. A lead stands before the block that it explains, a note stands after it."""
+    """A paragraph. A lead stands before the block that it explains, a note stands after it; a hint tells how to use a
+    page, and paper has none."""
 
     line: Line
-    role: Literal["plain", "lead", "note", "fine"] = "plain"
+    role: Literal["plain", "lead", "note", "fine", "hint"] = "plain"
     form: Form = "both"
 
 

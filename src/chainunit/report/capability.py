@@ -72,6 +72,14 @@ class Capability(StudyCapability):
         """The quantities of its table that a reader of a live page may change; `plan` is its plan, or None."""
         return ()
 
+    def on_sheet(self) -> tuple[str, ...]:
+        """Names of its sections that belong on the sheet of a study, not in the annex alone."""
+        return ()
+
+    def unchecked(self, study: StudyRecord) -> Iterator[Line]:
+        """What the study could have checked by this capability and did not."""
+        return iter(())
+
     def supplement(self, study: StudyRecord) -> Supplement | None:
         """Its additions to the machine in motion."""
         return None

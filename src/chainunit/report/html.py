@@ -57,7 +57,7 @@ def write(report: b.Report, folder: Path) -> Path:
 
 def render(report: b.Report) -> str:
     """The page as a text of HTML."""
-    page = _Page(report.units)
+    page = Page(report.units)
     live = next((page.live(block) for block in report.blocks("long") if isinstance(block, Live)), None)
     sections = [
         (section, content)
@@ -143,18 +143,19 @@ def _packed_plotly() -> str:
 
 def fragment(report: b.Report) -> str:
     """Title and blocks as a piece of another page, such as a notebook; without figures and style."""
-    page = _Page(report.units)
+    page = Page(report.units)
     failure = f"<p>The run stopped early: {page.line(report.failure)}.</p>" if report.failure else ""
     return f"<h3>{escape(report.title or report.kind)}</h3>\n{failure}{page.blocks(report.blocks('long'))}"
 
 
-def _resource(name: str) -> str:
+def resource(name: str) -> str:
+    """A text that lies beside this module: a style, a script, a piece of the page."""
     return (resources.files(__package__) / name).read_text("utf-8")
 
 
 def _short(name: str) -> str:
     """A script or a style without comments of whole lines and without spaces at the begin of lines."""
-    lines = (line.strip() for line in _resource(name).splitlines())
+    lines = (line.strip() for line in resource(name).splitlines())
     return "".join(f"{line}\n" for line in lines if line and not line.startswith("//"))
 
 
@@ -178,7 +179,7 @@ def _kind(block: b.Block) -> str:
     return "figures" if isinstance(block, Figure) else ""
 
 
-class _Page:
+class Page:
     """Renders blocks as HTML, with numbers in the units `units`."""
 
     def __init__(self, units: Units) -> None:
@@ -263,7 +264,7 @@ class _Page:
             case Figure():
                 return self._figure(block) if block.on_page else ""
             case motion.Animation():
-                return _resource("motion.html").replace("<!-- caption -->", self.line(block.caption))
+                return resource("motion.html").replace("<!-- caption -->", self.line(block.caption))
             case Live():
                 return self._live(block)
 
@@ -278,7 +279,7 @@ class _Page:
 
     def _live(self, block: Live) -> str:
         if self.live(block) is not None:
-            return _resource("live/live.html")
+            return resource("live/live.html")
         why = self._lives[block][1]
         return f'<p class="note">This machine cannot run in a page: {escape(why)}.</p>'
 

@@ -186,7 +186,7 @@ def _basis(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         "Every number in the text of this page comes from result.json, which the page contains whole. Point at a "
         "number to see its place in result.json and more digits."
     )
-    yield b.Text(hint, "note", "long")
+    yield b.Text(hint, "hint", "long")
 
 
 def _certificate(

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from ..core.files import atomic_file
 from ..models import MODELS
 from ..study.choice import check_motor
 from ..study.config import Config
@@ -14,8 +16,9 @@ from ..study.registry import registered
 from ..study.result import StudyData
 from ..study.run import run_study
 from ..work.progress import TaskProgress
-from . import series
+from . import pdf, series
 from . import study as contents
+from .sheet import sheet
 from .task import Task, Writer
 
 
@@ -40,6 +43,25 @@ def _writers(record: StudyRecord, folder: Path, of_report: list[Writer]) -> list
     return [numbers, lambda: series.write(record, folder), *others]
 
 
+def _with_sheet(record: StudyRecord, folder: Path, of_report: list[Writer]) -> list[Writer]:
+    """The files of a study, and behind its page the sheet, with the pictures of the folder."""
+
+    def sheet_file() -> list[Path]:
+        report = contents.report(record)
+        pictures = {each.file: folder / each.file for each in report.figures if each.file}
+        there = {name: file for name, file in pictures.items() if file.exists()}
+        with atomic_file(folder / pdf.NAME) as part:
+            pdf.write(sheet(record, report), there, part)
+        return [folder / pdf.NAME]
+
+    return [*_writers(record, folder, of_report), sheet_file]
+
+
+def _accept_sheet(config: Config, **options: Any) -> None:
+    pdf.check_library()
+    _accept(config, **options)
+
+
 def _fmus(config: Config) -> tuple[str, ...]:
     return tuple(f"fmu/{name}.fmu" for name in dict.fromkeys((*MODELS, config.machine.model.name)))
 
@@ -57,7 +79,7 @@ TASK: Task[Config, StudyRecord] = Task(
     "study",
     _compute,
     contents.report,
-    files=(*contents.pictures(), series.SERIES, LOAD_CYCLE),
+    files=(*contents.pictures(), series.SERIES, LOAD_CYCLE, pdf.NAME),
     accept=_accept,
     writers=_writers,
     replaced=_fmus,
@@ -67,3 +89,6 @@ TASK: Task[Config, StudyRecord] = Task(
     tells_remarks=True,
     content=StudyData,
 )
+
+SHEET_TASK = replace(TASK, accept=_accept_sheet, writers=_with_sheet)
+"""A study with its sheet as PDF."""

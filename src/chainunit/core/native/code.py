@@ -6,53 +6,18 @@ CasADi would write a function for each group of outputs, with all its operations
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
+from .c_forms import forms, number
 from .division import Division
+from .elementary_code import is_pair, own_forms
 from .operations import ARGUMENT, NUMBER, Operation, Operations
 
 _LONGEST = 2500
 """Largest number of operations in a part."""
 _WIDEST = 60
 """Largest number of characters of an operation that is written inline instead of on a line of its own."""
-
-
-def forms() -> dict[str, str]:
-    """The form of each operation in C, by its kind."""
-    signs = {"ADD": "+", "SUB": "-", "MUL": "*", "DIV": "/", "LT": "<", "LE": "<=", "EQ": "==", "NE": "!="}
-    signs |= {"AND": "&&", "OR": "||"}
-    unary = "sqrt exp log sin cos tan asin acos atan sinh cosh tanh floor ceil fabs"
-    binary = "fmin fmax pow fmod atan2 copysign"
-    forms = {"SQ": "({0}*{0})", "TWICE": "(2.0*{0})", "INV": "(1.0/{0})", "NEG": "(-{0})", "NOT": "(!{0})"}
-    forms |= {
-        "IF_ELSE_ZERO": "({0}?{1}:0.0)",
-        "SIGN": "sign({0})",
-        "CONSTPOW": "pow({0},{1})",
-        "ASSIGN": "{0}",
-    }
-    forms |= {name: f"({{0}}{sign}{{1}})" for name, sign in signs.items()}
-    forms |= {name.upper(): f"{name}({{0}})" for name in unary.split()}
-    return forms | {name.upper(): f"{name}({{0}},{{1}})" for name in binary.split()}
-
-
-def number(x: float) -> str:
-    """A number in C."""
-    if math.isnan(x):
-        return "NAN"
-    text = "INFINITY" if math.isinf(x) else repr(abs(float(x)))
-    return f"(-{text})" if math.copysign(1.0, x) < 0.0 else text
-
-
-def constant(name: str, value: Any) -> str:
-    """The definition of a number, an array, or an array of rows, where zeros fill up the shorter rows."""
-    if not isinstance(value, tuple):
-        return f"#define {name} {number(value)}"
-    if not isinstance(value[0], tuple):
-        return f"static const double {name}[{len(value)}] = {{{', '.join(map(number, value))}}};"
-    rows = ",\n".join(f"    {{{', '.join(map(number, row)) or '0.0'}}}" for row in value)
-    return f"static const double {name}[{len(value)}][{max(map(len, value))}] = {{\n{rows},\n}};"
 
 
 class Program:
@@ -91,7 +56,7 @@ class Program:
     def _collect(self, operations: Operations) -> None:
         """Collect all operations: the form of each in C, and the places of its operands. A number and an argument are
         operations without operands."""
-        in_c = forms()
+        in_c = forms() | own_forms()
 
         def form(operation: Operation) -> str:
             if operation.kind == NUMBER:
@@ -101,6 +66,7 @@ class Program:
 
         self._forms = [form(each) for each in operations.items]
         self._operands = [each.operands for each in operations.items]
+        self._pairs = {k for k, each in enumerate(operations.items) if is_pair(each.kind)}
         self._arguments = {k: each.entry for k, each in enumerate(operations.items) if each.kind == ARGUMENT}
         self._results = operations.results
 
@@ -108,6 +74,7 @@ class Program:
         """The definition of a part."""
         lines: list[str] = []
         texts: dict[int, str] = {}
+        calls: dict[str, str] = {}
         arguments = set()
         uses: dict[int, int] = {}
         for place in part:
@@ -126,12 +93,22 @@ class Program:
                 return text  # a number
             return variable(place, text) if uses[place] > 1 else text
 
+        def one_of_two(place: int, text: str) -> str:
+            """A result of a function with two, which is called once for both."""
+            call, _, which = text.rpartition(".")
+            if call not in calls:
+                calls[call] = f"b{place}"
+                lines.append(f"  const Two b{place}={call};")
+            return f"{calls[call]}.{which}"
+
         for place in part:
             for operand in self._operands[place]:
                 if operand not in texts:
                     texts[operand] = outside(operand)
             text = self._forms[place].format(*(texts[operand] for operand in self._operands[place]))
             inline = uses.get(place, 0) == 1 and len(text) <= _WIDEST and place not in self._slots
+            if place in self._pairs:
+                text, inline = one_of_two(place, text), True
             texts[place] = text if inline or place not in uses else variable(place, text)
             if place in self._slots:
                 lines.append(f"  w[{self._slots[place]}]={texts[place]};")
@@ -139,7 +116,7 @@ class Program:
         head = (
             f"{self._frequency} static void {self.name}_{k}(const double *const *arg, double *restrict w) {{"
         )
-        return [head, *pointers, *lines, "}"]
+        return [head, "  ROUNDED_APART", *pointers, *lines, "}"]
 
     def _function(self, offsets: Sequence[int]) -> list[str]:
         """The definition of the function that calls the parts."""

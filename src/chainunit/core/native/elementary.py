@@ -5,14 +5,14 @@ operations alone, which IEEE 754 rounds in one way everywhere: whatever computes
 written once, for any engine of basic operations: `numpy_basic` computes arrays, `Recorder` lists the operations
 from which code is printed.
 
-An engine has ``sqrt abs minimum maximum floor copysign`` and
+An engine has ``sqrt abs copysign`` and
 
-``nearest(x)``
-    the nearest whole number, of two the even one
 ``choose(condition, a, b)``
     `a` where the condition, a comparison, holds, else `b`; both are computed
 ``exponent(x)``
-    the exponent of 2 of a positive normal number, as a whole number
+    the nearest exponent of 2 of a positive normal number, as a whole number
+``mantissa(x)``
+    what that power is multiplied by, from the root of 1/2 to that of 2
 ``power2(k)``
     2 to the power of a whole number from -1022 to 1023
 
@@ -21,8 +21,8 @@ The largest errors, in units in the last place of the result, and the arguments 
 ======================  =====  ===================================================================
 `sine_and_cosine`       0.82   to 1.3e7 in size; an angle beyond is rounded to 53 bits once more, and
                                from 2**40 on the results are NaN
-`arcsine`, `arccosine`  0.67   -1 to 1
-`arctangent2`           0.72   0, and from 1e-280 to 1e280 in size
+`arcsine`, `arccosine`  0.68   -1 to 1
+`arctangent2`           0.73   0, and from 1e-280 to 1e280 in size
 `exponential`           0.95   all; results below 2.3e-308 have fewer digits
 `logarithm`             0.83   all from 2.3e-308 on
 ======================  =====  ===================================================================
@@ -34,7 +34,7 @@ library.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -114,8 +114,11 @@ _LOGARITHM = (
 """(log((1 + s)/(1 - s))/s - 2)/z of z = s*s, to s = 3 - 2*sqrt(2)."""
 
 _TWO_OVER_PI = 0.6366197723675814
-_HALF_PI_PARTS = (1.570796325802803, 9.920935791635221e-10, 5.17018297889025e-19, 2.9038559739793605e-28)
-"""pi/2 in parts of 30, 30, 30 and 53 bits: up to 2**23 times each of the first three is exact."""
+_HALF_PI_PARTS = (1.5707963276654482, -8.705516307827565e-10, 6.12323399409214e-17, 1.6446256936324258e-26)
+"""pi/2 in parts that end at the bits 2**-29, 2**-52 and 2**-82, and a rest: up to 2**23 times each of the first three
+is exact, and so is what the first two leave of an angle."""
+_WHOLE_NUMBERS, _FOURS = 1.5 * 2.0**52, 1.5 * 2.0**54
+"""Numbers of this size are whole, or multiples of 4: a sum is rounded to one of them, of two to the even one."""
 _HALF_PI = (1.5707963267948966, 6.123233995736766e-17)
 """pi/2 as a sum."""
 _QUARTER_PI = (0.7853981633974483, 3.061616997868383e-17)
@@ -125,36 +128,32 @@ _TAN_22 = 0.41421356237309503
 _LOG_2 = (0.6931471805598903, 5.497923018708371e-14)
 """log(2) as a sum; up to 2**11 times the first part is exact."""
 _PER_LOG_2 = 1.4426950408889634
-_ROOT_2 = 1.4142135623730951
+ROOT_OF_HALF = 0x3FE6A09E667F3BCD
+"""The bits of the root of 1/2 as a whole number."""
 _WHOLE = 2.0**40
 """Size of an angle from which on the results are NaN."""
+_TINY = 1e-300
+"""Changes no divisor but 0."""
 _NORMAL = 2.0**-1022
 """The smallest number with all digits."""
 
 
 def sine_and_cosine(xp: Any, x: Any) -> tuple[Any, Any]:
     """Sine and cosine of an angle [rad]."""
-    n = xp.nearest(x * _TWO_OVER_PI)
+    n = _nearest(x * _TWO_OVER_PI)
     first, second, third, last = _HALF_PI_PARTS
-    a, lost = _sum(x - n * first, -(n * second))
-    b, more = _sum(a, -(n * third))
-    r, tail = _short_sum(b, (lost + more) - n * last)
+    r, lost = _sum((x - n * first) - n * second, -(n * third))
+    tail = xp.choose(xp.abs(x) < _WHOLE, lost - n * last, math.nan)
     z = r * r
-    sine = r + (r * z * _polynomial(_SINE, z) + tail * (1.0 - 0.5 * z))
     half = 0.5 * z
     most = 1.0 - half
+    sine = r + (r * z * _polynomial(_SINE, z) + tail * most)
     cosine = most + (((1.0 - most) - half) + (z * z * _polynomial(_COSINE, z) - r * tail))
-    quarter = n - 4.0 * xp.floor(0.25 * n)
-    odd = 2.0 * xp.floor(0.5 * quarter) < quarter
-    known = xp.abs(x) < _WHOLE
-
-    def signed(negative: Any, size: Any) -> Any:
-        return xp.choose(known, xp.choose(negative, -size, size), math.nan)
-
-    return (
-        signed(quarter > 1.5, xp.choose(odd, cosine, sine)),
-        signed(xp.abs(quarter - 1.5) < 1.0, xp.choose(odd, sine, cosine)),
-    )
+    # sine and cosine of the quarters of a turn, of which there are -2 to 2 beside whole turns
+    quarters = n - ((n + _FOURS) - _FOURS)
+    count = xp.abs(quarters)
+    along, across = 1.0 - count, quarters * (2.0 - count)
+    return sine * along + cosine * across, cosine * along + sine * -across
 
 
 def arcsine(xp: Any, x: Any) -> Any:
@@ -185,63 +184,60 @@ def _near_zero(xp: Any, x: Any) -> tuple[Any, Any, Any, Any]:
     far = size > 0.5
     z = xp.choose(far, 0.5 * (1.0 - size), size * size)
     s = xp.choose(far, xp.sqrt(z), size)
-    square, rest = _product(s, s)
-    rounded = xp.choose(far, ((z - square) - rest) / xp.maximum(2.0 * s, 1e-300), 0.0)
+    # what the rounding of the root lost: (z - s*s)/(2 s)
+    rounded = xp.choose(far, _rest(z, s, s) / (2.0 * s + _TINY), 0.0)
     return far, size, s, rounded + s * z * _polynomial(_ARCSINE, z)
 
 
 def arctangent2(xp: Any, y: Any, x: Any) -> Any:
     """The angle of a vector (x, y) [rad], from -pi to pi; 0 or pi for one without length."""
     across, along = xp.abs(y), xp.abs(x)
-    small, large = xp.minimum(across, along), xp.maximum(across, along)
+    steep = along < across
+    small, large = xp.choose(steep, along, across), xp.choose(steep, across, along)
     # the angle from the nearer axis is that of small/large, or pi/4 and that of (small - large)/(small + large)
     far = _TAN_22 * large < small
     total, beyond = _short_sum(large, small)
     gap, rest = _short_sum(large, -small)
     over, over_rest = xp.choose(far, -gap, small), xp.choose(far, -rest, 0.0)
     under, under_rest = xp.choose(far, total, large), xp.choose(far, beyond, 0.0)
-    under = xp.choose(under < 1e-300, 1.0, under)
-    q = over / under
-    whole, part = _product(q, under)
-    lost = (((over - whole) - part) + (over_rest - q * under_rest)) / under
-    z = q * q
-    lost = lost - lost * z + q * z * _polynomial(_ARCTANGENT, z)
+    under = under + _TINY
     # so many quarters of pi, and this angle, forward or backward
-    steep, back = along < across, xp.copysign(1.0, x) < 0.0
+    back = xp.copysign(1.0, x) < 0.0
     quarters, way = xp.choose(far, 1.0, 0.0), xp.choose(steep, -1.0, 1.0)
     quarters = xp.choose(steep, 2.0 - quarters, quarters)
     quarters, way = xp.choose(back, 4.0 - quarters, quarters), xp.choose(back, -way, way)
+    inverse = way / under
+    q = over * inverse
+    z = q * q
+    lost = (_rest(over, q, way * under) + (over_rest - q * (way * under_rest))) * inverse
     high, low = _QUARTER_PI
-    h, tail = _sum(quarters * high, way * q)
-    return xp.copysign(h + (tail + (quarters * low + way * lost)), y)
+    h, tail = _short_sum(quarters * high, q)
+    rest = (tail + quarters * low) + q * z * _polynomial(_ARCTANGENT, z)
+    return xp.copysign(h + (rest + lost * (1.0 - z)), y)
 
 
 def exponential(xp: Any, x: Any) -> Any:
     """The exponential; inf beyond the largest number."""
-    x = xp.minimum(xp.maximum(x, -760.0), 720.0)
-    k = xp.nearest(x * _PER_LOG_2)
+    x = xp.choose(x < -760.0, -760.0, xp.choose(x > 720.0, 720.0, x))
+    k = _nearest(x * _PER_LOG_2)
     high, low = _LOG_2
     r, tail = _short_sum(x - k * high, -(k * low))
     size = 1.0 + (r + (tail + r * r * _polynomial(_EXPONENTIAL, r)))
-    half = xp.nearest(0.5 * k)
+    half = _nearest(0.5 * k)
     return size * xp.power2(half) * xp.power2(k - half)
 
 
 def logarithm(xp: Any, x: Any) -> Any:
     """The natural logarithm; -inf of 0, and NaN of a negative number."""
-    k = xp.exponent(x)
-    part = xp.nearest(-0.5 * k)
-    size = x * xp.power2(part) * xp.power2(-k - part)
-    upper = size > _ROOT_2
-    k, size = xp.choose(upper, k + 1.0, k), xp.choose(upper, 0.5 * size, size)
-    f = size - 1.0
+    k, f = xp.exponent(x), xp.mantissa(x) - 1.0
+    beyond = xp.choose(x < 0.0, math.nan, xp.choose(x < _NORMAL, -math.inf, x))
+    k = xp.choose(x > 0.0, xp.choose(x < math.inf, k, x), beyond)
     s = f / (2.0 + f)
     z, half = s * s, 0.5 * f * f
     high, low = _LOG_2
     # log(1 + f) = 2 s + s z P, where 2 s = f - s f and s f = f*f/2 - s f*f/2
-    value = k * high - ((half - (s * (half + z * _polynomial(_LOGARITHM, z)) + k * low)) - f)
-    value = xp.choose(x < math.inf, value, x)
-    return xp.choose(x > 0.0, value, xp.choose(x < 0.0, math.nan, xp.choose(x < _NORMAL, -math.inf, x)))
+    most, lost = _short_sum(f, -half)
+    return k * high + (most + (s * _polynomial((half, *_LOGARITHM), z) + (lost + k * low)))
 
 
 def _sum(a: Any, b: Any) -> tuple[Any, Any]:
@@ -252,17 +248,17 @@ def _sum(a: Any, b: Any) -> tuple[Any, Any]:
 
 
 def _short_sum(a: Any, b: Any) -> tuple[Any, Any]:
-    """The same where `a` is not smaller than `b` in size."""
+    """The same where `a` is not smaller than `b` in size, or 0."""
     s = a + b
     return s, b - (s - a)
 
 
-def _product(a: Any, b: Any) -> tuple[Any, Any]:
-    """The rounded product and what the rounding lost (Dekker), by factors of 26 bits."""
-    p = a * b
-    a1, b1 = _upper(a), _upper(b)
+def _rest(p: Any, a: Any, b: Any) -> Any:
+    """The difference of `p` and the product of `a` and `b`, which is near to it, by factors of 26 bits (Dekker)."""
+    a1 = _upper(a)
+    b1 = a1 if b is a else _upper(b)
     a2, b2 = a - a1, b - b1
-    return p, ((a1 * b1 - p) + a1 * b2 + a2 * b1) + a2 * b2
+    return (((p - a1 * b1) - a1 * b2) - a2 * b1) - a2 * b2
 
 
 def _upper(a: Any) -> Any:
@@ -271,21 +267,20 @@ def _upper(a: Any) -> Any:
     return t - (t - a)
 
 
-def _polynomial(coefficients: Sequence[float], z: Any) -> Any:
-    """The polynomial with these coefficients, lowest power first: even and odd powers apart, which a processor
-    computes at the same time."""
-    square = z * z
-
-    def horner(some: Sequence[float]) -> Any:
-        value: Any = some[-1]
-        for each in reversed(some[:-1]):
-            value = value * square + each
-        return value
-
-    return horner(coefficients[::2]) + z * horner(coefficients[1::2])
+def _nearest(x: Any) -> Any:
+    """The nearest whole number, of two the even one, of a number up to 2**51 in size."""
+    return (x + _WHOLE_NUMBERS) - _WHOLE_NUMBERS
 
 
-OWN = {
+def _polynomial(coefficients: Sequence[Any], z: Any) -> Any:
+    """The polynomial with these coefficients, lowest power first: pairs of terms, then pairs of these, which a
+    processor computes at the same time."""
+    pairs = [low + z * high for low, high in zip(coefficients[::2], coefficients[1::2], strict=False)]
+    terms = [*pairs, *coefficients[2 * len(pairs) :]]
+    return _polynomial(terms, z * z) if len(terms) > 1 else terms[0]
+
+
+OWN: dict[str, tuple[Callable[..., Any], int, int]] = {
     "SIN": (sine_and_cosine, 1, 0),
     "COS": (sine_and_cosine, 1, 1),
     "ASIN": (arcsine, 1, 0),
@@ -313,12 +308,9 @@ def numpy_basic() -> SimpleNamespace:
     return SimpleNamespace(
         sqrt=np.sqrt,
         abs=np.abs,
-        minimum=np.minimum,
-        maximum=np.maximum,
-        floor=np.floor,
         copysign=np.copysign,
-        nearest=np.rint,
         choose=np.where,
-        exponent=lambda x: ((bits(x) >> 52 & 0x7FF) - 1023).astype(float),
+        exponent=lambda x: (bits(x) - ROOT_OF_HALF >> 52).astype(float),
+        mantissa=lambda x: ((bits(x) - ROOT_OF_HALF & (1 << 52) - 1) + ROOT_OF_HALF).view(float),
         power2=lambda k: (np.asarray(k + 1023.0).astype(np.int64) << 52).view(float),
     )

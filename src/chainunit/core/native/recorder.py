@@ -13,9 +13,9 @@ from typing import Any
 
 from .operations import ARGUMENT, NUMBER, Operation
 
-NEAREST, CHOOSE, EXPONENT, POWER2 = "NEAREST", "CHOOSE", "EXPONENT", "POWER2"
-"""Kinds of operations beside those of CasADi: the nearest whole number, of two the even one; the second operand where
-the first one is not 0, else the third; the exponent of 2 of a number; and 2 to the power of a whole number."""
+CHOOSE, EXPONENT, MANTISSA, POWER2 = "CHOOSE", "EXPONENT", "MANTISSA", "POWER2"
+"""Kinds of operations beside those of CasADi: the second operand where the first one is not 0, else the third; the
+nearest exponent of 2 of a number, and what that power is multiplied by; and 2 to the power of a whole number."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,33 +56,21 @@ class Recorder:
         """The size."""
         return self.operation("FABS", x)
 
-    def minimum(self, a: Any, b: Any) -> Noted:
-        """The smaller number; NaN where one is."""
-        return self.operation("FMIN", a, b)
-
-    def maximum(self, a: Any, b: Any) -> Noted:
-        """The larger number; NaN where one is."""
-        return self.operation("FMAX", a, b)
-
-    def floor(self, x: Any) -> Noted:
-        """The whole number below or equal."""
-        return self.operation("FLOOR", x)
-
     def copysign(self, a: Any, b: Any) -> Noted:
         """The size of `a` with the sign of `b`."""
         return self.operation("COPYSIGN", a, b)
-
-    def nearest(self, x: Any) -> Noted:
-        """The nearest whole number, of two the even one."""
-        return self.operation(NEAREST, x)
 
     def choose(self, condition: Any, a: Any, b: Any) -> Noted:
         """`a` where the condition holds, else `b`."""
         return self.operation(CHOOSE, condition, a, b)
 
     def exponent(self, x: Any) -> Noted:
-        """The exponent of 2 of a positive normal number."""
+        """The nearest exponent of 2 of a positive normal number."""
         return self.operation(EXPONENT, x)
+
+    def mantissa(self, x: Any) -> Noted:
+        """A positive normal number over 2 to the power of that, from the root of 1/2 to that of 2."""
+        return self.operation(MANTISSA, x)
 
     def power2(self, k: Any) -> Noted:
         """2 to the power of a whole number from -1022 to 1023."""

@@ -11,9 +11,9 @@ from functools import partial
 from typing import Any
 
 from ..errors import InputError
-from ..native.elementary import OWN, recording
+from ..native.elementary import OWN, ROOT_OF_HALF, recording
 from ..native.operations import NUMBER, Operation
-from ..native.recorder import CHOOSE, NEAREST
+from ..native.recorder import CHOOSE, EXPONENT, MANTISSA, POWER2
 from .encoding import Function, Module
 
 Store = Callable[[int, Callable[[], None]], None]
@@ -21,7 +21,7 @@ Store = Callable[[int, Callable[[], None]], None]
 
 _PLAIN = {
     "ADD": "add", "SUB": "sub", "MUL": "mul", "DIV": "div", "FMIN": "min", "FMAX": "max", "COPYSIGN": "copysign",
-    "SQRT": "sqrt", "FABS": "abs", "NEG": "neg", "FLOOR": "floor", "CEIL": "ceil", NEAREST: "nearest",
+    "SQRT": "sqrt", "FABS": "abs", "NEG": "neg", "FLOOR": "floor", "CEIL": "ceil",
 }  # fmt: skip
 """Operations that are one instruction."""
 _COMPARISONS = {"LT": "f64.lt", "LE": "f64.le", "EQ": "f64.eq", "NE": "f64.ne"}
@@ -30,8 +30,8 @@ _OFTEN = {"SQ": 2, "TWICE": 2, "SIGN": 3}
 """Operations that push their operand so many times."""
 _DEEPEST = 60
 """Largest number of operations whose values stay on the stack one for the other."""
-_MANTISSA, _BIAS, _EXPONENTS = 52, 1023.0, 0x7FF
-"""Binary digits of a number behind the first, and the bits of its exponent with what is added to it (IEEE 754)."""
+_DIGITS, _BIAS = 52, 1023
+"""Binary digits of a number behind the first, and what is added to its exponent (IEEE 754)."""
 
 
 class OwnFunctions:
@@ -237,24 +237,36 @@ class Writer:
                 self.push(a)
                 f.f64(0.0)
                 f.do("f64.lt", "select")
+            case _:
+                self._push_digits(each)
+
+    def _push_digits(self, each: Operation) -> None:
+        """Push the value of an operation on the digits of a number."""
+        f = self._function
+        if each.kind not in (EXPONENT, MANTISSA, POWER2):
+            self._own.of(each.kind)
+        self.push(each.operands[0])
+        match each.kind:
             case "EXPONENT":
-                self.push(a)
                 f.do("i64.reinterpret_f64")
-                f.i64(_MANTISSA)
-                f.do("i64.shr_u")
-                f.i64(_EXPONENTS)
-                f.do("i64.and", "f64.convert_i64_s")
-                f.f64(_BIAS)
-                f.do("f64.sub")
+                f.i64(ROOT_OF_HALF)
+                f.do("i64.sub")
+                f.i64(_DIGITS)
+                f.do("i64.shr_s", "f64.convert_i64_s")
+            case "MANTISSA":
+                f.do("i64.reinterpret_f64")
+                f.i64(ROOT_OF_HALF)
+                f.do("i64.sub")
+                f.i64((1 << _DIGITS) - 1)
+                f.do("i64.and")
+                f.i64(ROOT_OF_HALF)
+                f.do("i64.add", "f64.reinterpret_i64")
             case "POWER2":
                 # the last digits of so large a number are those of a whole one
-                self.push(a)
-                f.f64(2.0**_MANTISSA + _BIAS)
+                f.f64(2.0**_DIGITS + _BIAS)
                 f.do("f64.add", "i64.reinterpret_f64")
-                f.i64(_MANTISSA)
+                f.i64(_DIGITS)
                 f.do("i64.shl", "f64.reinterpret_i64")
-            case kind:
-                self._own.of(kind)
 
     def _condition(self, place: int) -> None:
         """Push 1 where the value of an operation is not 0, else 0, as a whole number."""

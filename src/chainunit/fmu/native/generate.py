@@ -13,7 +13,8 @@ from typing import Any
 
 from ...core import integrators, messages
 from ...core.integrators import MAX_STEPS
-from ...core.native.code import Program, constant, number
+from ...core.native.c_forms import constant, number
+from ...core.native.code import Program
 from ...core.native.kernels import difference_groups, output_groups
 from ...core.native.kernels import kernels as kernels_of
 from ...core.quantities import Variable
@@ -37,6 +38,7 @@ _BEFORE_KERNELS = """\
 #include <math.h>
 
 #include "model.h"
+#include "elementary.h"
 
 /* a function that is seldom called is compiled with less optimization, in less time */
 #if defined __clang__

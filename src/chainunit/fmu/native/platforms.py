@@ -11,10 +11,11 @@ from dataclasses import dataclass
 
 from ...core.errors import InputError, RunError
 from ...core.native.compilers import Compiler, compile_code, compiler, host, zig_compiler
+from ...core.native.elementary_code import HEADER
 
 _FLAGS = ("-std=c99", "-O2", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off")
 _SHARED = ("-shared", "-s")
-KERNELS, KERNELS_OBJECT, HEADER = "kernels.c", "kernels.o", "model.h"
+KERNELS, KERNELS_OBJECT, HEADERS = "kernels.c", "kernels.o", ("model.h", HEADER)
 
 
 @dataclass(frozen=True)
@@ -149,7 +150,7 @@ def compile_with_kernels(
     RunError
         where the compiler fails, with its messages.
     """
-    kernels = {name: sources[name] for name in (KERNELS, HEADER)}
+    kernels = {name: sources[name] for name in (KERNELS, *HEADERS)}
     object_code = compile_code(
         compiler, (*flags, "-c", KERNELS, "-o", KERNELS_OBJECT), kernels, KERNELS_OBJECT
     )

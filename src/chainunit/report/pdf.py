@@ -1,0 +1,146 @@
+"""A sheet with its annex as PDF on A4, for people who sign paper: a title block, contents, page numbers.
+
+The blocks of a report are those of its page, with printed figures in place of those that move. The library makes
+PDF/A-3u, which archives keep.
+"""
+
+from __future__ import annotations
+
+import base64
+import logging
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from itertools import groupby
+from pathlib import Path
+
+from ..core.errors import InputError
+from ..reading.text import Units
+from . import blocks as b
+from .figure import Figure
+from .html import Page, resource
+from .live_block import Live
+from .motion import Animation
+
+NAME = "sheet.pdf"
+_SIGNED = ("Prepared", "Checked", "Released")
+_MISSING = (
+    "--pdf: needs the library WeasyPrint and the text engine Pango ({}); pip install 'chainunit[pdf]', and Pango by "
+    "the system's packages (Debian: libpango-1.0-0 libpangoft2-1.0-0; macOS: brew install pango; Windows: MSYS2)"
+)
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A sheet: its title, the rows of its title block, its `sections`, and the sections of the `annex`."""
+
+    title: str
+    block: Mapping[str, str]
+    sections: tuple[b.Section, ...]
+    annex: tuple[b.Section, ...]
+    units: Units
+
+
+class _PrintedPage(Page):
+    """The blocks of a page on paper; `pictures` are the files of the printed figures."""
+
+    def __init__(self, units: Units, pictures: Mapping[str, Path]) -> None:
+        super().__init__(units)
+        self._pictures = pictures
+
+    def block(self, block: b.Block) -> str:
+        """One block; nothing for one that moves, and for a figure that has no file."""
+        if isinstance(block, Animation | Live) or (isinstance(block, b.Text) and block.role == "hint"):
+            return ""
+        if isinstance(block, Figure):
+            return self._printed(block)
+        return super().block(block)
+
+    def blocks(self, blocks: Sequence[b.Block]) -> str:
+        """Blocks in order; consecutive warnings form one list."""
+        parts = []
+        for warns, together in groupby(blocks, lambda each: getattr(each, "severity", "") == "warning"):
+            texts = list(filter(None, map(self.block, together)))
+            parts += [f'<ul class="verdicts">{"".join(texts)}</ul>'] if warns and texts else texts
+        return "\n".join(parts)
+
+    def _printed(self, figure: Figure) -> str:
+        file = self._pictures.get(figure.file or "")
+        if file is None:
+            return ""
+        picture = base64.b64encode(file.read_bytes()).decode()
+        return (
+            f'<figure class="printed"><img src="data:image/png;base64,{picture}" alt="{escape(figure.alt)}">'
+            f"<figcaption>{escape(figure.title)}. {self.line(figure.caption)}</figcaption></figure>"
+        )
+
+
+def check_library() -> None:
+    """Refuse where the library or its text engine is missing.
+
+    Raises
+    ------
+    InputError
+        with the way to have them.
+    """
+    try:
+        import weasyprint  # type: ignore[import-untyped]  # noqa: F401
+    except (ImportError, OSError) as error:
+        raise InputError(_MISSING.format(str(error).splitlines()[0])) from None
+
+
+def write(sheet: Sheet, pictures: Mapping[str, Path], file: Path) -> Path:
+    """Write a sheet; `pictures` are the files of its figures by name. Returns the file.
+
+    Raises
+    ------
+    InputError
+        see `check_library`.
+    """
+    check_library()
+    import weasyprint
+
+    # it names every property of a screen that paper does not have
+    logging.getLogger("weasyprint").setLevel(logging.ERROR)
+    document = weasyprint.HTML(string=page_text(sheet, pictures), base_url=str(file.parent))
+    document.write_pdf(file, pdf_variant="pdf/a-3u")
+    return file
+
+
+def page_text(sheet: Sheet, pictures: Mapping[str, Path]) -> str:
+    """The sheet as a page of HTML, from which the PDF is made."""
+    page = _PrintedPage(sheet.units, pictures)
+    parts = [(each, page.blocks(b.of_form(each.blocks, "long"))) for each in sheet.sections]
+    annex = [(each, page.blocks(b.of_form(each.blocks, "long"))) for each in sheet.annex]
+    numbered = [(f"{n}", each, text) for n, (each, text) in enumerate(filter(lambda part: part[1], parts), 1)]
+    numbered += [
+        (f"A{n}", each, text) for n, (each, text) in enumerate(filter(lambda part: part[1], annex), 1)
+    ]
+    contents = "".join(
+        f'<li><a href="#{_place(number)}"><span>{number}</span> {escape(each.heading)}</a></li>'
+        for number, each, _ in numbered
+    )
+    sections = "".join(_section(number, each, text) for number, each, text in numbered)
+    rows = "".join(
+        f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in sheet.block.items()
+    )
+    signed = "".join(f"<td><span>{each}</span></td>" for each in _SIGNED)
+    return (
+        f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{escape(sheet.title)}</title>'
+        f"<style>{resource('page.css')}{resource('pdf.css')}</style></head><body>"
+        f'<header class="titles"><h1>{escape(sheet.title)}</h1><table class="of-title">{rows}</table>'
+        f'<table class="signed"><tr>{signed}</tr></table></header>'
+        f'<nav class="contents"><ol>{contents}</ol></nav>{sections}</body></html>'
+    )
+
+
+def _place(number: str) -> str:
+    return f"section-{number}"
+
+
+def _section(number: str, section: b.Section, text: str) -> str:
+    css = ' class="annex"' if number == "A1" else ""
+    return (
+        f'<section{css} id="{_place(number)}"><h2><span class="no">{number}</span> {escape(section.heading)}</h2>'
+        f"{text}</section>"
+    )

@@ -1,0 +1,128 @@
+"""The sheet of a study as PDF: its parts, their order, its pages, and what it refuses."""
+
+from __future__ import annotations
+
+import builtins
+import json
+import re
+
+import pytest
+
+from chainunit import InputError
+from chainunit.report import pdf
+from chainunit.report import study as study_report
+from chainunit.report.sheet import sheet
+from chainunit.report.study_task import SHEET_TASK, TASK
+from chainunit.study import config
+from chainunit.study.run import run_study
+
+TEXT = """
+title = "A mill <b>& more</b>"
+[report]
+project = "Quarry 7"
+author = "N. N."
+revision = "B"
+[run]
+ramp = 0.3
+settle_turns = 1
+step = 0.004
+crank_speed = 6
+[machine]
+ratio = 25
+[[event]]
+type = "jam"
+side = "left"
+turns = 1
+"""
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    return run_study(config.parse(TEXT), tmp_path_factory.mktemp("sheet"))
+
+
+@pytest.fixture(scope="module")
+def made(study):
+    return sheet(study, study_report.report(study))
+
+
+def test_the_sheet_has_each_section_once(study, made):
+    names = [each.name for each in (*made.sections, *made.annex)]
+    assert len(names) == len(set(names))
+    assert names[:3] == ["question", "answer", "demands"] and "unchecked" in names
+    whole = {each.name for each in study_report.report(study).sections}
+    assert whole - set(names) == {"live", "motion"}, "what moves is not on paper, all else is"
+    assert made.block["Project"] == "Quarry 7" and made.block["Revision"] == "B"
+
+
+def test_assumptions_are_the_numbers_that_the_file_leaves_out(study, made):
+    (section,) = (each for each in made.sections if each.name == "assumptions")
+    shown = {value.name for block in section.blocks for _, values in block.sections for value in values}
+    assert {"machine.crank.m", "motor.armature.R", "run.turns"} <= shown
+    assert not shown & study.config.file.given and not any(name.startswith("event.") for name in shown)
+
+
+def test_its_text_escapes_the_file_and_numbers_its_sections(made):
+    text = pdf.page_text(made, {})
+    assert "<b>& more" not in text and "A mill &lt;b&gt;&amp; more&lt;/b&gt;" in text
+    places = re.findall(r'<section(?: class="annex")? id="section-(\w+)"', text)
+    links = re.findall(r'<a href="#section-(\w+)"', text)
+    assert places == links and places[0] == "1" and "A1" in places
+    assert 'id="live-root"' not in text and "<script" not in text and "Point at a number" not in text
+
+
+def test_numbers_of_the_sheet_are_those_of_the_result(study, made):
+    result = json.loads(json.dumps(study_report.report(study).result))
+    text = pdf.page_text(made, {})
+    peak = result["answers"]["jam_left"]["crank_torque_peak"]["value"]
+    shown = re.findall(r'data-path="answers.jam_left.crank_torque_peak" value="([^"]+)"', text)
+    assert shown and all(float(each) == peak for each in shown)
+
+
+def test_a_missing_library_is_refused_before_the_runs(monkeypatch, tmp_path):
+    real = builtins.__import__
+
+    def without(name, *more, **options):
+        if name == "weasyprint":
+            raise OSError("cannot load library 'libpango-1.0-0'")
+        return real(name, *more, **options)
+
+    monkeypatch.setattr(builtins, "__import__", without)
+    with pytest.raises(InputError, match=r"--pdf: needs .*libpango.*pip install 'chainunit\[pdf\]'"):
+        SHEET_TASK.accept(config.parse(TEXT))
+
+
+def test_a_study_clears_the_sheet_of_an_earlier_one():
+    assert pdf.NAME in TASK.files and pdf.NAME in SHEET_TASK.files
+
+
+def pages_of(file):
+    reader = pytest.importorskip("pypdf").PdfReader(file)
+    return reader, [page.extract_text() for page in reader.pages]
+
+
+@pytest.mark.second
+@pytest.mark.filterwarnings(
+    "ignore::pytest.PytestUnraisableExceptionWarning"
+)  # the library leaves a file open
+def test_the_pdf_is_two_to_four_pages_and_an_annex(study, made, tmp_path):
+    try:
+        pdf.check_library()
+    except InputError as missing:
+        pytest.skip(str(missing))
+    file = pdf.write(made, {}, tmp_path / pdf.NAME)
+    reader, pages = pages_of(file)
+    assert reader.metadata.title == "A mill <b>& more</b>"
+    heading = rf"A1\s+{made.annex[0].heading}"
+    annex = next(n for n, text in enumerate(pages) if n and re.search(heading, text))
+    assert 2 <= annex <= 4 < len(pages)
+    assert f"Page 2 of {len(pages)}" in pages[1]
+    box = reader.pages[0].mediabox
+    assert (round(float(box.width)), round(float(box.height))) == (595, 842)
+    packet = reader.trailer["/Root"][
+        "/XMP_Metadata" if "/XMP_Metadata" in reader.trailer["/Root"] else "/Metadata"
+    ]
+    assert re.search(rb"pdfaid:part>3<|pdfaid:part=.3", packet.get_data())
+    first = " ".join(pages[:annex])
+    for words in ("Quarry 7", "Prepared", "What was not checked", "Demands on the drive", "The question"):
+        assert words in first
