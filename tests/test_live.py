@@ -13,6 +13,7 @@ from live_pages import OUTCOME, in_node, live_of
 from wasm_hosts import NODE
 
 from chainunit import InputError
+from chainunit.app.cli import live as live_command
 from chainunit.core.quantities import Layout
 from chainunit.machines.admissible import holding_range
 from chainunit.machines.linkages.file import read_linkage
@@ -157,6 +158,22 @@ def test_a_value_out_of_its_bounds_is_refused(packaged):
     assert "mass: must be ≥ 0\u00a0kg" in in_node(live, script)
 
 
+def test_a_refusal_names_one_range(packaged):
+    _, live, _ = packaged
+    script = """const at = model.quantities.findIndex((q) => q.key.join(".") === "machine.r");
+        return model.refusal(values({"machine.r": 1.4}), at);"""
+    words = in_node(live, script).replace("\u00a0", " ")
+    assert words.count("must be") == 1 and "crank O1-A must be ≤ 0.5" in words and words.endswith("m.")
+
+
+def test_runs_that_last_too_long_are_refused(packaged):
+    _, live, _ = packaged
+    script = """const runs = model.runsOf(values({"run.ramp": 10000}));
+        try { runs.start(); } catch (error) { return [error instanceof model.Refusal, error.message]; }"""
+    refused, words = in_node(live, script)
+    assert refused and words == "these runs last too long for a page: 10004\u00a0s and more"
+
+
 def test_pulls_below_zero_are_judged_as_in_a_study(packaged):
     _, live, choice = packaged
     pulls = in_node(live, 'return model.pulls(model.turn(values({"run.crank_speed": 9})));')
@@ -175,10 +192,10 @@ def test_pulls_below_zero_are_judged_as_in_a_study(packaged):
 # -- runs
 
 
-def measured(config, choice, event):
-    """The measures of an event by the compiled loop of the sweeps."""
+def measured(config, choice, event, limit=None):
+    """The measures of an event by the compiled loop of the sweeps, by default up to the `limit` of the coupling."""
     rig = Rig(config.operation, choice.drive, None).plain
-    limit = rig.guards.get(choice.drive.motor_torque, math.inf)
+    limit = limit or rig.guards.get(choice.drive.motor_torque, math.inf)
     block = BlockRuns(rig, [event])
     (run,) = block.runs([RunPoint(rig, event, event.time_followed(config.operation.turn), limit=limit)])
     assert run.fault is None
@@ -224,7 +241,9 @@ CHANGED = {
         "jam_left",
     ),
     "knife": ({"machine.knife.m": 95.0, "machine.r": 0.058, "event.hard_cut.force": 7e4}, "hard_cut"),
-    "jam_trips_coupling.toml": ({"coupling.trip_torque": 500.0, "feed.right.processing_force": 30.0}, "jam_left"),
+    "jam_trips_coupling.toml": (
+        {"coupling.trip_torque": 500.0, "coupling.release_time": 0.0, "feed.right.processing_force": 30.0}, "jam_left"
+    ),
     "jam_with_driveline.toml": ({"machine.rocker.m": 75.0, "feed.right.processing_force": 30.0}, "jam_left"),
     "on line": ({"feed.left.processing_force": 60.0, "flywheel.J": 0.005, "gear.ratio": 50.0}, "jam_left"),
     "inverter": ({"feed.left.processing_force": 60.0, "machine.rocker.m": 75.0, "run.crank_speed": 2.8}, "jam_right"),
@@ -260,6 +279,40 @@ def test_runs_and_the_copied_study_file_agree(name, tmp_path):
             assert choice.drive.machine.by_name[rest] == x
     # a cut lasts some rows of the page
     check_event(copied, choice, copied.events[run], found, rel=5e-4 if name == "knife" else 1e-4)
+
+
+@pytest.mark.second
+def test_a_run_goes_on_until_the_coupling_passes_no_torque(tmp_path):
+    """A blocked rocker loads the coupling further while it opens: as in a run without one, up to that time."""
+    config = study_of("jam_trips_coupling.toml")
+    live, choice = live_of(config, tmp_path)
+    event, times = config.events["blocked"], (0.0, 0.005)
+    found, later = (
+        in_node(live, f'{OUTCOME} return outcome({{"coupling.release_time": {t}}}, "blocked");')
+        for t in times
+    )
+    assert found["coupling_trip_time"] == later["coupling_trip_time"]
+    assert found["crank_torque_peak"] == pytest.approx(config.operation.coupling.trip_torque, rel=0.05)
+    trip = measured(config, choice, event)["coupling_trip_time"]
+    rig = Rig(config.operation, choice.drive, None).plain
+    (run,) = BlockRuns(rig, [event]).runs([RunPoint(rig, event, trip + times[1])])
+    window = Window(Phase.EVENT, run.series, choice.drive, (), config.run.crank_speed, 0.0, None, None)
+    # to a row of the page, in which the torque rises by some per cent
+    assert later["crank_torque_peak"] == pytest.approx(read_measure("crank_torque_peak", window), rel=0.03)
+    assert later["crank_torque_peak"] > 1.1 * found["crank_torque_peak"]
+
+
+@pytest.mark.second
+def test_a_motor_that_turns_slower_than_asked_for_settles(tmp_path):
+    """With a longer gear the crank makes a turn less in the time of steady running; that is no stall."""
+    config = study_of("knife")
+    live, _ = live_of(config, tmp_path)
+    changed = {"gear.ratio": 40.0}
+    found, text = in_node(
+        live, f'{OUTCOME} return [outcome({changed}, "dip"), model.studyFile(values({changed}))];'
+    )
+    copied = study_files.parse(text, str(tmp_path / "copied.toml"))
+    check_event(copied, choose(copied, tmp_path), copied.events["dip"], found, rel=1e-3)
 
 
 @pytest.mark.second
@@ -369,3 +422,16 @@ def test_a_page_of_a_wrong_file_is_refused_as_by_its_command(tmp_path):
     file.write_text("[run]\ncrank_sped = 3\n")
     with pytest.raises(InputError, match=r"crank_sped.*crank_speed"):
         live_page(file, None, tmp_path)
+
+
+def test_a_speed_is_for_a_linkage(tmp_path):
+    with pytest.raises(InputError, match=r"--speed is for a linkage.*run\.crank_speed"):
+        live_page(None, "60 rpm", tmp_path)
+
+
+def test_the_page_does_not_replace_its_file(tmp_path):
+    file = tmp_path / "study.toml"
+    file.write_text("[run]\ncrank_speed = 3\n")
+    with pytest.raises(InputError, match="name another file"):
+        live_command(file, file)
+    assert file.read_text() == "[run]\ncrank_speed = 3\n"

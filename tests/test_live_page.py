@@ -121,6 +121,30 @@ def test_sliders_show_the_numbers_of_python(page_file, tmp_path, width):
         )
 
 
+def test_the_field_to_mend_is_marked(page_file, tmp_path):
+    """Of two wrong values first the one, then the other."""
+    typed = """(async () => {
+      const data = await unpackedData("live-data");
+      for (const [key, text] of Object.entries(%s)) {
+        const i = data.quantities.findIndex((q) => q.key.join(".") === key);
+        const field = document.getElementById(`live-q-${i}-number`);
+        field.value = text;
+        field.dispatchEvent(new Event("change", { bubbles: true }));
+        await new Promise((go) => setTimeout(go, 200));
+      }
+      const marked = document.querySelectorAll("input[aria-invalid=true]");
+      return Array.from(marked, (each) => each.getAttribute("aria-label")).join();
+    })()"""
+    with Page(page_file, tmp_path / "browser") as page:
+        ready(page)
+        both = page.evaluate(typed % '{ "machine.r": "1.4", "machine.crank.m": "50" }')
+        other = page.evaluate(typed % '{ "machine.coupler.m": "-1", "machine.r": "0.15" }')
+        none = page.evaluate(typed % '{ "machine.coupler.m": "25" }')
+        console = page.console
+    assert both == "crank O1-A in m" and other == "coupler A-Bd: mass in kg" and none == ""
+    assert not console
+
+
 def test_a_length_that_cannot_close_is_refused_in_words(page_file, tmp_path):
     with Page(page_file, tmp_path / "browser") as page:
         ready(page)
@@ -138,11 +162,12 @@ def test_a_length_that_cannot_close_is_refused_in_words(page_file, tmp_path):
         after = shown(page)
         page.evaluate("document.getElementById('live-back').click()")
         page.wait("!document.getElementById('live-root').dataset.refused")
+        mended = page.evaluate("document.querySelectorAll('input[aria-invalid=true], .refused').length")
         console = page.console
     assert (
         "the organs cannot follow the rocker over its swing" in said and "must be ≥" in said and "≤" in said
     )
-    assert invalid == 1 and after == before and not console
+    assert invalid == 1 and after == before and mended == 0 and not console
 
 
 def test_the_worst_angle_is_that_of_the_runs(page_file, tmp_path):

@@ -228,6 +228,8 @@ def live(
     from ..report.html import render
     from ..report.live.page import live_page
 
+    if file is not None and file.resolve() == output.resolve():
+        raise InputError(f"-o {output}: is the file that is shown; name another file for the page")
     with scratch() as folder:
         page = render(live_page(file, speed, folder))
     with atomic_file(output) as part:

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 LEAD = (
     "The equations of this machine run in this page. Move a slider, or type a number: the new results stand beside "
-    "those of {}, whose value a small mark above each slider shows. A run is made when the slider is released."
+    "those of {}, whose value a small mark above each slider shows."
 )
 """The text before a live machine, with a slot for the noun of the file."""
 

@@ -46,7 +46,7 @@
     for (let t = Math.ceil(low / step - 1e-9) * step; t <= high + 1e-9 * step; t += step) ticks.push(Math.abs(t) < 1e-9 * step ? 0 : t);
     return ticks;
   };
-  const short = (x) => String(Number(x.toPrecision(4))).replace("-", "−");
+  const short = (x) => (x !== 0 && (Math.abs(x) < 1e-3 || Math.abs(x) >= 1e6) ? model.digits(x, 2).replace(".0", "").replace(/\u00a0/g, "") : String(Number(x.toPrecision(4))).replace("-", "−"));
   const COLOURS = ["#0b6fa4", "#c1440e", "#3d3d3d", "#6a994e", "#7a4fa3", "#b08900", "#00857c", "#a23b72", "#666666", "#4a6fe3"];
 
   class Plot {
@@ -117,10 +117,18 @@
       this.mark = { title, get };
       const at = (event) => this.xOf(((event.clientX - this.svg.getBoundingClientRect().left) / this.svg.getBoundingClientRect().width) * 560);
       this.svg.style.touchAction = "pan-y";
+      let before = null;
       this.svg.addEventListener("pointerdown", (event) => {
+        before = get();
+        if (before === null || event.button !== 0) return;
         this.svg.setPointerCapture(event.pointerId);
         this.dragged = true;
         moved(at(event));
+      });
+      // a finger that scrolls the page takes the pointer away
+      this.svg.addEventListener("pointercancel", () => {
+        if (this.dragged) moved(before);
+        this.dragged = false;
       });
       this.svg.addEventListener("pointermove", (event) => this.dragged && moved(at(event)));
       this.svg.addEventListener("pointerup", (event) => {
@@ -150,8 +158,9 @@
     const q = quantities[i], x = study[i];
     if (isAngle(q)) return [0, 2 * Math.PI];
     if (q.group === "feed") return [within(q, Math.min(0, x)), within(q, loadEnd(i))];
-    if (q.role === "event") return [within(q, 0), within(q, 3 * x || 1)];
-    if (x === 0) return [within(q, q.low !== null && q.low >= 0 ? 0 : -(BY_UNIT[q.unit] ?? 1)), within(q, BY_UNIT[q.unit] ?? 1)];
+    const usual = (BY_UNIT[q.unit] ?? 1 / q.factor);
+    if (q.role === "event") return [within(q, Math.min(0, 3 * x)), within(q, x > 0 ? 3 * x : x < 0 ? 0 : usual)];
+    if (x === 0) return [within(q, q.low !== null && q.low >= 0 ? 0 : -usual), within(q, usual)];
     return x > 0 ? [within(q, 0.4 * x), within(q, 2 * x)] : [within(q, 2 * x), within(q, 0.4 * x)];
   };
   // a load at which the effort is several times that of the study
@@ -172,7 +181,7 @@
   };
   const rows = new Map();
   const STEPS = 400;
-  const place = (row, x) => Math.round((STEPS * (x - row.low)) / (row.high - row.low));
+  const place = (row, x) => Math.round((STEPS * (x - row.low)) / (row.high - row.low || 1));
   const inputText = (q, x) => String(Number((q.factor * x + q.offset).toPrecision(7)));
 
   const control = (parent, i) => {
@@ -182,7 +191,7 @@
     make(box, "label", { for: id, title: q.key.join(".") }, q.title);
     const track = make(box, "span", { class: "live-track" });
     const range = make(track, "input", { type: "range", id, min: 0, max: STEPS, step: 1, "data-q": i });
-    const tick = make(track, "span", { class: "live-tick", "aria-hidden": "true", title: "the study's value" }, "▾");
+    const tick = make(track, "span", { class: "live-tick", "aria-hidden": "true" }, "▾");
     const field = make(box, "input", { type: "number", step: "any", "aria-label": `${q.title}${unit}`, "data-q": i, id: `${id}-number` });
     make(box, "span", { class: "u" }, q.unit);
     const row = { i, low, high, range, field, tick, box };
@@ -192,7 +201,8 @@
     field.addEventListener("change", () => {
       const x = (Number(field.value) - q.offset) / q.factor;
       if (field.value === "" || !Number.isFinite(x)) return refresh(row);
-      set(i, x);
+      // the number of the file in its shown digits is that of the file
+      set(i, inputText(q, x) === inputText(q, study[i]) ? study[i] : x);
       released();
     });
     refresh(row);
@@ -205,7 +215,7 @@
     row.range.value = place(row, x);
     row.range.setAttribute("aria-valuetext", shown(x, q));
     if (document.activeElement !== row.field || Number(row.field.value) !== Number(inputText(q, x))) row.field.value = inputText(q, x);
-    row.tick.style.left = `calc(8px + (100% - 16px) * ${(study[row.i] - row.low) / (row.high - row.low)})`;
+    row.tick.style.left = `calc(8px + (100% - 16px) * ${(study[row.i] - row.low) / (row.high - row.low || 1)})`;
     row.box.classList.toggle("changed", x !== study[row.i]);
   };
 
@@ -217,7 +227,7 @@
     if (!waiting) requestAnimationFrame(frame);
     waiting = true;
   };
-  let waiting = false, changed = null, good = study.slice();
+  let waiting = false, changed = null, culprit = null, good = study.slice();
   const frame = () => {
     waiting = false;
     update();
@@ -352,11 +362,24 @@
 
   const update = () => {
     const began = performance.now();
-    const why = model.refusal(values, changed);
-    for (const row of rows.values()) row.box.classList.toggle("refused", Boolean(why) && row.i === changed);
-    if (changed !== null && rows.has(changed)) rows.get(changed).field.setAttribute("aria-invalid", Boolean(why));
+    let turn = null, why = "";
+    try {
+      turn = model.turn(values);
+    } catch (error) {
+      if (!(error instanceof model.Refusal)) throw error;
+      // a value out of its bounds is the one to mend, or the first that was refused
+      const beyond = values.findIndex((x, i) => !model.admits(quantities[i], x));
+      if (beyond >= 0) culprit = beyond;
+      else if (culprit === null || values[culprit] === good[culprit]) culprit = values[changed] === good[changed] ? values.findIndex((x, i) => x !== good[i]) : changed;
+      why = model.explained(error, values, culprit);
+    }
+    if (turn) culprit = null;
+    for (const row of rows.values()) {
+      row.box.classList.toggle("refused", row.i === culprit);
+      row.field.setAttribute("aria-invalid", row.i === culprit);
+    }
     if (why) {
-      said(why);
+      said(`${why} The results below are those of the last machine that works.`);
       root.dataset.refused = why;
       return;
     }
@@ -364,7 +387,7 @@
     const same = values.every((x, i) => x === study[i]);
     said(same ? "" : `${values.filter((x, i) => x !== study[i]).length} numbers differ from the ${whole}'s.`.replace(/^1 numbers differ/, "1 number differs"));
     good = values.slice();
-    showTurn(model.turn(values), same);
+    showTurn(turn, same);
     if (markPlot) markPlot.drawMark();
     root.dataset.frame = (performance.now() - began).toFixed(2);
   };
@@ -384,7 +407,7 @@
     const jam = events.findIndex((event) => "force" in event.values);
     if (jam >= 0) select.value = jam;
     const measures = [...data.runs.results, ...(data.runs.trip === null ? [] : [{ name: "coupling_trip_time", title: "coupling opens after", unit: "s", factor: 1, offset: 0 }])];
-    const measureCells = tableOf("live-measures", ["from the begin of the event on", "now", "the study's", "change"], measures);
+    const measureCells = tableOf("live-measures", [events.length ? "from the begin of the event on" : "in steady running", "now", "the study's", "change"], measures);
     const runPlots = ["speed", "torque", "current"].map((name) => new Plot(byId("live-run-plots"), {
       speed: `Speed of the ${data.turn.driver}`, torque: `Torque at the ${data.turn.driver}`, current: "Current of the motor" }[name], "time in s"));
     const startPlot = new Plot(byId("live-run-plots"), `Start-up: speed of the ${data.turn.driver}`, "time in s");
@@ -418,17 +441,26 @@
         runs.states = kept.states;
         return { ...kept, runs };
       }
-      const start = runs.start();
+      const start = runs.cut(runs.start());
       const steady = start.made < start.wanted ? null : runs.settle();
       return (kept = { key, runs, start, steady, states: runs.states });
     };
     const outcome = (chosen, event) => {
+      try {
+        return followed(chosen, event);
+      } catch (error) {
+        if (!(error instanceof model.Refusal)) throw error;
+        return { ...kept, start: null, steady: null, run: null, measures: null, refused: `${error.message}.` };
+      }
+    };
+    const followed = (chosen, event) => {
       const found = steadyOf(chosen), { runs } = found;
       if (event?.from_rest) {
         const run = runs.cut(runs.start(event));
         return { ...found, run, measures: runs.measures(run) };
       }
-      if (!found.steady) return { ...found, run: null, measures: null };
+      const opened = [found.start, found.steady && runs.cut(found.steady)].some((each) => each?.tripped !== undefined);
+      if (!found.steady || opened) return { ...found, run: null, measures: null, opened };
       runs.states = found.states;
       const run = event ? runs.event(event, found.steady) : found.steady;
       return { ...found, run, measures: runs.measures(run) };
@@ -450,17 +482,18 @@
       return { title, behind, look: 0, x: found.run.time, y: Array.from(crank[name], (x) => r.factor * x + r.offset) };
     };
     const judge = (found) => {
-      const box = byId("live-judged"), w = found.runs.speed;
-      let text = "The motor runs through it.", mark = "good";
-      if (!found.run) [text, mark] = ["The motor does not come to steady running with this load: it stalls, or turns ever slower or faster.", "bad"];
+      const box = byId("live-judged"), w = model.speedOf(good), event = eventNow();
+      let text = !event ? "The motor drives the machine." : event.from_rest ? "The motor starts with it." : "The motor runs through it.", mark = "good";
+      const steady = found.steady ? found.runs.crank(found.steady).speed : null;
+      const mean = steady ? steady.reduce((a, b) => a + b, 0) / steady.length : w;
+      if (found.refused) [text, mark] = [found.refused, "partly"];
+      else if (found.opened) [text, mark] = ["The safety coupling opens before the event: in the start, or in steady running.", "bad"];
+      else if (!event?.from_rest && mean < 0.01 * w) [text, mark] = ["The motor stalls in the start: the machine stands.", "bad"];
+      else if (!found.run) [text, mark] = ["The motor does not come to steady running with this load: it stalls, falls far behind, or turns ever slower or faster.", "bad"];
       else if (found.run.tripped !== undefined) [text, mark] = [`The safety coupling opens ${model.digits(found.run.tripped)} s after the begin.`, "partly"];
       else if (found.measures.stall_time !== null) [text, mark] = [`The motor stalls ${model.digits(found.measures.stall_time)} s after the begin.`, "bad"];
-      else {
-        const steady = found.steady ? found.runs.crank(found.steady).speed : null;
-        const mean = steady ? steady.reduce((a, b) => a + b, 0) / steady.length : w;
-        if (mean < 0.01 * w) [text, mark] = ["The motor stalls in the start: the machine stands.", "bad"];
-        else if (mean < 0.98 * w && data.runs.reference) [text, mark] = [`The motor does not reach the speed that is asked for: it turns the ${data.turn.driver} at ${shown(mean, unit.speed_least)}.`, "bad"];
-      }
+      else if (mean < 0.98 * w && data.runs.reference) [text, mark] = [`The motor does not reach the speed that is asked for: it turns the ${data.turn.driver} at ${shown(mean, unit.speed_least)}.`, "bad"];
+      else if (event && !event.from_rest && found.measures.speed_least < 0.1 * w) [text, mark] = [`The ${data.turn.driver} is held up, and the motor turns it on again.`, "partly"];
       box.textContent = text;
       box.className = `judged ${mark}`;
     };
@@ -476,11 +509,12 @@
         runPlots[n].svg.parentElement.hidden = !curves.length;
         if (curves.length) runPlots[n].show(curves, r.unit);
       });
-      const speeds = [before, found].map((f, k) => {
+      const speeds = [before, found].filter((f) => f.start).map((f) => {
         const crank = f.runs.crank(f.start);
-        return { title: "", behind: k === 0, look: 0, x: f.start.time, y: Array.from(crank.speed, (x) => unit.speed_least.factor * x) };
+        return { title: "", behind: f === before && found !== before, look: 0, x: f.start.time, y: Array.from(crank.speed, (x) => unit.speed_least.factor * x) };
       });
-      startPlot.show(speeds, unit.speed_least.unit);
+      startPlot.svg.parentElement.hidden = !speeds.length;
+      if (speeds.length) startPlot.show(speeds, unit.speed_least.unit);
       root.dataset.runs = String(Number(root.dataset.runs ?? 0) + 1);
     };
     let token = 0;
@@ -512,7 +546,7 @@
         await new Promise((go) => setTimeout(go));
         if (own !== token) return;
       }
-      if (!y.length) return;
+      if (!y.length) return said("The motor does not come to the event, whose angles are not compared.");
       const worst = y.indexOf(Math.max(...y));
       anglePlot.legend.textContent = `Worst at ${x[worst]}°: ${model.digits(y[worst])} ${r.unit}.`;
       root.dataset.worst = x[worst];
@@ -524,7 +558,7 @@
   let playing = false, last = null, phase = 0;
   const advance = (now) => {
     if (!playing) return;
-    const turnTime = Math.max(1.5, (2 * Math.PI) / (data.turn.turns ? Math.max(data.turn.speed, 1e-6) : 2));
+    const turnTime = Math.min(8, Math.max(1.5, (2 * Math.PI) / (data.turn.turns ? model.speedOf(good) : 2)));
     if (last !== null) phase += (PICTURES * Math.min(now - last, 250)) / 1000 / turnTime;
     last = now;
     const swing = phase % (2 * PICTURES), k = data.turn.turns ? Math.floor(phase) % PICTURES : Math.floor(swing <= PICTURES ? swing : 2 * PICTURES - swing);

@@ -90,7 +90,7 @@ def of_linkage(machine: Machine, speed: float, file: str, units: Units = DEFAULT
     model = machine.model
     variable = next(v for v in Layout(Run).variables if v.name == "crank_speed")
     if model.slides:
-        q = Quantity("m/s", "speed of the driver", high=1e3, low=-1e3)
+        q = Quantity("m/s", "speed of the driver", low=0.0, high=1e3, open_low=True)
         variable = Variable("crank_speed", "speed of the driver", q)
     chosen = [
         *of_feed(machine, model.Feed()),

@@ -3,6 +3,7 @@
    in SI units, by their places in `data.quantities`. `bytes` has the modules by name. */
 const liveModel = async (data, bytes) => {
   const TURN = 2 * Math.PI;
+  const MOST_NUMBERS = 2 ** 24; // of a run, for which a browser has memory
 
   /* a module: its functions, and its memory as numbers by name */
   const kernel = async (name) => {
@@ -39,6 +40,7 @@ const liveModel = async (data, bytes) => {
   const baseRatio = data.turn.parameters.ratio ?? 1;
 
   /* numbers as people read them */
+  const raised = (n) => String(n).replace(/./g, (c) => "⁰¹²³⁴⁵⁶⁷⁸⁹⁻"["0123456789-".indexOf(c)]);
   const digits = (x, n = 3) => {
     if (x === 0) return "0";
     if (!Number.isFinite(x)) return x > 0 ? "∞" : x < 0 ? "−∞" : "-";
@@ -46,7 +48,7 @@ const liveModel = async (data, bytes) => {
     let text;
     if (size >= 1e6 || size < 1e-3) {
       const [mantissa, exponent] = x.toExponential(n - 1).split("e");
-      text = `${mantissa}\u00a0×\u00a010^${Number(exponent)}`;
+      text = `${mantissa}\u00a0×\u00a010${raised(Number(exponent))}`;
     } else text = size >= 10 ** (n - 1) ? x.toFixed(0) : x.toPrecision(n);
     return text.replace(/-/g, "−");
   };
@@ -58,8 +60,13 @@ const liveModel = async (data, bytes) => {
   const shownIn = (x, of, n) => `${digits(of.factor * x + of.offset, n)}${of.unit ? (of.unit === "°" ? "" : "\u00a0") + of.unit : ""}`;
   const general = (x) => String(Number(x.toPrecision(6))).replace("-", "−");
 
-  /* refusals */
-  class Refusal extends Error {}
+  /* refusals: the reason, and in words the range of the value that a rule names */
+  class Refusal extends Error {
+    constructor(reason, limits = "") {
+      super(reason + limits);
+      this.reason = reason;
+    }
+  }
 
   const admits = (q, x) => Number.isFinite(x) && (q.low === null || (q.above ? x > q.low : x >= q.low)) && (q.high === null || x <= q.high);
   const allowed = (q) =>
@@ -76,11 +83,12 @@ const liveModel = async (data, bytes) => {
     }
     return null;
   };
-  const words = ({ rule, value, low, high }) => {
+  const refused = ({ rule, value, low, high }) => {
     const unit = rule.unit === "1" ? "" : " " + rule.unit.replace(/\./g, " ");
     const given = rule.context.map((name) => `${name} = ${general(turnKernel.get(name))}`).join(", ");
     const limits = [Number.isFinite(low) ? `> ${general(low)}` : "", Number.isFinite(high) ? `< ${general(high)}` : ""].filter(Boolean).join(" and ");
-    return `${rule.subject} = ${general(value)}${unit}: ${rule.why}${given ? ` with ${given}` : ""}; ${low < high ? `must be ${limits}${unit}` : `no value fits; ${rule.remedy}`}`;
+    const found = Number.isFinite(value) ? ` = ${general(value)}${unit}` : "";
+    return new Refusal(`${rule.subject}${found}: ${rule.why}${given ? ` with ${given}` : ""}`, `; ${low < high ? `must be ${limits}${unit}` : `no value fits; ${rule.remedy}`}`);
   };
 
   /* the machine over a turn */
@@ -88,13 +96,13 @@ const liveModel = async (data, bytes) => {
   const speedOf = (values) => (speedAt < 0 ? data.turn.speed : values[speedAt]);
   const prepare = (values) => {
     quantities.forEach((q, i) => {
-      if (!admits(q, values[i])) throw new Refusal(`${q.title}: must be ${allowed(q)}`);
+      if (!admits(q, values[i])) throw new Refusal(q.title, `: must be ${allowed(q)}`);
       for (const name of q.turn) turnKernel.set(name, values[i]);
     });
     if (turnKernel.has("ratio")) turnKernel.set("ratio", ratioOf(values));
     if (turnKernel.functions.derive) turnKernel.functions.derive();
     const fault = unmet(turnKernel);
-    if (fault) throw new Refusal(words(fault));
+    if (fault) throw refused(fault);
   };
   const outputs = data.modules.turn.outputs.names;
 
@@ -128,7 +136,8 @@ const liveModel = async (data, bytes) => {
     peak: (c) => c.reduce((most, x) => Math.max(most, Math.abs(x)), 0),
     max: (c) => c.reduce((most, x) => Math.max(most, x), -Infinity),
     min: (c) => c.reduce((least, x) => Math.min(least, x), Infinity),
-    mean: means,
+    // what is left of a mean by rounding is none
+    mean: (c) => (Math.abs(means(c)) < 1e-12 * reductions.peak(c) ? 0 : means(c)),
     rms: (c) => Math.sqrt(means(c.map((x) => x * x))),
   };
   const factorOf = (by, at) => (by === "speed" ? at.speed : by === "ratio2" ? at.ratio * at.ratio : 1);
@@ -166,22 +175,28 @@ const liveModel = async (data, bytes) => {
     });
   };
 
-  // why values are refused, with the range of the value that was changed last; an empty text where they are not
+  // a refusal of values in words, with the range of the changed one
+  const explained = (error, values, changed) => {
+    const q = quantities[changed];
+    if (!q || !admits(q, values[changed])) return `${error.message}.`;
+    const limits = range(values, changed);
+    if (!limits) return `${error.message}.`;
+    // a limit beside a bound is that bound
+    const near = 1e-6 * Math.abs(study[changed]);
+    const sides = [
+      Number.isFinite(limits[0]) && (q.low === null || limits[0] > q.low + near) ? `≥ ${shown(limits[0], q, 4)}` : "",
+      Number.isFinite(limits[1]) && (q.high === null || limits[1] < q.high - near) ? `≤ ${shown(limits[1], q, 4)}` : "",
+    ].filter(Boolean);
+    return sides.length ? `${error.reason}. With the other values as they are, ${q.title} must be ${sides.join(" and ")}.` : `${error.message}.`;
+  };
+  // why values are refused; an empty text where they are not
   const refusal = (values, changed) => {
     try {
-      turn(values, 36);
+      turn(values);
       return "";
     } catch (error) {
       if (!(error instanceof Refusal)) throw error;
-      const q = quantities[changed];
-      if (!q || !admits(q, values[changed])) return error.message;
-      const limits = range(values, changed);
-      if (!limits) return error.message;
-      const sides = [
-        Number.isFinite(limits[0]) && (q.low === null || limits[0] > q.low) ? `≥ ${shown(limits[0], q, 4)}` : "",
-        Number.isFinite(limits[1]) && (q.high === null || limits[1] < q.high) ? `≤ ${shown(limits[1], q, 4)}` : "",
-      ];
-      return `${error.message}. With the other values as they are, ${q.title} must be ${sides.filter(Boolean).join(" and ") || "another"}.`;
+      return explained(error, values, changed);
     }
   };
 
@@ -229,6 +244,7 @@ const liveModel = async (data, bytes) => {
       const of = data.runs, k = (this.k = runsKernel);
       this.values = values;
       this.of = of;
+      this.spent = 0; // time in the runs so far
       this.ratio = ratioOf(values);
       this.speed = speedOf(values);
       this.turnTime = TURN / this.speed;
@@ -236,6 +252,7 @@ const liveModel = async (data, bytes) => {
       this.ramp = role("ramp", of.ramp);
       this.rampEnd = Math.max(this.ramp, of.soft_time);
       this.trip = role("trip", of.trip);
+      this.release = role("release", 0);
       this.inputs = { ...of.inputs };
       for (const [name, value] of Object.entries(of.parameters)) k.set(name, value);
       quantities.forEach((q, i) => {
@@ -280,6 +297,8 @@ const liveModel = async (data, bytes) => {
       let tail = 0;
       for (const s of Object.values(signals)) tail += 8 * (1 + 3 * s.changes.length);
       const table = 8 + 24 * names.length, chosen = 8 + 8 * Math.ceil(count / 2);
+      this.spent += (rows - 1) * step;
+      if (!(this.spent <= this.of.most && rows * count <= MOST_NUMBERS)) throw new Refusal(`these runs last too long for a page: ${shown(this.spent, { factor: 1, offset: 0, unit: "s" })} and more`);
       const at = k.room(table + tail + chosen + 8 * rows * count + 64), whole = new Int32Array(k.memory.buffer);
       let numbers = at + table;
       whole[at / 4] = names.length;
@@ -325,7 +344,7 @@ const liveModel = async (data, bytes) => {
     }
 
     angle(run, row = run.made - 1) {
-      return run[this.of.names.angle][row] / this.crankRatio("angle");
+      return run[this.of.names.angle][row] / this.crankRatio();
     }
 
     crankRatio() {
@@ -374,10 +393,11 @@ const liveModel = async (data, bytes) => {
     }
 
     isSettled(run) {
-      const { speed, torque } = this.crank(run), first = run[this.of.names.angle][0];
-      const goal = first + TURN * this.of.turns * this.crankRatio(), angle = run[this.of.names.angle];
-      const last = angle.findIndex((x) => x >= goal);
-      if (last < 1) return speed.every((w) => Math.abs(w) < 0.01 * this.speed);
+      const { speed, torque } = this.crank(run), angle = run[this.of.names.angle], first = angle[0];
+      // as many whole turns as the crank makes, see chainunit.study.readings.only_whole_turns
+      const turns = Math.min(this.of.turns, Math.floor((reductions.max(angle) - first) / (TURN * this.crankRatio()) + 1e-9));
+      const goal = first + TURN * (turns - 1e-9) * this.crankRatio(), last = angle.findIndex((x) => x >= goal);
+      if (turns < 1) return speed.every((w) => Math.abs(w) < 0.01 * this.speed);
       const share = (goal - angle[last - 1]) / (angle[last] - angle[last - 1]);
       const end = (x) => x[last - 1] + share * (x[last] - x[last - 1]);
       const inside = speed.slice(0, last + 1), ripple = reductions.max(inside) - reductions.min(inside);
@@ -436,18 +456,19 @@ const liveModel = async (data, bytes) => {
       return this.cut(run);
     }
 
-    // a run up to the opening of the coupling
+    // a run until the coupling that opens passes no torque, see chainunit.study.transients.release
     cut(run) {
       if (this.trip === null) return run;
       const limit = this.trip / this.ratio, motor = run[this.of.names.motor_torque];
       const row = motor.findIndex((x) => Math.abs(x) >= limit);
       if (row < 0) return run;
-      const short = { ...run, made: row + 1, tripped: run.time[row] };
-      for (const name of ["time", ...this.columns]) short[name] = run[name].slice(0, row + 1);
+      let tripped = run.time[row];
       if (row > 0) {
         const [a, b] = [Math.abs(motor[row - 1]), Math.abs(motor[row])];
-        short.tripped = run.time[row - 1] + ((limit - a) / (b - a)) * (run.time[row] - run.time[row - 1]);
+        tripped = run.time[row - 1] + ((limit - a) / (b - a)) * (run.time[row] - run.time[row - 1]);
       }
+      const made = Math.min(run.made, Math.max(row, Math.round((tripped + this.release) / this.of.step)) + 1), short = { ...run, made, tripped };
+      for (const name of ["time", ...this.columns]) short[name] = run[name].slice(0, made);
       return short;
     }
 
@@ -504,7 +525,7 @@ const liveModel = async (data, bytes) => {
   };
 
   return {
-    Refusal, Runs, data, digits, effects, quantities, pulls, range, reductions, refusal, results, shown, study, studyFile, turn, factorOf,
+    Refusal, Runs, admits, data, digits, effects, explained, quantities, speedOf, pulls, range, reductions, refusal, results, shown, study, studyFile, turn, factorOf,
     runsOf: (values) => new Runs(values),
   };
 };

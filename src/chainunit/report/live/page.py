@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ... import __version__
+from ...core.errors import InputError
 from ...machines.linkages.file import read_linkage
 from ...machines.machine import Machine
 from ...reading.tables import option_value
@@ -58,6 +59,10 @@ def live_page(file: Path | None, speed: str | None, folder: Path) -> b.Report:
     """
     if file is None or is_study_file(str(file)) or file.suffix.lower() != ".toml":
         config = load_study(file)
+        if speed is not None:
+            raise InputError(
+                "--speed is for a linkage; leave it out: the speed of a study is run.crank_speed in its file"
+            )
         live = live_of_config(config, folder)
         return _report(
             config.title or "Study", "Live study", "the study", live, str(file or "packaged example")

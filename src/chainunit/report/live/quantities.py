@@ -18,13 +18,12 @@ from ...reading.text import Units, scales, unit_text
 class LiveQuantity:
     """A quantity of the page.
 
-    `key` is its name in a study file, or its path, whose whole numbers are places in a list. `turn` and `runs` are
-    the full names of the parameters and inputs of the two modules that have its value. `role` is set where its value
-    takes another way: ``speed``, ``ratio``, ``ramp``, ``added``, ``trip``, or ``event``, a quantity of the event
-    `event`.
+    `key` is its path in a study file. `turn` and `runs` are the full names of the parameters and inputs of the two
+    modules that have its value. `role` is set where its value takes another way: ``speed``, ``ratio``, ``ramp``,
+    ``rotor``, ``added``, ``trip``, ``release``, or ``event``, a quantity of the event `event`.
     """
 
-    key: tuple[str | int, ...]
+    key: tuple[str, ...]
     variable: Variable
     value: float
     group: str

@@ -4,7 +4,7 @@ events. The page goes through a run as `chainunit.study.block_runs` does."""
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ...core.quantities import Layout
@@ -28,6 +28,8 @@ TOLERANCE = 1e-7
 """Relative tolerance of the integrator: peaks agree with those of a study to its coupling error."""
 SHORTEST = 1e-3
 """Least time between two rows [s]."""
+_MOST = 30.0
+"""Most time in the runs for one answer, as a multiple of that in the runs of the study."""
 _MEASURES = ("crank_torque_peak", "rocker_torque_peak", "current_peak", "speed_least", "stall_time")
 """The measures of an event that the page reads."""
 
@@ -79,6 +81,9 @@ def live_runs(
     torques = (f"{name}.{flange.members['tau']}" for name, flange in sides if "tau" in flange.members)
     torque = next(name for name in torques if name in columns)
     run = operation.run
+    turns = 2.0 * run.settle_turns + run.turns + 2.0
+    followed = max((event.time_followed(operation.turn) for event in taken), default=0.0)
+    usual = operation.ramp_end + turns * operation.turn + followed
     data = {
         "parameters": values,
         "inputs": inputs,
@@ -101,6 +106,7 @@ def live_runs(
         "turns": float(run.turns),
         "step": max(float(run.step), SHORTEST),
         "longest": LONGEST * float(run.step),
+        "most": _MOST * usual,
         "empty_start": operation.empty_start,
         "feed_rise": FEED_RISE,
         "started": STARTED,
@@ -116,7 +122,7 @@ def live_runs(
         },
         "gear_loss": None if plate is None else _gear_loss(plate, gear, drive),
         "events": [_event(rig, event) for event in taken],
-        "results": list(_results(drive, units)),
+        "results": list(_results(drive, units, "machine.rocker.tau" in columns)),
     }
     return LiveRuns(module, data, tuple(_quantities(drive, operation, taken, set(layout.names))))
 
@@ -166,12 +172,10 @@ def _pairs(event: Event) -> tuple[Any, Any]:
     return layout.variables, layout.values(event.p)
 
 
-def _results(drive: Drive, units: Units) -> Iterator[dict[str, Any]]:
-    """The results of an event that the page reads, by their measures."""
+def _results(drive: Drive, units: Units, rocker: bool) -> Iterator[dict[str, Any]]:
+    """The results of an event that the page reads, by their measures; `rocker` tells whether there is a rocker."""
     for v in Layout(Answers).variables:
-        if v.name in _MEASURES and not (
-            v.name == "rocker_torque_peak" and not hasattr(drive.machine.model, "sides")
-        ):
+        if v.name in _MEASURES and (v.name != "rocker_torque_peak" or rocker):
             title = v.described(drive.driver_noun)
             yield {"name": v.name, "title": title, **shown_in_unit(v.unit, v.kind, units)}
 
@@ -207,6 +211,8 @@ def _tables(drive: Drive, operation: OperatingConditions) -> Iterator[LiveQuanti
     if drive.follows:
         yield LiveQuantity(("run", "ramp"), run["ramp"], float(operation.run.ramp), "drive", role="ramp")
     if operation.coupling is not None:
-        trip = next(v for v in Layout(Coupling).variables if v.name == "trip_torque")
-        value = float(operation.coupling.trip_torque)
-        yield LiveQuantity(("coupling", "trip_torque"), trip, value, "drive", role="trip")
+        own = {v.name: v for v in Layout(Coupling).variables}
+        for name, role in (("trip_torque", "trip"), ("release_time", "release")):
+            variable = replace(own[name], template=f"safety coupling: {own[name].template}")
+            value = float(getattr(operation.coupling, name))
+            yield LiveQuantity(("coupling", name), variable, value, "drive", role=role)
