@@ -81,7 +81,7 @@ def test_only_what_is_wanted_is_written_and_right(called, longest, monkeypatch):
 def test_each_operation_stands_once():
     arguments, groups = expressions()
     program = code.Program("some", arguments, groups, [0, 4, 7], "OFTEN")
-    for operation in ("sin(", "sqrt(", "atan2(", "fmin(", "exp("):
+    for operation in ("sine_and_cosine(", "sqrt(", "arctangent2(", "least_of(", "exponential("):
         assert program.text.count(operation) == 1, operation
 
 

@@ -42,7 +42,9 @@ def test_no_renderer_names_a_study_or_a_machine():
         *"blocks figure files html lines live_block markdown motion packing".split(),
         *"page_figures print_figures style terminal".split(),
     ]
-    assert {f"report.{name}" for name in renderers} <= {a for a, _ in HOUSE.imports()} | {"report.lines"}
+    assert {f"report.{name}" for name in renderers} <= {a for a, _ in HOUSE.imports()} | {
+        f"report.{name}" for name in ("lines", "live_block", "packing")
+    }
     results = {(a, b) for a, b in HOUSE.imports() if a.startswith("report.") and a.split(".")[1] in renderers}
     assert {HOUSE.layer(b) for _, b in results} == {"core", "reading", "report"}
     assert {b.split(".")[1] for _, b in results if HOUSE.layer(b) == "report"} <= set(renderers)
@@ -80,6 +82,9 @@ DOORS = {
     "study.choice": {"choose", "choose_for", "drive_of"},
     "study.run": {"run_study"},
     "report.study_task": {"_accept", "_compute", "_fmus"},
+    # the live machine of a study
+    "report.live.machine": {"of_study", "without_drive"},
+    "report.live.page": {"live_of_config"},
     "app.studies": {"_take"},
     # the export of a study and its linear model, and the tasks of the capabilities
     "study.linear": {"_point_of_study"},

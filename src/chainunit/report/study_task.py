@@ -57,9 +57,9 @@ def _with_sheet(record: StudyRecord, folder: Path, of_report: list[Writer]) -> l
     return [*_writers(record, folder, of_report), sheet_file]
 
 
-def _accept_sheet(config: Config, **options: Any) -> None:
+def _accept_sheet(question: Any, **options: Any) -> None:
     pdf.check_library()
-    _accept(config, **options)
+    _accept(question, **options)
 
 
 def _fmus(config: Config) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ from typing import Any
 from ...core import messages
 from ...core.quantities import Layout, Quantity, Variable
 from ...core.wasm.module import WasmModule
+from ...drives.catalogue import CatalogueMotor
 from ...machines.machine import Machine
 from ...reading.text import DEFAULT_UNITS, Units
 from ...study.config import Config
@@ -62,13 +63,16 @@ def of_study(
     inputs = set(runs.module.description["inputs"]["names"]) if runs else set()
     chosen = [
         *of_feed(machine, config.feed, inputs),
-        *_speed(config, drive),
-        *_ratio(config, drive, plate is not None),
+        *_speed(float(config.run.crank_speed), drive),
+        *_ratio(drive, plate is not None),
         *of_machine(machine, known, without=("ratio",)),
         *(runs.quantities if runs else ()),
         *(quantities if runs else ()),
     ]
-    copied = _copied(config, drive, tables, proposal)
+    # names of other files are as in the study file, beside which the copy lies
+    folder = Path(config.file.source).parent
+    copied = changed_tables(config, _settled_values(machine, drive, tables, plate), _TITLE, folder)
+    copied = _with_drive(copied, drive, tables.start, proposal, config.events)
     return _assembled(turn, runs, why, chosen, copied, units)
 
 
@@ -82,7 +86,8 @@ def without_drive(config: Config, why: str) -> LiveMachine:
         *of_machine(machine, without=("ratio",)),
     ]
     turn = live_turn(machine, float(speed), config.units)
-    return _assembled(turn, None, why, chosen, _tables(config, _lengths(config)), config.units)
+    copied = changed_tables(config, _lengths(machine), _TITLE, Path(config.file.source).parent)
+    return _assembled(turn, None, why, chosen, copied, config.units)
 
 
 def of_linkage(machine: Machine, speed: float, file: str, units: Units = DEFAULT_UNITS) -> LiveMachine:
@@ -146,15 +151,15 @@ def _memory(module: WasmModule) -> dict[str, Any]:
     }
 
 
-def _speed(config: Config, drive: Drive) -> Iterable[LiveQuantity]:
+def _speed(crank_speed: float, drive: Drive) -> Iterable[LiveQuantity]:
     """The speed of the crank, where the motor follows it."""
     if drive.follows or drive.foreign is not None:
         variable = next(v for v in Layout(Run).variables if v.name == "crank_speed")
         key = ("run", "crank_speed")
-        yield LiveQuantity(key, variable, float(config.run.crank_speed), "drive", role="speed")
+        yield LiveQuantity(key, variable, crank_speed, "drive", role="speed")
 
 
-def _ratio(config: Config, drive: Drive, is_plate: bool) -> Iterable[LiveQuantity]:
+def _ratio(drive: Drive, is_plate: bool) -> Iterable[LiveQuantity]:
     """The ratio of the gear, where it is one number of the drive."""
     model = drive.machine.model
     if not drive.whole_line and "ratio" in model.parameter_layout.names:
@@ -163,42 +168,47 @@ def _ratio(config: Config, drive: Drive, is_plate: bool) -> Iterable[LiveQuantit
         yield LiveQuantity(key, variable, drive.ratio, "drive", role="ratio")
 
 
-def _copied(
-    config: Config, drive: Drive, tables: DriveTables, proposal: DriveProposal | None
-) -> dict[str, Any]:
-    """The tables of the study file that a reader copies, with what follows from the machine written down: another
-    machine shall not have another motor, gear or control. Names of other files are as in the study file."""
+def _settled_values(
+    machine: Machine, drive: Drive, tables: DriveTables, plate: CatalogueMotor | None
+) -> dict[str, float]:
+    """What follows from the machine, by its key in a study file: another machine shall not have another motor, gear
+    or control."""
     values = {f"motor.{name}": x for name, x in (drive.tuning.parameters if drive.tuning else {}).items()}
-    values |= _lengths(config)
-    plate = proposal.motor if proposal is not None else config.plate
+    values |= _lengths(machine)
     if plate is not None:
         values |= {"gear.ratio": drive.ratio, "gear.efficiency": float(tables.gear.efficiency)}
         if drive.follows:
             inverter = tables.starter.inverter
             values |= {"starter.inverter.boost": inverter.boost, "starter.inverter.slip": inverter.slip}
-    copied = _tables(config, values)
+    return values
+
+
+def _with_drive(
+    copied: dict[str, Any],
+    drive: Drive,
+    start: str,
+    proposal: DriveProposal | None,
+    events: Mapping[str, Event],
+) -> dict[str, Any]:
+    """The tables of a study file with the chosen motor and its `start`, the parts of the line, and the events."""
     if proposal is not None:
         for part in registered():
             copied.pop(part.motor_table or "", None)
         copied.setdefault("system", {})["motor"] = proposal.motor.designation
-        copied["start"] = tables.start
+        copied["start"] = start
         if drive.added_inertia:
             copied.setdefault("flywheel", {})["J"] = drive.added_inertia
     for part in parts_of_line():
         if (placed := drive.line.part(part.name)) is not None:
             copied = part.settled(copied, placed)
-    copied["event"] = [_entry(event) for event in config.events.values()]
+    copied["event"] = [_entry(event) for event in events.values()]
     return copied
 
 
-def _lengths(config: Config) -> dict[str, float]:
+def _lengths(machine: Machine) -> dict[str, float]:
     """All lengths of a chain unit: a file that gives one takes none from its ratios."""
-    own = config.machine.by_name
-    return {f"machine.{name}": own[name] for name in LENGTHS} if config.machine.model.sides else {}
-
-
-def _tables(config: Config, values: Mapping[str, float]) -> dict[str, Any]:
-    return changed_tables(config, values, _TITLE, Path(config.file.source).parent)
+    own = machine.by_name
+    return {f"machine.{name}": own[name] for name in LENGTHS} if machine.model.sides else {}
 
 
 def _entry(event: Event) -> dict[str, Any]:
