@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from scipy.integrate import solve_ivp
 
 from chainunit.core import engines
 from chainunit.core.errors import InputError
-from chainunit.core.integrators import rk4
+from chainunit.core.integrators import controlled, rk4
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.speed_control import loop, tune
 from chainunit.study.choice import choose
@@ -162,3 +163,35 @@ def test_feed_forward_of_the_whole_torque_leaves_no_dip():
             least = min(least, x[LAYOUT.names.index("w")])
         dips.append(least)
     assert dips[1] > 0.25 * dips[0] and dips[0] < -0.5
+
+
+def test_the_internal_step_resolves_the_current_loop_and_the_rotor():
+    """A quarter of the time constant of the closed current loop, where that is the fastest part."""
+    p = DcMotor.Parameters()
+    slow = engines.MATH
+    armature = dataclasses.replace(p.armature, L=0.01)
+    quick = dataclasses.replace(
+        p, armature=armature, current_control=dataclasses.replace(p.current_control, kp=90.0)
+    )
+    loop_time = 0.01 / (armature.R + 90.0)
+    assert DcMotor.internal_step(slow, quick) == pytest.approx(0.25 * loop_time)
+    long = dataclasses.replace(p, armature=dataclasses.replace(p.armature, L=10.0))
+    assert DcMotor.internal_step(slow, long) == 2.5e-4
+
+
+def test_states_that_leave_all_bounds_end_a_controlled_step():
+    def broken(t, x):
+        raise ValueError("no number")
+
+    def keep(t, x):
+        return x
+
+    with pytest.raises(ArithmeticError, match="left all bounds"):
+        controlled(broken, keep, [1.0], 0.1, 0.0, 0.05, 1e-6, [1.0])
+
+    def late(t, x):
+        return [1.0 / (0.05 - t) if t < 0.05 else math.nan]
+
+    # up to there the step goes on with shorter substeps
+    x, _ = controlled(late, keep, [0.0], 0.04, 0.0, 0.05, 1e-8, [1.0])
+    assert x[0] == pytest.approx(math.log(5.0), rel=1e-6)

@@ -15,7 +15,7 @@ from chainunit.groups.driver import Crank, Ram
 from chainunit.groups.dyad import Dyad
 from chainunit.groups.group import Rail
 from chainunit.groups.legs import BlockLeg, RodLeg, SlotLeg
-from chainunit.groups.loads import GuideLosses, PinLosses, Push, Weight
+from chainunit.groups.loads import GuideLosses, PinLosses, Push, Weight, _ends
 from chainunit.groups.sliding import RPR, RRP
 from chainunit.groups.triad import Pose, Triad
 from chainunit.groups.yokes import PRP, RPP
@@ -290,3 +290,10 @@ def test_elliptic_trammel():
         # the rod turns at 1/height, its middle about the corner
         inertia = 2.0 * (0.5 * l) ** 2 + 2.0 * l * l / 12.0
         assert state.J == pytest.approx(3.0 + inertia / height**2 + (q / height) ** 2, rel=1e-12)
+
+
+def test_the_forces_at_the_ends_of_a_block_are_its_normal_force_and_its_moment():
+    length, normal, moment = 0.12, 340.0, -17.0
+    ahead, behind = _ends(normal, moment, length)
+    assert ahead + behind == pytest.approx(normal)
+    assert 0.5 * length * (ahead - behind) == pytest.approx(moment)

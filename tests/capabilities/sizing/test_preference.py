@@ -279,6 +279,14 @@ def test_prices_count_before_masses():
     assert second.reason.startswith("heavier than the chosen one: 96.4 kg with its flywheel")
 
 
+def test_a_motor_of_unknown_mass_is_not_passed_over_for_its_costs():
+    """Where the mass of one is not known and not each has a price, the next criterion decides."""
+    known, unknown = made("a, known", mass=25.0), made("b, unknown", mass=0.0)
+    assert unknown.mass is None
+    first, second = ranked(unknown, known)
+    assert {first.motor.designation, second.motor.designation} == {"a, known", "b, unknown"}
+
+
 def test_without_a_candidate_that_keeps_the_margin_the_nearest_is_taken():
     """Its drive still fits, and the reason says that it keeps no margin."""
     first, second = ranked(made("a", used=0.998), made("b", 5500.0, used=0.92))
