@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import io
+import json
+import re
 
 from rich.console import Console
 
 from chainunit.reading.text import DEFAULT_UNITS
 from chainunit.report import files, html, motion, series, terminal
 from chainunit.report import study as study_report
+from chainunit.report.packing import unpacked
 
 
 def page_of(study, result=None):
@@ -25,6 +28,12 @@ def said_of(study, width=200):
 def write(study, folder):
     numbers, *others = files.writers(study_report.report(study), folder, "result")
     return [file for each in (numbers, lambda: series.write(study, folder), *others) for file in each()]
+
+
+def packed_in(page, name):
+    """The data of that name which a page holds packed, as a text of JSON."""
+    content = re.search(rf'<script type="application/octet-stream" id="{name}">(.*?)</script>', page)[1]
+    return json.dumps(unpacked(content))
 
 
 def pictures(moving):

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from multibody import Multibody
 from random_rest import resting
+from reports import packed_in
 from scipy.integrate import solve_ivp
 
 from chainunit.core.engines import MATH
@@ -503,7 +504,7 @@ def test_equilibria_are_told():
     assert data["by_speed"] == data["without_potential"] == ["fluid"]
     assert data["over_the_way"]["potential"]["value"] == own.rest.potential.tolist()
     assert "2: stable" in words and "1.26 rad/s (0.201 Hz)" in words and "fluid depends on the speed" in words
-    assert 'id="rest"' in page and "held by friction" in page
+    assert 'id="rest"' in page and "held by friction" in packed_in(page, "figures")
 
     data, words, _ = report_of(Machine(read_linkage(LINKAGES / "tipper.toml")), 0.1)
     (entry,) = data["equilibria"]

@@ -274,7 +274,8 @@ def test_lines():
 
 
 RENDERERS = (
-    "blocks figure files html lines linkage markdown motion page_figures print_figures style terminal".split()
+    "blocks figure files html lines linkage live_block markdown motion packing".split()
+    + "page_figures print_figures style terminal".split()
 )
 
 

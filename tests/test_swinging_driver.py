@@ -21,6 +21,7 @@ from fmpy.validation import validate_fmu
 from linkage_files import MACHINES, tables
 from multibody import Multibody
 from random_linkages import DYADS, random_linkage
+from reports import packed_in
 from scipy.optimize import brentq
 from swinging import ALL, DOUBLE_ROCKER, STEPHENSON, WATT, with_range
 from test_linear_driver import TRAMMEL
@@ -423,7 +424,7 @@ def test_the_command_shows_the_motion_there_and_back(tmp_path):
     assert np.all(forth > back)
     assert result["swings"]["crank"]["least_at"]["value"] == pytest.approx(LOW)
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
-    assert "path of A" in page
+    assert "path of A" in packed_in(page, "pictures")
 
 
 def test_a_study_names_what_serves_instead(tmp_path):
