@@ -3,6 +3,7 @@ Python."""
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -435,3 +436,9 @@ def test_the_page_does_not_replace_its_file(tmp_path):
     with pytest.raises(InputError, match="name another file"):
         live_command(file, file)
     assert file.read_text() == "[run]\ncrank_speed = 3\n"
+
+
+def test_a_date_in_the_study_file_is_a_text_in_the_page(tmp_path):
+    """TOML has dates, and JSON none."""
+    live, _ = live_of(study_files.parse("event = []\n[report]\ndate = 2026-03-01\n"), tmp_path)
+    assert json.loads(json.dumps(live.data["file"]))["report"] == {"date": "2026-03-01"}

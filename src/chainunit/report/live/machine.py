@@ -7,6 +7,7 @@ turn, the machine in motion, and runs with events.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -127,7 +128,7 @@ def _assembled(
         "without_runs": why,
         "quantities": [each.data(units, turn.data["driver"]) for each in quantities],
         "modules": {name: _memory(module) for name, module in modules.items()},
-        "file": copied,
+        "file": copied and _without_dates(copied),
         "messages": {
             "requirement": messages.REQUIREMENT,
             "first": messages.FIRST_PARAMETER,
@@ -209,6 +210,14 @@ def _lengths(machine: Machine) -> dict[str, float]:
     """All lengths of a chain unit: a file that gives one takes none from its ratios."""
     own = machine.by_name
     return {f"machine.{name}": own[name] for name in LENGTHS} if machine.model.sides else {}
+
+
+def _without_dates(copied: dict[str, Any]) -> dict[str, Any]:
+    """The tables with the text of a date, which the file takes, too, and JSON does not have."""
+    labels = {
+        name: x.isoformat() if isinstance(x, date) else x for name, x in copied.get("report", {}).items()
+    }
+    return copied | ({"report": labels} if labels else {})
 
 
 def _entry(event: Event) -> dict[str, Any]:
