@@ -395,6 +395,17 @@ def variables(cls: type, prefix: str = "", context: str = "", default: Any = Non
             yield from variables(field.metadata["of"], name + ".", words, inner)
 
 
+def variable_of(cls: type, name: str) -> Variable:
+    """The scalar of the declaration `cls` with this name.
+
+    Raises
+    ------
+    KeyError
+        for a name that is not declared.
+    """
+    return {v.name: v for v in variables(cls)}[name]
+
+
 def named_values(instance: Any, prefix: str = "") -> Iterator[tuple[Variable, float]]:
     """Every scalar of an instance of a declaration, with `prefix` before its name, and its value."""
     layout = Layout(type(instance))

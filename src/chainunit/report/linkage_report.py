@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import __version__
-from ..core.engines import MATH
 from ..core.quantities import Layout
 from ..machines.machine import Machine
 from ..mechanism.assur import PRISMATIC
@@ -210,7 +209,7 @@ def _reversals(s: b.Source, f: LinkageFindings, path: str) -> Iterator[b.Block]:
 
 
 def _animation(f: LinkageFindings) -> Animation:
-    machine = f.machine
+    machine, model = f.machine, f.machine.model
     low, _ = f.description.span
     step = (2 if f.back else 1) * (len(f.q) - 1) // _PICTURES
     q, speed = f.q[::step], np.full(_PICTURES // (2 if f.back else 1) + 1, f.speed)
@@ -225,11 +224,9 @@ def _animation(f: LinkageFindings) -> Animation:
         return np.concatenate([forth, values(f.back)[::-1][::step][1:]]) if f.back else forth
 
     state = _state(f, q, speed)
-    effort, unit = ("Force" if machine.model.slides else "Torque"), machine.model.driver_port.unit
-    description, driver = f.description, state.m.linkage.driver
-    titles = {name: description.variable("joint", name) for name in description.structure.joints}
-    receivers = description.parts(MATH, machine.p, machine.model.Inputs()).receivers
-    joints = {variable: receivers[name][0][0] for name, variable in titles.items()}
+    effort, unit = ("Force" if model.slides else "Torque"), model.driver_port.unit
+    driver = state.m.linkage.driver
+    joints = {variable: pin for variable, (pin, _) in model.joints.items()}
 
     def force(output: str) -> tuple[Any, Any]:
         x, y = (over(lambda g, axis=axis: g.outputs[f"{output}.{axis}"]) for axis in ("fx", "fy"))  # type: ignore[misc]
@@ -241,7 +238,7 @@ def _animation(f: LinkageFindings) -> Animation:
     )
     clip = Clip(
         "turn", f"{'There and back at' if f.back else 'At'} constant speed", time, linkage.places(state.m), readings,
-        (*linkage.arrows(titles, joints, force, named=True), *linkage_loads.load_arrows(state)),
+        (*linkage.arrows(model.pins, joints, force, named=True), *linkage_loads.load_arrows(state)),
         blocks=linkage.blocks(state.m),
     )  # fmt: skip
     shown = linkage.shown_pins(state.m.linkage)
@@ -252,7 +249,7 @@ def _animation(f: LinkageFindings) -> Animation:
         float(time[-1]),
         "An arrow is the force on a link from its neighbour; a dotted one is a force of the loads.",
         hanging=linkage.hanging(state.m),
-        orbit=(driver.bar.pin, driver.end) if machine.model.turns else None,
+        orbit=(driver.bar.pin, driver.end) if model.turns else None,
         names=linkage.labels(state.m.linkage),
         paths=linkage.paths(state.m, driver.end if f.back else ""),
         rails=linkage.rails(state.m),

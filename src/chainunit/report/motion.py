@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
@@ -104,10 +104,7 @@ def pictures(animation: Animation, units: Units) -> dict[str, Any]:
     reach = max((high - low for low, high in ends), default=1.0)
     reach = max(reach, *(abs(end) for both in ends for end in both))
     return {
-        "links": [
-            {"name": link.name, "look": link.look, "joints": link.joints, "closed": link.closed}
-            for link in animation.links
-        ],
+        "links": [asdict(link) for link in animation.links],
         "grounds": animation.grounds,
         "hanging": animation.hanging,
         "orbit": animation.orbit,

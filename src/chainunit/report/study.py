@@ -153,12 +153,9 @@ def _live(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The live machine of the study; none of a machine whose equations are not known."""
     if study.drive.foreign_machine:
         return
-    config, drive = study.config, study.drive
-    further = [
-        each for part in capabilities() for each in part.live_quantities(config.plans[part.name], drive)
-    ]
+    config = study.config
     yield b.Text(LEAD.format("the study"), "lead", "long")
-    yield Live(lambda: of_study(config, drive, config.drive, study.proposal, further))
+    yield Live(lambda: of_study(config, study.drive, config.drive, study.proposal))
 
 
 # -- the basis of the results

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
@@ -92,6 +92,18 @@ class EventRun:
     steady: xr.Dataset | None = None
 
 
+def names_read(rig: Rig, events: Iterable[Event]) -> list[str]:
+    """Full names of the outputs and states that an answer of a run reads, and the events themselves; the system of
+    the `rig` may not have all."""
+    names = [f"motor.{rig.drive.motor.current}", "machine.rocker.tau"]
+    names += [f"machine.{name}" for event in events for name in event.reads]
+    for bond in rig.graph.bonds:
+        for name, terminal in zip((bond.driver, bond.machine), bond.flanges, strict=True):
+            members = terminal.members
+            names += [f"{name}.{members[x]}" for x in ("phi", "w", "tau") if x in members]
+    return list(dict.fromkeys(names))
+
+
 class BlockRuns:
     """The compiled system of a rig, and runs on it.
 
@@ -152,14 +164,8 @@ class BlockRuns:
     @cached_property
     def outputs(self) -> list[str]:
         """The outputs and states that the measures of a run with an event read, and the events themselves."""
-        names = {"motor.air_gap_tau", f"motor.{self.rig.drive.motor.current}", "machine.rocker.tau"}
-        names |= {f"machine.{name}" for event in self._events for name in event.reads}
-        for bond in self.rig.graph.bonds:
-            for name, terminal in zip((bond.driver, bond.machine), bond.flanges, strict=True):
-                names |= {
-                    f"{name}.{terminal.members[x]}" for x in ("phi", "w", "tau") if x in terminal.members
-                }
-        return sorted(names & set(self.system.outputs))
+        names = ["motor.air_gap_tau", *names_read(self.rig, self._events)]
+        return sorted(set(names) & set(self.system.outputs))
 
     @cached_property
     def _driven(self) -> dict[str, int]:

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field
 from pydantic_core import PydanticCustomError
 
-from ..core.quantities import variables
+from ..core.quantities import variable_of
 from ..reading.tables import to_number
 
 
@@ -41,8 +41,7 @@ def numbers(
 ) -> Any:
     """The type of a list of at most `most` values of a quantity of the `declaration`, and of at least one unless
     `is_empty_allowed`; a refusal calls the list `name`."""
-    variable = next(v for v in variables(declaration) if v.name == quantity_name)
-    variable = dataclasses.replace(variable, name=name)
+    variable = dataclasses.replace(variable_of(declaration, quantity_name), name=name)
     value = Annotated[float, BeforeValidator(lambda entry: to_number(variable, entry))]
 
     def filled(entry: Any) -> Any:

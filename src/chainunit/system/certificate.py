@@ -70,6 +70,13 @@ def certify(
     return {bond.machine: energy_residual(run, bond, feed, lead) for bond in system.bonds}
 
 
+def torque_names(bond: Bond) -> tuple[str, ...]:
+    """The full names of the torque of the shaft, that of the machine first."""
+    driver, machine = bond.flanges
+    sides = ((bond.machine, machine), (bond.driver, driver))
+    return tuple(f"{name}.{side.members['tau']}" for name, side in sides if "tau" in side.members)
+
+
 def shaft_torque(run: xr.Dataset, bond: Bond) -> Any:
     """Torque of the shaft [N m], shape (time,), from the side that has it as a variable.
 
@@ -78,10 +85,7 @@ def shaft_torque(run: xr.Dataset, bond: Bond) -> Any:
     InputError
         where neither side has it.
     """
-    driver, machine = bond.flanges
-    sides = ((bond.machine, machine), (bond.driver, driver))
-    torques = (f"{name}.{side.members['tau']}" for name, side in sides if "tau" in side.members)
-    torque = next((full for full in torques if full in run), None)
+    torque = next((full for full in torque_names(bond) if full in run), None)
     if torque is None:
         raise InputError(
             f"neither {bond.machine} nor {bond.driver} gives the torque of the shaft between them"

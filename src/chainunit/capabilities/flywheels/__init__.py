@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from pydantic import Field
 
-from ...core.quantities import variables
+from ...core.quantities import variable_of
 from ...report.capability import Capability, Contents
 from ...report.live.quantities import LiveQuantity
 from ...study.analysis import Analysis
@@ -64,7 +64,7 @@ class FlywheelCapability(Capability):
 
     def live_quantities(self, plan: FlywheelPlan | None, drive: Drive) -> Iterable[LiveQuantity]:
         """The flywheel on the motor's shaft."""
-        J = next(v for v in variables(FlywheelTable) if v.name == "J")
+        J = variable_of(FlywheelTable, "J")
         yield LiveQuantity(("flywheel", "J"), J, drive.added_inertia, "drive", role="added")
 
     def not_with_foreign_motor(self, plan: FlywheelPlan | None) -> str:

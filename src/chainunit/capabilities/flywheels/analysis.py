@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ...core.quantities import Layout
+from ...core.quantities import Layout, variable_of
 from ...reading.results import derived, part, result
 from ...reading.text import number
 from ...study.analysis import Analysis, Findings, Work
@@ -282,7 +282,7 @@ class Trouble:
 
     def amount(self, wheel: Wheel) -> Amount:
         """The answer with its unit and kind."""
-        v = next(v for v in Layout(FlywheelAnswers).variables if v.name == self.number)
+        v = variable_of(FlywheelAnswers, self.number)
         return getattr(wheel.answers, v.name), v.unit, v.kind
 
     def words(self, wheel: Wheel) -> str:

@@ -20,7 +20,7 @@ from ...core.errors import GeometryError, InputError
 from ...core.messages import unit_behind
 from ...core.model import About, FmuData, Making, Requirement, keep
 from ...core.planar import ZERO
-from ...core.quantities import Layout, Value, declared_class, group, quantity
+from ...core.quantities import Value, declared_class, group, quantity, variable_of
 from ...groups.loads import GuideLosses, PinLosses, Weight
 from ...groups.triad import MOST_MISFIT
 from ...mechanism.assur import GROUND, PRISMATIC
@@ -136,7 +136,7 @@ class LinkageDescription(LinkageOutputs):
 
     def _in_range(self, declared: type, name: str) -> tuple[str, Any, Any]:
         """The field of a declaration with the bounds of the driver's range, at the ratio of the file."""
-        q = next(v for v in Layout(declared).variables if v.name == name).quantity
+        q = variable_of(declared, name).quantity
         low, high = (self._ratio * end for end in self.span)
         ends = " to ".join(f"{math.degrees(end):g} deg" for end in self.span)
         words = q.template if self.way.linear else f"{q.template}; range of the driver: {ends}"

@@ -7,12 +7,12 @@ turn, the machine in motion, and runs with events.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 from typing import Any
 
-from ...core import messages
-from ...core.quantities import Layout, Quantity, Variable
+from ...core.quantities import Quantity, Variable, named_values, variable_of
 from ...core.wasm.module import WasmModule
 from ...drives.catalogue import CatalogueMotor
 from ...machines.machine import Machine
@@ -26,8 +26,9 @@ from ...study.proposal import DriveProposal
 from ...study.registry import parts_of_line, registered
 from ...study.sections import Run
 from ...study.study_file import changed_tables
+from ..capability import capabilities
 from ..live_block import LiveMachine
-from .quantities import LiveQuantity, of_feed, of_machine
+from .quantities import LiveQuantity, of_machine
 from .runs import LiveRuns, live_runs, reason_without_runs
 from .turn import LiveTurn, live_turn
 
@@ -39,7 +40,6 @@ def of_study(
     drive: Drive,
     tables: DriveTables,
     proposal: DriveProposal | None = None,
-    quantities: Iterable[LiveQuantity] = (),
 ) -> LiveMachine:
     """The live machine of a study.
 
@@ -47,7 +47,6 @@ def of_study(
     ----------
     drive, tables : the drive with the values that follow from it
     proposal : the choice of the drive, where a capability made it
-    quantities : further quantities of the drive
 
     Raises
     ------
@@ -60,16 +59,15 @@ def of_study(
     plate = proposal.motor if proposal is not None else config.plate
     if not why:
         runs = live_runs(drive, config.operation, config.events, units, plate, tables.gear)
-    known = set(runs.module.description["parameters"]["names"]) if runs else set()
-    inputs = set(runs.module.description["inputs"]["names"]) if runs else set()
-    chosen = [
-        *of_feed(machine, config.feed, inputs),
-        *_speed(float(config.run.crank_speed), drive),
-        *_ratio(drive, plate is not None),
-        *of_machine(machine, known, without=("ratio",)),
-        *(runs.quantities if runs else ()),
-        *(quantities if runs else ()),
-    ]
+    known = runs.names if runs else set()
+    chosen = [*of_machine("feed", config.feed, known)]
+    if drive.follows or drive.foreign is not None:
+        chosen.append(_speed(float(speed)))
+    chosen += [*_ratio(drive, plate is not None), *of_machine("machine", machine.p, known)]
+    if runs:
+        chosen += runs.quantities
+        for part in capabilities():
+            chosen += part.live_quantities(config.plans[part.name], drive)
     # names of other files are as in the study file, beside which the copy lies
     folder = Path(config.file.source).parent
     copied = changed_tables(config, _settled_values(machine, drive, tables, plate), _TITLE, folder)
@@ -79,14 +77,9 @@ def of_study(
 
 def without_drive(config: Config, why: str) -> LiveMachine:
     """The live machine of a study whose drive is not known, with the reason in words."""
-    machine, speed = config.machine, config.run.crank_speed
-    variable = next(v for v in Layout(Run).variables if v.name == "crank_speed")
-    chosen = [
-        *of_feed(machine, config.feed),
-        LiveQuantity(("run", "crank_speed"), variable, float(speed), "drive", role="speed"),
-        *of_machine(machine, without=("ratio",)),
-    ]
-    turn = live_turn(machine, float(speed), config.units)
+    machine, speed = config.machine, float(config.run.crank_speed)
+    chosen = [*of_machine("feed", config.feed), _speed(speed), *of_machine("machine", machine.p)]
+    turn = live_turn(machine, speed, config.units)
     copied = changed_tables(config, _lengths(machine), _TITLE, Path(config.file.source).parent)
     return _assembled(turn, None, why, chosen, copied, config.units)
 
@@ -94,15 +87,11 @@ def without_drive(config: Config, why: str) -> LiveMachine:
 def of_linkage(machine: Machine, speed: float, file: str, units: Units = DEFAULT_UNITS) -> LiveMachine:
     """The live machine of a linkage at the `speed` of its driver [rad/s, m/s]; `file` is the name of its file."""
     model = machine.model
-    variable = next(v for v in Layout(Run).variables if v.name == "crank_speed")
+    own = _speed(speed)
     if model.slides:
         q = Quantity("m/s", "speed of the driver", low=0.0, high=1e3, open_low=True)
-        variable = Variable("crank_speed", "speed of the driver", q)
-    chosen = [
-        *of_feed(machine, model.Feed()),
-        LiveQuantity(("run", "crank_speed"), variable, speed, "drive", role="speed"),
-        *of_machine(machine, without=("ratio",)),
-    ]
+        own = replace(own, variable=Variable("crank_speed", "speed of the driver", q))
+    chosen = [*of_machine("feed", model.Feed()), own, *of_machine("machine", machine.p)]
     copied = None
     if model.turns and not model.slides:
         copied = {
@@ -129,11 +118,6 @@ def _assembled(
         "quantities": [each.data(units, turn.data["driver"]) for each in quantities],
         "modules": {name: _memory(module) for name, module in modules.items()},
         "file": copied and _without_dates(copied),
-        "messages": {
-            "requirement": messages.REQUIREMENT,
-            "first": messages.FIRST_PARAMETER,
-            "next": messages.NEXT_PARAMETER,
-        },
     }
     return LiveMachine(data, {name: module.content for name, module in modules.items()})
 
@@ -148,25 +132,21 @@ def _memory(module: WasmModule) -> dict[str, Any]:
         "pace": d["addresses"].get("pace"),
         "requirements": d["requirements"],
         "free": d["memory"]["free"],
-        "functions": d["functions"],
     }
 
 
-def _speed(crank_speed: float, drive: Drive) -> Iterable[LiveQuantity]:
-    """The speed of the crank, where the motor follows it."""
-    if drive.follows or drive.foreign is not None:
-        variable = next(v for v in Layout(Run).variables if v.name == "crank_speed")
-        key = ("run", "crank_speed")
-        yield LiveQuantity(key, variable, crank_speed, "drive", role="speed")
+def _speed(value: float) -> LiveQuantity:
+    """The speed of the crank [rad/s]."""
+    variable = variable_of(Run, "crank_speed")
+    return LiveQuantity(("run", "crank_speed"), variable, value, "drive", role="speed")
 
 
 def _ratio(drive: Drive, is_plate: bool) -> Iterable[LiveQuantity]:
     """The ratio of the gear, where it is one number of the drive."""
     model = drive.machine.model
     if not drive.whole_line and "ratio" in model.parameter_layout.names:
-        variable = next(v for v in model.parameter_layout.variables if v.name == "ratio")
         key = ("gear", "ratio") if is_plate else ("machine", "ratio")
-        yield LiveQuantity(key, variable, drive.ratio, "drive", role="ratio")
+        yield LiveQuantity(key, variable_of(model.Parameters, "ratio"), drive.ratio, "drive", role="ratio")
 
 
 def _settled_values(
@@ -225,10 +205,5 @@ def _entry(event: Event) -> dict[str, Any]:
     names = {"type": event.kind, "name": event.name} | ({"side": event.side} if event.side else {})
     if event.has_input:
         names["input"] = event.acts_on[0]
-    values = {v.name: (int(x) if v.type == "Integer" else float(x)) for v, x in _values(event)}
+    values = {v.name: (int(x) if v.type == "Integer" else x) for v, x in named_values(event.p)}
     return names | values
-
-
-def _values(event: Event) -> Iterable[tuple[Any, Any]]:
-    layout = Layout(type(event.p))
-    return zip(layout.variables, layout.values(event.p), strict=True)

@@ -14,7 +14,6 @@ from ...study.config import Config
 from ...study.config import load as load_study
 from ...study.package import is_study_file
 from .. import blocks as b
-from ..capability import capabilities
 from ..lines import line
 from ..live_block import LEAD, Live, LiveMachine
 from .machine import of_linkage, of_study, without_drive
@@ -40,12 +39,7 @@ def live_of_config(config: Config, folder: Path) -> LiveMachine:
     if config.motor is None:
         return without_drive(config, "the study chooses the motor; chainunit study makes the page with it")
     choice = choose(config, folder)
-    further = [
-        each
-        for part in capabilities()
-        for each in part.live_quantities(config.plans[part.name], choice.drive)
-    ]
-    return of_study(config, choice.drive, choice.tables, choice.proposal, further)
+    return of_study(config, choice.drive, choice.tables, choice.proposal)
 
 
 def live_page(file: Path | None, speed: str | None, folder: Path) -> b.Report:

@@ -10,7 +10,6 @@ from typing import Any
 
 from ...core.descriptions import of_driver
 from ...core.quantities import Variable, named_values
-from ...machines.machine import Machine
 from ...reading.text import Units, scales, unit_text
 
 
@@ -52,25 +51,14 @@ class LiveQuantity:
         }
 
 
-def of_machine(
-    machine: Machine, known: Collection[str] = (), without: Collection[str] = ()
-) -> Iterator[LiveQuantity]:
-    """The real parameters of a machine, as its own tables have them; `known` are the parameters of the module of
-    runs, and those `without` are left out."""
-    for v, value in named_values(machine.p):
-        if v.type == "Real" and v.name not in without:
+def of_machine(table: str, declared: Any, known: Collection[str] = ()) -> Iterator[LiveQuantity]:
+    """The real numbers that a `table` of a study file has of a machine: its parameters, or its loads in normal
+    running; `known` are the parameters and inputs of the module of runs. The ratio is a quantity of the drive."""
+    for v, value in named_values(declared):
+        if v.type == "Real" and v.name != "ratio":
             full = f"machine.{v.name}"
             runs = (full,) if full in known else ()
-            yield LiveQuantity(("machine", *v.name.split(".")), v, value, "machine", (v.name,), runs)
-
-
-def of_feed(machine: Machine, feed: Any, known: Collection[str] = ()) -> Iterator[LiveQuantity]:
-    """The loads of a machine in normal running."""
-    for v, value in named_values(feed):
-        if v.type == "Real":
-            full = f"machine.{v.name}"
-            runs = (full,) if full in known else ()
-            yield LiveQuantity(("feed", *v.name.split(".")), v, value, "feed", (v.name,), runs)
+            yield LiveQuantity((table, *v.name.split(".")), v, value, table, (v.name,), runs)
 
 
 def shown_in_unit(unit: str, kind: str, units: Units) -> dict[str, Any]:

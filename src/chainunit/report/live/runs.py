@@ -3,14 +3,15 @@ events. The page goes through a run as `chainunit.study.block_runs` does."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ...core.quantities import Layout
+from ...core.quantities import Layout, named_values, variable_of
 from ...core.wasm.module import WasmModule, wasm_module
 from ...drives.catalogue import CatalogueMotor
 from ...reading.text import Units
+from ...study.block_runs import names_read
 from ...study.drive import Drive
 from ...study.event import Event
 from ...study.measures import STARTED, Answers
@@ -19,9 +20,9 @@ from ...study.rig import FEED_RISE, Rig
 from ...study.sections import Coupling, Run
 from ...study.start_up import PATIENCE
 from ...study.window import CLOSED, DRIFT
-from ...system.compiled import compiled, input_starts
-from ...system.compiled_simulation import LONGEST
-from .formulas import event_signals, varied_names
+from ...system.certificate import torque_names
+from ...system.compiled_simulation import LONGEST, CompiledSystem
+from .formulas import event_signals
 from .quantities import LiveQuantity, shown_in_unit
 
 TOLERANCE = 1e-7
@@ -36,10 +37,12 @@ _MEASURES = ("crank_torque_peak", "rocker_torque_peak", "current_peak", "speed_l
 
 @dataclass(frozen=True)
 class LiveRuns:
-    """The module of a drive, the `data` of its runs as JSON has it, and the quantities that only they have."""
+    """The module of a drive, the `data` of its runs as JSON has it, the `names` of its parameters and inputs, and the
+    quantities that only runs have."""
 
     module: WasmModule
     data: dict[str, Any]
+    names: Collection[str]
     quantities: tuple[LiveQuantity, ...]
 
 
@@ -65,21 +68,17 @@ def live_runs(
     """The runs of a drive for which `reason_without_runs` is empty; a motor of the catalogue has its `plate` and its
     `gear`."""
     rig = Rig(operation, drive, None).plain
-    part = compiled(rig.graph)
-    model, layout = part.model, part.model.parameter_layout
+    system = CompiledSystem(rig.graph)
+    model = system.model
     taken = [event for event in events.values() if rig.takes(event)]
-    columns = _columns(rig, taken, {v.name for each in model.parts for v in each.layout.variables})
+    outputs = {v.name for part in model.parts for v in part.layout.variables}
+    columns = [name for name in names_read(rig, taken) if name in outputs]
     machine = drive.simulated_machine.model
     shared = machine.derived_count == model.derived_count
     module = wasm_module(model, False, tuple(columns), not (shared and model.derived_count))
-    values = layout.by_name(part.parameters) | {"solver.tolerance": TOLERANCE}
-    inputs = {v.name: float(v.quantity.start or 0.0) for v in model.input_layout.variables}
-    inputs |= input_starts(rig.graph, model) | rig.normal
-    bond = drive.machine_bond
-    driver, driven = bond.flanges
-    sides = ((bond.machine, driven), (bond.driver, driver))
-    torques = (f"{name}.{flange.members['tau']}" for name, flange in sides if "tau" in flange.members)
-    torque = next(name for name in torques if name in columns)
+    values = model.parameter_layout.by_name(system.p) | {"solver.tolerance": TOLERANCE}
+    inputs = system.inputs | rig.normal
+    torque = next(name for name in torque_names(drive.machine_bond) if name in columns)
     run = operation.run
     turns = 2.0 * run.settle_turns + run.turns + 2.0
     followed = max((event.time_followed(operation.turn) for event in taken), default=0.0)
@@ -124,19 +123,8 @@ def live_runs(
         "events": [_event(rig, event) for event in taken],
         "results": list(_results(drive, units, "machine.rocker.tau" in columns)),
     }
-    return LiveRuns(module, data, tuple(_quantities(drive, operation, taken, set(layout.names))))
-
-
-def _columns(rig: Rig, events: Iterable[Event], known: set[str]) -> list[str]:
-    """The outputs that the results and the events read."""
-    names = {f"motor.{rig.drive.motor.current}": None, "machine.rocker.tau": None}
-    names |= {f"machine.{name}": None for event in events for name in event.reads}
-    for bond in rig.graph.bonds:
-        for name, terminal in zip((bond.driver, bond.machine), bond.flanges, strict=True):
-            names |= {
-                f"{name}.{terminal.members[x]}": None for x in ("phi", "w", "tau") if x in terminal.members
-            }
-    return [name for name in names if name in known]
+    names = {*model.parameter_layout.names, *system.inputs}
+    return LiveRuns(module, data, names, tuple(_quantities(drive, operation, taken, names)))
 
 
 def _gear_loss(plate: CatalogueMotor, gear: Any, drive: Drive) -> dict[str, Any]:
@@ -159,17 +147,11 @@ def _event(rig: Rig, event: Event) -> dict[str, Any]:
         "name": event.name,
         "title": event.title,
         "from_rest": event.from_rest,
-        "values": {v.name: float(x) for v, x in zip(*_pairs(event), strict=True)},
-        "varied": varied_names(event),
+        "values": {v.name: x for v, x in named_values(event.p)},
         "normal": {name: rig.inputs[name][0] for name in event.inputs(event.side)},
         "reads": {name: f"machine.{name}" for name in event.reads},
         "signals": event_signals(event, lambda name: rig.inputs[name][0]),
     }
-
-
-def _pairs(event: Event) -> tuple[Any, Any]:
-    layout = Layout(type(event.p))
-    return layout.variables, layout.values(event.p)
 
 
 def _results(drive: Drive, units: Units, rocker: bool) -> Iterator[dict[str, Any]]:
@@ -181,13 +163,12 @@ def _results(drive: Drive, units: Units, rocker: bool) -> Iterator[dict[str, Any
 
 
 def _quantities(
-    drive: Drive, operation: OperatingConditions, events: Iterable[Event], known: set[str]
+    drive: Drive, operation: OperatingConditions, events: Iterable[Event], known: Collection[str]
 ) -> Iterator[LiveQuantity]:
     """The quantities that the runs alone have: of the motor, the flywheel, the coupling, the ramp, the events."""
-    motor = Layout(type(drive.parameters))
     # the parameters of a motor of the catalogue follow from its plate
     if drive.rated_current is None:
-        for v, value in zip(motor.variables, motor.values(drive.parameters), strict=True):
+        for v, value in named_values(drive.parameters):
             full = f"motor.{v.name}"
             if (
                 v.type == "Real"
@@ -195,24 +176,22 @@ def _quantities(
                 and not v.name.startswith(("solver.", "phi_start", "w_start"))
             ):
                 role, runs = ("rotor", ()) if v.name == "rotor.J" else ("", (full,))
-                yield LiveQuantity(("motor", *v.name.split(".")), v, float(value), "drive", (), runs, role)
+                yield LiveQuantity(("motor", *v.name.split(".")), v, value, "drive", (), runs, role)
     yield from _tables(drive, operation)
     for event in events:
-        for v, value in zip(*_pairs(event), strict=True):
+        for v, value in named_values(event.p):
             if v.type == "Real":
                 key = ("event", event.name, v.name)
-                yield LiveQuantity(
-                    key, v, float(value), f"event.{event.name}", role="event", event=event.name
-                )
+                yield LiveQuantity(key, v, value, f"event.{event.name}", role="event", event=event.name)
 
 
 def _tables(drive: Drive, operation: OperatingConditions) -> Iterator[LiveQuantity]:
-    run = {v.name: v for v in Layout(Run).variables}
     if drive.follows:
-        yield LiveQuantity(("run", "ramp"), run["ramp"], float(operation.run.ramp), "drive", role="ramp")
+        ramp = variable_of(Run, "ramp")
+        yield LiveQuantity(("run", "ramp"), ramp, float(operation.run.ramp), "drive", role="ramp")
     if operation.coupling is not None:
-        own = {v.name: v for v in Layout(Coupling).variables}
         for name, role in (("trip_torque", "trip"), ("release_time", "release")):
-            variable = replace(own[name], template=f"safety coupling: {own[name].template}")
+            own = variable_of(Coupling, name)
+            variable = replace(own, template=f"safety coupling: {own.template}")
             value = float(getattr(operation.coupling, name))
             yield LiveQuantity(("coupling", name), variable, value, "drive", role=role)

@@ -4,12 +4,11 @@ draws it and reads its results."""
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
-from ...core.engines import MATH
 from ...core.symbolic_trace import trace
 from ...core.wasm.module import WasmModule, wasm_module
 from ...machines.machine import Machine
@@ -23,8 +22,6 @@ from .quantities import shown_in_unit
 
 _ON_THE_WAY = 361
 """Places of a driver that does not turn round."""
-_PULLS = (("mean_pull", "pushed", "bad"), ("end_pull", "end pushed", "partly"))
-"""By the kind of the pull in a rod, the topic of the verdict where it is below zero, and its sign."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +70,7 @@ def live_turn(machine: Machine, speed: float, units: Units) -> LiveTurn:
         "places": ANGLES if model.turns else _ON_THE_WAY,
         "speed": speed,
         "driver": model.driver_noun,
-        "effort": "force" if model.slides else "torque",
+        "effort": _effort(machine),
         "place": shown_in_unit("m" if model.slides else "rad", "", units),
         "results": results,
         "pulls": list(_pulls(known)),
@@ -83,10 +80,7 @@ def live_turn(machine: Machine, speed: float, units: Units) -> LiveTurn:
         ],
         "curves": list(_curves(machine, known, units)),
         "picture": {
-            "links": [
-                {"name": link.name, "look": link.look, "joints": link.joints, "closed": link.closed}
-                for link in linkage.links(whole.linkage, {})
-            ],
+            "links": [asdict(link) for link in linkage.links(whole.linkage, {})],
             "grounds": [pin for pin in whole.linkage.ground if pin in shown],
             "hanging": linkage.hanging(whole),
             "orbit": (driver.bar.pin, driver.end) if model.turns else None,
@@ -103,25 +97,24 @@ def live_turn(machine: Machine, speed: float, units: Units) -> LiveTurn:
     return LiveTurn(wasm_module(model, False, tuple(columns)), data)
 
 
+def _effort(machine: Machine) -> str:
+    """The noun of the effort at the driver."""
+    return "force" if machine.model.slides else "torque"
+
+
 def _forces(machine: Machine) -> Iterator[_Force]:
     model = machine.model
-    described = getattr(model, "described_by", None)
-    if described is None:
-        for title, output in model.pins.items():
-            if output in model.joints:
-                yield _Force(title, output, model.joints[output][0], "")
-        return
-    receivers = described.parts(MATH, machine.p, model.Inputs()).receivers
-    for name in described.structure.joints:
-        yield _Force(name, described.variable("joint", name), receivers[name][0][0], name)
+    named = hasattr(model, "described_by")
+    for title, output in model.pins.items():
+        if output in model.joints:
+            yield _Force(title, output, model.joints[output][0], title if named else "")
 
 
 def _results(machine: Machine, forces: list[_Force], known: Any, units: Units) -> Iterator[dict[str, Any]]:
     """The results of a turn: each is a reduction of a column, ``peak``, ``rms``, ``mean``, ``min`` or ``max``, times
     the factors ``by``: the speed of the driver, or the square of the ratio."""
     model = machine.model
-    port, driver = model.driver_port.unit, model.driver_noun
-    effort = "force" if model.slides else "torque"
+    port, driver, effort = model.driver_port.unit, model.driver_noun, _effort(machine)
     unit, inertia = port("N.m"), port("kg.m2")
     rows: list[tuple[str, str, str, str, str]] = [
         (f"{driver} {effort}, peak", "peak", "crank_torque", unit, ""),
@@ -149,29 +142,23 @@ def _results(machine: Machine, forces: list[_Force], known: Any, units: Units) -
 
 
 def _pulls(known: Any) -> Iterator[dict[str, Any]]:
-    """The pulls in the rods of organs, by kind of rod: of both sides the columns, and the topic where the least of
+    """The pulls in the rods of organs, by kind of rod: the columns of both sides, and the words where the least of
     them is below zero."""
     for rod in ("web", "wall"):
-        for kind, topic, sign in _PULLS:
-            names = {
-                "mean_pull": [f"mean_pull({side}.{rod})" for side in ("left", "right")],
-                "end_pull": [f"{side}.{rod}_pull" for side in ("left", "right")],
-            }[kind]
-            if all(name in known for name in names):
-                yield {
-                    "title": f"least {'mean' if kind == 'mean_pull' else 'end'} pull in a {rod}",
-                    "columns": names,
-                    "topic": topic,
-                    "words": TOPICS[topic].short,
-                    "sign": sign,
-                }
+        for kind, column, topic in (
+            ("mean", "mean_pull({}.{})", "pushed"),
+            ("end", "{}.{}_pull", "end pushed"),
+        ):
+            columns = [column.format(side, rod) for side in ("left", "right")]
+            if all(name in known for name in columns):
+                title = f"least {kind} pull in a {rod}"
+                yield {"title": title, "columns": columns, "words": TOPICS[topic].short}
 
 
 def _curves(machine: Machine, known: Any, units: Units) -> Iterator[dict[str, Any]]:
     """The plots over the turn: each has curves of one unit."""
     model = machine.model
-    port, driver = model.driver_port.unit, model.driver_noun
-    effort = "force" if model.slides else "torque"
+    port, driver, effort = model.driver_port.unit, model.driver_noun, _effort(machine)
     curves = [{"title": capital(f"{effort} at the {driver}"), "of": "crank_torque", "by": ""}]
     if "rocker.tau" in known:
         curves.append({"title": "Rocker torque", "of": "rocker.tau", "by": ""})
