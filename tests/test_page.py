@@ -29,8 +29,9 @@ from chainunit.reading.text import DEFAULT_UNITS, digits_text, forms, scales, un
 from chainunit.reading.text import number as told_as
 from chainunit.report import html, page_figures, study_motion
 from chainunit.report import study as study_report
-from chainunit.report.blocks import at
+from chainunit.report.blocks import Report, Section, at
 from chainunit.report.figure import Label, Mark, Shade
+from chainunit.report.live_block import Live
 from chainunit.report.packing import unpacked
 from chainunit.study import config, judgement
 from chainunit.study.cycle import cycle
@@ -674,6 +675,26 @@ def test_the_page_carries_the_library_packed(written):
     packed = Reader(written.read_text("utf-8")).scripts["plotly"]
     assert gzip.decompress(base64.b64decode(packed)).decode() == get_plotlyjs()
     assert written.stat().st_size < 2.5e6
+
+
+def test_a_piece_of_another_page_has_nothing_that_a_script_draws(study):
+    report = study_report.report(study)
+    kinds = {type(block).__name__ for block in report.blocks("long")}
+    assert {"Figure", "Animation", "Live"} <= kinds
+    piece = html.fragment(report)
+    assert "<table" in piece and "crank torque, peak" in piece
+    for mark in ('class="plot"', 'id="stage"', "live-root", "Move a slider", "Drag to zoom"):
+        assert mark in html.render(report) and mark not in piece, mark
+
+
+def test_a_machine_that_cannot_run_is_not_said_to_run():
+    def refuse():
+        raise InputError("erf: WebAssembly does not have it")
+
+    report = Report("", "a study", {}, (), (Section("live", "Try it", (Live(refuse, "the study"),)),))
+    page = html.render(report)
+    assert "This machine cannot run in a page: erf: WebAssembly does not have it." in page
+    assert "run in this page" not in page and "live-root" not in page and "wasm-unsafe-eval" not in page
 
 
 def test_an_error_leaves_the_old_page(study, tmp_path, monkeypatch):

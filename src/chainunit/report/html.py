@@ -58,7 +58,6 @@ def write(report: b.Report, folder: Path) -> Path:
 def render(report: b.Report) -> str:
     """The page as a text of HTML."""
     page = Page(report.units)
-    live = next((page.live(block) for block in report.blocks("long") if isinstance(block, Live)), None)
     sections = [
         (section, content)
         for section in report.sections
@@ -73,7 +72,7 @@ def render(report: b.Report) -> str:
         "pictures": packed(animation and motion.pictures(animation, report.units)),
     }
     styles, scripts = ["page.css"], ["packing.js", "picture.js", "page.js"]
-    if live is not None:
+    if (live := page.live) is not None:
         styles.append("live/live.css")
         scripts += ["live/model.js", "live/live.js"]
         modules = {f"module-{name}": packed_bytes(each) for name, each in live.modules.items()}
@@ -142,10 +141,13 @@ def _packed_plotly() -> str:
 
 
 def fragment(report: b.Report) -> str:
-    """Title and blocks as a piece of another page, such as a notebook; without figures and style."""
+    """Title and blocks as a piece of another page, such as a notebook; without style, and without the blocks that the
+    scripts of the page draw: figures, motion, live machine."""
     page = Page(report.units)
     failure = f"<p>The run stopped early: {page.line(report.failure)}.</p>" if report.failure else ""
-    return f"<h3>{escape(report.title or report.kind)}</h3>\n{failure}{page.blocks(report.blocks('long'))}"
+    drawn = (Figure, motion.Animation, Live)
+    still = [block for block in report.blocks("long") if not isinstance(block, drawn)]
+    return f"<h3>{escape(report.title or report.kind)}</h3>\n{failure}{page.blocks(still)}"
 
 
 def resource(name: str) -> str:
@@ -184,7 +186,8 @@ class Page:
 
     def __init__(self, units: Units) -> None:
         self.units = units
-        self._lives: dict[Live, tuple[LiveMachine | None, str]] = {}
+        self.live: LiveMachine | None = None
+        """the live machine among the blocks so far"""
 
     # -- pieces
 
@@ -268,20 +271,12 @@ class Page:
             case Live():
                 return self._live(block)
 
-    def live(self, block: Live) -> LiveMachine | None:
-        """The live machine of the page; None where it cannot be made."""
-        if block not in self._lives:
-            try:
-                self._lives[block] = block.make(), ""
-            except InputError as error:
-                self._lives[block] = None, str(error)
-        return self._lives[block][0]
-
     def _live(self, block: Live) -> str:
-        if self.live(block) is not None:
-            return resource("live/live.html")
-        why = self._lives[block][1]
-        return f'<p class="note">This machine cannot run in a page: {escape(why)}.</p>'
+        try:
+            self.live = block.make()
+        except InputError as error:
+            return f'<p class="note">This machine cannot run in a page: {escape(str(error))}.</p>'
+        return f'<p class="lead">{escape(block.lead)}</p>\n{resource("live/live.html")}'
 
     def _verdict(self, verdict: b.Judgement) -> str:
         text = self.line(verdict.line)

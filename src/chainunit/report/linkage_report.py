@@ -21,7 +21,7 @@ from . import linkage, linkage_loads, linkage_rest
 from .drawing import drawing
 from .lines import Line, Name, Number, capital, join, line
 from .live.machine import of_linkage
-from .live_block import LEAD, Live
+from .live_block import Live
 from .motion import Animation, Clip, Reading
 from .task import Task, no_check
 
@@ -63,8 +63,7 @@ def linkage_report(findings: LinkageFindings, source: str) -> b.Report:
 
 
 def _live(f: LinkageFindings, source: str) -> Iterator[b.Block]:
-    yield b.Text(LEAD.format("the file"), "lead", "long")
-    yield Live(lambda: of_linkage(f.machine, f.speed, Path(source).name))
+    yield Live(lambda: of_linkage(f.machine, f.speed, Path(source).name), "the file")
 
 
 def _entry(value: Any, unit: str) -> dict[str, Any]:

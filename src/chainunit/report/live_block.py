@@ -7,11 +7,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-LEAD = (
+_LEAD = (
     "The equations of this machine run in this page. Move a slider, or type a number: the new results stand beside "
     "those of {}, whose value a small mark above each slider shows."
 )
-"""The text before a live machine, with a slot for the noun of the file."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +23,7 @@ class LiveMachine:
 
 @dataclass(frozen=True)
 class Live:
-    """A live machine, which `make` makes.
+    """A live machine, which `make` makes; `beside` is the noun of what has the values that the reader changes.
 
     Raises
     ------
@@ -33,4 +32,10 @@ class Live:
     """
 
     make: Callable[[], LiveMachine]
+    beside: str
     form: ClassVar[str] = "long"
+
+    @property
+    def lead(self) -> str:
+        """The text before the machine."""
+        return _LEAD.format(self.beside)

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import base64
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
-from itertools import groupby
+from itertools import groupby, starmap
+from operator import itemgetter
 from pathlib import Path
 
 from ..core.errors import InputError
@@ -110,17 +111,12 @@ def write(sheet: Sheet, pictures: Mapping[str, Path], file: Path) -> Path:
 def page_text(sheet: Sheet, pictures: Mapping[str, Path]) -> str:
     """The sheet as a page of HTML, from which the PDF is made."""
     page = _PrintedPage(sheet.units, pictures)
-    parts = [(each, page.blocks(b.of_form(each.blocks, "long"))) for each in sheet.sections]
-    annex = [(each, page.blocks(b.of_form(each.blocks, "long"))) for each in sheet.annex]
-    numbered = [(f"{n}", each, text) for n, (each, text) in enumerate(filter(lambda part: part[1], parts), 1)]
-    numbered += [
-        (f"A{n}", each, text) for n, (each, text) in enumerate(filter(lambda part: part[1], annex), 1)
-    ]
+    numbered = [*_numbered(page, sheet.sections), *_numbered(page, sheet.annex, "A")]
     contents = "".join(
         f'<li><a href="#{_place(number)}"><span>{number}</span> {escape(each.heading)}</a></li>'
         for number, each, _ in numbered
     )
-    sections = "".join(_section(number, each, text) for number, each, text in numbered)
+    sections = "".join(starmap(_section, numbered))
     rows = "".join(
         f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in sheet.block.items()
     )
@@ -132,6 +128,15 @@ def page_text(sheet: Sheet, pictures: Mapping[str, Path]) -> str:
         f'<table class="signed"><tr>{signed}</tr></table></header>'
         f'<nav class="contents"><ol>{contents}</ol></nav>{sections}</body></html>'
     )
+
+
+def _numbered(
+    page: Page, sections: Iterable[b.Section], letter: str = ""
+) -> Iterator[tuple[str, b.Section, str]]:
+    """The sections that are not empty on paper, each with its number before it and its text behind it."""
+    texts = ((each, page.blocks(b.of_form(each.blocks, "long"))) for each in sections)
+    for n, (each, text) in enumerate(filter(itemgetter(1), texts), 1):
+        yield f"{letter}{n}", each, text
 
 
 def _place(number: str) -> str:

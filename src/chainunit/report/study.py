@@ -21,7 +21,7 @@ from .capability import Contents, capabilities
 from .drawing import drawing
 from .lines import Line, capital, join, line, spoken
 from .live.machine import of_study
-from .live_block import LEAD, Live
+from .live_block import Live
 from .study_motion import motion
 
 DRAWING, QUESTION = "machine.svg", "question"
@@ -154,8 +154,7 @@ def _live(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     if study.drive.foreign_machine:
         return
     config = study.config
-    yield b.Text(LEAD.format("the study"), "lead", "long")
-    yield Live(lambda: of_study(config, study.drive, config.drive, study.proposal))
+    yield Live(lambda: of_study(config, study.drive, config.drive, study.proposal), "the study")
 
 
 # -- the basis of the results

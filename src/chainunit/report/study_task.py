@@ -18,6 +18,7 @@ from ..study.run import run_study
 from ..work.progress import TaskProgress
 from . import pdf, series
 from . import study as contents
+from .blocks import Report
 from .sheet import sheet
 from .task import Task, Writer
 
@@ -38,23 +39,22 @@ def _compute(config: Config, folder: Path, progress: TaskProgress, **options: An
         return run_study(config, folder, progress, **options)
 
 
-def _writers(record: StudyRecord, folder: Path, of_report: list[Writer]) -> list[Writer]:
+def _writers(record: StudyRecord, report: Report, folder: Path, of_report: list[Writer]) -> list[Writer]:
     numbers, *others = of_report
     return [numbers, lambda: series.write(record, folder), *others]
 
 
-def _with_sheet(record: StudyRecord, folder: Path, of_report: list[Writer]) -> list[Writer]:
+def _with_sheet(record: StudyRecord, report: Report, folder: Path, of_report: list[Writer]) -> list[Writer]:
     """The files of a study, and behind its page the sheet, with the pictures of the folder."""
 
     def sheet_file() -> list[Path]:
-        report = contents.report(record)
         pictures = {each.file: folder / each.file for each in report.figures if each.file}
         there = {name: file for name, file in pictures.items() if file.exists()}
         with atomic_file(folder / pdf.NAME) as part:
             pdf.write(sheet(record, report), there, part)
         return [folder / pdf.NAME]
 
-    return [*_writers(record, folder, of_report), sheet_file]
+    return [*_writers(record, report, folder, of_report), sheet_file]
 
 
 def _accept_sheet(question: Any, **options: Any) -> None:

@@ -59,11 +59,11 @@ class Task(Generic[Question, Outcome]):
     accept: Callable[..., object] | None = None
     """gets the question and the options, and refuses what is wrong. With it the files of an earlier result are
     removed before the computation; without it after the computation, which then refuses."""
-    writers: Callable[[Outcome, Path, list[Writer]], list[Writer]] = lambda outcome, folder, of_report: (
-        of_report
+    writers: Callable[[Outcome, Report, Path, list[Writer]], list[Writer]] = (
+        lambda outcome, report, folder, of_report: of_report
     )
-    """gets the outcome, the folder and the writers of the report: numbers, pictures, text, page. Gives all writers in
-    their order."""
+    """gets the outcome, its report, the folder and the writers of the report: numbers, pictures, text, page. Gives
+    all writers in their order."""
     replaced: Callable[[Question], tuple[str, ...]] = lambda question: ()
     """names of the files that the computation replaces by itself: they are claimed, and not cleared"""
     kept: Callable[[Outcome, Path], Iterable[Path]] | None = None
@@ -122,4 +122,4 @@ class Task(Generic[Question, Outcome]):
 
     def write(self, outcome: Outcome, report: Report, folder: Path) -> tuple[list[Path], WriteError | None]:
         """Write all files. Returns the files, and the first error of a file that could not be written, or None."""
-        return write_all(self.writers(outcome, folder, files.writers(report, folder, self._stem)))
+        return write_all(self.writers(outcome, report, folder, files.writers(report, folder, self._stem)))

@@ -53,7 +53,9 @@ def pictures(machine: IdentifiedMachine) -> tuple[str, ...]:
     return tuple(f"course_{run.name}.png" for run in machine.plan.runs)
 
 
-def _writers(machine: IdentifiedMachine, folder: Path, of_report: list[Writer]) -> list[Writer]:
+def _writers(
+    machine: IdentifiedMachine, report: b.Report, folder: Path, of_report: list[Writer]
+) -> list[Writer]:
     """With the study file of the identified values."""
 
     def study_file() -> list[Path]:

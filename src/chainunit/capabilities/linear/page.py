@@ -134,7 +134,7 @@ def _bode(k: int, response: FrequencyResponse) -> fig.Figure:
     )
 
 
-def _writers(found: LinearResult, folder: Path, of_report: list[Writer]) -> list[Writer]:
+def _writers(found: LinearResult, report: b.Report, folder: Path, of_report: list[Writer]) -> list[Writer]:
     return [lambda: write_npz(found, folder), *of_report]
 
 

@@ -17,7 +17,7 @@ from ...report import blocks as b
 from ...report import figure as fig
 from ...report.lines import Line, Name, line
 from ...report.live.page import live_of_config
-from ...report.live_block import LEAD, Live, LiveMachine
+from ...report.live_block import Live, LiveMachine
 from ...report.task import Task, Writer
 from ...study.config import Config, FileContents, of_tables
 from ...study.heading import Heading
@@ -79,10 +79,8 @@ class OptimizedStudy(NamedTuple):
     def report(self) -> b.Report:
         """The report on the search."""
         config = self.config
-        live = (b.Text(LEAD.format("the best machine"), "lead", "long"), Live(self._live))
-        return optimum_report(
-            self.best, config.title, config.file, config.units, live if self.best.met else ()
-        )
+        live = (Live(self._live, "the best machine"),) if self.best.met else ()
+        return optimum_report(self.best, config.title, config.file, config.units, live)
 
     def _live(self) -> LiveMachine:
         source, tables = self.as_file()
@@ -120,7 +118,9 @@ def _accept(config: Config, **options: Any) -> None:
         wishes_of(config.plans)
 
 
-def _writers(outcome: OptimizedStudy, folder: Path, of_report: list[Writer]) -> list[Writer]:
+def _writers(
+    outcome: OptimizedStudy, report: b.Report, folder: Path, of_report: list[Writer]
+) -> list[Writer]:
     """With the study file of the best machine, where there is one."""
 
     def study_file() -> list[Path]:

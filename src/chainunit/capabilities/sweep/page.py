@@ -300,7 +300,7 @@ TASK: Task[Config, SweptStudy] = Task(
     report,
     content=SweepSummary,
     files=("sweep_*.png",),
-    writers=lambda swept, folder, of_report: [*of_report, lambda: [_store_in(swept, folder)]],
+    writers=lambda swept, report, folder, of_report: [*of_report, lambda: [_store_in(swept, folder)]],
     kept=lambda swept, folder: [_store_in(swept, folder)],
     shortfall=lambda swept: None if swept.findings.passed.counts[0] else "",
 )

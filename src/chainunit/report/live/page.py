@@ -15,7 +15,7 @@ from ...study.config import load as load_study
 from ...study.package import is_study_file
 from .. import blocks as b
 from ..lines import line
-from ..live_block import LEAD, Live, LiveMachine
+from ..live_block import Live, LiveMachine
 from .machine import of_linkage, of_study, without_drive
 
 USUAL_SPEEDS = {"rad/s": "60 rpm", "m/s": "0.1 m/s"}
@@ -67,12 +67,11 @@ def live_page(file: Path | None, speed: str | None, folder: Path) -> b.Report:
 
 
 def _report(title: str, kind: str, whole: str, live: LiveMachine, source: str) -> b.Report:
-    blocks: tuple[b.Block, ...] = (b.Text(LEAD.format(whole), "lead", "long"), Live(lambda: live))
     return b.Report(
         title,
         kind,
         {"chainunit": __version__, "source": source},
         (),
-        (b.Section("live", "Try it", blocks),),
+        (b.Section("live", "Try it", (Live(lambda: live, whole),)),),
         source=line(f"{source} · chainunit {__version__}"),
     )
