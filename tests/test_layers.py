@@ -83,7 +83,7 @@ DOORS = {
     "study.run": {"run_study"},
     "report.study_task": {"_accept", "_compute", "_fmus"},
     # the live machine of a study
-    "report.live.machine": {"of_study", "without_drive"},
+    "report.live.study": {"of_study", "without_drive"},
     "report.live.page": {"live_of_config"},
     "app.studies": {"_take"},
     # the export of a study and its linear model, and the tasks of the capabilities

@@ -22,7 +22,7 @@ from chainunit.machines.machine import Machine
 from chainunit.report import html
 from chainunit.report import study as study_report
 from chainunit.report.live.formulas import event_signals, varied_names
-from chainunit.report.live.machine import of_linkage
+from chainunit.report.live.linkage import of_linkage
 from chainunit.report.live.page import live_page
 from chainunit.study import config as study_files
 from chainunit.study.block_runs import BlockRuns, RunPoint
@@ -442,3 +442,7 @@ def test_a_date_in_the_study_file_is_a_text_in_the_page(tmp_path):
     """TOML has dates, and JSON none."""
     live, _ = live_of(study_files.parse("event = []\n[report]\ndate = 2026-03-01\n"), tmp_path)
     assert json.loads(json.dumps(live.data["file"]))["report"] == {"date": "2026-03-01"}
+
+
+def test_the_page_says_that_no_run_was_made(tmp_path):
+    assert "status: no run was made<" in html.render(live_page(None, None, tmp_path))

@@ -201,7 +201,7 @@ def linkage_command(
     from ..machines.linkages.file import read_linkage
     from ..machines.machine import Machine
     from ..report.linkage_report import TASK, LinkageQuestion
-    from ..report.live.page import speed_of_driver
+    from ..study.linkage_turn import speed_of_driver
 
     machine = Machine(read_linkage(file))
     carry_out(TASK, LinkageQuestion(machine, speed_of_driver(machine, speed), str(file)), output)

@@ -12,7 +12,7 @@ from ..core.errors import InputError, near_name
 from ..core.model import Model
 from ..core.native.operations import Operations
 from ..core.quantities import Variable, quotient
-from ..core.symbolic_trace import outputs_of, trace
+from ..core.symbolic_trace import trace
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Equations:
 
 def columns_of(model: type[Model]) -> tuple[Variable, ...]:
     """All that a batch can compute of a model: its outputs, and the quantities of `Model.further_quantities`."""
-    return (*outputs_of(model), *(variable for variable, _ in trace(model).further_quantities))
+    return tuple(variable for variable, _ in trace(model).columns.values())
 
 
 def arguments_of(model: type[Model]) -> tuple[Variable, ...]:
@@ -101,7 +101,7 @@ def equations(model: type[Model], outputs: tuple[str, ...], by: tuple[str, ...])
     places = find(outputs, names_of(declared), "output")
     columns = find(by, names_of(arguments), "parameter, input or state")
     p, u, x, _ = t.symbols
-    traced = [*t.outputs, *(value for _, value in t.further_quantities)]
+    traced = [value for _, value in t.columns.values()]
     rows = casadi.vertcat(*(casadi.SX(traced[place]) for place in places), casadi.SX(0, 1))
     rows, codes = t.explicit([rows, _first_unmet(list(model.requirements(casadi_(), t.p)))])
     point = casadi.vertcat(p, u, x)

@@ -21,6 +21,7 @@ from ..core.model import Model
 from ..core.wasm.encoding import PAGE
 from ..core.wasm.memory import BYTES
 from ..core.wasm.module import wasm_module
+from ..core.wasm.signals import PROFILE, RECORD
 from .equations import find
 
 if TYPE_CHECKING:
@@ -28,10 +29,6 @@ if TYPE_CHECKING:
 
 _PIECE = 1024
 """Largest number of rows in one call: the memory of a module has room for so many, and Ctrl-C is heard between."""
-_RECORD = 24
-"""Bytes of a signal in the table of signals."""
-_PROFILE = 1
-"""The kind of a signal that is a profile."""
 
 
 def has_wasmtime() -> bool:
@@ -151,7 +148,7 @@ class _Instance:
         self._exports = exports
         free = -(-loop.description["memory"]["free"] // BYTES) * BYTES
         self._table = free
-        at = free + BYTES + _RECORD * len(loop.driven)
+        at = free + BYTES + RECORD * len(loop.driven)
         own = at + BYTES * loop.numbers * len(loop.driven)
         self._list = own
         self._into = own + BYTES + -(-len(loop.chosen) // 2) * BYTES
@@ -164,7 +161,7 @@ class _Instance:
         whole: Any = (ctypes.c_ubyte * size).from_address(begin)
         self._values, words = np.frombuffer(whole), np.frombuffer(whole, np.int32)
         records = [
-            [address, _PROFILE, loop.numbers // 3, at + BYTES * loop.numbers * k, 0, 0]
+            [address, PROFILE, loop.numbers // 3, at + BYTES * loop.numbers * k, 0, 0]
             for k, address in enumerate(loop.driven)
         ]
         self._put(words, self._table, [len(records), 0, *(x for record in records for x in record)])

@@ -20,8 +20,7 @@ from . import figure as fig
 from . import linkage, linkage_loads, linkage_rest
 from .drawing import drawing
 from .lines import Line, Name, Number, capital, join, line
-from .live.machine import of_linkage
-from .live_block import Live
+from .live_block import Live, LiveMachine
 from .motion import Animation, Clip, Reading
 from .task import Task, no_check
 
@@ -63,7 +62,13 @@ def linkage_report(findings: LinkageFindings, source: str) -> b.Report:
 
 
 def _live(f: LinkageFindings, source: str) -> Iterator[b.Block]:
-    yield Live(lambda: of_linkage(f.machine, f.speed, Path(source).name), "the file")
+    def make() -> LiveMachine:
+        # a page alone needs it
+        from .live.linkage import of_linkage
+
+        return of_linkage(f.machine, f.speed, Path(source).name)
+
+    yield Live(make, "the file")
 
 
 def _entry(value: Any, unit: str) -> dict[str, Any]:

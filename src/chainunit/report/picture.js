@@ -1,16 +1,17 @@
 "use strict";
+/* Adds an element of SVG to another one. */
+const drawn = (parent, tag, attributes = {}, text) => {
+  const element = document.createElementNS("http://www.w3.org/2000/svg", tag);
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+  if (text !== undefined) element.textContent = text;
+  parent.appendChild(element);
+  return element;
+};
+
 /* The picture of a machine: a function that draws into an element of SVG. `motion` has the links, and the runs; the
    readings and the forces of a run stand in `tables`, whose first `kept` rows stay. */
 const machinePicture = (stage, motion, tables) => {
-  const SVG = "http://www.w3.org/2000/svg";
   const WIDTH = 900;
-  const add = (parent, tag, attributes, text) => {
-    const element = document.createElementNS(SVG, tag);
-    for (const [name, value] of Object.entries(attributes || {})) element.setAttribute(name, value);
-    if (text !== undefined) element.textContent = text;
-    parent.appendChild(element);
-    return element;
-  };
   const of = (list, i) => list[Math.min(i, list.length - 1)];
 
   const colour = (group) => "group-" + (motion.groups.indexOf(group) + 1);
@@ -54,21 +55,21 @@ const machinePicture = (stage, motion, tables) => {
     stage.setAttribute("viewBox", `0 0 ${WIDTH} ${height}`);
     parts = { arrow: arrow * scale };
 
-    const ground = add(stage, "g");
+    const ground = drawn(stage, "g");
     frame = 0;
     for (const name of motion.grounds) {
       const [px, py] = at(name);
       // a joint from which links hang has its support above it, another one below
       const up = motion.hanging.includes(name) ? -1 : 1;
-      add(ground, "path", { class: "ground", d: `M${px} ${py} l-14 ${22 * up} h28 z` });
-      add(ground, "path", {
+      drawn(ground, "path", { class: "ground", d: `M${px} ${py} l-14 ${22 * up} h28 z` });
+      drawn(ground, "path", {
         class: "hatch",
         d: `M${px - 22} ${py + 22 * up} h44` + [-18, -8, 2, 12].map((s) => `M${px + s} ${py + 22 * up} l8 ${8 * up}`).join(""),
       });
     }
     if (motion.orbit) {
       const [[ox, oy], [px, py]] = motion.orbit.map(at);
-      add(stage, "circle", { class: "orbit", cx: ox, cy: oy, r: Math.hypot(px - ox, py - oy) });
+      drawn(stage, "circle", { class: "orbit", cx: ox, cy: oy, r: Math.hypot(px - ox, py - oy) });
     }
     for (const ends of motion.rails) {
       const [ax, ay, bx, by] = ends.map((v, i) => origin[i % 2] + (i % 2 ? -scale : scale) * v);
@@ -79,42 +80,42 @@ const machinePicture = (stage, motion, tables) => {
           const x = ax + s * ux - side * uy, y = ay + s * uy + side * ux, out = Math.sign(side) * 7;
           strokes.push(`M${x} ${y} l${-out * uy - 5 * ux} ${out * ux - 5 * uy}`);
         }
-        add(stage, "path", { class: "rail", d: strokes.join("") });
+        drawn(stage, "path", { class: "rail", d: strokes.join("") });
       }
     }
     parts.loads = motion.links
       .filter((link) => link.name in run.loads)
-      .map((link) => [link, add(stage, "polyline", { class: "material" })]);
+      .map((link) => [link, drawn(stage, "polyline", { class: "material" })]);
     parts.links = motion.links.map((link) =>
-      add(stage, link.closed ? "polygon" : "polyline", { class: `link ${link.look}${link.closed ? " closed" : ""}` }));
-    parts.blocks = Object.keys(run.blocks).map((joint) => [joint, add(stage, "rect", {
+      drawn(stage, link.closed ? "polygon" : "polyline", { class: `link ${link.look}${link.closed ? " closed" : ""}` }));
+    parts.blocks = Object.keys(run.blocks).map((joint) => [joint, drawn(stage, "rect", {
       class: "block", x: -20, y: -10, width: 40, height: 20, rx: 2 })]);
     for (const path of motion.paths) {
       const points = path.x.map((px, i) => `${origin[0] + scale * px} ${origin[1] - scale * of(path.y, i)}`);
-      add(add(stage, "path", { class: "path", d: "M" + points.join("L") }), "title", {}, path.title);
+      drawn(drawn(stage, "path", { class: "path", d: "M" + points.join("L") }), "title", {}, path.title);
     }
     parts.joints = {};
     for (const name of Object.keys(run.joints)) {
-      parts.joints[name] = [add(stage, "circle", { class: "joint", r: labelOf(name) ? 5 : 3 })];
+      parts.joints[name] = [drawn(stage, "circle", { class: "joint", r: labelOf(name) ? 5 : 3 })];
     }
     parts.forces = run.forces.map((force) => {
-      const group = add(stage, "g", { class: `arrow ${colour(force.group)} ${force.kind}` });
-      add(group, "title", {}, force.title);
+      const group = drawn(stage, "g", { class: `arrow ${colour(force.group)} ${force.kind}` });
+      drawn(group, "title", {}, force.title);
       return {
-        line: add(group, "path", { class: "force" }),
-        head: add(group, "path", { class: "head" }),
-        name: add(group, "text", { "text-anchor": "middle" }),
+        line: drawn(group, "path", { class: "force" }),
+        head: drawn(group, "path", { class: "head" }),
+        name: drawn(group, "text", { "text-anchor": "middle" }),
       };
     });
     // names come last: no arrow covers them
     for (const [name, part] of Object.entries(parts.joints)) {
-      part.push(add(stage, "text", { "text-anchor": "middle", class: "joint-name" }, labelOf(name)), null);
+      part.push(drawn(stage, "text", { "text-anchor": "middle", class: "joint-name" }, labelOf(name)), null);
     }
-    parts.legend = add(stage, "g", { class: "arrow legend" });
-    parts.legendLine = add(parts.legend, "path", { class: "force" });
-    parts.legendHead = add(parts.legend, "path", { class: "head" });
-    parts.legendText = add(parts.legend, "text", {});
-    parts.caption = add(stage, "text", { x: 16, y: 28, class: "where" });
+    parts.legend = drawn(stage, "g", { class: "arrow legend" });
+    parts.legendLine = drawn(parts.legend, "path", { class: "force" });
+    parts.legendHead = drawn(parts.legend, "path", { class: "head" });
+    parts.legendText = drawn(parts.legend, "text", {});
+    parts.caption = drawn(stage, "text", { x: 16, y: 28, class: "where" });
 
     while (tables.values.rows.length > tables.kept) tables.values.deleteRow(tables.kept);
     parts.readings = run.readings.map((reading) => {

@@ -20,7 +20,7 @@ from .analyses import analysis_sections
 from .capability import Contents, capabilities
 from .drawing import drawing
 from .lines import Line, capital, join, line, spoken
-from .live.machine import of_study
+from .live.study import of_study
 from .live_block import Live
 from .study_motion import motion
 

@@ -20,8 +20,11 @@ from ..machines.linkages.structure import CYLINDER
 from ..machines.machine import Machine
 from ..mechanism.assur import PRISMATIC
 from ..mechanism.sampled_quantities import largest, means, roots
+from ..reading.tables import option_value
 
 PLACES = 361
+USUAL_SPEEDS = {"rad/s": "60 rpm", "m/s": "0.1 m/s"}
+"""Speed of the driver of a linkage where nobody gives one, by its unit."""
 _LOSSLESS = 1e-9
 """Part of the mean size of a torque below which its mean is that of a machine without losses."""
 STANDS = 1e-9
@@ -157,6 +160,18 @@ class _Way:
             return np.array([given[name] for name in kept]).reshape(-1, len(q))
 
         return values
+
+
+def speed_of_driver(machine: Machine, given: str | None) -> float:
+    """The speed of the driver of a linkage [rad/s, m/s] from an option, or the usual one.
+
+    Raises
+    ------
+    InputError
+        for a text that is no speed.
+    """
+    unit = "m/s" if machine.model.slides else "rad/s"
+    return option_value("--speed", given or USUAL_SPEEDS[unit], unit, "speed of the driver")
 
 
 def linkage_findings(machine: Machine, speed: float) -> LinkageFindings:

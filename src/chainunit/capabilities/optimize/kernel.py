@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...batch.arrays import by_numpy
-from ...batch.equations import Equations, Result, columns_of
+from ...batch.equations import Equations, Result
 from ...batch.native import Reductions, aligned, native_kernel
 from ...core.engines import casadi_
 from ...core.errors import RunError
@@ -246,13 +246,11 @@ def symbols_of(machine: Machine, names: Sequence[str]) -> list[Any]:
     RunError
         for a name that the model does not have.
     """
-    t = trace(machine.model)
-    places = {v.name: k for k, v in enumerate(columns_of(machine.model))}
-    values = [*t.outputs, *(value for _, value in t.further_quantities)]
-    missing = [name for name in names if name not in places]
+    columns = trace(machine.model).columns
+    missing = [name for name in names if name not in columns]
     if missing:
         raise RunError(f"{missing[0]}: no such column of the {machine.model.name}")
-    return [values[places[name]] for name in names]
+    return [columns[name][1] for name in names]
 
 
 def pieces(expression: Any, kind: str) -> list[Any]:

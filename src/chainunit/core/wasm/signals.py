@@ -6,8 +6,10 @@ from __future__ import annotations
 from .encoding import Function, Module
 from .memory import BYTES, Places
 
-_RECORD = 24
+RECORD = 24
 """Bytes of the record of a signal."""
+PROFILE = 1
+"""The kind of a signal that is a profile; 0 is one of lines."""
 
 
 def signals(memory: Places, module: Module) -> Function:
@@ -46,7 +48,7 @@ def signals(memory: Places, module: Module) -> Function:
             f.load("i32")
             f.get(value)
             f.store()
-            add(f, record, _RECORD)
+            add(f, record, RECORD)
             add(f, left, -1)
             f.leave(0)
     return f

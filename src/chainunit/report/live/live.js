@@ -29,14 +29,6 @@
     parent.appendChild(element);
     return element;
   };
-  const SVG = "http://www.w3.org/2000/svg";
-  const draw = (parent, tag, attributes = {}, text) => {
-    const element = document.createElementNS(SVG, tag);
-    for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
-    if (text !== undefined) element.textContent = text;
-    parent.appendChild(element);
-    return element;
-  };
 
   /* plots: curves over one axis, with those of the study behind them */
   const nice = (low, high, most) => {
@@ -53,10 +45,9 @@
     constructor(parent, title, xUnit, xTicks) {
       this.xUnit = xUnit;
       this.xTicks = xTicks;
-      this.title = title;
       const box = make(parent, "figure", { class: "live-plot" });
       make(box, "figcaption", {}, title);
-      this.svg = draw(box, "svg", { viewBox: "0 0 560 230", role: "img", "aria-label": title });
+      this.svg = drawn(box, "svg", { viewBox: "0 0 560 230", role: "img", "aria-label": title });
       this.legend = make(box, "p", { class: "live-legend" });
       this.mark = null;
     }
@@ -75,15 +66,15 @@
       this.xOf = (p) => x0 + ((p - left) / (right - left)) * (x1 - x0);
       this.svg.replaceChildren();
       for (const y of nice(y0, y1, 5)) {
-        draw(this.svg, "path", { class: "grid", d: `M${left} ${py(y)} H${right}` });
-        draw(this.svg, "text", { x: left - 6, y: py(y) + 4, "text-anchor": "end" }, short(y));
+        drawn(this.svg, "path", { class: "grid", d: `M${left} ${py(y)} H${right}` });
+        drawn(this.svg, "text", { x: left - 6, y: py(y) + 4, "text-anchor": "end" }, short(y));
       }
       for (const x of this.xTicks ? this.xTicks(x0, x1) : nice(x0, x1, 7)) {
-        draw(this.svg, "path", { class: "grid", d: `M${px(x)} ${top} V${bottom}` });
-        draw(this.svg, "text", { x: px(x), y: bottom + 17, "text-anchor": "middle" }, short(x));
+        drawn(this.svg, "path", { class: "grid", d: `M${px(x)} ${top} V${bottom}` });
+        drawn(this.svg, "text", { x: px(x), y: bottom + 17, "text-anchor": "middle" }, short(x));
       }
-      draw(this.svg, "text", { x: right, y: bottom + 34, "text-anchor": "end" }, this.xUnit);
-      draw(this.svg, "text", { x: left - 50, y: bottom + 34 }, unit ? `in ${unit}` : "");
+      drawn(this.svg, "text", { x: right, y: bottom + 34, "text-anchor": "end" }, this.xUnit);
+      drawn(this.svg, "text", { x: left - 50, y: bottom + 34 }, unit ? `in ${unit}` : "");
       curves.forEach((curve, n) => {
         // the largest and the least of each piece that is a pixel wide
         const size = curve.x.length, every = Math.max(1, Math.floor(size / 480)), points = [];
@@ -100,7 +91,7 @@
           }
         }
         add(size - 1);
-        draw(this.svg, "path", { class: curve.behind ? "curve behind" : "curve", d: "M" + points.join("L"), stroke: curve.behind ? "#999" : COLOURS[curve.look ?? n % COLOURS.length] });
+        drawn(this.svg, "path", { class: curve.behind ? "curve behind" : "curve", d: "M" + points.join("L"), stroke: curve.behind ? "#999" : COLOURS[curve.look ?? n % COLOURS.length] });
       });
       this.legend.replaceChildren();
       const named = curves.filter((c) => c.title);
@@ -143,10 +134,10 @@
       this.svg.querySelector(".mark")?.remove();
       const x = this.mark.get();
       if (x === null) return;
-      const group = draw(this.svg, "g", { class: "mark" });
-      draw(group, "path", { d: `M${this.px(x)} 10 V192` });
-      draw(group, "path", { class: "grip", d: `M${this.px(x)} 10 l-7 -10 h14 z` });
-      draw(group, "title", {}, this.mark.title);
+      const group = drawn(this.svg, "g", { class: "mark" });
+      drawn(group, "path", { d: `M${this.px(x)} 10 V192` });
+      drawn(group, "path", { class: "grip", d: `M${this.px(x)} 10 l-7 -10 h14 z` });
+      drawn(group, "title", {}, this.mark.title);
     }
   }
 
@@ -258,9 +249,9 @@
   const stage = byId("live-stage"), PICTURES = 120;
   const sketch = data.turn.picture;
   const motion = { ...sketch, groups: [], paths: [], rails: [], runs: [] };
-  let arrows = 1, clip = null, at = 0;
+  let clip = null, at = 0;
   const picture = machinePicture(stage, motion, {
-    values: byId("live-readings"), kept: 0, forces: byId("live-forces"), factor: () => arrows, caption: () => "",
+    values: byId("live-readings"), kept: 0, forces: byId("live-forces"), factor: () => 1, caption: () => "",
   });
   const sampled = (turn, name) => {
     const column = turn.columns[name], last = data.turn.turns ? turn.count : turn.count - 1;

@@ -1,4 +1,4 @@
-"""Live machines of studies and linkages: a page whose reader changes numbers and sees at once what follows.
+"""Live machines: a page whose reader changes numbers and sees at once what follows.
 
 The page holds the equations of the machine and its drive as WebAssembly, and computes with them alone: results over a
 turn, the machine in motion, and runs with events.
@@ -6,103 +6,20 @@ turn, the machine in motion, and runs with events.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import replace
-from datetime import date
-from pathlib import Path
+from collections.abc import Iterable
 from typing import Any
 
-from ...core.quantities import Quantity, Variable, named_values, variable_of
+from ...core.quantities import variable_of
 from ...core.wasm.module import WasmModule
-from ...drives.catalogue import CatalogueMotor
-from ...machines.machine import Machine
-from ...reading.text import DEFAULT_UNITS, Units
-from ...study.config import Config
-from ...study.drive import Drive
-from ...study.drive_tables import DriveTables
-from ...study.event import Event
-from ...study.parts import LENGTHS
-from ...study.proposal import DriveProposal
-from ...study.registry import parts_of_line, registered
+from ...reading.text import Units
 from ...study.sections import Run
-from ...study.study_file import changed_tables
-from ..capability import capabilities
 from ..live_block import LiveMachine
-from .quantities import LiveQuantity, of_machine
-from .runs import LiveRuns, live_runs, reason_without_runs
-from .turn import LiveTurn, live_turn
-
-_TITLE = "with other values"
+from .quantities import LiveQuantity
+from .runs import LiveRuns
+from .turn import LiveTurn
 
 
-def of_study(
-    config: Config,
-    drive: Drive,
-    tables: DriveTables,
-    proposal: DriveProposal | None = None,
-) -> LiveMachine:
-    """The live machine of a study.
-
-    Parameters
-    ----------
-    drive, tables : the drive with the values that follow from it
-    proposal : the choice of the drive, where a capability made it
-
-    Raises
-    ------
-    InputError
-        for an equation with a function that WebAssembly has not.
-    """
-    machine, units, speed = drive.machine, config.units, config.run.crank_speed
-    turn = live_turn(machine, float(speed), units)
-    why, runs = reason_without_runs(drive), None
-    plate = proposal.motor if proposal is not None else config.plate
-    if not why:
-        runs = live_runs(drive, config.operation, config.events, units, plate, tables.gear)
-    known = runs.names if runs else set()
-    chosen = [*of_machine("feed", config.feed, known)]
-    if drive.follows or drive.foreign is not None:
-        chosen.append(_speed(float(speed)))
-    chosen += [*_ratio(drive, plate is not None), *of_machine("machine", machine.p, known)]
-    if runs:
-        chosen += runs.quantities
-        for part in capabilities():
-            chosen += part.live_quantities(config.plans[part.name], drive)
-    # names of other files are as in the study file, beside which the copy lies
-    folder = Path(config.file.source).parent
-    copied = changed_tables(config, _settled_values(machine, drive, tables, plate), _TITLE, folder)
-    copied = _with_drive(copied, drive, tables.start, proposal, config.events)
-    return _assembled(turn, runs, why, chosen, copied, units)
-
-
-def without_drive(config: Config, why: str) -> LiveMachine:
-    """The live machine of a study whose drive is not known, with the reason in words."""
-    machine, speed = config.machine, float(config.run.crank_speed)
-    chosen = [*of_machine("feed", config.feed), _speed(speed), *of_machine("machine", machine.p)]
-    turn = live_turn(machine, speed, config.units)
-    copied = changed_tables(config, _lengths(machine), _TITLE, Path(config.file.source).parent)
-    return _assembled(turn, None, why, chosen, copied, config.units)
-
-
-def of_linkage(machine: Machine, speed: float, file: str, units: Units = DEFAULT_UNITS) -> LiveMachine:
-    """The live machine of a linkage at the `speed` of its driver [rad/s, m/s]; `file` is the name of its file."""
-    model = machine.model
-    own = _speed(speed)
-    if model.slides:
-        q = Quantity("m/s", "speed of the driver", low=0.0, high=1e3, open_low=True)
-        own = replace(own, variable=Variable("crank_speed", "speed of the driver", q))
-    chosen = [*of_machine("feed", model.Feed()), own, *of_machine("machine", machine.p)]
-    copied = None
-    if model.turns and not model.slides:
-        copied = {
-            "title": model.description,
-            "system": {"machine": file},
-            "run": {"crank_speed": float(speed)},
-        }
-    return _assembled(live_turn(machine, speed, units), None, "", chosen, copied, units)
-
-
-def _assembled(
+def assembled(
     turn: LiveTurn,
     runs: LiveRuns | None,
     why: str,
@@ -110,6 +27,8 @@ def _assembled(
     copied: dict[str, Any] | None,
     units: Units,
 ) -> LiveMachine:
+    """The live machine with this turn and these `runs`, or the reason `why` it has none; `copied` are the tables of
+    the study file that its page gives, ready for JSON, or None where it gives none."""
     modules = {"turn": turn.module} | ({"runs": runs.module} if runs else {})
     data = {
         "turn": turn.data,
@@ -117,7 +36,7 @@ def _assembled(
         "without_runs": why,
         "quantities": [each.data(units, turn.data["driver"]) for each in quantities],
         "modules": {name: _memory(module) for name, module in modules.items()},
-        "file": copied and _without_dates(copied),
+        "file": copied,
     }
     return LiveMachine(data, {name: module.content for name, module in modules.items()})
 
@@ -135,75 +54,7 @@ def _memory(module: WasmModule) -> dict[str, Any]:
     }
 
 
-def _speed(value: float) -> LiveQuantity:
+def speed_of_crank(value: float) -> LiveQuantity:
     """The speed of the crank [rad/s]."""
     variable = variable_of(Run, "crank_speed")
     return LiveQuantity(("run", "crank_speed"), variable, value, "drive", role="speed")
-
-
-def _ratio(drive: Drive, is_plate: bool) -> Iterable[LiveQuantity]:
-    """The ratio of the gear, where it is one number of the drive."""
-    model = drive.machine.model
-    if not drive.whole_line and "ratio" in model.parameter_layout.names:
-        key = ("gear", "ratio") if is_plate else ("machine", "ratio")
-        yield LiveQuantity(key, variable_of(model.Parameters, "ratio"), drive.ratio, "drive", role="ratio")
-
-
-def _settled_values(
-    machine: Machine, drive: Drive, tables: DriveTables, plate: CatalogueMotor | None
-) -> dict[str, float]:
-    """What follows from the machine, by its key in a study file: another machine shall not have another motor, gear
-    or control."""
-    values = {f"motor.{name}": x for name, x in (drive.tuning.parameters if drive.tuning else {}).items()}
-    values |= _lengths(machine)
-    if plate is not None:
-        values |= {"gear.ratio": drive.ratio, "gear.efficiency": float(tables.gear.efficiency)}
-        if drive.follows:
-            inverter = tables.starter.inverter
-            values |= {"starter.inverter.boost": inverter.boost, "starter.inverter.slip": inverter.slip}
-    return values
-
-
-def _with_drive(
-    copied: dict[str, Any],
-    drive: Drive,
-    start: str,
-    proposal: DriveProposal | None,
-    events: Mapping[str, Event],
-) -> dict[str, Any]:
-    """The tables of a study file with the chosen motor and its `start`, the parts of the line, and the events."""
-    if proposal is not None:
-        for part in registered():
-            copied.pop(part.motor_table or "", None)
-        copied.setdefault("system", {})["motor"] = proposal.motor.designation
-        copied["start"] = start
-        if drive.added_inertia:
-            copied.setdefault("flywheel", {})["J"] = drive.added_inertia
-    for part in parts_of_line():
-        if (placed := drive.line.part(part.name)) is not None:
-            copied = part.settled(copied, placed)
-    copied["event"] = [_entry(event) for event in events.values()]
-    return copied
-
-
-def _lengths(machine: Machine) -> dict[str, float]:
-    """All lengths of a chain unit: a file that gives one takes none from its ratios."""
-    own = machine.by_name
-    return {f"machine.{name}": own[name] for name in LENGTHS} if machine.model.sides else {}
-
-
-def _without_dates(copied: dict[str, Any]) -> dict[str, Any]:
-    """The tables with the text of a date, which the file takes, too, and JSON does not have."""
-    labels = {
-        name: x.isoformat() if isinstance(x, date) else x for name, x in copied.get("report", {}).items()
-    }
-    return copied | ({"report": labels} if labels else {})
-
-
-def _entry(event: Event) -> dict[str, Any]:
-    """An event as a study file has it, with all its quantities."""
-    names = {"type": event.kind, "name": event.name} | ({"side": event.side} if event.side else {})
-    if event.has_input:
-        names["input"] = event.acts_on[0]
-    values = {v.name: (int(x) if v.type == "Integer" else x) for v, x in named_values(event.p)}
-    return names | values

@@ -8,30 +8,16 @@ from ... import __version__
 from ...core.errors import InputError
 from ...machines.linkages.file import read_linkage
 from ...machines.machine import Machine
-from ...reading.tables import option_value
 from ...study.choice import choose
 from ...study.config import Config
 from ...study.config import load as load_study
+from ...study.linkage_turn import speed_of_driver
 from ...study.package import is_study_file
 from .. import blocks as b
 from ..lines import line
 from ..live_block import Live, LiveMachine
-from .machine import of_linkage, of_study, without_drive
-
-USUAL_SPEEDS = {"rad/s": "60 rpm", "m/s": "0.1 m/s"}
-"""Speed of the driver of a linkage where nobody gives one, by its unit."""
-
-
-def speed_of_driver(machine: Machine, given: str | None) -> float:
-    """The speed of the driver of a linkage [rad/s, m/s] from an option, or the usual one.
-
-    Raises
-    ------
-    InputError
-        for a text that is no speed.
-    """
-    unit = "m/s" if machine.model.slides else "rad/s"
-    return option_value("--speed", given or USUAL_SPEEDS[unit], unit, "speed of the driver")
+from .linkage import of_linkage
+from .study import of_study, without_drive
 
 
 def live_of_config(config: Config, folder: Path) -> LiveMachine:
@@ -74,4 +60,5 @@ def _report(title: str, kind: str, whole: str, live: LiveMachine, source: str) -
         (),
         (b.Section("live", "Try it", (Live(lambda: live, whole),)),),
         source=line(f"{source} · chainunit {__version__}"),
+        status="no run was made",
     )
