@@ -80,6 +80,8 @@ def _one_key(table, key):
     if table.name == "sweep.parameter":
         own = f"{key.name} = {key.left_out}\n"
         return f'[[sweep.parameter]]\nname = "machine.r"\ntolerance = "1 mm"\n{own}'
+    if table.name == "usage.load":
+        return f"[[usage.load]]\n{key.name} = {key.left_out}\n"
     if table.name.startswith("identify"):
         own = f"{key.name} = {key.left_out}\n"
         needed = {

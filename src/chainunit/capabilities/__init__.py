@@ -10,6 +10,7 @@ from typing import Any
 NAMES = (
     "chains",
     "sizing",
+    "energy",
     "sides",
     "blade",
     "random_overloads",

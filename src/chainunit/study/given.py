@@ -117,7 +117,8 @@ def _tables(study: StudyRecord) -> Iterator[GivenSection]:
         events = [key for key in section.random_events if keys.pop(key, None) is not None]
         # without its own ratio the gear has that of the machine, which follows from the motor's speed
         follows = frozenset({"ratio"} if name == "gear" and "gear.ratio" not in config.file.given else ())
-        choices = {key: x for key, x in keys.items() if x}
+        # the findings have the entries of a list of tables
+        choices = {key: x for key, x in keys.items() if x and key not in section.entries}
         yield GivenSection(name, section.title, values, choices, unused_names=follows)
         for key in events:
             random = randoms[f"{name}.{key}"]

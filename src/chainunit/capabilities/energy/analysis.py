@@ -1,0 +1,265 @@
+"""The energy of a year by place, its cost and CO2, and a second motor over the life of the drive."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ...core.errors import InputError, RunError
+from ...core.quantities import Value, declaration, quantity
+from ...drives.catalogue import CatalogueMotor
+from ...reading.results import part, result
+from ...study.analysis import Analysis, Findings, Work
+from ...study.drive import Drive
+from ...study.record import StudyRecord
+from ...study.verdict import STEADY
+from .duty import LoadDuty, duty_of
+from .inverter import apparent_power, reference_losses
+from .other_motor import other_motor, with_motor
+from .running import InverterRating, Losses
+from .table import Usage, UsagePlan
+
+LARGEST_GAP = 0.01
+"""Share of the electric power that may be missing in the balance."""
+_GIVEN_BACK = 0.01
+"""Share of the electric power above which the power that comes back from the motor is worth a remark."""
+
+
+@declaration
+class Year:
+    """Energy, cost and CO2 of a year, and of the life of the drive."""
+
+    energy: Value = quantity("J", "energy a year", kind="energy")
+    energy_per_tonne: Value = quantity("J", "energy a tonne", kind="energy")
+    cost: Value = quantity("1", "cost of energy a year")
+    co2: Value = quantity("kg", "CO2 a year")
+    life_energy: Value = quantity("J", "energy over the life", kind="energy")
+    life_cost: Value = quantity("1", "price of the motor and cost of energy over the life")
+
+
+@result
+class LoadEnergy:
+    """A load of the machine in steady running."""
+
+    losses: Losses = part(inline=True)
+    share: float = quantity("1", "share of the running time", kind="percent")
+    factor: float = quantity("1", "factor on the feed")
+
+
+@result
+class MotorEnergy:
+    """The energy that the duty takes with one motor."""
+
+    motor: str = part("the motor")
+    year: Year = part(inline=True)
+    mean: Losses = part("mean power over the time of running, by place")
+    temperature: float = quantity("K", "temperature of the winding in the duty")
+    speed: float = quantity("rad/s", "speed of the motor, mean", kind="speed")
+    price: float | None = quantity("1", "price of the motor")
+
+
+@result
+class MotorComparison:
+    """The better of two motors, by energy, and what it saves."""
+
+    better: str = part("the motor that takes less energy")
+    saving: float = quantity("J", "energy that it saves a year", kind="energy")
+    saving_share: float = quantity("1", "the same over the energy with the other motor", kind="percent")
+    cost_saving: float | None = quantity("1", "cost that it saves a year")
+    extra_price: float | None = quantity("1", "price that it costs more")
+    pays_after: float | None = quantity("1", "years until it has paid")
+
+
+@result
+class EnergyFindings(Findings):
+    """The energy of the study's motor, by load; the other motor, where there is one, and the comparison of both."""
+
+    own: MotorEnergy = part("the motor of the study")
+    loads: Mapping[str, LoadEnergy] = part("its loads, by name")
+    running: float = quantity("s", "time of running a year", kind="hours")
+    other: MotorEnergy | None = part("the other motor")
+    comparison: MotorComparison | None = part("the better of both motors")
+    inverter: str = part("the source of the losses of the inverter; empty without one")
+    no_other: str = part("the reason why no other motor is compared; empty where one is")
+    given_back: float = quantity("W", "mean power that the motor gives back at moments")
+
+    def remark(self, study: StudyRecord) -> None:
+        """The assumptions behind the losses."""
+        mean = self.own.mean
+        if abs(mean.missing) > LARGEST_GAP * abs(mean.electric):
+            study.warn(
+                "energy balance",
+                "{missing} of the electric power of {electric} are missing in the sum of the losses by place: raise "
+                "run.settle_turns, or take a shorter run.step.",
+                STEADY,
+                missing=(mean.missing, "W"),
+                electric=(mean.electric, "W"),
+            )
+        study.note(
+            "losses in iron",
+            "The model of the motor has no iron and stray losses of their own: the windings of a motor of the "
+            "catalogue are fitted so that their losses include them at rated load. At light load a real motor loses "
+            "more.",
+        )
+        if self.inverter:
+            study.note("losses of the inverter", f"The losses of the inverter are {self.inverter}.")
+        elif study.drive.follows:
+            study.note(
+                "losses of the inverter",
+                "The losses of the converter are not known, as the motor has no nameplate; they come on top.",
+            )
+        if study.drive.follows and self.given_back > _GIVEN_BACK * mean.electric:
+            study.note(
+                "power that comes back",
+                "In parts of the turn the motor gives back {back} in the mean. Here this power counts as saved; an "
+                "inverter with a diode bridge stores it in its intermediate circuit, as far as that is large enough, "
+                "and turns the rest into heat in a braking resistor.",
+                back=(self.given_back, "W"),
+            )
+
+
+class EnergyAnalysis(Analysis):
+    """The energy of a study with a table [usage]."""
+
+    name = "energy"
+    needs_runs = True
+
+    @staticmethod
+    def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
+        """Whether the study asks for it, and the motor is one of this package."""
+        return plans["energy"] is not None and drive.foreign is None
+
+    @staticmethod
+    def find(study: StudyRecord, work: Work) -> EnergyFindings | None:
+        """Run the loads, with both motors; None where one of them has no steady running.
+
+        Raises
+        ------
+        RunError
+            where a run fails.
+        """
+        return _Task(study, work, study.config.plans["energy"]).find()
+
+
+@dataclass(frozen=True)
+class _Task:
+    study: StudyRecord
+    work: Work
+    plan: UsagePlan
+
+    def find(self) -> EnergyFindings | None:
+        drive, motor = self.study.drive, self.study.plate
+        inverter = self._inverter(drive, motor)
+        duty = self._duty(drive, inverter, "")
+        if duty.unsteady:
+            self.study.warn(
+                "energy not known",
+                "the drive does not run steadily with {loads}, so that no mean power stands for a year; raise "
+                "run.settle_turns, or see the other warnings.",
+                loads=", ".join(duty.unsteady),
+            )
+            return None
+        own = self._energy(duty, motor.designation if motor else "the motor of the study", self._price(motor))
+        other, no_other = self._other(drive, motor)
+        return EnergyFindings(
+            own=own,
+            loads={
+                name: LoadEnergy(run.losses, duty.shares[name], float(self.plan.loads[name].factor))
+                for name, run in duty.runs.items()
+            },
+            running=self.plan.running,
+            other=other,
+            comparison=None if other is None else _compared(own, other),
+            inverter=self._inverter_words() if inverter else "",
+            no_other=no_other,
+            given_back=duty.given_back,
+        )
+
+    def _duty(self, drive: Drive, inverter: InverterRating | None, words: str) -> LoadDuty:
+        steady = self.study.answers[STEADY]
+        usual = (
+            drive.parameters.ambient.T if steady.winding_temperature is None else steady.winding_temperature
+        )
+        runs = 2.0 * len(self.plan.loads)
+
+        def progress(name: str) -> None:
+            self.work.progress(f"energy: {name}{words}", 0.0, runs)
+
+        hottest = self.study.config.permitted_temperature[1]
+        return duty_of(self.work.rig, drive, self.plan.loads, inverter, usual, hottest, progress)
+
+    def _inverter(self, drive: Drive, motor: CatalogueMotor | None) -> InverterRating | None:
+        if not drive.follows or motor is None:
+            return None
+        power = motor.nameplate.power
+        given = self.plan.inverter_losses
+        losses = tuple(apparent_power(power) * x for x in given) if given else reference_losses(power)
+        return InverterRating(losses, motor.nameplate)
+
+    def _inverter_words(self) -> str:
+        if self.plan.inverter_losses:
+            return "interpolated between the eight operating points of IEC 61800-9-2 that usage.inverter_losses gives"
+        return (
+            "interpolated between the eight operating points of IEC 61800-9-2 of a reference drive of this size; "
+            "they are typical values, and a drive of class IE2 loses at least a quarter less at full load. The data "
+            "sheet of the inverter has its own (usage.inverter_losses)"
+        )
+
+    def _price(self, motor: CatalogueMotor | None, *, is_other: bool = False) -> float | None:
+        table = self.plan.table
+        given = float(table.other_price if is_other else table.motor_price)
+        return given or (motor.nameplate.price if motor else 0.0) or None
+
+    def _other(self, drive: Drive, motor: CatalogueMotor | None) -> tuple[MotorEnergy | None, str]:
+        """The energy with the other motor, or the reason why there is none."""
+        if motor is None:
+            return None, "the motor has no nameplate"
+        try:
+            other = other_motor(motor, self.plan.other, self.study.config.file.catalogue)
+            if other is None:
+                return (
+                    None,
+                    "the motor has no efficiency class, or the highest one; usage.other names another motor",
+                )
+            with_it = with_motor(drive, self.study.config.drive, other)
+            duty = self._duty(with_it, self._inverter(with_it, other), f", {other.designation}")
+        except (InputError, RunError) as error:
+            return None, f"the other motor could not be run: {error}"
+        if duty.unsteady:
+            return None, f"{other.designation} does not run steadily with {', '.join(duty.unsteady)}"
+        return self._energy(duty, other.designation, self._price(other, is_other=True)), ""
+
+    def _energy(self, duty: LoadDuty, name: str, price: float | None) -> MotorEnergy:
+        losses = duty.losses
+        year = year_of(self.plan, float(losses.electric), price)
+        speed = duty.mean(self.study.drive.motor_speed)
+        return MotorEnergy(name, year, losses, duty.temperature, speed, price)
+
+
+def year_of(plan: UsagePlan, power: float, price: float | None) -> Year:
+    """Energy and cost of a year with that mean electric `power` [W], for a motor of that `price`, if it is known."""
+    table: Usage = plan.table
+    energy, years, hours = power * plan.running, float(table.years), float(table.hours) * float(table.days)
+    tonnes = float(table.tonnes_per_hour) * hours
+    kWh = energy / 3.6e6
+    cost = kWh * float(table.price) if table.price else None
+    return Year(
+        energy=energy,
+        energy_per_tonne=energy / tonnes if tonnes else None,
+        cost=cost,
+        co2=kWh * float(table.co2) if table.co2 else None,
+        life_energy=years * energy,
+        life_cost=None if cost is None or price is None else price + years * cost,
+    )
+
+
+def _compared(own: MotorEnergy, other: MotorEnergy) -> MotorComparison:
+    better, worse = sorted((own, other), key=lambda each: float(each.year.energy))
+    saving = worse.year.energy - better.year.energy
+    costs = worse.year.cost, better.year.cost
+    cost = None if None in costs else costs[0] - costs[1]
+    prices = better.price, worse.price
+    extra = None if prices[0] is None or prices[1] is None else prices[0] - prices[1]
+    pays = None if not cost or extra is None else max(0.0, extra / cost)
+    return MotorComparison(better.motor, saving, saving / worse.year.energy, cost, extra, pays)

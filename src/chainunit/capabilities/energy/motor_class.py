@@ -1,0 +1,65 @@
+"""The efficiency class of the study's motor, beside the one that EU 2019/1781 asks of it."""
+
+from __future__ import annotations
+
+from ...core.quantities import quantity
+from ...reading.results import part, result
+from ...study.analysis import Analysis, Findings, Work
+from ...study.record import StudyRecord
+from .efficiency_class import EXEMPTIONS, class_of, falls_short, required
+
+
+@result
+class MotorClass(Findings):
+    """Class and efficiency of a motor."""
+
+    designation: str = part("the motor")
+    efficiency_class: str = part("its class by IEC 60034-30-1; empty where that has none for it")
+    required: str = part(
+        "the class that EU 2019/1781 asks of it; empty outside of the scope of that regulation"
+    )
+    falls_short: bool = part("whether its class is below that")
+    efficiency: float = quantity("1", "rated efficiency", kind="percent")
+
+    def remark(self, study: StudyRecord) -> None:
+        """Warn of a motor that may not be sold any more."""
+        if self.falls_short:
+            study.warn(
+                "efficiency class",
+                "the motor {motor} is {own} by its efficiency of {efficiency}, and EU 2019/1781 asks {asked} of a "
+                "motor of its size and number of poles that comes to the market since July 2023 ({exemptions}); take "
+                "one of class {asked}.",
+                motor=self.designation,
+                own=self.efficiency_class,
+                efficiency=(self.efficiency, "1", "percent"),
+                asked=self.required,
+                exemptions=EXEMPTIONS,
+            )
+
+
+class MotorClassAnalysis(Analysis):
+    """The class, where a motor of the catalogue falls short of what is asked, or the study asks for the energy."""
+
+    name = "motor_class"
+
+    @staticmethod
+    def find(study: StudyRecord, work: Work) -> MotorClass | None:
+        """The class of the motor that the file names, or that was chosen."""
+        motor = study.plate
+        if motor is None or study.drive.foreign is not None:
+            return None
+        plate = motor.nameplate
+        short = falls_short(plate)
+        if not short and study.config.plans["energy"] is None:
+            return None
+        return MotorClass(motor.designation, class_of(plate), required(plate), short, float(plate.efficiency))
+
+
+def words_of(found: MotorClass) -> str:
+    """Class and demand, in a sentence."""
+    if not found.efficiency_class:
+        return "IEC 60034-30-1 has no class for this motor at 50 Hz."
+    if not found.required:
+        return f"The motor is {found.efficiency_class}; EU 2019/1781 does not cover it."
+    verb = "asks" if not found.falls_short else "asks more,"
+    return f"The motor is {found.efficiency_class}; EU 2019/1781 {verb} {found.required}."

@@ -1,0 +1,115 @@
+"""The section on energy: a year, the power by place and load, and the other motor."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ...core.quantities import Layout
+from ...report import blocks as b
+from ...report import figure as fig
+from ...report.lines import Line, line
+from ...study.record import StudyRecord
+from .analysis import EnergyFindings, Year
+from .motor_class import MotorClass, words_of
+from .running import PLACES, Losses
+
+PICTURE = "energy.png"
+_NAMES = {v.name: v.template for v in Layout(Losses).variables}
+
+
+def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+    """The tables and the figure of the energy."""
+    findings = EnergyFindings.of_study(study)
+    yield b.Text(_lead(s, findings))
+    found = MotorClass.found_in(study)
+    if found is not None:
+        yield b.Text(words_of(found))
+    yield _places(s, findings)
+    yield _figure(findings)
+    yield _year(s, findings)
+    if findings.comparison is not None:
+        yield b.Text(_verdict(s, findings))
+    else:
+        yield b.Text(f"No other motor is compared: {findings.no_other}.", "note")
+
+
+def _lead(s: b.Source, findings: EnergyFindings) -> Line:
+    text = "The drive takes {energy.own.mean.electric} in the mean, {energy.own.energy} in a year of {energy.running}"
+    year = findings.own.year
+    if year.energy_per_tonne is not None:
+        text += ", {energy.own.energy_per_tonne} a tonne"
+    if year.cost is not None:
+        text += "; a year costs {energy.own.cost}"
+    if year.co2 is not None:
+        text += (
+            " and stands for {energy.own.co2} of CO2" if year.cost is not None else "; CO2: {energy.own.co2}"
+        )
+    return s.line(text + ". Its winding is at {energy.own.temperature}.")
+
+
+def _known(findings: EnergyFindings) -> list[str]:
+    return [name for name in PLACES if getattr(findings.own.mean, name) is not None]
+
+
+def _places(s: b.Source, findings: EnergyFindings) -> b.Table:
+    loads = list(findings.loads)
+    paths = ["energy.own.mean", *(f"energy.loads.{name}" for name in loads)]
+    rows = [
+        b.TableRow((_NAMES[name], *(s.number(f"{path}.{name}") for path in paths)))
+        for name in ("electric", *_known(findings), "missing")
+    ]
+    heads: list[Line] = ["mean"]
+    for name in loads:
+        path = f"energy.loads.{name}"
+        heads.append(
+            line(f"{name}: ", s.number(f"{path}.share"), " of the time, feed x ", s.number(f"{path}.factor"))
+        )
+    return b.Table(tuple(rows), b.heads("", *heads), title="Electric power, and where it goes")
+
+
+def _year(s: b.Source, findings: EnergyFindings) -> b.Table:
+    motors = {"own": findings.own} | ({} if findings.other is None else {"other": findings.other})
+    rows = [
+        b.TableRow((v.template, *(s.number(f"energy.{name}.{v.name}", none="-") for name in motors)))
+        for v in Layout(Year).variables
+        if any(getattr(motor.year, v.name) is not None for motor in motors.values())
+    ]
+    rows += [
+        b.TableRow((words, *(s.number(f"energy.{name}.{key}", none="-") for name in motors)))
+        for key, words in (("speed", "speed of the motor, mean"), ("price", "price of the motor"))
+        if any(getattr(motor, key) is not None for motor in motors.values())
+    ]
+    heads = (s.words(f"energy.{name}.motor") for name in motors)
+    title = s.line("A year, and a life of {=usage.years} years")
+    return b.Table(tuple(rows), b.heads("", *(line(head) for head in heads)), title=title)
+
+
+def _verdict(s: b.Source, findings: EnergyFindings) -> Line:
+    comparison = findings.comparison
+    assert comparison is not None
+    text = (
+        "{energy.comparison.better} takes less: it saves {energy.comparison.saving} a year, "
+        "{energy.comparison.saving_share}"
+    )
+    if comparison.cost_saving is not None:
+        text += ", a cost of {energy.comparison.cost_saving} a year"
+    if comparison.pays_after is not None:
+        text += "; it has paid after {energy.comparison.pays_after} years"
+    else:
+        text += "; when it has paid is not known without the prices of both motors and of the energy"
+    return s.line(text + ".")
+
+
+def _figure(findings: EnergyFindings) -> fig.Figure:
+    names, mean = _known(findings), findings.own.mean
+    sizes = [float(getattr(mean, name)) for name in names]
+    y = fig.Axis("", names=tuple(_NAMES[name] for name in names))
+    bars = fig.Bars("mean over the time of running", list(range(len(names))), sizes, 0.6)
+    return fig.Figure(
+        "energy",
+        "Where the electric power goes",
+        "Mean power by place.",
+        ((fig.Panel(fig.Axis("mean power", "W", low=0.0), y, (bars,)),),),
+        file=PICTURE,
+        heights=(0.9,),
+    )

@@ -1,0 +1,159 @@
+"""Steady running of a drive with a share of its feed: where its electric power goes.
+
+Means are over the time of whole turns. The power that the masses still take up, where the turns have not settled, is
+no loss and is left out of the electric power, as in the measures of a study. The balance
+
+    electric power = winding + friction and windage + gear + line + machine        (+ inverter on its own side)
+
+closes because each loss is read from another output than the electric power; what is missing is reported.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ...core.quantities import Layout, Value, declaration, quantity
+from ...drives.nameplate import Nameplate
+from ...study.drive import Drive
+from ...study.readings import crank_angle, crank_speed, shaft_power
+from ...study.rig import Rig
+from ...study.start_up import start_up
+from ...study.window import Phase, Window, whole_turns
+from .inverter import loss
+
+_HELD = 1e6
+"""Factor on the heat capacity of a winding that keeps its temperature."""
+_LOSSES_IN_JOINTS = (
+    *(f"{law}.{name}" for law in ("pin", "pins", "guides") for name in ("friction", "damping")),
+    "joint_damping",
+)
+"""Parameters of machines by which their joints take power."""
+
+
+@declaration
+class Losses:
+    """Mean electric power, and the places where it goes. A place that the drive has not, or whose loss is not known,
+    has no number."""
+
+    electric: Value = quantity("W", "electric power")
+    inverter: Value = quantity("W", "inverter")
+    winding: Value = quantity("W", "windings of the motor")
+    windage: Value = quantity("W", "friction and windage of the motor")
+    gear: Value = quantity("W", "gear")
+    line: Value = quantity("W", "shafts and clutches of the line")
+    joints: Value = quantity("W", "pins and guides of the machine")
+    processing: Value = quantity("W", "processing")
+    machine: Value = quantity("W", "machine, joints and processing together")
+    missing: Value = quantity("W", "missing in the balance")
+
+
+PLACES = ("inverter", "winding", "windage", "gear", "line", "joints", "processing", "machine")
+"""The places of losses, in the order of the power's way."""
+
+
+@dataclass(frozen=True)
+class InverterRating:
+    """An inverter by its losses [W] at the points of `chainunit.capabilities.energy.inverter`, and the nameplate of
+    its motor."""
+
+    losses: tuple[float, ...]
+    plate: Nameplate
+
+    def loss(self, run: xr.Dataset) -> Any:
+        """The loss over a run [W], shape (time,). The torque-producing current is in proportion to the torque, and in
+        field weakening to the frequency, too."""
+        frequency = run["motor.supply.frequency"].values / self.plate.frequency
+        torque = run["motor.air_gap_tau"].values / self.plate.torque
+        return loss(self.losses, frequency, torque * np.maximum(frequency, 1.0))
+
+
+@dataclass(frozen=True)
+class SteadyLoad:
+    """Steady running with a load: its `losses`, its whole `turns`, and the mean power that the motor gives back to
+    its supply at moments [W]. `lasts` tells whether its means stand for running that lasts."""
+
+    losses: Losses
+    turns: xr.Dataset
+    given_back: float
+    lasts: bool
+    rig: Rig
+
+
+def scaled(feed: Any, factor: float) -> Any:
+    """The feed with each of its quantities multiplied by the `factor`; one that cannot be so has its start value."""
+    layout = Layout(type(feed))
+    pairs = zip(layout.variables, layout.values(feed), strict=True)
+    return layout.instance(
+        [factor * x if v.quantity.admits(factor * x) else v.quantity.start for v, x in pairs]
+    )
+
+
+def warm(drive: Drive, temperature: float) -> Drive:
+    """The drive with its winding held at that temperature [K], as a long duty leaves it: it begins there, and its
+    heat capacity is so large that it stays there."""
+    p, name = drive.parameters, drive.motor.winding
+    winding = getattr(p, name)
+    held = {name: replace(winding, C=_HELD * winding.C), "ambient": replace(p.ambient, T=temperature)}
+    return replace(drive, parameters=replace(p, **held), observer=None)
+
+
+def run_steadily(rig: Rig, drive: Drive, feed: Any, inverter: InverterRating | None) -> SteadyLoad:
+    """The `drive` in steady running with that `feed`, from rest, without its safety coupling.
+
+    Raises
+    ------
+    RunError
+        where the run fails.
+    """
+    rig = replace(rig, drive=drive, operation=replace(rig.operation, feed=feed), fed_from=None)
+    with rig.from_rest() as simulation:
+        started = start_up(rig, simulation, lambda time: None, {})
+    run = started.run.sel(time=slice(started.steady_from, None))
+    return read_running(rig, whole_turns(drive, run, rig.operation.run.turns), inverter)
+
+
+def read_running(rig: Rig, turns: xr.Dataset, inverter: InverterRating | None) -> SteadyLoad:
+    """The losses in whole `turns` of a drive."""
+    drive, operation = rig.drive, rig.operation
+    w = Window(Phase.STEADY, turns, drive, drive.machine.loaded_sides(operation.feed), operation.crank_speed)
+    squared, p = w.mean(lambda drive, run: run[drive.motor_speed].values ** 2), drive.parameters
+    motor = w.mean("motor.supply_power") - w.taken_up[1]
+    shaft = w.mean(shaft_power) - w.taken_up[0]
+    line = [f"{part.name}.dissipated_power" for part in drive.line]
+    parts: dict[str, float | None] = dict.fromkeys(PLACES)
+    parts["winding"] = w.mean("motor.heat")
+    parts["windage"] = float(p.rotor.d) * squared
+    parts["gear"] = drive.gear_friction * squared if drive.gear_friction else None
+    parts["line"] = sum(w.mean(full) for full in line if full in turns) if drive.line else None
+    if inverter is not None:
+        parts["inverter"] = w.mean(lambda drive, run: inverter.loss(run))
+    if "machine.dissipated_power" in turns:
+        parts |= _machine(w, operation.feed)
+    else:
+        parts["machine"] = shaft - (parts["line"] or 0.0)
+    electric = motor + (parts["inverter"] or 0.0)
+    missing = electric - sum(x for x in parts.values() if x is not None)
+    back = w.mean(lambda drive, run: np.maximum(-run["motor.supply_power"].values, 0.0))
+    return SteadyLoad(Losses(electric=electric, missing=missing, **parts), turns, back, w.lasts, rig)
+
+
+def _machine(w: Window, feed: Any) -> dict[str, float]:
+    """The power that the machine takes: of its joints and of the processing, where they can be told apart. The forces
+    of the processing follow from the motion alone, so the same turns without friction take theirs alone."""
+    whole, machine = w.mean("machine.dissipated_power"), w.drive.machine
+    names = [name for name in _LOSSES_IN_JOINTS if name in machine.by_name]
+    if not names or machine.simulated is not machine or machine.model.States is not None:
+        return {"machine": whole}
+    smooth = machine.replace(dict.fromkeys(names, 0.0))
+    values = Layout(type(feed)).by_name(feed)
+
+    def processing(drive: Drive, run: xr.Dataset) -> Any:
+        motion = {"phi": crank_angle(drive, run) * drive.ratio, "w": crank_speed(drive, run) * drive.ratio}
+        return smooth.evaluate({**motion, **values})["dissipated_power"]
+
+    taken = w.mean(processing)
+    return {"joints": whole - taken, "processing": taken}

@@ -1,0 +1,313 @@
+"""The energy of a year: against a simulated day, a balance, limit cases and tables; refusals."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+from chainunit.app import cli
+from chainunit.capabilities.energy import inverter
+from chainunit.capabilities.energy.analysis import EnergyFindings, year_of
+from chainunit.capabilities.energy.efficiency_class import (
+    CLASSES,
+    class_of,
+    falls_short,
+    limit,
+    next_class,
+    required,
+)
+from chainunit.capabilities.energy.motor_class import MotorClass
+from chainunit.capabilities.energy.running import PLACES, scaled, warm
+from chainunit.core.errors import InputError
+from chainunit.core.quantities import Layout
+from chainunit.drives.catalogue import catalogue
+from chainunit.machines.knife_drive import KnifeDrive
+from chainunit.study.config import parse
+from chainunit.study.run import run_study
+from chainunit.system import CompiledSimulation, Profile
+
+STUDY = """
+event = []
+start = "{start}"
+[system]
+motor = "IE3 4-pole 1.5 kW, 90L"
+[feed]
+left = {{ material_mass = 30, processing_force = 200 }}
+right = {{ material_mass = 20, processing_force = 300 }}
+[gear]
+efficiency = 0.95
+[run]
+crank_speed = 8
+settle_turns = 3
+turns = 3
+step = "2 ms"
+[usage]
+hours = 10
+days = 200
+tonnes_per_hour = 4
+price = 0.25
+co2 = 0.4
+years = 10
+motor_price = 400
+other_price = 450
+[[usage.load]]
+share = "60 %"
+[[usage.load]]
+name = "half"
+share = "30 %"
+factor = 0.5
+[[usage.load]]
+name = "empty"
+share = "10 %"
+factor = 0
+"""
+SHARES = {"load 1": 0.6, "half": 0.3, "empty": 0.1}
+FACTORS = {"load 1": 1.0, "half": 0.5, "empty": 0.0}
+
+
+@pytest.fixture(scope="module", params=["inverter", "direct"])
+def study(request, tmp_path_factory):
+    made = run_study(parse(STUDY.format(start=request.param)), tmp_path_factory.mktemp(request.param))
+    assert made.failure is None
+    return made
+
+
+def found(study) -> EnergyFindings:
+    return study.findings["energy"]
+
+
+def test_the_losses_by_place_add_up_to_the_electric_power(study):
+    for losses in (
+        found(study).own.mean,
+        found(study).other.mean,
+        *(x.losses for x in found(study).loads.values()),
+    ):
+        places = [getattr(losses, name) for name in PLACES]
+        assert sum(x for x in places if x is not None) + losses.missing == pytest.approx(
+            losses.electric, rel=1e-12
+        )
+        assert abs(losses.missing) < 1e-3 * losses.electric
+        # each place on its own: none takes back what another gives
+        assert all(x is None or x >= 0.0 for x in places)
+
+
+@pytest.mark.second
+def test_a_year_is_the_integral_over_a_simulated_day(study):
+    """The feed changes its size through a day of the shares, scaled down; the supply's power of the compiled system
+    is integrated from a steady state to the same steady state. Material that comes with a change brings its energy
+    with it; the day has enough turns for that not to count."""
+    drive = warm(study.drive, found(study).own.temperature)
+    operation, turn = study.config.operation, study.config.operation.turn
+    whole = 2000.0 * turn
+    at, changes = 30.0 * turn, {}
+    names = Layout(type(operation.feed)).by_name(operation.feed)
+    for load in ("half", "empty", "load 1"):
+        # the day begins in the middle of the first load
+        at += (
+            whole * {"half": 0.5 * SHARES["load 1"], "empty": SHARES["half"], "load 1": SHARES["empty"]}[load]
+        )
+        changes[load] = at
+    signals = {
+        f"machine.{name}": Profile(x, tuple((at, 0.02, FACTORS[load] * x) for load, at in changes.items()))
+        for name, x in names.items()
+    }
+    begin, end = 30.0 * turn, 30.0 * turn + whole
+    with CompiledSimulation(drive.graph, signals | drive.reference(operation.crank_speed, 1.0)) as simulation:
+        simulation.run(begin, 2e-3, names=())
+        names = ("motor.supply_power", "motor.supply.frequency", "motor.air_gap_tau")
+        run = simulation.run(end, 2e-3, names=names)
+    power = run["motor.supply_power"].values
+    if drive.follows:
+        plate = study.plate.nameplate
+        losses = inverter.reference_losses(plate.power)
+        f = run["motor.supply.frequency"].values / plate.frequency
+        power = power + inverter.loss(losses, f, run["motor.air_gap_tau"].values / plate.torque)
+    day = np.trapezoid(power, run["time"].values) / (end - begin) * 10.0 * 3600.0
+    assert day * 200.0 == pytest.approx(found(study).own.year.energy, rel=1e-3)
+
+
+def test_processing_is_the_work_of_its_force_and_falls_with_the_feed(study):
+    loads = {name: each.losses for name, each in found(study).loads.items()}
+    assert loads["empty"].processing == pytest.approx(0.0, abs=1e-9)
+    # the force is smoothed at rest; the speed of a motor on the line changes with the load
+    assert loads["half"].processing == pytest.approx(0.5 * loads["load 1"].processing, rel=0.01)
+    assert loads["load 1"].joints > loads["half"].joints > loads["empty"].joints > 0.0
+    assert loads["load 1"].electric > loads["half"].electric > loads["empty"].electric
+
+
+def test_cost_and_co2_follow_from_the_energy(study):
+    own, other, comparison = found(study).own, found(study).other, found(study).comparison
+    kWh = own.mean.electric / 1e3 * 2000.0
+    assert own.year.energy / 3.6e6 == pytest.approx(kWh)
+    assert own.year.cost == pytest.approx(0.25 * kWh) and own.year.co2 == pytest.approx(0.4 * kWh)
+    assert own.year.energy_per_tonne / 3.6e6 == pytest.approx(kWh / 8000.0)
+    assert own.year.life_cost == pytest.approx(400.0 + 10.0 * 0.25 * kWh)
+    # the same losses at a better class: less energy, and the extra price pays back at the saving of a year
+    assert other.year.energy < own.year.energy and comparison.better == other.motor
+    assert comparison.pays_after == pytest.approx(50.0 / (own.year.cost - other.year.cost))
+
+
+def test_an_inverter_has_losses_and_a_line_has_none(study):
+    assert (found(study).own.mean.inverter is not None) == study.drive.follows
+    kinds = {remark.kind for remark in study.remarks}
+    assert "losses in iron" in kinds and ("losses of the inverter" in kinds) == study.drive.follows
+
+
+# -- inverter
+
+
+def test_the_interpolation_meets_its_points_and_its_borders():
+    losses = inverter.reference_losses(4000.0)
+    f, i = np.array(inverter.POINTS).T
+    assert inverter.loss(losses, f, i) == pytest.approx(losses)
+    assert losses[-1] == 374.0 and inverter.apparent_power(4000.0) == 5440.0
+    # between two points the mean; on the plane at the corner without a point; beyond the border that of the border
+    assert inverter.loss(losses, 0.25, 1.0) == pytest.approx(0.5 * (losses[2] + losses[5]))
+    corner = losses[3] + losses[6] - losses[4]
+    assert inverter.loss(losses, 0.9, 0.25) == pytest.approx(corner)
+    assert inverter.loss(losses, [1.0, 0.9, -0.9], [-1.0, 3.0, 1.0]) == pytest.approx([losses[-1]] * 3)
+    assert inverter.loss(losses, 0.0, 0.0) == pytest.approx(losses[0])
+    assert inverter.apparent_power(4000.0) < inverter.apparent_power(4500.0) < inverter.apparent_power(5500.0)
+    assert inverter.reference_losses(400e3)[-1] == pytest.approx(2.0 * inverter.reference_losses(200e3)[-1])
+
+
+def test_the_losses_of_the_maker_stand_in_place_of_the_reference(tmp_path):
+    given = "inverter_losses = [1, 1, 1, 1, 1, 1, 1, 1]\n".replace("1", "0.02")
+    text = STUDY.format(start="inverter").replace("hours = 10\n", f"hours = 10\n{given}")
+    made = run_study(parse(text.partition("[[usage")[0]), tmp_path)
+    # the same at every point: 2 % of the apparent power
+    assert found(made).own.mean.inverter == pytest.approx(0.02 * inverter.apparent_power(1500.0))
+    assert list(found(made).loads) == ["load 1"] and found(made).loads["load 1"].share == 1.0
+
+
+# -- classes
+
+
+def test_the_packaged_motors_have_the_class_that_their_names_say():
+    for motor in catalogue():
+        plate = motor.nameplate
+        assert class_of(plate) == motor.designation[:3], motor.designation
+        assert limit(class_of(plate), plate.power, plate.poles) == pytest.approx(plate.efficiency), motor
+        assert not falls_short(plate)
+        assert required(plate) == ("IE4" if plate.power >= 75e3 else "IE3" if plate.power >= 750.0 else "IE2")
+
+
+def test_limits_rise_with_class_and_size():
+    for poles in (2, 4, 6):
+        table = [[limit(of, power, poles) for power in (120.0, 1e3, 75e3, 200e3)] for of in CLASSES]
+        assert np.all(np.diff(table, axis=0) > 0.0) and np.all(np.diff(table, axis=1) > 0.0)
+        assert limit("IE3", 1e6, poles) == limit("IE3", 2e5, poles)
+        assert limit("IE3", 119.0, poles) is None and limit("IE3", 1.1e6, poles) is None
+    assert limit("IE3", 1e3, 12) is None
+
+
+@pytest.mark.parametrize(
+    ("power", "poles", "asked"),
+    [
+        *(
+            (110, 4, ""),
+            (120, 4, "IE2"),
+            (740, 8, "IE2"),
+            (750, 8, "IE3"),
+            (74e3, 2, "IE3"),
+            (75e3, 6, "IE4"),
+        ),
+        *(
+            (75e3, 8, "IE3"),
+            (200e3, 4, "IE4"),
+            (201e3, 4, "IE3"),
+            (1e6, 2, "IE3"),
+            (1.1e6, 2, ""),
+            (1e3, 10, ""),
+        ),
+    ],
+)
+def test_what_the_regulation_asks(power, poles, asked):
+    plate = dataclasses.replace(catalogue()[0].nameplate, power=power, poles=poles)
+    assert required(plate) == asked
+
+
+def test_a_motor_of_75_kw_below_ie4_is_warned_of(tmp_path):
+    """The row as the packaged catalogue had it before: of class IE3."""
+    row = (
+        "designation,power [W],poles,speed [rev/min],efficiency,power_factor,breakdown_ratio,locked_torque_ratio,"
+        'locked_current_ratio,J [kg.m2],locked_time [s]\n"Old 75",75000,4,1486,0.950,0.86,2.96,2.11,7.3,1.2,11\n'
+    )
+    (tmp_path / "motors.csv").write_text(row)
+    old = next(
+        motor for motor in catalogue(tmp_path / "motors.csv") if motor.designation == "Old 75"
+    ).nameplate
+    assert class_of(old) == "IE3" and required(old) == "IE4" and falls_short(old)
+    assert next_class(old) == ("IE4", 0.96) and next_class(dataclasses.replace(old, efficiency=0.961)) is None
+    text = 'event = []\ncatalogue = "motors.csv"\n[system]\nmotor = "Old 75"\n[run]\nsettle_turns = 1\n'
+    made = run_study(parse(text, source=str(tmp_path / "study.toml")), tmp_path / "out")
+    assert isinstance(made.findings["motor_class"], MotorClass)
+    (warning,) = [remark for remark in made.warnings if remark.kind == "efficiency class"]
+    assert "is IE3" in warning.text and "asks IE4" in warning.text and "brake motors" in warning.text
+
+
+def test_a_study_without_usage_has_no_new_findings(tmp_path):
+    text = STUDY.format(start="direct").partition("[usage]")[0]
+    made = run_study(parse(text), tmp_path)
+    assert not {"energy", "motor_class"} & set(made.findings)
+
+
+# -- input
+
+
+def test_a_feed_is_scaled_within_its_bounds():
+    feed = KnifeDrive.Feed(cut_force=2000.0)
+    assert scaled(feed, 0.25).cut_force == 500.0 and scaled(feed, 0.0).cut_force == 0.0
+
+
+def test_a_year_without_prices_has_energy_alone(study):
+    plan = study.config.plans["energy"]
+    bare = dataclasses.replace(plan.table, price=0.0, co2=0.0, tonnes_per_hour=0.0)
+    year = year_of(dataclasses.replace(plan, table=bare), 1000.0, None)
+    assert (year.cost, year.co2, year.energy_per_tonne, year.life_cost) == (None,) * 4
+    assert year.life_energy == pytest.approx(10.0 * 1000.0 * 2000.0 * 3600.0)
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ("[[usage.load]]\nshare = 0.5\n", "the shares are 50 % together; must be 100 %"),
+        ("[[usage.load]]\nshare = 1.5\n", "usage.load.1.share"),
+        (
+            "[[usage.load]]\nname = 'a'\nshare = 0.5\n[[usage.load]]\nname = 'a'\nshare = 0.5\n",
+            "stands there twice",
+        ),
+        ("[usage]\ninverter_losses = [0.02, 0.03]\n", "has 2 values; must have 8"),
+        ("[usage]\nother = 'IE9'\n", 'usage.other = "IE9": not in the catalogue'),
+        ("[usage]\nhours = 25\n", "usage.hours"),
+        ("[usage]\nhour = 8\n", "hours"),
+    ],
+)
+def test_refusals_name_key_and_remedy(table, words):
+    with pytest.raises(InputError, match="usage") as refused:
+        parse(f"event = []\n[system]\nmotor = 'IE3 4-pole 1.5 kW, 90L'\n{table}")
+    assert words in str(refused.value)
+
+
+def test_the_reports_have_the_numbers_of_the_result(tmp_path, monkeypatch, capsys):
+    file = tmp_path / "study.toml"
+    file.write_text(STUDY.format(start="inverter"))
+    monkeypatch.setattr("sys.argv", ["chainunit", "study", str(file), "-o", str(tmp_path / "out")])
+    with pytest.raises(SystemExit) as ended:
+        cli.main()
+    assert ended.value.code == 0
+    out = tmp_path / "out"
+    energy = json.loads((out / "result.json").read_text("utf-8"))["energy"]
+    assert energy["own"]["energy"]["unit"] == "J" and energy["own"]["energy"]["kind"] == "energy"
+    assert set(energy["loads"]) == set(SHARES)
+    page, words, said = (
+        (out / "report.html").read_text("utf-8"),
+        (out / "result.md").read_text("utf-8"),
+        capsys.readouterr().out,
+    )
+    assert 'id="energy"' in page and (out / "energy.png").exists()
+    for text in (words, said):
+        assert "Electric power, and where it goes" in text and "it has paid after" in text
