@@ -91,6 +91,8 @@ def _one_key(table, key):
             "identify.sensor": "[[identify.sensor]]\ncolumn = 'motor.i'\n",
         }
         return "".join(text + (own if name == table.name else "") for name, text in needed.items())
+    if table.name == "bearing.NAME":
+        return f'[bearing.C]\nkind = "ball"\nC = "50 kN"\n{key.name} = {key.left_out}\n'
     if table.name == "watch":
         return f"[watch]\nfile = 'a.csv'\n{key.name} = {key.left_out}\n"
     if table.name == "optimize":
@@ -172,7 +174,7 @@ def _values(part):
 def test_the_full_example_names_every_key_once():
     text = commented(example("full"))
     assert parse(text).machine.p == parse(example("full")).machine.p
-    tables = re.findall(r"^(?:# )?\[(\w+)\]", text, re.MULTILINE)
+    tables = re.findall(r"^(?:# )?\[(\w+)(?:\.NAME)?\]", text, re.MULTILINE)
     assert sorted({*tables}) == sorted({*Parts(ChamberForces, DcMotor).sections, "report", "system"})
     for table in key_tables():
         if table.name in ("", "event", "system") or table.of not in ("", "ChamberForces"):

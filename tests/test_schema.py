@@ -295,8 +295,15 @@ def test_each_unit_that_is_read_is_matched_and_no_other_of_one_name():
 
 def _property(table, name):
     """The schema of a key; those of machines, motors and events are definitions."""
-    own = f"{table.name}.{table.of}"
-    inner = SCHEMA["definitions"][own] if own in SCHEMA["definitions"] else SCHEMA["properties"][table.name]
+    own, (first, *below) = f"{table.name}.{table.of}", table.name.split(".")
+    inner = SCHEMA["definitions"][own] if own in SCHEMA["definitions"] else SCHEMA["properties"][first]
+    inner = (
+        inner["additionalProperties"]
+        if table.is_named
+        else inner["properties"][below[0]]["items"]
+        if below
+        else inner
+    )
     for each in name.split("."):
         inner = inner["properties"][each]
     return inner

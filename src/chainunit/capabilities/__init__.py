@@ -16,6 +16,7 @@ NAMES = (
     "random_overloads",
     "flywheels",
     "torsion",
+    "checks",
     "optimize",
     "identification",
     "watch",

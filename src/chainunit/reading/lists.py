@@ -191,6 +191,18 @@ class TableList:
 
         return dict(read_entries(enumerate(tables, 1), self.name, faults, of))
 
+    def read_named(
+        self, tables: Mapping[str, Any], faults: Faults, read: Callable[[Entry, str], T]
+    ) -> dict[str, T]:
+        """The results of `read` by the names of the tables [name.NAME], for those without a fault; the faults of the
+        others go to `faults`."""
+
+        def of(entry: Entry, name: str) -> tuple[str, T]:
+            entry.raw = given_values(read_table(self.form(f"{entry.place}."), entry.given, f"{entry.place}."))
+            return name, read(entry, name)
+
+        return dict(read_entries(tables.items(), self.name, faults, of))
+
     def _check(
         self, entry: Entry, name: str, known: Collection[str] | None, fixed: Mapping[str, str]
     ) -> None:

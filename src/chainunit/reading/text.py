@@ -13,6 +13,9 @@ Kinds, beside the unit (see `quantities.quantity`):
 ``hours``        the time of long operation, in h
 ``assumed``      a value that is known to one digit
 ``millimetres``  a length in mm
+``stress``       a stress or a pressure, in MPa
+``pv``           a pressure times a sliding speed, in MPa m/s
+``per_hour``     a number in each hour
 """
 
 from __future__ import annotations
@@ -52,6 +55,9 @@ DEFAULT_UNITS: Units = MappingProxyType(
         "energy": ("kWh",),
         "hours": ("h",),
         "millimetres": ("mm",),
+        "stress": ("MPa",),
+        "pv": ("MPa m/s",),
+        "per_hour": ("1/h",),
     }
 )
 _SHOWN_IN: ContextVar[Units] = ContextVar("units of words", default=DEFAULT_UNITS)
@@ -67,6 +73,9 @@ _SCALES: dict[str, dict[str, tuple[float, float]]] = {
     "torque": {"N.m": (1.0, 0.0), "kN.m": (1e-3, 0.0)},
     "force": {"N": (1.0, 0.0), "kN": (1e-3, 0.0)},
     "millimetres": {"mm": (1e3, 0.0)},
+    "stress": {"MPa": (1e-6, 0.0)},
+    "pv": {"MPa m/s": (1e-6, 0.0)},
+    "per_hour": {"1/h": (3600.0, 0.0)},
 }
 """By kind, the units in which it may be shown, with factor and offset: shown = factor * value + offset."""
 _BY_SIZE: Mapping[str, tuple[float, float, str]] = {

@@ -40,6 +40,8 @@ def report(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Rep
             for name, each in _sections().items()
             if name not in analysis_sections() or (each.analysis or name) in study.findings
         ]
+        # an analysis may have nothing to show
+        sections = [each for each in sections if each.blocks or each.name not in analysis_sections()]
         return b.Report(
             study.config.title,
             study.kind,

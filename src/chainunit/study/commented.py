@@ -10,7 +10,7 @@ from ..core.messages import unit_behind
 from ..drives.motors import MOTORS
 from ..reading.tables import toml
 from ..reading.toml_lines import Statement, statements
-from .keys import Key, KeyTable, entry_tables, key_tables
+from .keys import NAME, Key, KeyTable, entry_tables, key_tables
 from .schema import FILE
 
 _OF_OTHERS = ("motor_names.", "machine_names.")
@@ -46,7 +46,10 @@ def commented(text: str, machine: str = "ChamberForces") -> str:
 def _keys(table: str, machine: str, types: list[str]) -> Iterator[Key]:
     """The keys of a table of the file; of an event, those of its type."""
     name, _, number = table.partition(".")
-    name = next((each for each in entry_tables() if table.startswith(f"{each}.")), name)
+    begins = {
+        each: each.removesuffix(NAME) if each.endswith(f".{NAME}") else f"{each}." for each in entry_tables()
+    }
+    name = next((each for each, begin in begins.items() if table.startswith(begin)), name)
     of = types[int(number) - 1] if name == "event" else machine
     for each in key_tables():
         if each.name == name and each.of in ("", of):
@@ -57,7 +60,9 @@ def _absent(present: set[str], machine: str) -> Iterable[KeyTable]:
     return (
         each
         for each in key_tables()
-        if each.name and each.name not in {*present, "event"} and each.of in ("", machine, *MOTORS)
+        if each.name
+        and each.name.removesuffix(f".{NAME}") not in {*present, "event"}
+        and each.of in ("", machine, *MOTORS)
     )
 
 

@@ -6,8 +6,9 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from pydantic import BaseModel
+from pydantic import BaseModel, ConfigDict, create_model
 
+from ..core.quantities import declaration
 from ..reading.lists import TableList
 from ..reading.tables import given_values, schema
 
@@ -69,3 +70,28 @@ class FileSection:
     """lists and tables in it whose faults say nothing of its other keys"""
     deciders: Mapping[str, str] = field(default_factory=dict)
     """by a key of entries, the key of the table that decides whether it has a meaning"""
+    named: TableList | None = None
+    """where the file chooses the names in the table, the declaration of the tables [table.NAME]"""
+
+
+@declaration
+class NoQuantities:
+    """A table without quantities of its own."""
+
+
+def _open_form(declared: type, title: str, prefix: str, **more: Any) -> type[BaseModel]:
+    """The form of a table in which any name may stand; a capability reads the tables of these names."""
+    return create_model(title, __config__=ConfigDict(extra="allow"))
+
+
+def of_named(named: TableList) -> FileSection:
+    """The section of a table whose inner tables have names that the file chooses: [table.NAME]. Its capability reads
+    them by `TableList.read_named`, and its findings hold their values."""
+    return FileSection(
+        NoQuantities,
+        optional=True,
+        title=named.title,
+        is_used=lambda config: False,
+        form=TableForm(_open_form, lambda checked: {}),
+        named=named,
+    )

@@ -20,6 +20,7 @@ from ..drives.catalogue import TEXTS
 from ..drives.motors import MOTORS
 from ..models import MACHINES
 from ..reading.lists import TableList
+from ..reading.tables import instance
 from ..reading.text import CHOICES as UNITS
 from .config import Config, parse
 from .event import TYPES, Event
@@ -38,6 +39,8 @@ _OF_MOTORS = {
 
 
 NONE: Mapping[str, str] = MappingProxyType({})
+NAME = "NAME"
+"""It stands for a name that the file chooses."""
 _VALUE = "a number, or a text with a unit"
 
 
@@ -96,7 +99,12 @@ class KeyTable:
     @property
     def is_list(self) -> bool:
         """Whether a file may have several tables of this name."""
-        return self.name == "event" or self.name in entry_tables()
+        return self.name == "event" or (self.name in entry_tables() and not self.is_named)
+
+    @property
+    def is_named(self) -> bool:
+        """Whether the file chooses the name of the table, which stands here as ``NAME``."""
+        return self.name.endswith(f".{NAME}")
 
     @property
     def bracketed(self) -> str:
@@ -108,12 +116,14 @@ class KeyTable:
 
 @cache
 def entry_tables() -> dict[str, TableList]:
-    """The declarations of the lists of tables in a table, by the names of table and key."""
-    return {
-        f"{table}.{key}": entry
-        for table, section in all_sections().items()
-        for key, entry in section.entries.items()
-    }
+    """The declarations of the lists of tables in a table, by the names of table and key; and of the tables whose
+    names the file chooses, by the name of the table that holds them and `NAME`."""
+    found: dict[str, TableList] = {}
+    for table, section in all_sections().items():
+        found |= {f"{table}.{key}": entry for key, entry in section.entries.items()}
+        if section.named is not None:
+            found[f"{table}.{NAME}"] = section.named
+    return found
 
 
 @cache
@@ -142,6 +152,7 @@ def key_tables() -> tuple[KeyTable, ...]:
         *(
             KeyTable(name, section.title, tuple(_of_section(name, section)))
             for name, section in all_sections().items()
+            if section.named is None
         ),
         *(KeyTable(name, entry.title, tuple(_of_entry(entry))) for name, entry in entry_tables().items()),
         KeyTable("report", "Report", tuple(_of_report())),
@@ -258,7 +269,7 @@ def _of_entry(entry: TableList) -> Iterator[Key]:
     for key in _of_fields(entry.keys):
         yield dataclasses.replace(key, follows=entry.follows.get(key.name, ""))
     if entry.declared is not None:
-        yield from quantity_keys(entry.declared, entry.declared(), sources=entry.follows)
+        yield from quantity_keys(entry.declared, instance(entry.declared, {}), sources=entry.follows)
 
 
 def _of_fields(fields: Mapping[str, Any], values: Mapping[str, Any] | None = None) -> Iterator[Key]:

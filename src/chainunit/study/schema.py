@@ -72,6 +72,9 @@ class _Schema:
             place = properties
             if table.name in entry_tables():
                 above, _, name = table.name.partition(".")
+                if table.is_named:
+                    _object(properties, above, table.title)["additionalProperties"] = self._entry(table)
+                    continue
                 properties[above]["properties"][name]["items"] = self._entry(table)
                 continue
             if table.name:

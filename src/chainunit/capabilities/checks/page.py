@@ -1,0 +1,68 @@
+"""The section on the checks: a row for each, with its clause and formula, and what was not checked."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ...report import blocks as b
+from ...report.lines import Line, join, line
+from ...study.record import StudyRecord
+from .analysis import CheckFindings
+from .row import CheckRow
+
+
+def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+    """The table of the checks."""
+    found = CheckFindings.of_study(study)
+    if found.rows:
+        lead = (
+            "Each row is a check by the clause or source under it: the value of the run, the limit, and the share "
+            "of the limit that is used. A check holds up to 100 %. docs/checks.md has each formula with its "
+            "simplifications and an example."
+        )
+        yield b.Text(lead, "lead", "long")
+        yield b.Table(
+            tuple(_row(s, found, k) for k in range(len(found.rows))),
+            b.heads("check", "value", "limit", "used"),
+            title="Checks by clause",
+            note_title="clause, formula, numbers",
+            form="long",
+        )
+        yield b.Table(
+            tuple(_row(s, found, k, short=True) for k in range(len(found.rows))),
+            b.heads("check", "value", "limit", "used"),
+            title="Checks by clause",
+            form="short",
+        )
+
+
+def missing(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+    """What was not checked, and why."""
+    found = CheckFindings.of_study(study)
+    if found.not_checked:
+        cells = (
+            (s.words(f"checks.not_checked.{k}.what"), s.words(f"checks.not_checked.{k}.why"))
+            for k in range(len(found.not_checked))
+        )
+        yield b.Table(
+            tuple(map(b.TableRow, cells)), b.heads("not checked", "why"), numeric=False, form="long"
+        )
+
+
+def _row(s: b.Source, found: CheckFindings, k: int, *, short: bool = False) -> b.TableRow:
+    row, path = found.rows[k], f"checks.rows.{k}"
+    title = line(s.words(f"{path}.of"), ": ", s.words(f"{path}.title"))
+    limit = line("at least " if row.at_least else "at most ", s.number(f"{path}.limit"))
+    used = s.number(f"{path}.utilisation", over=not row.holds)
+    cells = (title, s.number(row.number), limit, b.Share(used))
+    note = (
+        () if short else line(s.words(f"{path}.clause"), ". ", s.words(f"{path}.formula"), *_numbers(s, row))
+    )
+    return b.TableRow(cells, note)
+
+
+def _numbers(s: b.Source, row: CheckRow) -> tuple[Line, ...]:
+    """The numbers of the formula, behind it."""
+    if not row.numbers:
+        return ()
+    return (" (", *join([line(f"{symbol} = ", s.number(at)) for symbol, at in row.numbers.items()]), ")")
