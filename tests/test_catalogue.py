@@ -18,7 +18,8 @@ from chainunit.core.integrators import rk4
 from chainunit.core.quantities import Layout
 from chainunit.drives.catalogue import LAYOUT, catalogue, heading, motor_of_catalogue
 from chainunit.drives.gearing import KINDS, W_REST, Transmission, motor_side
-from chainunit.drives.induction_motor import InductionMotor, breakdown, steady
+from chainunit.drives.induction_motor import InductionMotor
+from chainunit.drives.induction_steady import breakdown, steady
 from chainunit.drives.nameplate import LAYOUT as NAMEPLATE
 from chainunit.drives.nameplate import TYPICAL, Assumptions, Nameplate, check, identify
 

@@ -151,7 +151,8 @@ def test_types_of_an_fmu_are_those_of_the_declaration(version):
             if own.tag in names:
                 found[node.get("name")] = (own.tag, {**node.attrib, **own.attrib})
     assert {name: tag for name, (tag, _) in found.items()} == {
-        "solver.max_steps": names[0], "pole_pairs": names[0], "inverter.on": names[1], "alarm": names[0],
+        "solver.max_steps": names[0], "pole_pairs": names[0], "inverter.on": names[1],
+        "switching.preferred": names[1], "alarm": names[0],
     }  # fmt: skip
     assert [found[name][1]["start"] for name in ("solver.max_steps", "pole_pairs", "inverter.on")] == [
         "500000", "3", "true",

@@ -159,3 +159,14 @@ def test_the_scripts_run_without_a_warning(script, tmp_path):
     # fmpy prints its warnings
     output = process.stdout + process.stderr
     assert process.stdout and "warning" not in output.lower() and not list(tmp_path.iterdir())
+
+
+def test_a_motor_that_starts_in_star_is_closed_on_its_field(result):
+    numbers, message, _ = result("star_delta")
+    answers = numbers["answers"]
+    short, long = (answers[name]["current_peak"]["value"] for name in ("interruption_short", "interruption"))
+    assert 2.0 * short < long < 25.0 and "the motor is cut off and reclosed (short)" in message
+    start = numbers["start_up"]
+    # the change to delta takes more current than the start in star
+    assert start["current_peak"]["value"] > 2.0 * 11.1 * 0.95
+    assert start["start_time"]["value"] < 0.5

@@ -11,7 +11,8 @@ from scipy.integrate import solve_ivp
 
 from chainunit.core import engines
 from chainunit.core.integrators import rk4
-from chainunit.drives.induction_motor import InductionMotor, breakdown, skin, steady, volts_per_hertz
+from chainunit.drives.induction_motor import InductionMotor
+from chainunit.drives.induction_steady import breakdown, skin, steady, volts_per_hertz
 from chainunit.drives.motor import T_RATED
 
 LAYOUT = InductionMotor.state_layout

@@ -21,7 +21,7 @@ from chainunit.capabilities.flywheels.analysis import FlywheelFindings, least_fl
 from chainunit.capabilities.flywheels.wheel import FlywheelAnswers, Wheel
 from chainunit.core.engines import MATH
 from chainunit.core.quantities import Layout
-from chainunit.drives.induction_motor import steady
+from chainunit.drives.induction_steady import steady
 from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.models import MACHINES
 from chainunit.reading.text import entry, number

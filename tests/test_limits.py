@@ -10,7 +10,7 @@ from event_tables import event_line
 
 from chainunit import InputError
 from chainunit.core.engines import MATH
-from chainunit.drives import induction_motor as induction
+from chainunit.drives import induction_steady as induction
 from chainunit.study.config import parse
 from chainunit.study.judgement import motor_limits, motor_verdict
 from chainunit.study.limits import SPEED_DEVIATION, heating

@@ -234,6 +234,7 @@ STUDIES = {
     "on line": CATALOGUE.format("direct"),
     "inverter": CATALOGUE.format("inverter"),
     "soft": CATALOGUE.format("soft"),
+    "star-delta": CATALOGUE.format("star-delta") + "[[event]]\ntype = 'interruption'\n",
 }
 CHANGED = {
     "chain-unit": (
@@ -249,6 +250,7 @@ CHANGED = {
     "on line": ({"feed.left.processing_force": 60.0, "flywheel.J": 0.005, "gear.ratio": 50.0}, "jam_left"),
     "inverter": ({"feed.left.processing_force": 60.0, "machine.rocker.m": 75.0, "run.crank_speed": 2.8}, "jam_right"),
     "soft": ({"feed.left.processing_force": 60.0, "machine.rocker.m": 75.0}, "jam_right"),
+    "star-delta": ({"feed.left.processing_force": 60.0, "event.interruption.duration": 0.13}, "interruption"),
 }  # fmt: skip
 
 

@@ -199,7 +199,9 @@ def test_directional_derivatives_are_exact(native, name):
     first, n_u, n_x = len(interface.parameters), len(interface.inputs), len(interface.states)
     last = first + n_u + 2 * n_x + len(interface.others)
     rng = np.random.default_rng(8)
-    unit.setReal(list(range(first, first + n_u)), list(rng.uniform(0.5, 2.0, n_u)))
+    drawn = zip(rng.uniform(0.5, 2.0, n_u), model.input_layout.variables, strict=True)
+    within = [min(value, v.quantity.high) for value, v in drawn]
+    unit.setReal(list(range(first, first + n_u)), within)
     if n_x:
         x = (ctypes.c_double * n_x)(*rng.uniform(0.5, 2.0, n_x))
         unit.setContinuousStates(x, n_x)

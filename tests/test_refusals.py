@@ -93,8 +93,12 @@ def test_each_key_of_a_table_is_refused_in_toml_forms(table, shift):
     keys = [key for key in table.keys if key.name not in above and (table.name, key.name) not in names]
     wrong = [WRONG[(k + 3 * shift) % len(WRONG)] for k, _ in enumerate(keys)]
     right = {"switch": "true", "table": WRONG[0]}
+
+    def sort(key):
+        return "switch" if key.variable is not None and key.variable.type == "Boolean" else key.sort
+
     lines = [
-        f"{key.name} = {value if value != right.get(key.sort) and key.name != 'date' else 3}"
+        f"{key.name} = {value if value != right.get(sort(key)) and key.name != 'date' else 3}"
         for key, value in zip(keys, wrong, strict=True)
     ]
     text = _head(table) + "\n".join(lines)

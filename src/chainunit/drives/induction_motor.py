@@ -1,4 +1,5 @@
-"""A three-phase squirrel-cage induction motor: on the line, with a soft starter, or on an inverter with V/f control.
+"""A three-phase squirrel-cage induction motor: on the line, behind a contactor or in star, with a soft starter, or on
+an inverter with V/f control.
 
 The model is the Gamma equivalent circuit in a dq frame that turns with the supply, so that in steady running every
 state is constant. Flux linkages `psi` and currents `i` are space vectors of peak phase quantities; `s` means the
@@ -11,6 +12,8 @@ of the supply.
     (J_rotor + J_load) a = tau_air - d w - tau_load
     C dT/dt = losses - cooling(w) (T - T_ambient)/R_th
 
+`contactor` has the voltage u_s of an open contactor, and that of a winding in star.
+
 All leakage is on the rotor side, so that saturation of the main path follows from |psi_s| alone: 1/L_m grows by
 (beta |psi_s|)^6. The skin effect of a deep bar raises R_r and lowers L_l with the slip frequency, quasi-steadily, by
 2 s^2/(1 + s^2), with s = 1 at standstill on the line. Sources: H. R. Slemon, "Modelling of induction machines for
@@ -21,16 +24,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
-from ..core.engines import MATH
 from ..core.model import Part, Requirement
 from ..core.planar import Vec2
 from ..core.ports import LoadInput, measured_terminal
 from ..core.quantities import Value, declaration, group, quantity
-from ..core.search import lowest
+from .contactor import Switching, connection, opening
+from .induction_steady import SLIPS, Flux, breakdown, circuit, skin_slope, steady, volts_per_hertz
 from .motor import (
-    T_RATED,
     Motor,
     MotorOutputs,
     MotorParameters,
@@ -149,11 +151,12 @@ class Parameters(MotorParameters):
     soft_start: SoftStart = group(SoftStart, "soft starter", default=SoftStart())
     inverter: Inverter = group(Inverter, "inverter", default=Inverter())
     cooling: Cooling = group(Cooling, "cooling", default=Cooling())
+    switching: Switching = group(Switching, "switching", default=Switching())
 
 
 @declaration
 class Inputs(LoadInput):
-    """The load, the voltage of the supply and the speed demand of the inverter."""
+    """The load, the voltage of the supply, the speed demand of the inverter, and the contactor."""
 
     voltage: Value = quantity(
         "1",
@@ -163,14 +166,17 @@ class Inputs(LoadInput):
         max=2.0,
     )
     w_ref: Value = quantity("rad/s", "speed demand of the inverter", default=0.0)
-
-
-@declaration
-class Flux:
-    """A flux linkage in the frame of the supply."""
-
-    d: Value = quantity("Wb", "along the voltage")
-    q: Value = quantity("Wb", "across the voltage")
+    # the bounds leave room for the differences by which tools linearise
+    contactor: Value = quantity(
+        "1",
+        "contactor between line and motor: 1 closed, 0 open; between them, closed for this share of the time",
+        default=1.0,
+        min=-0.1,
+        max=1.1,
+    )
+    star: Value = quantity(
+        "1", "winding: 0 in delta, for which the parameters hold, 1 in star", default=0.0, min=-0.1, max=1.1
+    )
 
 
 @declaration
@@ -209,147 +215,49 @@ class States(ShaftStates):
 class Outputs(MotorOutputs):
     """Quantities that follow from the states."""
 
-    i: Value = quantity("A", "current of a phase, RMS")
-    v: Value = quantity("V", "line-to-line voltage, RMS", nominal=100.0)
+    i: Value = quantity("A", "current of a phase of the line, RMS")
+    v: Value = quantity(
+        "V",
+        "line-to-line voltage of the line at the winding, RMS; in star 1/sqrt(3) of it, 0 behind an open contactor",
+        nominal=100.0,
+    )
     slip: Value = quantity("1", "slip against the supply's present frequency; 1 at rest")
     magnetic_energy: Value = quantity("J", "energy of the magnetic field")
-
-
-def skin(s: Any) -> Any:
-    """The share of the skin effect at the slip frequency `s`, in parts of the supply's frequency: 0 at 0, 1 at 1."""
-    return 2.0 * s * s / (1.0 + s * s)
-
-
-def _circuit(p: Any, slip_speed: Any, T: Any) -> tuple[Any, Any, Any]:
-    """Resistances of stator and cage [Ohm] and the leakage inductance [H] at this slip [rad/s, electrical] and
-    temperature [K]."""
-    share = skin(slip_speed * (1.0 / (_TURN * p.supply.f)))
-    warm = 1.0 + p.stator.alpha * (T - T_RATED)
-    return (
-        p.stator.R * warm,
-        p.cage.R * warm * (1.0 + p.cage.skin_R * share),
-        p.cage.L * (1.0 - p.cage.skin_L * share),
+    terminal_v: Value = quantity(
+        "V",
+        "line-to-line voltage at the terminals, RMS; behind an open contactor that of the motor's field",
+        nominal=100.0,
     )
-
-
-def volts_per_hertz(xp: Any, p: Any, f: Any) -> Any:
-    """Share of the voltage that the inverter gives at the frequency `f` [Hz]: V/f with a boost at low frequency, and
-    the full voltage above the corner frequency."""
-    return xp.minimum(p.inverter.boost + (1.0 - p.inverter.boost) * f / p.supply.f, 1.0)
-
-
-class Steady(NamedTuple):
-    """Steady running at one speed. Values that are also outputs of the model have the same names and units; `psi` and
-    `psi_r` are the states."""
-
-    air_gap_tau: Any
-    tau: Any
-    """torque for a load, after friction and windage"""
-    i: Any
-    power_factor: Any
-    supply_power: Any
-    heat: Any
-    slip: Any
-    psi: Flux
-    psi_r: Flux
-
-
-_ITERATIONS = 20
-
-
-def steady(xp: Any, p: Any, w: Any, voltage_share: Any = 1.0, f: Any = None, T: Any = T_RATED) -> Steady:
-    """The state in which every flux is constant, at the rotor speed `w` [rad/s].
-
-    `voltage_share` is the share of the supply's voltage, `f` the frequency [Hz] (by default that of the supply), `T`
-    the temperature of the windings [K]. With all derivatives 0 the model's equations are the Gamma circuit,
-
-        i_r = -(g + j b) psi_s        g + j b = j w_r/(R_r + j w_r L_l)        w_r = 2 pi f - p w
-        u_s = (R_s (1/L_m + g) + j (2 pi f + R_s b)) psi_s
-
-    and |psi_s|^2, on which L_m depends, follows by Newton's method. From the flux without saturation it falls
-    monotonically to the root, because |u_s|^2 is a growing and convex function of it. The result is exact where
-    saturation lowers the flux at this voltage to no less than a third.
-    """
-    w_s = _TURN * (p.supply.f if f is None else f)
-    slip_speed = w_s - p.pole_pairs * w
-    R_s, R_r, leak = _circuit(p, slip_speed, T)
-    rotor = slip_speed / (R_r * R_r + slip_speed * slip_speed * leak * leak)
-    g, b = rotor * slip_speed * leak, rotor * R_r
-    u = math.sqrt(2.0 / 3.0) * p.supply.V * voltage_share
-    quadrature = w_s + R_s * b
-    beta_2 = p.main.beta * p.main.beta
-    beta_6 = beta_2 * beta_2 * beta_2
-    phase = R_s * (1.0 / p.main.L + g)
-    squared = u * u / (phase * phase + quadrature * quadrature)
-    for _ in range(_ITERATIONS):
-        cube = beta_6 * squared * squared * squared
-        phase = R_s * ((1.0 + cube) / p.main.L + g)
-        impedance = phase * phase + quadrature * quadrature
-        slope = impedance + 6.0 * phase * R_s * cube / p.main.L
-        squared = squared - (squared * impedance - u * u) / slope
-    main = (1.0 + beta_6 * squared * squared * squared) / p.main.L
-    phase = R_s * (main + g)
-    impedance = phase * phase + quadrature * quadrature
-    psi = Flux(d=u * phase / impedance, q=-u * quadrature / impedance)
-    ir_d, ir_q = psi.q * b - psi.d * g, -psi.q * g - psi.d * b
-    i_d, i_q = psi.d * main - ir_d, psi.q * main - ir_q
-    current = Vec2(i_d, i_q).length(xp)
-    air_gap = 1.5 * p.pole_pairs * squared * b
-    return Steady(
-        air_gap_tau=air_gap,
-        tau=air_gap - p.rotor.d * w,
-        i=math.sqrt(0.5) * current,
-        power_factor=i_d / current,
-        supply_power=1.5 * u * i_d,
-        heat=1.5 * (R_s * (i_d * i_d + i_q * i_q) + R_r * (ir_d * ir_d + ir_q * ir_q)),
-        slip=slip_speed / xp.maximum(w_s, 1e-3 * _TURN * p.supply.f),
-        psi=psi,
-        psi_r=Flux(d=psi.d + leak * ir_d, q=psi.q + leak * ir_q),
-    )
-
-
-_SLIPS = tuple(10.0 ** (k / 10.0) for k in range(-30, 1))
-
-
-def breakdown(p: Any, voltage_share: float = 1.0, f: float | None = None, T: float = T_RATED) -> Steady:
-    """Steady running at the largest torque of the shaft, between standstill and synchronous speed; arguments as in
-    `steady`.
-
-    It is the first maximum below synchronous speed: with a strong skin effect the torque rises again towards
-    standstill. The slip has a relative accuracy of 1e-5, the torque therefore one of about 1e-10.
-    """
-    synchronous = _TURN * (p.supply.f if f is None else f) / p.pole_pairs
-
-    def at(slip: float) -> Steady:
-        return steady(MATH, p, (1.0 - slip) * synchronous, voltage_share, f, T)
-
-    k, tau = 0, at(_SLIPS[0]).tau
-    while k + 1 < len(_SLIPS) and (next_tau := at(_SLIPS[k + 1]).tau) >= tau:
-        k, tau = k + 1, next_tau
-    low, high = _SLIPS[max(k - 1, 0)], _SLIPS[min(k + 1, len(_SLIPS) - 1)]
-    slip, _ = lowest(lambda slip: -float(at(slip).tau), low, high)
-    return max(at(slip), at(high), key=lambda s: s.tau)
+    contactor_v: Value = quantity(
+        "V", "voltage across the open contactor, line to line, RMS; largest where the motor's field opposes the line",
+        nominal=100.0,
+    )  # fmt: skip
+    arc_power: Value = quantity("W", "losses of the arcs of the contactor", nominal=100.0)
 
 
 class InductionMotorPoint(MotorPoint):
     """The motor at one state: supply, circuit, shaft."""
 
     __slots__ = (
-        "R_r", "R_s", "cooling", "df", "heat", "i_d", "i_q", "ir_d", "ir_q", "leak", "main", "slip_speed", "u", "w_s",
+        "R_r", "R_s", "cooling", "df", "gap", "heat", "i_d", "i_q", "ir_d", "ir_q", "leak", "psi_r_rate", "psi_rate",
+        "ratio", "slip_speed", "u", "u_d", "u_q", "w_s",
     )  # fmt: skip
 
     def __init__(self, xp: Any, p: Any, u: Any, x: Any) -> None:
         psi, psi_r, f = x.stator.psi, x.cage.psi, x.supply.frequency
         self.w_s = _TURN * f
         self.slip_speed = self.w_s - p.pole_pairs * x.w
-        self.R_s, self.R_r, self.leak = _circuit(p, self.slip_speed, x.stator.T)
+        self.R_s, self.R_r, self.leak = circuit(p, self.slip_speed, x.stator.T)
         squared = psi.d * psi.d + psi.q * psi.q
         b = p.main.beta * p.main.beta * squared
-        self.main = (1.0 + b * b * b) / p.main.L
+        main = (1.0 + b * b * b) / p.main.L
         self.ir_d, self.ir_q = (psi_r.d - psi.d) / self.leak, (psi_r.q - psi.q) / self.leak
-        self.i_d, self.i_q = psi.d * self.main - self.ir_d, psi.q * self.main - self.ir_q
+        self.i_d, self.i_q = psi.d * main - self.ir_d, psi.q * main - self.ir_q
         by_frequency = 1.0 + p.inverter.on * (volts_per_hertz(xp, p, f) - 1.0)
         self.u = math.sqrt(2.0 / 3.0) * p.supply.V * u.voltage * x.supply.ramp * by_frequency
+        ratio_d, ratio_q = connection(u.star, p.switching.preferred)
+        self.ratio = Vec2(ratio_d, ratio_q).length(xp)
+        self.u_d, self.u_q = self.u * ratio_d, self.u * ratio_q
         self.air_gap = 1.5 * p.pole_pairs * (psi.d * self.i_q - psi.q * self.i_d)
         demand = p.pole_pairs * u.w_ref / _TURN + p.inverter.slip * self.air_gap
         target = p.supply.f + p.inverter.on * (xp.maximum(demand, 0.0) - p.supply.f)
@@ -360,21 +268,45 @@ class InductionMotorPoint(MotorPoint):
         )
         self.cooling = InductionMotor.cooling(xp, p, x.w)
         self.turn(p, u, x)
+        self._flux_rates(p, u, x, main, 6.0 * b * b * p.main.beta * p.main.beta / p.main.L)
+
+    def _flux_rates(self, p: Any, u: Any, x: Any, main: Any, bend: Any) -> None:
+        """The derivatives of the fluxes, and the voltage by which an open contactor changes that of the winding.
+        `main` is 1/L_m [1/H], `bend` twice its derivative by |psi|^2."""
+        psi, psi_r = x.stator.psi, x.cage.psi
+        rotor_d = -self.R_r * self.ir_d + self.slip_speed * psi_r.q
+        rotor_q = -self.R_r * self.ir_q - self.slip_speed * psi_r.d
+        closed_d = self.u_d - self.R_s * self.i_d + self.w_s * psi.q
+        closed_q = self.u_q - self.R_s * self.i_q - self.w_s * psi.d
+        # the skin effect changes the leakage with the slip
+        rated = _TURN * p.supply.f
+        slope = (
+            skin_slope(self.slip_speed / rated)
+            * (_TURN * p.inverter.on * self.df - p.pole_pairs * self.a)
+            / rated
+        )
+        leak_rate = -p.cage.L * p.cage.skin_L * slope
+        pull = (rotor_d - self.ir_d * leak_rate) / self.leak, (rotor_q - self.ir_q * leak_rate) / self.leak
+        currents = self.i_d, self.i_q
+        open_d, open_q = opening(
+            (psi.d, psi.q), main + 1.0 / self.leak, bend, pull, currents, p.switching.decay
+        )
+        away = 1.0 - u.contactor
+        self.gap = away * (open_d - closed_d), away * (open_q - closed_q)
+        self.psi_rate = closed_d + self.gap[0], closed_q + self.gap[1]
+        self.psi_r_rate = rotor_d, rotor_q
 
     def rates(self, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
         """Time derivatives of the states after the derivatives of the shaft's states."""
-        psi, psi_r = x.stator.psi, x.cage.psi
         # the soft starter runs while the supply is on, up to the full voltage
         limit = (1.0 - x.supply.ramp) / 2e-3
         rise = xp.minimum((1.0 - p.soft_start.voltage) / p.soft_start.time, limit)
         return [
-            self.u - self.R_s * self.i_d + self.w_s * psi.q,
-            -self.R_s * self.i_q - self.w_s * psi.d,
+            *self.psi_rate,
             self.warming(p, p.stator, x.stator.T, self.cooling),
-            -self.R_r * self.ir_d + self.slip_speed * psi_r.q,
-            -self.R_r * self.ir_q - self.slip_speed * psi_r.d,
+            *self.psi_r_rate,
             p.inverter.on * self.df,
-            rise * xp.minimum(u.voltage * 1e3, 1.0),
+            rise * xp.minimum(u.voltage * 1e3, 1.0) * u.contactor,
         ]
 
 
@@ -385,14 +317,19 @@ def _outputs(xp: Any, p: Any, u: Any, x: Any, s: InductionMotorPoint) -> Outputs
     # energy of the main field: the integral of i_m d psi; of the leakage field: L i^2/2
     main = 0.5 * squared * (1.0 + 0.25 * b * b * b) / p.main.L
     leakage = 0.5 * s.leak * (s.ir_d * s.ir_d + s.ir_q * s.ir_q)
+    gap_d, gap_q = s.gap
+    per_line = math.sqrt(1.5) / s.ratio
     return Outputs(
         **s.outputs(),
-        i=math.sqrt(0.5) * Vec2(s.i_d, s.i_q).length(xp),
-        v=math.sqrt(1.5) * s.u,
+        i=math.sqrt(0.5) * Vec2(s.i_d, s.i_q).length(xp) * s.ratio,
+        v=math.sqrt(1.5) * s.u * s.ratio * u.contactor,
         slip=s.slip_speed / xp.maximum(s.w_s, 1e-3 * _TURN * p.supply.f),
-        supply_power=1.5 * s.u * s.i_d,
+        supply_power=1.5 * (s.u_d * s.i_d + s.u_q * s.i_q),
         heat=s.heat,
         magnetic_energy=1.5 * (main + leakage),
+        terminal_v=per_line * Vec2(s.u_d + gap_d, s.u_q + gap_q).length(xp),
+        contactor_v=per_line * Vec2(gap_d, gap_q).length(xp),
+        arc_power=-1.5 * (gap_d * s.i_d + gap_q * s.i_q),
     )
 
 
@@ -402,7 +339,9 @@ class InductionMotor(Motor):
     With the start values the motor starts direct on line. With `soft_start.voltage` below 1 it has a soft starter.
     With `inverter.on` = 1 it runs on an inverter and follows `w_ref`. The input `voltage` makes dips. At 0 the
     terminals are short-circuited: as long as the field lasts, currents as large as at the start flow and brake the
-    shaft. A motor that a contactor cuts off, with open terminals, would coast; this is not in the model.
+    shaft. With the input `contactor` at 0 the terminals are open: the currents vanish in `switching.decay`, the motor
+    coasts, and its field decays with the time constant of the cage; a contactor that closes meanwhile finds the field
+    at its phase. With `star` at 1 the winding is in star. A soft starter does not begin anew after an opening.
     """
 
     name = "InductionMotor"
@@ -438,7 +377,7 @@ class InductionMotor(Motor):
         with an error of about 1 % (the current limit of the inverter is not in the model)."""
         on_line = steady(xp, p, w).air_gap_tau
         most = on_line * 0.0
-        for slip in _SLIPS:
+        for slip in SLIPS:
             f = xp.maximum(p.pole_pairs * w / _TURN, 0.0) + slip * p.supply.f
             most = xp.maximum(most, steady(xp, p, w, volts_per_hertz(xp, p, f), f).air_gap_tau)
         return on_line + p.inverter.on * (most - on_line)
@@ -473,10 +412,11 @@ class InductionMotor(Motor):
 
     @staticmethod
     def internal_step(xp: Any, p: Any) -> Any:
-        """The least of a quarter of the fluxes' time constant, 1/12 rad of the supply, `friction_time`, 0.25 ms."""
+        """The least of a quarter of the time constant of the fluxes and of the contactor, 1/12 rad of the supply,
+        `friction_time`, 0.25 ms."""
         by_flux = 0.25 * p.cage.L * (1.0 - p.cage.skin_L) / _resistance(p)
         longest = xp.minimum(xp.minimum(2.5e-4, 1.0 / (12.0 * _TURN * p.supply.f)), by_flux)
-        return xp.minimum(longest, friction_time(xp, p.rotor))
+        return xp.minimum(xp.minimum(longest, 0.25 * p.switching.decay), friction_time(xp, p.rotor))
 
     @staticmethod
     def initial_states(xp: Any, p: Any) -> Any:

@@ -29,7 +29,8 @@ import numpy as np
 from ..core.engines import MATH, Dual, dual, slope, value
 from ..core.errors import Faults, InputError
 from ..core.quantities import Layout, Value, complaint, declaration, quantity, violations
-from .induction_motor import InductionMotor, Parameters, Steady, breakdown, steady
+from .induction_motor import InductionMotor, Parameters
+from .induction_steady import Steady, breakdown, steady
 from .motor import T_RATED
 
 _TURN = 2.0 * math.pi

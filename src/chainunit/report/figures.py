@@ -286,7 +286,9 @@ def _marks(study: StudyRecord, name: str, event: float | None) -> Callable[[bool
     def marks(words: bool) -> list[fig.Item]:
         if event is not None:
             loads = (name for name in study.drive.machine.model.input_layout.names if name not in _MOTION)
-            changing = _load_change(run, [*(f"machine.{load}" for load in loads), "motor.voltage"])
+            changing = _load_change(
+                run, [*(f"machine.{load}" for load in loads), "motor.voltage", "motor.contactor"]
+            )
             shade = [] if changing is None else [fig.Shade(changing[0] - event, changing[1] - event)]
             return [*shade, fig.Mark(0.0, words="event" if words else "")]
         if name == "start_up" and study.answers:

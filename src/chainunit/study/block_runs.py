@@ -172,7 +172,10 @@ class BlockRuns:
         """By full name of an input that differs between points, or over time, the number of its changes."""
         unknown: Mapping[str, float] = defaultdict(float)
         # a start has a ramp of the reference, and may have a rise of each load
-        driven = dict.fromkeys(self.rig.normal, 1) if self._start is None else {}
+        driven: dict[str, int] = {}
+        if self._start is None:
+            from_rest = self.rig.signals(ramp=True)
+            driven = {full: max(1, len(getattr(x, "changes", ()))) for full, x in from_rest.items()}
         for event in self._events:
             for full, signal in self.rig.event_signals(event, 0.0, unknown).items():
                 driven[full] = max(driven.get(full, 0), len(getattr(signal, "changes", ())))

@@ -88,6 +88,7 @@ def catalogue_drive(
         rated_current=plate.rated_current,
         gear_inertia=tables.gear.J,
         gear_friction=drag,
+        star_delta=tables.starter.star_delta if tables.start == "star-delta" else None,
     )
 
 
@@ -110,6 +111,9 @@ def with_starter(tables: DriveTables, p: Any, plate: Nameplate) -> Any:
         slip_hz = (plate.synchronous - plate.speed) * plate.poles / (4.0 * math.pi)
         control["slip"] = slip_hz / plate.torque
     soft = tables.starter.soft_start if tables.start == "soft" else p.soft_start
+    if tables.start == "star-delta":
+        preferred = tables.starter.star_delta.preferred
+        p = replace(p, switching=replace(p.switching, preferred=preferred))
     return replace(p, soft_start=soft, inverter=Inverter(on=float(follows), **control))
 
 

@@ -120,7 +120,7 @@ class Config:
     def operation(self) -> OperatingConditions:
         """What the runs of the drive have in common."""
         return OperatingConditions(
-            self.run, self.feed, self.empty_start, self.drive.soft_time, self.coupling, self.simulation
+            self.run, self.feed, self.empty_start, self.drive.starter_time, self.coupling, self.simulation
         )
 
     @property

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from ..core.errors import InputError
 from ..core.quantities import Layout
+from ..drives.contactor import CONTACTOR_EDGE, StarDelta
 from ..drives.gear import Gear
 from ..drives.motor import Motor
 from ..drives.speed_control import Tuning
@@ -72,6 +73,9 @@ class Drive:
     """a load observer, which takes signals of the motor"""
     observed: Mapping[str, str] = field(default_factory=dict)
     """by input of the observer, the output of the motor that it takes"""
+
+    star_delta: StarDelta | None = None
+    """the starter of a motor that starts in star; None for another start"""
 
     foreign: FmuComponent | None = None
     """the motor, if it is a foreign FMU; then `motor` is `Motor` itself, of which only the terminals are
@@ -217,6 +221,24 @@ class Drive:
         crank."""
         bond = self.machine_bond
         return f"{bond.driver}.{bond.flanges[0].members[quantity]}", self.ratio_at_machine
+
+    @property
+    def switched_until(self) -> float:
+        """Time in a start from rest from which the motor is in delta [s]; 0 without star."""
+        starter = self.star_delta
+        return 0.0 if starter is None else float(starter.time + starter.pause + CONTACTOR_EDGE)
+
+    def switching(self) -> dict[str, Any]:
+        """The signals of the contactor and of the connection in a start from rest."""
+        if self.star_delta is None:
+            return {}
+        begin, pause = self.star_delta.time, self.star_delta.pause
+        opens, closes = (begin, CONTACTOR_EDGE, 0.0), (begin + pause, CONTACTOR_EDGE, 1.0)
+        # the connection changes while no current flows
+        return {
+            "motor.contactor": Profile(1.0, (opens, closes)),
+            "motor.star": Profile(1.0, ((begin + 0.75 * pause, 0.2 * pause, 0.0),)),
+        }
 
     def reference(self, crank_speed: float, ramp: float | None = None) -> dict[str, Any]:
         """The signal of the speed reference for this crank speed [rad/s], after a `ramp` from rest [s] if one

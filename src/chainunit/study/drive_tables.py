@@ -22,8 +22,10 @@ class DriveTables:
     """names of all values that the file sets, such as "gear.ratio\""""
 
     @property
-    def soft_time(self) -> float:
-        """Time in which a soft starter raises the voltage [s]; 0 without one."""
+    def starter_time(self) -> float:
+        """Time after which a starter gives the motor the whole voltage [s]; 0 without one."""
+        if self.start == "star-delta":
+            return float(self.starter.star_delta.time + self.starter.star_delta.pause)
         return float(self.starter.soft_start.time) if self.start == "soft" else 0.0
 
     @property

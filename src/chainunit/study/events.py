@@ -10,6 +10,7 @@ from functools import cache
 from typing import Any, ClassVar
 
 from ..core.quantities import Value, declaration, quantity
+from ..drives.contactor import CONTACTOR_EDGE
 from ..machines.chain_unit import SideName, other
 from ..reading.text import number
 from ..system.signals import Profile
@@ -285,6 +286,39 @@ class Dip(Event):
         whole = normal["voltage"]
         low = (at, edge, (1.0 - self.p.depth) * whole)
         return {"voltage": Profile(whole, (low, (at + self.p.duration, edge, whole)))}
+
+
+class Interruption(Event):
+    """The contactor of the motor opens, and closes on the field that remains."""
+
+    kind, run = "interruption", "interruption"
+    words, heading = "the motor is cut off and reclosed", "interruption"
+    role, has_side = Role.DISTURBANCE, False
+    acts_on = ("contactor",)
+
+    @declaration
+    class Parameters(Timing):
+        """Quantities of the interruption."""
+
+        duration: Value = quantity(
+            "s",
+            "time for which the contactor is open; at its end it closes on the field of the motor",
+            default=0.1,
+            min=CONTACTOR_EDGE,
+            max=1e4,
+            usual=(5e-3, 60.0),
+        )
+
+    @property
+    def without(self) -> str:
+        """See `Event`: a DC motor has its own supply."""
+        return "this motor's drive has no contactor on the line"
+
+    def signals(self, normal: Values, at: float, state: Values) -> Signals:
+        """The contactor opens and closes."""
+        usual = normal["contactor"]
+        changes = ((at, CONTACTOR_EDGE, 0.0), (at + self.p.duration, CONTACTOR_EDGE, usual))
+        return {"contactor": Profile(usual, changes)}
 
 
 class HardCut(Event):

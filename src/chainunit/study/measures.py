@@ -61,7 +61,12 @@ def _reserve(w: Window) -> float:
     if w.drive.follows and (w.steady or w).speed_mean < 0.99 * w.requested_speed:
         # a controlled motor that falls behind gives all the torque that it can
         return 0.0
-    return torque_reserve(largest_torque(w.drive, w.run, w.warm), driving)
+    limit = largest_torque(w.drive, w.run, w.warm)
+    if "motor.contactor" in w.run:
+        # a motor that is cut off is asked for no torque
+        closed = w.value("motor.contactor") == 1.0
+        limit, driving = limit[closed], driving[closed]
+    return torque_reserve(limit, driving)
 
 
 def _recovery(w: Window) -> float | None:

@@ -18,8 +18,8 @@ class OperatingConditions:
     """loads in normal running, as the machine declares them"""
     empty_start: bool = False
     """whether the feed comes once the machine runs"""
-    soft_time: float = 0.0
-    """time in which a soft starter raises the voltage [s]; 0 without one"""
+    starter_time: float = 0.0
+    """time after which a starter gives the motor the whole voltage [s]; 0 without one"""
     coupling: Coupling | None = None
     simulation: str = "cs"
     """one of `chainunit.study.sections.SIMULATIONS`"""
@@ -36,8 +36,8 @@ class OperatingConditions:
 
     @property
     def ramp_end(self) -> float:
-        """Time at which the ramp of the reference or of the soft starter ends [s]."""
-        return float(max(self.run.ramp, self.soft_time))
+        """Time at which the ramp of the reference ends, or the work of a starter [s]."""
+        return float(max(self.run.ramp, self.starter_time))
 
     @property
     def steady_begin(self) -> float:

@@ -52,7 +52,9 @@ def _name_in_file(study: StudyRecord, parameter: str) -> str:
         return "start"
     if parameter == "inverter.slip" and config.drive.start == "inverter" and SLIP not in config.file.given:
         return ""
+    if parameter == "switching.preferred" and config.drive.start == "star-delta":
+        return "starter.star_delta.preferred"
     if group in ("soft_start", "inverter"):
         return f"starter.{parameter}"
-    is_own = parameter in ("phi_start", "w_start", "ambient.T") or group == "solver"
+    is_own = parameter in ("phi_start", "w_start", "ambient.T") or group in ("solver", "switching")
     return f"motor.{parameter}" if is_own else ""

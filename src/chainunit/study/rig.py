@@ -103,7 +103,7 @@ class Rig:
 
     def signals(self, changes: Mapping[str, OverTime] | None = None, *, ramp: bool = False) -> Signals:
         """Loads of normal running, or the `changes` in their place, and the speed reference, with `ramp` from
-        rest."""
+        rest, where a starter switches the motor."""
         run = self.operation.run
         loads = self.drive.loads(self.operation.feed)
         if ramp and self.operation.empty_start:
@@ -111,6 +111,7 @@ class Rig:
             loads = {full: self._coming(empty[full], value) for full, value in loads.items()}
         signals = {
             **loads,
+            **(self.drive.switching() if ramp else {}),
             **(changes or {}),
             **self.drive.reference(run.crank_speed, run.ramp if ramp else None),
         }

@@ -9,6 +9,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, create_model
 
 from ..core.quantities import Value, declaration, group, quantity
+from ..drives.contactor import StarDelta
 from ..drives.gearing import KINDS, Transmission
 from ..drives.induction_motor import InverterControl, SoftStart
 from ..drives.motor import Motor
@@ -91,10 +92,11 @@ class Coupling:
 
 @declaration
 class Starter:
-    """The starter of an induction motor, where `start` is "soft" or "inverter"; the key `start` chooses
-    between them."""
+    """The starter of an induction motor, where `start` is "star-delta", "soft" or "inverter"; the key `start`
+    chooses between them."""
 
     soft_start: SoftStart = group(SoftStart, "soft starter", default=SoftStart(voltage=0.5, time=1.0))
+    star_delta: StarDelta = group(StarDelta, "star-delta starter", default=StarDelta())
     inverter: InverterControl = group(InverterControl, "inverter", default=InverterControl())
     overload: Value = quantity(
         "1",
@@ -108,10 +110,11 @@ class Starter:
 SIMULATIONS = ("cs", "me")
 """The methods of simulation: as a co-simulation, or as one ODE of Model Exchange FMUs."""
 
-STARTS = ("direct", "soft", "inverter")
+STARTS = ("direct", "star-delta", "soft", "inverter")
 
 SOFTER: Mapping[str, str] = {
     "direct": 'start softer (start = "soft" or "inverter")',
+    "star-delta": 'start softer (start = "soft" or "inverter")',
     "soft": "lower the voltage or lengthen the ramp of the soft starter",
     "inverter": "lengthen run.ramp",
 }
@@ -130,7 +133,8 @@ CHOICES: Mapping[str, Any] = {
         Literal[STARTS],
         Field(
             "direct",
-            description="start of a motor of the catalogue: on line, by a soft starter, or by an inverter",
+            description="start of a motor of the catalogue: on line, in star and delta, by a soft starter, or by "
+            "an inverter",
         ),
     ),
     "simulation": (

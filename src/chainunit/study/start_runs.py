@@ -70,7 +70,8 @@ def start_from(
         run = simulation.run(longest, step, guards={name: goal})
         reached = float(simulation.time) if float(run[name][-1]) >= (1.0 - 1e-9) * goal else None
         if reached is not None:
-            run = join([run, simulation.run(reached + _AFTER, step)])
+            # the change from star to delta is a part of the start
+            run = join([run, simulation.run(max(reached, rig.drive.switched_until) + _AFTER, step)])
         else:
             # it may have settled at another speed: then it has started, as in the start-up of a study
             time, speed = run["time"].values, run[name].values / ratio
@@ -79,7 +80,8 @@ def start_from(
     time, current = run["time"].values, np.abs(run[f"motor.{rig.drive.motor.current}"].values)
     relay, rated = None, rig.drive.rated_current
     if reached is not None and rated is not None and not rig.drive.follows:
-        relay = start_class(time[time <= reached], current[time <= reached], rated)
+        starting = time <= max(reached, rig.drive.switched_until)
+        relay = start_class(time[starting], current[starting], rated)
     return StartNumbers(
         angle=angle,
         gear_torque=at_gear(rig.drive, run),

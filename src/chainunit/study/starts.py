@@ -97,6 +97,7 @@ class StartFindings(Findings):
 
 _STARTERS = {
     "direct": "A start direct on line",
+    "star-delta": "A start in star and delta",
     "soft": "A start with the soft starter",
     "inverter": "A start by the inverter",
 }

@@ -28,7 +28,8 @@ from chainunit.capabilities.sizing.page import _best, _starter
 from chainunit.capabilities.sizing.protection import CouplingEffect, Obstacle, Setting, Way
 from chainunit.core.engines import MATH
 from chainunit.core.errors import InputError
-from chainunit.drives.induction_motor import InductionMotor, steady
+from chainunit.drives.induction_motor import InductionMotor
+from chainunit.drives.induction_steady import steady
 from chainunit.drives.motor import T_RATED
 from chainunit.drives.slip_clutch import SlipClutch
 from chainunit.machines.chain_unit import SIDES

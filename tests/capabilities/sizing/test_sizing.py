@@ -26,7 +26,8 @@ from chainunit.core.engines import MATH
 from chainunit.core.errors import InputError, InterruptedRunError
 from chainunit.drives.catalogue import catalogue
 from chainunit.drives.dc_motor import DcMotor
-from chainunit.drives.induction_motor import InductionMotor, breakdown, steady
+from chainunit.drives.induction_motor import InductionMotor
+from chainunit.drives.induction_steady import breakdown, steady
 from chainunit.drives.motor import T_RATED
 from chainunit.fmu.backends import export
 from chainunit.machines.chain_unit import Feed, SideLoads

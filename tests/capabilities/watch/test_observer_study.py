@@ -14,7 +14,8 @@ from chainunit import InputError
 from chainunit.core.engines import MATH
 from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
-from chainunit.drives.induction_motor import InductionMotor, steady
+from chainunit.drives.induction_motor import InductionMotor
+from chainunit.drives.induction_steady import steady
 from chainunit.drives.motor import Motor
 from chainunit.drives.terminal_signals import terminal_signals
 from chainunit.machines.load_observer import FARTHEST, Inputs, rotor_torque

@@ -180,7 +180,7 @@ def _soft_starter(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative
             p = with_starter(own, rig.drive.parameters, plate)
             soft = dataclasses.replace(
                 rig,
-                operation=dataclasses.replace(rig.operation, soft_time=time),
+                operation=dataclasses.replace(rig.operation, starter_time=time),
                 drive=dataclasses.replace(rig.drive, parameters=p),
             )
             yield soft, usual + time, {"voltage": voltage, "ramp": time}
@@ -227,7 +227,7 @@ def _inverter(study: StudyRecord, rig: Rig, setting: Setting) -> Alternative:
         own = dataclasses.replace(tables, start="inverter", starter=starter)
         for ramp in RAMPS:
             run = dataclasses.replace(rig.operation.run, ramp=ramp)
-            operation = dataclasses.replace(rig.operation, run=run, soft_time=0.0)
+            operation = dataclasses.replace(rig.operation, run=run, starter_time=0.0)
             p = with_starter(own, rig.drive.parameters, plate)
             drive = dataclasses.replace(rig.drive, parameters=p, follows=True, observer=None, observed={})
             fed = dataclasses.replace(

@@ -111,6 +111,8 @@ def _starter(s: b.Source, path: str) -> Iterator[Line]:
     start = s.result["start"] if "starter" in s.result else "direct"
     if start == "soft":
         yield s.line("soft starter, {=starter.soft_start.voltage} voltage, {=starter.soft_start.time}")
+    elif start == "star-delta":
+        yield s.line("star-delta starter, {=starter.star_delta.time} in star")
     elif start == "inverter":
         current = s.line(f" of at least {{{path}.numbers.inverter_current}}") if _starts(s, path) else ()
         yield line("inverter", current, s.line(", boost {=starter.inverter.boost}, ramp {=run.ramp}"))

@@ -186,7 +186,7 @@ def _remedy(trials: MotorTrials, c: Candidate) -> str:
     if start != "direct":
         return SOFTER[start]
     soft_tables = dataclasses.replace(tables, start="soft")
-    operation = dataclasses.replace(trials.task.operation, soft_time=soft_tables.soft_time)
+    operation = dataclasses.replace(trials.task.operation, starter_time=soft_tables.starter_time)
     softly = dataclasses.replace(
         trials, task=dataclasses.replace(trials.task, tables=soft_tables, operation=operation)
     )

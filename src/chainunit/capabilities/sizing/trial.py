@@ -15,7 +15,7 @@ import xarray as xr
 
 from ...core.engines import MATH
 from ...drives.catalogue import CatalogueMotor
-from ...drives.induction_motor import volts_per_hertz
+from ...drives.induction_steady import volts_per_hertz
 from ...drives.motor import T_RATED
 from ...machines.chain_unit import SideName
 from ...study.arrays import peak
@@ -100,7 +100,7 @@ class Trial:
         runs = (self.start, self.steady)
         names = ("time", f"motor.{self.drive.motor.current}")
         time, current = (np.concatenate([run[name].values for run in runs]) for name in names)
-        starting = time <= self._first
+        starting = time <= max(self._first, self.drive.switched_until)
         first = start_class(time[starting], current[starting], self.motor.nameplate.rated_current)
         return max(first, *(start.start_class for start in self.starts), 0)
 
@@ -323,8 +323,8 @@ def try_motor(
     # three times as long as the rated torque takes to bring all inertia up to speed, and at least the ramp of
     # the start
     inertia = drive.fmu_parameters.rotor.J + duty.numbers.inertia_mean / drive.ratio**2
-    rise = task.tables.soft_time or ramp
-    window = max(1.0, 3.0 * inertia * plate.speed / plate.torque, 1.5 * rise)
+    rise = ramp if drive.star_delta else task.tables.starter_time or ramp
+    window = drive.switched_until + max(1.0, 3.0 * inertia * plate.speed / plate.torque, 1.5 * rise)
     if operation.empty_start:
         # the run ends with a turn without feed
         window += turn

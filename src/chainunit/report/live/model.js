@@ -250,7 +250,7 @@ const liveModel = async (data, bytes) => {
       this.turnTime = TURN / this.speed;
       const role = (name, otherwise) => (placeOf(name) < 0 ? otherwise : values[placeOf(name)]);
       this.ramp = role("ramp", of.ramp);
-      this.rampEnd = Math.max(this.ramp, of.soft_time);
+      this.rampEnd = Math.max(this.ramp, of.starter_time);
       this.trip = role("trip", of.trip);
       this.release = role("release", 0);
       this.inputs = { ...of.inputs };
@@ -288,6 +288,7 @@ const liveModel = async (data, bytes) => {
         const w = this.speed * this.ratio;
         all[this.of.reference] = fromRest ? { start: 0, changes: [[0, this.ramp, w]] } : { start: w, changes: [] };
       }
+      if (fromRest) Object.assign(all, this.of.switching);
       return { ...all, ...changes };
     }
 
@@ -373,7 +374,7 @@ const liveModel = async (data, bytes) => {
       if (!this.of.empty_start || event) return this.run(0, this.rowsOf(time), signals);
       const free = this.run(0, this.rowsOf(time), signals), speed = this.crank(free).speed;
       const row = speed.findIndex((w) => w >= this.of.started * this.speed);
-      const from = row < 0 ? this.rampEnd + this.of.settle_turns * this.turnTime : free.time[row];
+      const from = row < 0 ? this.rampEnd + this.of.settle_turns * this.turnTime : Math.max(free.time[row], this.of.switched_until);
       signals = this.signals({}, true, from);
       this.setInputs(signals);
       this.k.functions.start();

@@ -22,6 +22,7 @@ from ...study.start_up import PATIENCE
 from ...study.window import CLOSED, DRIFT
 from ...system.certificate import torque_names
 from ...system.compiled_simulation import LONGEST, CompiledSystem
+from ...system.signals import Profile
 from .formulas import event_signals
 from .quantities import LiveQuantity, shown_in_unit
 
@@ -100,7 +101,9 @@ def live_runs(
         "line_ratio": float(drive.line.ratio),
         "reference": "motor.w_ref" if drive.follows else None,
         "ramp": float(run.ramp),
-        "soft_time": operation.soft_time,
+        "switching": {full: _profile(x) for full, x in drive.switching().items()},
+        "switched_until": drive.switched_until,
+        "starter_time": operation.starter_time,
         "settle_turns": float(run.settle_turns),
         "turns": float(run.turns),
         "step": max(float(run.step), SHORTEST),
@@ -125,6 +128,10 @@ def live_runs(
     }
     names = {*model.parameter_layout.names, *system.inputs}
     return LiveRuns(module, data, names, tuple(_quantities(drive, operation, taken, names)))
+
+
+def _profile(signal: Profile) -> dict[str, Any]:
+    return {"start": float(signal.start), "changes": [list(map(float, change)) for change in signal.changes]}
 
 
 def _gear_loss(plate: CatalogueMotor, gear: Any, drive: Drive) -> dict[str, Any]:
