@@ -23,6 +23,7 @@ NAMES = (
     "sweep",
     "comparison",
     "linear",
+    "handover",
 )
 """The folders of the capabilities, in the order in which their tables, results and sections come."""
 

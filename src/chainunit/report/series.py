@@ -5,7 +5,8 @@ This line opens result.nc::
     runs = xarray.open_datatree("results/result.nc")
 
 ``runs["jam_left"]["machine.tau"]`` is then the torque in that run over ``time``, with its unit and description in
-``attrs``. A tool that knows no trees opens a run as a group: ``xarray.open_dataset(file, group="jam_left")``.
+``attrs``. The start-up has the time at which the turns of load_cycle.csv begin, ``attrs["steady_begin"]`` [s]. A tool
+that knows no trees opens a run as a group: ``xarray.open_dataset(file, group="jam_left")``.
 """
 
 from __future__ import annotations
@@ -23,6 +24,8 @@ from ..work.interrupts import stoppable
 from .run_names import title
 
 SERIES = "result.nc"
+STEADY_BEGIN = "steady_begin"
+"""Attribute of the start-up: the time at which the turns of the load cycle begin [s]."""
 
 
 def _load_cycle(study: StudyRecord, turns: xr.Dataset, file: Path) -> Path:
@@ -39,9 +42,16 @@ def _load_cycle(study: StudyRecord, turns: xr.Dataset, file: Path) -> Path:
     return file
 
 
+def _has_cycle(study: StudyRecord) -> bool:
+    return "steady" in study.answers and has_turn(study.drive, study.steady)
+
+
 def tree(study: StudyRecord) -> xr.DataTree:
     """The time series of all runs, a node for each run; each variable has its unit and description."""
     runs = {f"/{name}": run.assign_attrs(title=title(study, name)) for name, run in study.runs.items()}
+    if _has_cycle(study):
+        start_up = runs["/start_up"]
+        runs["/start_up"] = start_up.assign_attrs({STEADY_BEGIN: float(study.steady["time"][0])})
     whole_study = xr.DataTree.from_dict(runs)
     whole_study.attrs.update(title=study.config.title, source=f"chainunit {__version__}")
     return whole_study
@@ -53,7 +63,7 @@ def write(study: StudyRecord, folder: Path) -> list[Path]:
     ``result.nc`` is netCDF-4 with a group per run, the `tree`.
     """
     files = []
-    if "steady" in study.answers and has_turn(study.drive, study.steady):
+    if _has_cycle(study):
         files.append(_load_cycle(study, study.steady, folder / LOAD_CYCLE))
     if study.runs:
         file = folder / SERIES

@@ -8,11 +8,12 @@ import shutil
 import pytest
 from command import chainunit
 
-from chainunit.capabilities.comparison.comparison import compare, read_result
+from chainunit.capabilities.comparison.comparison import compare
 from chainunit.reading.text import number as shown
 from chainunit.study.config import parse
 from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
+from chainunit.study.stored_result import read_result
 
 STUDY = """
 title = "{title}"

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-import json
 import math
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 from ... import __version__
 from ...core.descriptions import USUAL_DRIVER
-from ...core.errors import InputError, printable
+from ...core.errors import printable
 from ...core.quantities import variables
 from ...reading.text import entry
 from ...study.line.shaft import ShaftAnswers
 from ...study.measures import Answers
 from ...study.registry import registered
 from ...study.sections import all_choices, all_sections
+from ...study.stored_result import StoredResult, as_mapping
 
-FILE = "result.json"
 _ROUNDING = 1e-12
 """Relative difference up to which two given values are the same: that of a unit's factor."""
 
@@ -33,52 +31,7 @@ def _words(driver: str) -> dict[str, str]:
     return words | {v.name: v.described(driver) for of in (ShaftAnswers, Answers) for v in variables(of)}
 
 
-_TITLES = {"steady": "steady running", "start_up": "start-up", "settling": "settling"}
 _SIDES = ("a", "b")
-
-
-@dataclass(frozen=True)
-class StoredResult:
-    """The content of a result.json."""
-
-    file: Path
-    data: Mapping[str, Any]
-
-    def words(self, name: str) -> str:
-        """A text of the result; empty where it has none."""
-        value = self.data.get(name)
-        return printable(value) if isinstance(value, str) else ""
-
-    def title_of(self, run: str) -> str:
-        """The title of a run."""
-        title = _mapping(_mapping(self.data.get("events")).get(run)).get("title")
-        return printable(title if isinstance(title, str) else _TITLES.get(run, run.replace("_", " ")))
-
-
-def read_result(path: Path) -> StoredResult:
-    """The result in a folder of ``chainunit study``, or in a file.
-
-    Raises
-    ------
-    InputError
-        where there is none.
-    """
-    file = path / FILE if path.is_dir() else path
-    try:
-        data = json.loads(file.read_bytes(), parse_constant=_refuse)
-    except OSError as error:
-        raise InputError(
-            f"{path}: has no result ({error.strerror or error}); make it by chainunit study -o {path}"
-        ) from error
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{file}: is no result of a study ({printable(str(error))})") from error
-    if not isinstance(data, dict) or not isinstance(data.get("answers"), dict) or "chainunit" not in data:
-        raise InputError(f"{file}: is no result of a study; chainunit study writes {FILE}")
-    return StoredResult(file, data)
-
-
-def _refuse(constant: str) -> None:
-    raise ValueError(f"{constant} is no number of JSON")
 
 
 def compare(a: StoredResult, b: StoredResult) -> dict[str, Any]:
@@ -110,7 +63,7 @@ def compare(a: StoredResult, b: StoredResult) -> dict[str, Any]:
         "given": {
             name: {side: given[side].get(name) for side in _SIDES}
             | {
-                f"origin_{side}": _mapping(each.data.get("origins")).get(name, "")
+                f"origin_{side}": as_mapping(each.data.get("origins")).get(name, "")
                 for side, each in results.items()
             }
             for name in different
@@ -138,10 +91,10 @@ def _alone(
     # the further numbers of a run go with the run
     whole = {name.removeprefix("answers.") for name in missing if name.startswith("answers.")}
     runs = [name for name in missing if name.startswith("answers.") or name.split(".")[-1] not in whole]
-    events = _mapping(theirs.data.get("event"))
+    events = as_mapping(theirs.data.get("event"))
     return {
         "runs": [groups[name].title for name in runs],
-        "events": [name for name in _mapping(mine.data.get("event")) if name not in events],
+        "events": [name for name in as_mapping(mine.data.get("event")) if name not in events],
         "measures": [
             f"{group.title}: {words}"
             for name, group in groups.items()
@@ -155,8 +108,8 @@ def _alone(
 def _verdicts(result: StoredResult) -> dict[str, dict[str, str]]:
     """The verdicts of a result by their subject: whether it holds, and the text."""
     verdicts = {}
-    for name, verdict in _mapping(result.data.get("verdict")).items():
-        words = {key: _mapping(verdict).get(key) for key in ("holds", "text")}
+    for name, verdict in as_mapping(result.data.get("verdict")).items():
+        words = {key: as_mapping(verdict).get(key) for key in ("holds", "text")}
         if all(isinstance(each, str) for each in words.values()):
             verdicts[printable(name)] = {key: printable(str(each), 2000) for key, each in words.items()}
     return verdicts
@@ -173,7 +126,7 @@ def _warnings(result: StoredResult) -> Iterator[tuple[Any, str]]:
     """The warnings of a result, each with its subject: its kind and its runs."""
     warnings = result.data.get("warnings")
     for each in warnings if isinstance(warnings, list) else []:
-        text = _mapping(each).get("text")
+        text = as_mapping(each).get("text")
         if isinstance(text, str):
             yield (str(each.get("kind")), str(each.get("runs"))), printable(text, 2000)
 
@@ -181,10 +134,6 @@ def _warnings(result: StoredResult) -> Iterator[tuple[Any, str]]:
 def _head(result: StoredResult) -> dict[str, str]:
     names = ("title", "status", "chainunit")
     return {"file": printable(str(result.file), 500)} | {name: result.words(name) for name in names}
-
-
-def _mapping(node: Any) -> Mapping[str, Any]:
-    return node if isinstance(node, Mapping) else {}
 
 
 def _is_finite(value: Any) -> bool:
@@ -214,7 +163,7 @@ def _given_values(data: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
     for table in ("system", "machine", "feed", "motor", "event"):
         yield from _leaves(data.get(table), table)
     for table, section in all_sections().items():
-        node = _mapping(data.get(table))
+        node = as_mapping(data.get(table))
         if section.apart:
             yield from _leaves(node.get("asked"), table)
             continue
@@ -255,13 +204,13 @@ def _groups(result: StoredResult, driver: str) -> Iterator[tuple[str, _Group]]:
     data = result.data
     for run in ("start_up", "settling"):
         yield from _group(run, result.title_of(run), data.get(run), driver)
-    for run, numbers in _mapping(data.get("answers")).items():
+    for run, numbers in as_mapping(data.get("answers")).items():
         yield from _group(f"answers.{run}", result.title_of(run), numbers, driver)
-    for run, numbers in _mapping(data.get("shaft")).items():
+    for run, numbers in as_mapping(data.get("shaft")).items():
         yield from _group(f"shaft.{run}", f"{result.title_of(run)}: driveline", numbers, driver)
-    for run, pins in _mapping(data.get("pins")).items():
+    for run, pins in as_mapping(data.get("pins")).items():
         yield from _group(f"pins.{run}", f"{result.title_of(run)}: forces in the bearings", pins, driver)
-    random = _mapping(data.get("monte_carlo")).get("quantiles")
+    random = as_mapping(data.get("monte_carlo")).get("quantiles")
     yield from _group("monte_carlo.quantiles", "overloads at random", random, driver)
 
 

@@ -10,7 +10,8 @@ from ...report import blocks as b
 from ...report.lines import Aside, Line, Name, capital, line
 from ...report.task import Task
 from ...study.measures import MEASURES
-from .comparison import compare, read_result
+from ...study.stored_result import read_result
+from .comparison import compare
 
 _SIDES = ("a", "b")
 _FOLLOWS = {"tuned": "tuned", "catalogue": "of the catalogue", "sizing": "by sizing"}

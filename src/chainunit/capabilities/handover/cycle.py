@@ -1,0 +1,147 @@
+"""The load of the motor's shaft over time: as a study has it, in the CSV of the template, and read back from it.
+
+The columns of the CSV are those of ``MetadataRotativeMotionFile``. The template's load torque acts on the turning
+mass from outside, positive along a growing angle: the torque that the motor must give is its negative. It holds all
+of that torque, also the part that accelerates the machine, whose inertia changes over the turn;
+``MomentOfInertiaOfLoad`` of the template is one number, and stays empty, so that no reader adds an inertia twice. The
+inertia over the turn is a column of load_cycle.csv."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...core.errors import InputError, printable
+from .shell import environment_of
+from .template import ROOT, elements
+
+SECTION = f"{ROOT}/ApplicationRequirements/MotionPattern/MotionPatternSections/RotativeSection"
+COLUMNS = ("Time", "AngularPosition", "AngularVelocity", "AngularAcceleration", "LoadTorque")
+"""The names of the columns, elements of ``MetadataRotativeMotionFile``."""
+
+
+@dataclass(frozen=True)
+class ShaftCycle:
+    """The motor's shaft over time; every array has the shape (time,)."""
+
+    time: np.ndarray
+    """time from the first row [s]"""
+    angle: np.ndarray
+    """angle from the first row [rad]"""
+    speed: np.ndarray
+    """speed [rad/s]"""
+    acceleration: np.ndarray
+    """acceleration [rad/s2]"""
+    torque: np.ndarray
+    """torque that the motor gives to the load [N m], with the torque that accelerates it"""
+    inertia: np.ndarray | None = None
+    """inertia of the load at the motor's shaft [kg m2]; None where the file does not have it"""
+
+
+def headings() -> list[str]:
+    """The headings of the CSV: name and unit of each column."""
+    units = (elements()[f"{SECTION}/MetadataRotativeMotionFile/{name}"].unit for name in COLUMNS)
+    return [f"{name} [{unit}]" for name, unit in zip(COLUMNS, units, strict=True)]
+
+
+def as_csv(cycle: ShaftCycle) -> str:
+    """The CSV of the template: headings, then a row for each instant; separated by ``;``, with decimal points."""
+    columns = cycle.time, cycle.angle, cycle.speed, cycle.acceleration, -cycle.torque
+    text = io.StringIO()
+    writer = csv.writer(text, delimiter=";", lineterminator="\n")
+    writer.writerow(headings())
+    writer.writerows([f"{x + 0.0:.9g}" for x in row] for row in zip(*columns, strict=True))
+    return text.getvalue()
+
+
+def read_cycle(file: str | Path, section: str = "RotativeSection") -> ShaftCycle:
+    """The load of the motor's shaft from the files of ``chainunit handover``.
+
+    Parameters
+    ----------
+    file : sizing.aasx, sizing.json with the CSV beside it, or the CSV itself
+    section : name of the motion section in a shell: ``RotativeSection`` is the steady turns, ``RotativeSection02``
+        the whole run
+
+    Returns
+    -------
+    the cycle; with the inertia where the shell links a load_cycle.csv with the same instants
+
+    Raises
+    ------
+    InputError
+        for a file that is none of these, or has no such section; for an AASX without basyx-python-sdk.
+    """
+    path = Path(file)
+    if path.suffix.lower() == ".csv":
+        return _of_csv(_text(_bytes(path), path), path)
+    environment, supplement = environment_of(path)
+    sections = _at(_submodel(environment, path), SECTION.split("/")[1:-1])
+    own = next((each for each in sections if each.get("idShort") == section), None)
+    if own is None:
+        names = ", ".join(str(each.get("idShort")) for each in sections) or "none"
+        raise InputError(f"{path}: has no motion section {printable(section)}; it has {names}")
+    name = next((each.get("value") for each in own["value"] if each["idShort"] == "MotionSectionFile"), None)
+    if not name:
+        raise InputError(f"{path}: the MotionSectionFile of {section} names no file")
+    cycle = _of_csv(_text(supplement(name), path), path)
+    links = _at(_submodel(environment, path), ["SizingProjectInformation"])
+    plain = [each["value"] for each in links if str(each.get("value", "")).endswith("load_cycle.csv")]
+    return _with_inertia(cycle, _text(supplement(plain[0]), path)) if plain else cycle
+
+
+def _submodel(environment: Mapping[str, Any], path: Path) -> Mapping[str, Any]:
+    own = [each for each in environment.get("submodels", []) if each.get("idShort") == ROOT]
+    if not own:
+        raise InputError(f"{path}: has no submodel {ROOT}; chainunit handover writes one")
+    return own[0]
+
+
+def _at(submodel: Mapping[str, Any], names: Sequence[str]) -> list[dict[str, Any]]:
+    """The elements below the collection with these names; none where there is no such collection."""
+    below: list[dict[str, Any]] = submodel.get("submodelElements", [])
+    for name in names:
+        below = next((each.get("value", []) for each in below if each.get("idShort") == name), [])
+    return below
+
+
+def _bytes(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error
+
+
+def _text(content: bytes, path: Path) -> str:
+    try:
+        return content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: is no text in UTF-8 ({error.reason})") from error
+
+
+def _of_csv(text: str, path: Path) -> ShaftCycle:
+    rows = list(csv.reader(text.splitlines(), delimiter=";"))
+    if not rows or rows[0] != headings():
+        raise InputError(f"{path}: the first line of the motion section must be {';'.join(headings())}")
+    try:
+        values = np.array(rows[1:], float)
+    except ValueError as error:
+        raise InputError(f"{path}: {printable(str(error))}") from error
+    if values.ndim != 2 or len(values) < 2 or not np.all(np.isfinite(values)):
+        raise InputError(f"{path}: the motion section must have at least two rows of finite numbers")
+    time, angle, speed, acceleration, torque = values.T
+    return ShaftCycle(time, angle, speed, acceleration, -torque)
+
+
+def _with_inertia(cycle: ShaftCycle, text: str) -> ShaftCycle:
+    """The cycle with the inertia of a load_cycle.csv, where this has the same instants."""
+    time, *_, inertia = np.array(list(csv.reader(text.splitlines()[1:])), float).T
+    if time.shape != cycle.time.shape or not np.allclose(time, cycle.time, rtol=1e-8, atol=1e-12):
+        return cycle
+    return ShaftCycle(cycle.time, cycle.angle, cycle.speed, cycle.acceleration, cycle.torque, inertia)

@@ -1,0 +1,182 @@
+"""The stored study that is handed over: its numbers, and the load of the motor's shaft over time."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import UTC, date, datetime
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ...core.errors import InputError, printable
+from ...report.series import SERIES, STEADY_BEGIN
+from ...study.record import LOAD_CYCLE
+from ...study.stored_result import StoredResult, as_mapping, read_result
+from .cycle import ShaftCycle
+
+_CLOSE = 1e-6
+"""Difference, relative to the largest value, up to which a series is that of load_cycle.csv, which has nine
+digits."""
+
+
+@dataclass(frozen=True)
+class StudiedDrive:
+    """The result of a study in its folder, without its overloads."""
+
+    result: StoredResult
+    steady: ShaftCycle
+    """the steady turns, those of load_cycle.csv"""
+    run: ShaftCycle
+    """start-up and steady running"""
+    supply_power: np.ndarray | None
+    """electric power that the motor takes in the steady turns [W], shape (time,); None where it is not known"""
+    files: Mapping[str, bytes] = field(repr=False)
+    """the content of result.json and load_cycle.csv, by name"""
+
+    def number(self, *path: str) -> float | None:
+        """The number of the result at a path, in its unit there; None where it has none."""
+        node: Any = self.result.data
+        for name in path:
+            node = as_mapping(node).get(name)
+        value = as_mapping(node).get("value")
+        return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
+
+    def text(self, *path: str) -> str:
+        """The text of the result at a path; empty where it has none."""
+        node: Any = self.result.data
+        for name in path:
+            node = as_mapping(node).get(name)
+        return printable(node, 2000) if isinstance(node, str) else ""
+
+    @cached_property
+    def written(self) -> datetime:
+        """The time at which the result was written."""
+        return datetime.fromtimestamp(int(self.result.file.stat().st_mtime), UTC)
+
+    @property
+    def dated(self) -> datetime:
+        """The date of the report, where the study file gives one in ISO 8601; else the time of the result."""
+        try:
+            day = date.fromisoformat(self.text("report", "date"))
+        except ValueError:
+            return self.written
+        return datetime(day.year, day.month, day.day, tzinfo=UTC)
+
+    @property
+    def candidates(self) -> list[Mapping[str, Any]]:
+        """The candidates of sizing by their rank; none without sizing."""
+        found = as_mapping(self.result.data.get("sizing")).get("candidates")
+        return [as_mapping(each) for each in found] if isinstance(found, list) else []
+
+    @property
+    def best(self) -> Mapping[str, Any]:
+        """The candidate with which all runs are; empty without sizing."""
+        sizing = as_mapping(self.result.data.get("sizing"))
+        place = sizing.get("nearest") if sizing.get("chosen") is None else sizing["chosen"]
+        return self.candidates[place] if isinstance(place, int) else {}
+
+    def check(self, name: str, part: str) -> float | None:
+        """A number of a check of the drive of sizing: its ``value``, ``limit`` or ``utilisation``."""
+        entry = as_mapping(as_mapping(as_mapping(self.best.get("checks")).get(name)).get(part))
+        value = entry.get("value")
+        return float(value) if isinstance(value, int | float) else None
+
+
+def read_study(folder: Path) -> StudiedDrive:
+    """The study in a folder of ``chainunit study``.
+
+    Raises
+    ------
+    InputError
+        where the folder has no complete result, or no steady turn of the motor's shaft.
+    """
+    result = read_result(folder)
+    if not folder.is_dir():
+        folder = result.file.parent
+    if result.data.get("status") != "complete":
+        raise InputError(f"{folder}: the study is not complete ({result.words('status')}); run it again")
+    if not (folder / LOAD_CYCLE).is_file():
+        raise InputError(
+            f"{folder}: has no {LOAD_CYCLE}, as its machine makes no whole turn in steady running; a sizing needs one"
+        )
+    plain = _plain_cycle(folder / LOAD_CYCLE)
+    try:
+        start = xr.load_dataset(folder / SERIES, group="start_up")
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"{folder / SERIES}: cannot be read ({printable(str(error))}); run the study again"
+        ) from error
+    if STEADY_BEGIN not in start.attrs:
+        raise InputError(
+            f"{folder / SERIES}: does not say when the steady turns begin, as an earlier version wrote it; run the "
+            "study again"
+        )
+    missing = [name for name in ("motor.phi", "motor.w", "motor.a") if name not in start]
+    if missing:
+        raise InputError(
+            f"{folder / SERIES}: has no {', '.join(missing)}: its motor is an FMU that does not give the motion of "
+            "its shaft by these names"
+        )
+    at = float(start.attrs[STEADY_BEGIN]) + plain[0]
+    torque = _torque(start, at, plain[2], folder)
+    power = start.get("motor.supply_power")
+    time = start["time"].values
+    return StudiedDrive(
+        result,
+        _steady(start, at, plain),
+        ShaftCycle(
+            time - time[0],
+            start["motor.phi"].values - float(start["motor.phi"][0]),
+            start["motor.w"].values,
+            start["motor.a"].values,
+            torque,
+        ),
+        None if power is None else np.interp(at, time, power.values),
+        {name: (folder / name).read_bytes() for name in (result.file.name, LOAD_CYCLE)},
+    )
+
+
+def _plain_cycle(file: Path) -> np.ndarray:
+    """Time, speed, torque and inertia of a load_cycle.csv, shape (4, time)."""
+    try:
+        rows = list(csv.reader(file.read_text("utf-8").splitlines()))[1:]
+        values = np.array(rows, float).T
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"{file}: is no load cycle ({printable(str(error))}); run the study again"
+        ) from error
+    if values.shape[0] != 4 or values.shape[1] < 2:
+        raise InputError(f"{file}: is no load cycle, which has four columns; run the study again")
+    return values
+
+
+def _steady(start: xr.Dataset, at: np.ndarray, plain: np.ndarray) -> ShaftCycle:
+    """The steady turns: speed, torque and inertia as load_cycle.csv has them, angle and acceleration of the same
+    rows."""
+    time, speed, torque, inertia = plain
+    angle, acceleration = (
+        np.interp(at, start["time"].values, start[f"motor.{x}"].values) for x in ("phi", "a")
+    )
+    return ShaftCycle(time, angle - angle[0], speed, acceleration, torque, inertia)
+
+
+def _torque(start: xr.Dataset, at: np.ndarray, wanted: np.ndarray, folder: Path) -> np.ndarray:
+    """The torque of the motor's shaft in the whole run [N m], shape (time,): the variable that load_cycle.csv has in
+    the steady turns. Of which part of the drive it is depends on the parts between motor and machine."""
+    names = [
+        str(name) for name in start.data_vars if str(name).count(".") == 1 and str(name).endswith(".tau")
+    ]
+    gaps = {
+        name: float(np.max(np.abs(np.interp(at, start["time"].values, start[name].values) - wanted)))
+        for name in names
+    }
+    best = min(gaps, key=lambda name: gaps[name], default="")
+    if not best or gaps[best] > _CLOSE * float(np.max(np.abs(wanted))):
+        raise InputError(f"{folder}: {SERIES} and {LOAD_CYCLE} are not of the same run; run the study again")
+    torque: np.ndarray = start[best].values
+    return torque

@@ -1,0 +1,63 @@
+"""The result of a study as it was stored: the content of its result.json."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..core.errors import InputError, printable
+
+FILE = "result.json"
+_TITLES = {"steady": "steady running", "start_up": "start-up", "settling": "settling"}
+
+
+def as_mapping(node: Any) -> Mapping[str, Any]:
+    """A node of a result, where it is a mapping; else an empty one."""
+    return node if isinstance(node, Mapping) else {}
+
+
+@dataclass(frozen=True)
+class StoredResult:
+    """The content of a result.json."""
+
+    file: Path
+    data: Mapping[str, Any]
+
+    def words(self, name: str) -> str:
+        """A text of the result; empty where it has none."""
+        value = self.data.get(name)
+        return printable(value) if isinstance(value, str) else ""
+
+    def title_of(self, run: str) -> str:
+        """The title of a run."""
+        title = as_mapping(as_mapping(self.data.get("events")).get(run)).get("title")
+        return printable(title if isinstance(title, str) else _TITLES.get(run, run.replace("_", " ")))
+
+
+def read_result(path: Path) -> StoredResult:
+    """The result in a folder of ``chainunit study``, or in a file.
+
+    Raises
+    ------
+    InputError
+        where there is none.
+    """
+    file = path / FILE if path.is_dir() else path
+    try:
+        data = json.loads(file.read_bytes(), parse_constant=_refuse)
+    except OSError as error:
+        raise InputError(
+            f"{path}: has no result ({error.strerror or error}); make it by chainunit study -o {path}"
+        ) from error
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{file}: is no result of a study ({printable(str(error))})") from error
+    if not isinstance(data, dict) or not isinstance(data.get("answers"), dict) or "chainunit" not in data:
+        raise InputError(f"{file}: is no result of a study; chainunit study writes {FILE}")
+    return StoredResult(file, data)
+
+
+def _refuse(constant: str) -> None:
+    raise ValueError(f"{constant} is no number of JSON")
