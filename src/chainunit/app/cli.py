@@ -126,7 +126,8 @@ def study(
 
 
 for module in modules("command"):
-    app.command()(module.COMMAND)
+    for command in module.COMMANDS if hasattr(module, "COMMANDS") else (module.COMMAND,):
+        app.command()(command)
 app.command(cls=ExportCommand)(export)
 app.command("export-ssp")(export_ssp)
 

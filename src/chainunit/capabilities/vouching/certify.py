@@ -1,0 +1,373 @@
+"""Certification: what is known about an FMU or an SSP package, written into it and signed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from ... import __version__
+from ...core.errors import InputError, RunError, printable
+from ...core.files import atomic_file, regular_bytes
+from ...core.model import Model
+from ...fmu.description import Interface, generation_time
+from ...fmu.pack import interface_of
+from ...fmu.recipe import recipes
+from ...models import MODELS
+from ...study.package import with_rods
+from . import documents as docs
+from . import experiments as ex
+from .archive import contents, unsafe
+from .domain import domain
+from .manifest import MANIFEST, OWN, SIGNATURE, json_bytes, sha3, signed
+from .rerun import TimeTable, UnpackedFmu, table_bytes, unpacked
+
+if TYPE_CHECKING:
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+
+SMOOTH_IN, SMOOTH_OUT = f"{OWN}/smooth_in.csv", f"{OWN}/smooth_out.csv"
+EVERY = 40
+"""One of so many rows of the smooth experiment is kept as a result."""
+Told = Callable[[str], Any]
+
+
+class Certified(NamedTuple):
+    """A certified file: its content, and sentences on what it carries."""
+
+    data: bytes
+    words: list[str]
+
+
+def sources_hash() -> str:
+    """The SHA3-256 over the sources of this package and of the C layer of its FMUs: of each file, in the order of
+    their paths, its path and its own hash."""
+    lines = []
+    for name, root in (("chainunit", Path(str(resources.files("chainunit")))), ("fmu", recipes())):
+        for path in sorted(root.rglob("*")):
+            inside = path.relative_to(root).as_posix()
+            if path.suffix in (".py", ".c", ".h", ".js") and not inside.startswith("fmu/recipes/"):
+                lines.append(f"{name}/{inside} {sha3(path.read_bytes())}\n")
+    return sha3("".join(lines).encode())
+
+
+def members_of(file: Path) -> dict[str, bytes]:
+    """The members of a file without those of an earlier certification.
+
+    Raises
+    ------
+    InputError
+        where the file is no sound archive.
+    """
+    data = regular_bytes(file)
+    if data is None:
+        raise InputError(f"{file}: no such file")
+    read = contents(data)
+    for name, fault in read.faults.items():
+        raise InputError(f"{file}: {printable(name) + ': ' if name else ''}{fault}; it is not certified")
+    if bad := unsafe(read.members):
+        raise InputError(
+            f"{file}: the member {printable(bad[0])!r} leads out of its folder; it is not certified"
+        )
+    return without_certification(read.members)
+
+
+def without_certification(members: Mapping[str, bytes]) -> dict[str, bytes]:
+    """The members as they were before an earlier certification."""
+    own = {n: x for n, x in members.items() if not n.startswith(f"{OWN}/") and n != docs.SRMD}
+    if len(own) < len(members) and docs.RELATED in own:
+        before = docs.related(own.pop(docs.RELATED), ())
+        if before is not None:
+            own[docs.RELATED] = before
+    return own
+
+
+def certified(
+    members: Mapping[str, bytes], name: str, key: Ed25519PrivateKey, model: type[Model] | None, told: Told
+) -> Certified:
+    """The certified file with these members, an FMU or an SSP package.
+
+    Parameters
+    ----------
+    name : of the file, for errors and in its documents
+    model : of an FMU, where the caller has it; else it is found by its name
+    told : is called with texts on the work
+
+    Raises
+    ------
+    InputError
+        for a file that is neither, or not of this version of the package.
+    RunError
+        where the FMU does not run on this machine.
+    """
+    if "modelDescription.xml" in members:
+        return _certified_fmu(dict(members), name, key, model, told)
+    if "SystemStructure.ssd" in members:
+        return _certified_ssp(dict(members), name, key, told)
+    raise InputError(
+        f"{name}: is neither an FMU (modelDescription.xml) nor an SSP package (SystemStructure.ssd)"
+    )
+
+
+def _certified_fmu(
+    members: dict[str, bytes], name: str, key: Ed25519PrivateKey, model: type[Model] | None, told: Told
+) -> Certified:
+    with unpacked(members, name) as fmu:
+        _require_own(fmu, name)
+        interface = interface_for(fmu, model)
+        found = evidence(fmu, interface, told)
+        given = [t for t in (found.tables and found.tables[0], found.given) if t]
+        limits = domain(fmu, interface, found.points, given)
+        types = {v.name: v.type for v in fmu.variables.values()}
+        if found.given is not None and found.results is not None:
+            members[SMOOTH_IN] = table_bytes(found.given, types)
+            members[SMOOTH_OUT] = table_bytes(found.results, types)
+        if found.tables:
+            members[docs.EXPERIMENTS] = docs.experiments_xml(
+                fmu.name, found.tolerance, smooth=found.given is not None
+            )
+        title = fmu.name
+    words = told_evidence(found.data, limits)
+    return _signed(members, ("fmu", title), (found.data, limits, words), key)
+
+
+def _certified_ssp(members: dict[str, bytes], name: str, key: Ed25519PrivateKey, told: Told) -> Certified:
+    words, inner = [], {}
+    for member in sorted(n for n in members if n.endswith(".fmu")):
+        read = contents(members[member])
+        if read.faults:
+            raise InputError(f"{name}: {printable(member)} is damaged: {next(iter(read.faults.values()))}")
+        own = without_certification(read.members)
+        if f"chainunit {__version__}".encode() not in own.get("modelDescription.xml", b""):
+            words.append(
+                f"{printable(member)}: is not of this version of chainunit; its hash alone is signed"
+            )
+            inner[member] = "hash"
+            continue
+        made = _certified_fmu(own, f"{name}: {member}", key, None, told)
+        members[member] = made.data
+        words += [f"{printable(member)}: {line}" for line in made.words]
+        inner[member] = "certified"
+    found = {"model": "SystemStructure.ssd", "fmus": inner, "sources": sources_hash()}
+    return _signed(members, ("ssp", Path(name).stem), (found, None, words), key)
+
+
+def _signed(
+    members: dict[str, bytes],
+    of: tuple[str, str],
+    found: tuple[dict[str, Any], dict[str, Any] | None, list[str]],
+    key: Ed25519PrivateKey,
+) -> Certified:
+    """The file with the documents on it; `of` is its kind and name, `found` evidence, domain and sentences."""
+    kind, title = of
+    data, limits, words = found
+    members[docs.EVIDENCE] = json_bytes(data)
+    if limits is not None:
+        members[docs.DOMAIN] = json_bytes(limits)
+    report = [
+        f"# {title}",
+        "",
+        f"Certified by chainunit {__version__}.",
+        "",
+        *(f"- {line}" for line in words),
+    ]
+    members[docs.REPORT] = ("\n".join(report) + "\n").encode()
+    members[docs.SRMD] = docs.srmd(title, classifications(data, limits), __version__)
+    there = [*members, docs.SBOM, MANIFEST, SIGNATURE]
+    members[docs.RELATED] = docs.related(members.get(docs.RELATED), there) or b""
+    members[docs.SBOM] = json_bytes(docs.sbom(title, __version__, members))
+    head = {"kind": kind, "name": title, "version": __version__, "time": generation_time()}
+    return Certified(signed(members, key, **head), words)
+
+
+def _require_own(fmu: UnpackedFmu, name: str) -> None:
+    tool = str(fmu.description.generationTool or "")
+    if not tool.startswith("chainunit "):
+        raise InputError(
+            f"{name}: was made by {printable(tool) or 'an unknown tool'}; must be an FMU of chainunit"
+        )
+    if tool != f"chainunit {__version__}":
+        raise InputError(
+            f"{name}: was made by {printable(tool)}, this is chainunit {__version__}; export it anew first"
+        )
+
+
+def interface_for(fmu: UnpackedFmu, model: type[Model] | None = None) -> Interface | None:
+    """The interface of the FMU's model with its start values; None for a model that this package does not know, and
+    where the variables are not those of the model."""
+    start = fmu.start("parameter") | fmu.start("input")
+    own = model or MODELS.get(fmu.name)
+    if fmu.name == "ChainUnitFlexible" and model is None:
+        rods = sum(name.startswith("left.theta_") for name in fmu.variables)
+        own = with_rods(rods, start)
+    if own is None:
+        return None
+    try:
+        interface = interface_of(own, start)
+    except (KeyError, InputError):
+        return None
+    names = [s.name for s in interface.signals]
+    return interface if all(n in fmu.variables for n in names) else None
+
+
+class Evidence(NamedTuple):
+    """What was found about an FMU: the content of evidence.json, and the tables of its experiments."""
+
+    data: dict[str, Any]
+    tables: tuple[TimeTable, TimeTable, TimeTable] | None
+    given: TimeTable | None
+    results: TimeTable | None
+    points: list[ex.StatePoint]
+    tolerance: float
+
+
+def evidence(fmu: UnpackedFmu, interface: Interface | None, told: Told) -> Evidence:
+    """Run the experiments of an FMU.
+
+    Raises
+    ------
+    RunError
+        where the FMU does not run on this machine, or does not give its results.
+    """
+    has_states = bool(interface.states) if interface else True
+    tolerance = ex.TOLERANCE if has_states else ex.TOLERANCE_WITHOUT_STATES
+    data: dict[str, Any] = {"model": fmu.name, "sources": sources_hash(), "tolerance": tolerance}
+    told(f"{fmu.name}: reference experiment")
+    tables = ex.reference_tables(fmu)
+    if tables:
+        data["reference"] = _checked(ex.rerun_reference(fmu, tables), tolerance, "its reference results")
+    if interface is None:
+        words = "the model is not one of this package by its name; certify its study file or linkage file"
+        data["left_out"] = f"smooth experiment, energy, points: {words}"
+        return Evidence(data, tables, None, None, [], tolerance)
+    told(f"{fmu.name}: smooth experiment")
+    given = ex.smooth_inputs(interface)
+    outputs = [s.name for s in interface.signals_of("output")]
+    columns = [*outputs, *(n for n in ("tau", "w") if n in fmu.variables and n not in outputs)]
+    found, run = ex.convergence(fmu, given, columns)
+    data["convergence"] = found._asdict()
+    balance = ex.balance_of(columns)
+    if balance:
+        missing, flow = ex.energy_residual(run, balance)
+        data["energy"] = {"missing": missing, "flow": flow, **balance._asdict()}
+        _balanced(
+            missing,
+            ex.MISSING * flow,
+            "its energy does not balance: {:.2g} J are missing, allowed are {:.2g} J",
+        )
+    told(f"{fmu.name}: points")
+    points = ex.chosen_points(interface)
+    data["points"] = {
+        "at": [point._asdict() for point in points],
+        **_checked(ex.rerun_points(fmu, points), tolerance, "the points by the equations in Python"),
+        "power_gap": ex.power_gap(interface, points, balance) if balance else None,
+    }
+    gap = data["points"]["power_gap"]
+    _balanced(
+        gap or 0.0,
+        ex.POWER_GAP,
+        "its powers do not balance: the gap is {:.2g} of their size, allowed is {:g}",
+    )
+    own = [columns.index(name) for name in outputs]
+    results = TimeTable(tuple(outputs), run.time[::EVERY], run.values[::EVERY, own])
+    return Evidence(data, tables, given, results, points, tolerance)
+
+
+def _checked(found: ex.Deviation, tolerance: float, what: str) -> dict[str, Any]:
+    if not found.value <= tolerance:
+        raise RunError(
+            f"the FMU does not give {what}: {found.of} deviates by {found.value:.2g} of its size, allowed are "
+            f"{tolerance:g}; it is not certified"
+        )
+    return {"deviation": found.value, "of": found.of}
+
+
+def _balanced(value: float, allowed: float, words: str) -> None:
+    if not value <= allowed:
+        raise RunError(f"the FMU is not certified: {words.format(value, allowed)}")
+
+
+def told_evidence(data: Mapping[str, Any], limits: Mapping[str, Any] | None) -> list[str]:
+    """Sentences on the evidence and the domain of an FMU."""
+    words = []
+    if (own := data.get("reference")) is not None:
+        words.append(
+            f"reference experiment: deviates by {own['deviation']:.2g} of the size of a column, allowed are "
+            f"{data['tolerance']:g}"
+        )
+    else:
+        words.append("reference experiment: the FMU has none, as its states are too fast or run away")
+    if (own := data.get("convergence")) is not None:
+        words.append(f"step: {told_convergence(own)}")
+    if (own := data.get("energy")) is not None:
+        words.append(
+            f"energy: {own['missing']:.2g} J are missing of {own['flow']:.3g} J that went to and fro"
+        )
+    elif "convergence" in data:
+        words.append("energy: no balance, as the model has no outputs of its energies and losses")
+    if (own := data.get("points")) is not None:
+        gap = own["power_gap"]
+        second = (
+            ""
+            if gap is None
+            else f"; the powers balance there to {gap:.2g} by exact derivatives of the energy"
+        )
+        words.append(
+            f"points: {len(own['at'])} states by the equations in Python, deviation {own['deviation']:.2g}{second}"
+        )
+    if "left_out" in data:
+        words.append(f"left out: {data['left_out']}")
+    for each in (limits or {}).get("limits", ()):
+        value = "none up to 1000 rad/s" if each["value"] is None else f"{each['value']:.4g} rad/s"
+        words.append(f"limit: {each['meaning']}: {value}")
+    return words
+
+
+def told_convergence(own: Mapping[str, Any]) -> str:
+    """Words on the runs at three steps."""
+    at = ", ".join(f"{1e3 * h:g}" for h in own["steps"])
+    if own["order"] is None:
+        return f"at {at} ms the results differ by {max(own['differences']):.2g}: the step sets no error"
+    return f"at {at} ms order {own['order']:.2f}, error {own['error']:.2g} at the smallest"
+
+
+def classifications(data: Mapping[str, Any], limits: Mapping[str, Any] | None) -> dict[str, dict[str, str]]:
+    """The entries of the SRMD: evidence as numbers, domain of validity by variable."""
+    general = {"certified by": f"chainunit {__version__}", "sources SHA3-256": data["sources"]}
+    for topic, key in (("reference", "deviation"), ("convergence", "error"), ("energy", "missing")):
+        if topic in data:
+            general[f"{topic} {key}"] = repr(data[topic][key])
+    found = {"chainunit.evidence": general}
+    if limits is None:
+        return found
+    found["chainunit.domain-of-validity"] = {
+        f"{name} [{own['unit'] or '1'}]": json.dumps(
+            {key: own[key] for key in ("start", "min", "max", "tried") if own[key] is not None}
+        )
+        for name, own in limits["variables"].items()
+    }
+    found["chainunit.limits"] = {
+        f"{each['name']} [{each['unit']}]": json.dumps(each["value"]) for each in limits["limits"]
+    }
+    return found
+
+
+def write(made: Certified, file: Path, name: str) -> Path:
+    """Write a certified file, and its SRMD with checksum beside it; returns the place of the SRMD.
+
+    Raises
+    ------
+    InputError, WriteError
+        see `atomic_file`.
+    """
+    with atomic_file(file) as part:
+        part.write_bytes(made.data)
+    beside = file.with_suffix(".srmd")
+    inner = contents(made.data).members
+    data = json.loads(inner[docs.EVIDENCE])
+    limits = json.loads(inner[docs.DOMAIN]) if docs.DOMAIN in inner else None
+    entries = classifications(data, limits)
+    with atomic_file(beside) as part:
+        part.write_bytes(docs.srmd(name, entries, __version__, (file.name, made.data)))
+    return beside

@@ -1,0 +1,129 @@
+"""The commands that make a key, certify a file, and verify a certified one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ...core.errors import InputError
+from ...core.files import ResultKind
+from ...report.console import show_remark, study_file, terminal_console
+
+_MODEL = "Study file or linkage file (TOML) of the FMU, where its model is no packaged one."
+
+
+def key(
+    output: Annotated[Path, typer.Option("-o", "--output", help="File of the private key.")] = Path(
+        "chainunit.key"
+    ),
+) -> None:
+    """Make a key for signatures: the private one, which stays with you, and the public one to hand on."""
+    from .keys import make_key
+
+    public, print_of = make_key(output)
+    print(f"{output}: private key, keep it; {public}: public key, hand it on; fingerprint {print_of}")
+
+
+def certify(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            help="FMU or SSP package of this package; or a study file or linkage file (TOML), whose FMU is written."
+        ),
+    ],
+    key_file: Annotated[
+        Path, typer.Option("--key", help="File of the private key, by chainunit key.")
+    ] = Path("chainunit.key"),
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", help="Certified file; by default FILE itself, of a TOML file NAME.fmu."
+        ),
+    ] = None,
+    of: Annotated[Path | None, typer.Option("--of", help=_MODEL)] = None,
+) -> None:
+    """Write into an FMU or SSP package what is known about it, and sign it.
+
+    Writes beside it its meta-data (.srmd).
+    """
+    from ...core.temporary_folders import scratch
+    from .certify import certified, members_of, write
+    from .keys import private_key, readable_by_others
+
+    secret = private_key(key_file)
+    if readable_by_others(key_file):
+        show_remark(f"{key_file}: other users of this machine can read this key; chmod 600 {key_file}")
+    with terminal_console(stderr=True).status("certifying") as status, scratch() as folder:
+        if file.suffix.lower() == ".toml":
+            if of is not None:
+                raise InputError(f"--of {of}: is for FMUs; leave it out for {file}")
+            model, source = _exported(file, folder, status.update)
+        else:
+            model, source = (_model(of) if of else None), file
+        target = output or (Path(source.name) if source != file else file)
+        if target.suffix.lower() not in (".fmu", ".ssp"):
+            raise InputError(f"-o {target}: must be a file name that ends in .fmu or .ssp")
+        made = certified(members_of(source), target.name, secret, model, status.update)
+        beside = write(made, target, target.name)
+    print(f"{target}: certified; {beside}: its meta-data with checksum")
+    for line in made.words:
+        print(f"  {line}")
+
+
+def verify(
+    file: Annotated[Path, typer.Argument(help="Certified FMU or SSP package.")],
+    key_file: Annotated[
+        Path | None, typer.Option("--key", help="Public key of whom you expect the signature.")
+    ] = None,
+    no_run: Annotated[
+        bool,
+        typer.Option(
+            "--no-run", help="Check bytes and equations alone; the library of the FMU is not loaded."
+        ),
+    ] = False,
+    of: Annotated[Path | None, typer.Option("--of", help=_MODEL)] = None,
+) -> None:
+    """Check a certified FMU or SSP package: signature, every member, and its experiments again on this machine.
+
+    The exit status is 0 where all lines hold, 1 where one does not, 2 for bad input.
+    """
+    from .keys import public_key
+    from .verify import verify as check
+
+    expected = public_key(key_file) if key_file else None
+    model = _model(of) if of else None
+    with terminal_console(stderr=True).status("verifying") as status:
+        found = check(file, expected, model, run=not no_run, told=status.update)
+    wide = max(len(each.topic) for each in found)
+    for each in found:
+        sign = {True: "holds", False: "FAILS", None: "note"}[each.holds]
+        print(f"{sign:5}  {each.topic:{wide}}  {each.words}")
+    failed = sum(each.holds is False for each in found)
+    print(f"{file}: {'holds' if not failed else f'does not hold: {failed} of {len(found)} lines fail'}")
+    if failed:
+        raise typer.Exit(1)
+
+
+def _model(file: Path) -> Any:
+    """The model of a study file or linkage file."""
+    from ...study.package import is_study_file, model_and_start
+
+    return model_and_start(str(file), study_file(file) if is_study_file(str(file)) else None)[0]
+
+
+def _exported(file: Path, folder: Path, progress: Any) -> tuple[Any, Path]:
+    """The model of a study file or linkage file, and its FMU in the folder."""
+    from ...fmu.backends import export
+    from ...study.package import is_study_file, model_and_start
+
+    loaded = study_file(file) if is_study_file(str(file)) else None
+    model, start = model_and_start(str(file), loaded, progress=progress)
+    target = folder / f"{model.name}.fmu"
+    export(model, target, start, progress=progress)
+    return model, target
+
+
+COMMANDS = (key, certify, verify)
+KINDS: dict[str, ResultKind] = {}

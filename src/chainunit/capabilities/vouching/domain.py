@@ -1,0 +1,120 @@
+"""The domain of validity of an FMU as numbers: bounds of its variables, ranges that were tried, conditions on its
+parameters, and of a chain unit the speeds up to which two bars are a model of its organs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from ...core.engines import MATH
+from ...core.errors import InputError
+from ...fmu.description import Interface
+from ...machines.api import ChainUnitMachine
+from ...machines.chain_unit import SIDES, ChamberForces, Feed, SideLoads
+from ...study.organ_limits import slack_and_mode
+from .experiments import StatePoint
+from .rerun import TimeTable, UnpackedFmu
+
+
+def domain(
+    fmu: UnpackedFmu, interface: Interface | None, points: Iterable[StatePoint], given: Iterable[TimeTable]
+) -> dict[str, Any]:
+    """The content of domain.json.
+
+    Parameters
+    ----------
+    interface : of the model with the start values of the FMU, if the model is known
+    points, given : the points and the tables of inputs that were run; their values are the tried ranges
+    """
+    tried = ranges(points, given)
+    variables = {
+        v.name: {
+            "causality": v.causality,
+            "unit": v.unit,
+            "start": v.start,
+            "min": v.low,
+            "max": v.high,
+            "tried": tried.get(v.name),
+        }
+        for causality in ("parameter", "input")
+        for v in fmu.of(causality)
+    }
+    return {
+        "model": fmu.name,
+        "variables": variables,
+        "conditions": list(_conditions(interface)) if interface else [],
+        "limits": list(_limits(fmu)),
+    }
+
+
+def ranges(points: Iterable[StatePoint], given: Iterable[TimeTable]) -> dict[str, list[float]]:
+    """By variable, the least and the largest value among points and rows of tables."""
+    found: dict[str, list[float]] = {}
+
+    def take(name: str, low: float, high: float) -> None:
+        own = found.setdefault(name, [low, high])
+        own[:] = min(own[0], low), max(own[1], high)
+
+    for point in points:
+        for name, value in point.given.items():
+            take(name, value, value)
+    for each in given:
+        for name, column in zip(each.names, each.values.T, strict=True):
+            take(name, float(column.min()), float(column.max()))
+    return found
+
+
+def _conditions(interface: Interface) -> Iterator[dict[str, Any]]:
+    """The conditions of the model on its parameters beside their bounds, with their limits at the start values."""
+    model = interface.model
+    p = model.with_derived(
+        MATH, model.parameter_layout.instance([s.start for s in interface.signals_of("parameter")])
+    )
+    for each, (value, low, high) in zip(model.required, model.requirements(MATH, p), strict=True):
+        yield {
+            "subject": each.subject,
+            "unit": each.unit,
+            "why": each.why,
+            "value": _finite(value),
+            "above": _finite(low),
+            "below": _finite(high),
+            "of": [*each.context, *each.depends],
+        }
+
+
+def _finite(value: Any) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _limits(fmu: UnpackedFmu) -> Iterator[dict[str, Any]]:
+    """The speeds of the crank up to which two bars are a model of the organs, of a chain unit that the FMU is or has;
+    they follow from the names of its variables."""
+    own = ChamberForces.parameter_layout.names
+    start, loads = fmu.start("parameter"), fmu.start("input")
+    for prefix in ("", "machine."):
+        if not all(prefix + name in start for name in own):
+            continue
+        try:
+            machine = ChainUnitMachine({name: start[prefix + name] for name in own})
+        except InputError:
+            return
+        sides = {
+            side: SideLoads(
+                **{k: loads.get(f"{prefix}{side}.{k}", 0.0) for k in ("material_mass", "processing_force")}
+            )
+            for side in SIDES
+        }
+        slack, mode = slack_and_mode(machine, Feed(**sides))
+        feed: Mapping[str, float] = {
+            f"{prefix}{side}.material_mass": sides[side].material_mass for side in SIDES
+        }
+        for name, value, words in (
+            (
+                "slack_free_speed",
+                slack,
+                "crank speed at which a web first goes slack; above, two bars are no chain",
+            ),
+            ("chain_resonance", mode, "crank speed at the lowest natural frequency of an organ as a chain"),
+        ):
+            yield {"name": name, "unit": "rad/s", "value": _finite(value), "with": feed, "meaning": words}

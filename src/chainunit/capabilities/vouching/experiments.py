@@ -1,0 +1,351 @@
+"""The experiments that an FMU carries: what they must give, and how far it is from that on this machine.
+
+Three experiments are of a certified FMU:
+
+- the *reference experiment*, which every FMU of this package has: all inputs move, each is held over a step of 40 ms;
+  its results come from the equations in Python under CVODES;
+- the *smooth experiment*: a shaft or ram that is an input moves smoothly, all other inputs stay. The FMU itself runs
+  it at the steps h, h/2 and h/4, from which the error of the step and its order follow, at h/4 the energy balance;
+- *points*: states at the start with varied parameters and inputs; the outputs come from the equations in Python.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.integrate import cumulative_simpson
+
+from ...core.engines import MATH
+from ...core.errors import InputError
+from ...core.model import Model
+from ...fmu.description import Interface
+from ...fmu.reference import INPUTS, READ, REFERENCE, STEPPED, excitation
+from .rerun import TimeTable, UnpackedFmu, deviation, sizes, slave, stepped, table
+
+STEP, END = 0.004, 1.0
+"""Largest step and end of the smooth experiment [s]."""
+HALVINGS = 2
+TOLERANCE = 1e-5
+"""Allowed deviation from reference results of a model with states, over the size of the column."""
+TOLERANCE_WITHOUT_STATES = 1e-9
+_ROUNDING = 1e-11
+"""Differences of runs below this are of rounding and have no order."""
+MISSING, POWER_GAP = 1e-2, 1e-6
+"""Largest share of the energy that may be missing, of which a part is the interpolation between steps, and
+largest gap of the power balance, with which an FMU is certified."""
+POINTS, SPREAD = 12, 0.05
+"""Number of points, and range of the factors of their parameters about 1."""
+
+
+class Deviation(NamedTuple):
+    """The largest deviation of a run from its results, over the size of its column `of`."""
+
+    value: float
+    of: str
+
+
+def reference_tables(fmu: UnpackedFmu) -> tuple[TimeTable, TimeTable, TimeTable] | None:
+    """Inputs, and outputs before and after the inputs are set, of the reference experiment; None where the FMU has
+    none.
+
+    Raises
+    ------
+    InputError
+        for files that are no tables of variables of the FMU.
+    """
+    files = [f"{REFERENCE}/{fmu.name}_{end}.csv" for end in (INPUTS, STEPPED, READ)]
+    texts = [fmu.file(name) for name in files]
+    if None in texts:
+        return None
+    found = []
+    for name, text in zip(files, texts, strict=True):
+        try:
+            own = table(text or b"")
+        except InputError as error:
+            raise InputError(f"{name}: {error}") from error
+        if unknown := [each for each in own.names if each not in fmu.variables]:
+            raise InputError(f"{name}: {unknown[0]}: is no variable of the FMU")
+        found.append(own)
+    return found[0], found[1], found[2]
+
+
+def rerun_reference(fmu: UnpackedFmu, tables: tuple[TimeTable, TimeTable, TimeTable]) -> Deviation:
+    """The FMU on this machine against its reference results.
+
+    Raises
+    ------
+    RunError
+        where the FMU cannot run.
+    """
+    given, before, behind = tables
+    got = stepped(fmu, given, before.names)
+    return Deviation(
+        *max(deviation(one, other, fmu) for one, other in zip(got, (before, behind), strict=True))
+    )
+
+
+# -- the smooth experiment
+
+
+def smooth_inputs(interface: Interface) -> TimeTable:
+    """The inputs of the smooth experiment, at its smallest step."""
+    course = excitation(interface)
+    names = [s.name for s in interface.signals_of("input")]
+    count = round(END / STEP) * 2**HALVINGS
+    time = np.linspace(0.0, END, count + 1)
+    still = course(0.0)
+    values = {name: np.full(len(time), still[name]) for name in names}
+    for own in _drivers(interface.model):
+        if set(own.values()) <= set(names):
+            values |= dict(zip(own.values(), _motion(course, own, time), strict=True))
+    columns = np.array([values[name] for name in names], float).T
+    return TimeTable(tuple(names), time, columns.reshape(len(time), len(names)))
+
+
+def _drivers(model: type[Model]) -> list[dict[str, str]]:
+    """The names of way, speed and acceleration of each shaft or ram at a terminal of the model."""
+    members = [terminal.members for terminal in model.terminals]
+    return [{n: own[n] for n in ("phi", "w", "a")} for own in members if {"phi", "w", "a"} <= set(own)]
+
+
+def _motion(course: Callable[[float], Mapping[str, float]], own: Mapping[str, str], time: Any) -> list[Any]:
+    """Way, speed and acceleration of a driver, each of shape (n,): those of the reference experiment where they fit
+    each other, as those of a shaft do; else a swing over the same way."""
+    rows = [course(float(t)) for t in time]
+    phi, w, a = (np.array([row[own[n]] for row in rows]) for n in ("phi", "w", "a"))
+    if np.allclose(np.gradient(phi, time)[1:-1], w[1:-1], rtol=0.0, atol=1e-3 * float(np.max(np.abs(w)))):
+        return [phi, w, a]
+    middle, reach = 0.5 * (phi.max() + phi.min()), 0.5 * (phi.max() - phi.min())
+    swing = reach * np.sin(2.0 * time)
+    return [middle + swing, 2.0 * reach * np.cos(2.0 * time), -4.0 * swing]
+
+
+class Convergence(NamedTuple):
+    """Runs at the steps h, h/2 and h/4: the largest differences of the first two pairs, over the size of their
+    column, the order that follows, and the estimated error of the run at the smallest step. The order is None where
+    the step sets no error: the differences are of rounding, or do not shrink, as steps of the FMU inside a step set
+    them."""
+
+    steps: tuple[float, ...]
+    differences: tuple[float, float]
+    order: float | None
+    error: float
+
+
+def convergence(fmu: UnpackedFmu, given: TimeTable, outputs: Sequence[str]) -> tuple[Convergence, TimeTable]:
+    """Run the smooth experiment at its three steps; also the outputs of the last run. Outputs are read once
+    the inputs of their time are set.
+
+    Raises
+    ------
+    RunError
+        where the FMU cannot run.
+    """
+    runs = [stepped(fmu, given, outputs, every=2**k)[1] for k in reversed(range(HALVINGS + 1))]
+    size = sizes(runs[-1], fmu)
+    common = [run.values[:: 2**k] for k, run in enumerate(runs)]
+    first, second = (
+        float(np.max(np.abs(one - other) / size, initial=0.0)) for one, other in pairwise(common)
+    )
+    shrinks = second > _ROUNDING and first > 1.3 * second
+    order = math.log2(first / second) if shrinks else None
+    error = max(first, second) if order is None else second / (2.0**order - 1.0)
+    steps = tuple(STEP / 2**k for k in range(HALVINGS + 1))
+    return Convergence(steps, (first, second), order, error), runs[-1]
+
+
+# -- the energy balance of a run
+
+
+class EnergyBalance(NamedTuple):
+    """The names of the outputs by which energy is balanced: what is given as an energy or as torque and speed, and by
+    component the stored energies and the dissipated power."""
+
+    supply: tuple[str, ...]
+    stores: tuple[str, ...]
+    losses: tuple[str, ...]
+
+
+_STORES = ("kinetic_energy", "potential_energy")
+
+
+def balance_of(names: Sequence[str]) -> EnergyBalance | None:
+    """The energy balance that variables of these names allow: of a machine by the torque and speed of its shaft, of a
+    system by the energy that its motor has given to its load; None where they allow none."""
+    there = set(names)
+    losses = [n for n in names if n.rpartition(".")[2] == "dissipated_power"]
+    parts = [n.removesuffix("dissipated_power") for n in losses]
+    parts = [p for p in parts if p != "model." and all(p + each in there for each in _STORES)]
+    if not parts:
+        return None
+    stores = tuple(p + each for p in parts for each in _STORES)
+    own = tuple(p + "dissipated_power" for p in parts)
+    if parts == [""] and {"tau", "w"} <= there:
+        onward = ("load_energy",) if "load_energy" in there else ()
+        return EnergyBalance(("tau", "w"), (*stores, *onward), own)
+    if "" not in parts and "motor.load_energy" in there:
+        return EnergyBalance(("motor.load_energy",), stores, own)
+    return None
+
+
+def energy_residual(run: TimeTable, balance: EnergyBalance) -> tuple[float, float]:
+    """The largest missing energy of a run, and the energy that went to and fro [J]."""
+    column = dict(zip(run.names, run.values.T, strict=True))
+    lost = cumulative_simpson(sum(column[n] for n in balance.losses), x=run.time, initial=0.0)
+    if len(balance.supply) == 2:
+        power = column[balance.supply[0]] * column[balance.supply[1]]
+        given = cumulative_simpson(power, x=run.time, initial=0.0)
+        flow = float(np.trapezoid(np.abs(power), run.time))
+    else:
+        given = column[balance.supply[0]] - column[balance.supply[0]][0]
+        flow = float(np.sum(np.abs(np.diff(given))))
+    stored = sum(column[n] for n in balance.stores)
+    gap = given - lost - (stored - stored[0])
+    return float(np.max(np.abs(gap))), max(flow, float(np.max(np.abs(stored - stored[0]))))
+
+
+# -- points
+
+
+class StatePoint(NamedTuple):
+    """Parameters and inputs of a state at the start, and the outputs there."""
+
+    given: dict[str, float]
+    outputs: dict[str, float]
+
+
+def chosen_points(interface: Interface) -> list[StatePoint]:
+    """Points about the start values with the outputs by the equations in Python; always the same. At the first one
+    the parameters have their start values. Parameters with which the model does not work are left as they are."""
+    rng = np.random.default_rng(20)
+    course = excitation(interface)
+    parameters = interface.signals_of("parameter")
+    start = {s.name: float(s.start or 0.0) for s in parameters}
+    real = [s for s in parameters if s.variable.type == "Real" and s.start and s.name.find("solver.") < 0]
+    points = []
+    for k in range(POINTS):
+        inputs = {name: float(x) for name, x in course(0.08 * k).items()}
+        values = dict(start)
+        # all at once; where that makes no machine, one by one
+        factors = {s.name: float(1.0 + SPREAD * (2.0 * rng.random() - 1.0)) for s in real} if k else {}
+        if k:
+            start |= {n: x for n, x in (("phi_start", 0.5 * k), ("w_start", 0.2 * k)) if start.get(n) == 0.0}
+            values = dict(start)
+        for changes in ([factors], [{name: x} for name, x in factors.items()]):
+            for change in changes:
+                trial = values | {
+                    name: _within(interface, name, start[name] * x) for name, x in change.items()
+                }
+                if outputs_at(interface.model, trial, inputs) is not None:
+                    values = trial
+            if values != start or not factors:
+                break
+        outputs = outputs_at(interface.model, values, inputs)
+        if outputs is not None:
+            points.append(StatePoint(values | inputs, outputs))
+    return points
+
+
+def _within(interface: Interface, name: str, x: float) -> float:
+    quantity = next(s.variable.quantity for s in interface.signals if s.name == name)
+    return min(max(x, quantity.low), quantity.high)
+
+
+def outputs_at(
+    model: type[Model], parameters: Mapping[str, float], inputs: Mapping[str, float]
+) -> dict[str, float] | None:
+    """The states and outputs at the start by the equations in Python; None where there is no machine."""
+    try:
+        p = model.check(model.parameter_layout.from_names(dict(parameters)))
+        u = model.input_layout.from_names(dict(inputs))
+        x = model.begin(p, u) if model.state_layout else None
+        parts = model.evaluate(MATH, p, u, x)
+    except (InputError, ArithmeticError, ValueError):
+        return None
+    found = model.state_layout.by_name(x) if model.state_layout else {}
+    for part, out in zip(model.parts, parts, strict=True):
+        found |= part.layout.by_name(out)
+    numbers = {name: float(value) for name, value in found.items()}
+    return numbers if all(map(math.isfinite, numbers.values())) else None
+
+
+def rerun_points(fmu: UnpackedFmu, points: Sequence[StatePoint]) -> Deviation:
+    """The FMU on this machine against the outputs of the points; each is compared at its own size, at least that of
+    its variable.
+
+    Raises
+    ------
+    RunError
+        where the FMU cannot run.
+    """
+    worst = Deviation(0.0, "")
+    for point in points:
+        with slave(fmu, point.given) as running:
+            got = running.get(list(point.outputs))
+        worst = max(worst, _largest(fmu, dict(zip(point.outputs, got, strict=True)), point.outputs))
+    return worst
+
+
+def recompute_points(fmu: UnpackedFmu, model: type[Model], points: Sequence[StatePoint]) -> Deviation:
+    """The equations in Python on this machine against the outputs of the points."""
+    parameters, worst = set(model.parameter_layout.names), Deviation(0.0, "")
+    for point in points:
+        given = [
+            {n: x for n, x in point.given.items() if (n in parameters) == side} for side in (True, False)
+        ]
+        found = outputs_at(model, *given)
+        worst = max(worst, _largest(fmu, found or {}, point.outputs))
+    return worst
+
+
+def _largest(fmu: UnpackedFmu, got: Mapping[str, float], wanted: Mapping[str, float]) -> Deviation:
+    def gap(name: str) -> float:
+        size = max(abs(wanted[name]), fmu.variables[name].nominal)
+        value = abs(got.get(name, math.inf) - wanted[name]) / size
+        return value if math.isfinite(value) else math.inf
+
+    return max((Deviation(gap(name), name) for name in wanted), default=Deviation(0.0, ""))
+
+
+def power_gap(interface: Interface, points: Sequence[StatePoint], balance: EnergyBalance) -> float | None:
+    """The largest gap of the power balance at the points, by the second route: the rate of the stored energy is its
+    exact derivative along the motion, which the torque does not use. Over the sum of the powers' sizes; None for
+    models whose supply is no torque."""
+    import casadi
+
+    if len(balance.supply) != 2:
+        return None
+    model, trace = interface.model, interface.trace
+    symbols, columns = trace.symbols, {name: value for name, (_, value) in trace.columns.items()}
+    for layout, place in ((model.input_layout, 1), (model.state_layout, 2)):
+        columns |= {name: symbols[place][k] for k, name in enumerate(layout.names)} if layout else {}
+    names = model.input_layout.names
+    rates = {own[n]: own[rate] for own in _drivers(model) for n, rate in (("phi", "w"), ("w", "a"))}
+    along = [columns[rates[n]] if n in rates else casadi.SX(0.0) for n in names]
+    stored = casadi.SX(sum(columns[n] for n in balance.stores))
+    rate = casadi.jtimes(stored, symbols[1], casadi.vertcat(*along)) if names else casadi.SX(0.0)
+    if trace.derivatives:
+        rate += casadi.jtimes(stored, symbols[2], casadi.vertcat(*trace.derivatives))
+    given = columns[balance.supply[0]] * columns[balance.supply[1]]
+    lost = casadi.SX(sum(columns[n] for n in balance.losses))
+    powers = casadi.Function("powers", symbols, [casadi.vertcat(given, lost, rate)])
+    worst = 0.0
+    for point in points:
+        p = model.with_derived(
+            MATH, model.parameter_layout.from_names(_of(point, model.parameter_layout.names))
+        )
+        u = model.input_layout.from_names(_of(point, names))
+        x = model.state_layout.values(model.begin(p, u)) if model.state_layout else []
+        at = [model.parameter_layout.values(p), model.input_layout.values(u), x, getattr(p, "derived", [])]
+        supply, loss, rise = (float(v) for v in powers(*at).full().ravel())
+        size = abs(supply) + abs(loss) + abs(rise)
+        worst = max(worst, abs(supply - loss - rise) / size if size > 0.0 else 0.0)
+    return worst
+
+
+def _of(point: StatePoint, names: Sequence[str]) -> dict[str, float]:
+    return {name: point.given[name] for name in names}

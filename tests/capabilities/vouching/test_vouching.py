@@ -1,0 +1,693 @@
+"""`chainunit key`, `certify` and `verify`: what a certified file carries, and every way in which one may not hold."""
+
+from __future__ import annotations
+
+import io
+import json
+import random
+import re
+import zipfile
+from pathlib import Path
+from xml.etree import ElementTree
+
+import fmpy
+import numpy as np
+import pytest
+from command import chainunit
+from fmpy.validation import validate_fmu
+
+from chainunit import ChainUnitMachine, InputError, __version__
+from chainunit.capabilities.vouching import archive, certify, documents, experiments, keys, manifest, rerun
+from chainunit.capabilities.vouching.integrity import integrity
+from chainunit.capabilities.vouching.verify import verify
+from chainunit.fmu.backends import export
+from chainunit.machines.accelerator import Accelerator
+from chainunit.machines.chain_unit import ChamberForces
+from chainunit.models import MODELS
+
+pytest.importorskip("cryptography")
+
+
+def silent(what):
+    pass
+
+
+@pytest.fixture(scope="module")
+def made(once):
+    """A folder with a key, and a certified FMU beside the same without certification."""
+
+    def fill(folder):
+        assert chainunit("key", cwd=folder).returncode == 0
+        export(ChamberForces, folder / "plain.fmu", {"left.material_mass": 45.0})
+        run = chainunit("certify", "plain.fmu", "-o", "it.fmu", cwd=folder)
+        assert run.returncode == 0, run.stderr
+        (folder / "said.txt").write_text(run.stdout)
+
+    return once("vouching", fill)
+
+
+@pytest.fixture(scope="module")
+def data(made):
+    return (made / "it.fmu").read_bytes()
+
+
+@pytest.fixture(scope="module")
+def members(data):
+    return archive.contents(data).members
+
+
+@pytest.fixture(scope="module")
+def own(made):
+    return keys.private_key(made / "chainunit.key")
+
+
+@pytest.fixture(scope="module")
+def other():
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+
+    return Ed25519PrivateKey.generate()
+
+
+def signed(members, key, **changes):
+    """A file with these members, signed again: manifest and signature anew."""
+    rest = {n: x for n, x in members.items() if n not in (manifest.MANIFEST, manifest.SIGNATURE)}
+    given = {"kind": "fmu", "name": "it", "version": __version__, "time": "2026-11-21T00:00:00Z"}
+    return manifest.signed(rest, key, **given | changes)
+
+
+def failing(data, key=None):
+    return [each.words for each in integrity(data, key).findings if each.holds is False]
+
+
+def checked(tmp_path, data, **options):
+    """The lines of a file with this content, by topic."""
+    file = tmp_path / "it.fmu"
+    file.write_bytes(data)
+    options.setdefault("told", silent)
+    return {each.topic: each for each in verify(file, None, **options)}
+
+
+# -- what holds
+
+
+def test_a_certified_fmu_holds(made):
+    run = chainunit("verify", "it.fmu", "--key", "chainunit.key.pub", cwd=made)
+    lines = run.stdout.splitlines()
+    assert (run.returncode, run.stderr) == (0, "")
+    assert [re.split(r"  +", line)[:2] for line in lines[:-1]] == [
+        ["holds", topic]
+        for topic in (
+            "signature", "members", "SRMD", "version", "domain", "equations", "reference experiment",
+            "smooth experiment", "step", "energy", "points",
+        )
+    ]  # fmt: skip
+    assert lines[-1] == "it.fmu: holds"
+    assert "by the expected key" in lines[0] and "29 members" in lines[1]
+
+
+def test_other_members_stay_to_the_bit_and_importers_take_it(made, data, members):
+    plain = archive.contents((made / "plain.fmu").read_bytes()).members
+    changed = {name for name, content in plain.items() if members[name] != content}
+    assert changed == {documents.RELATED}
+    added = set(members) - set(plain)
+    assert all(name.startswith(manifest.OWN) or name == documents.SRMD for name in added)
+    assert list(validate_fmu(str(made / "it.fmu"))) == []
+    one, two = (
+        fmpy.simulate_fmu(str(made / name), stop_time=0.1, output_interval=0.02, output=["tau", "J"])
+        for name in ("plain.fmu", "it.fmu")
+    )
+    np.testing.assert_array_equal(one, two)
+    with zipfile.ZipFile(io.BytesIO(data)) as opened:
+        assert opened.testzip() is None and {info.date_time for info in opened.infolist()} == {
+            (1980, 1, 1, 0, 0, 0)
+        }
+
+
+def test_to_certify_is_deterministic_and_replaces_an_earlier_one(made, data, own):
+    """From the FMU as it was exported, and from the certified one, with the same bytes."""
+    for name in ("plain.fmu", "it.fmu"):
+        again = certify.certified(certify.members_of(made / name), "it.fmu", own, None, silent)
+        assert again.data == data
+    plain = archive.contents((made / "plain.fmu").read_bytes()).members
+    assert certify.members_of(made / "it.fmu") == plain
+
+
+def test_the_domain_of_validity_in_numbers(members):
+    found = json.loads(members[documents.DOMAIN])
+    crank = found["variables"]["r"]
+    quantity = next(v.quantity for v in ChamberForces.parameter_layout.variables if v.name == "r")
+    assert (crank["causality"], crank["unit"], crank["start"]) == ("parameter", "m", quantity.start)
+    assert (crank["min"], crank["max"]) == (quantity.low, quantity.high)
+    low, high = crank["tried"]
+    assert 0.95 * quantity.start <= low < quantity.start < high <= 1.05 * quantity.start
+    assert found["variables"]["left.material_mass"]["causality"] == "input"
+    limits = {each["name"]: each["value"] for each in found["limits"]}
+    machine = ChainUnitMachine()
+    from chainunit import SideLoads
+
+    loads = (
+        SideLoads(material_mass=45.0, processing_force=0.0),
+        SideLoads(material_mass=0.0, processing_force=0.0),
+    )
+    right = json.loads(members[documents.DOMAIN])["variables"]["right.material_mass"]["start"]
+    if right:
+        loads = loads[0], SideLoads(material_mass=right, processing_force=0.0)
+    assert limits["slack_free_speed"] == pytest.approx(machine.slack_speed(*loads), rel=1e-9)
+    assert limits["chain_resonance"] == pytest.approx(
+        float(machine.chain_modes(*loads).frequency[0]), rel=1e-9
+    )
+    subjects = [each["subject"] for each in found["conditions"]]
+    assert subjects == [each.subject for each in ChamberForces.required]
+    assert all(each["above"] is None or each["value"] > each["above"] for each in found["conditions"])
+
+
+def test_evidence_holds_the_numbers_of_the_sentences(members):
+    found = json.loads(members[documents.EVIDENCE])
+    assert found["reference"]["deviation"] <= 1e-12 and found["tolerance"] == 1e-9
+    assert found["energy"]["missing"] < 1e-7 * found["energy"]["flow"]
+    assert found["points"]["deviation"] < 1e-12 and found["points"]["power_gap"] < 1e-12
+    assert len(found["points"]["at"]) == experiments.POINTS
+    first = found["points"]["at"][0]
+    assert first["given"]["r"] == ChamberForces.Parameters().r
+    assert found["sources"] == certify.sources_hash()
+    words = members[documents.REPORT].decode()
+    assert f"{found['energy']['missing']:.2g} J are missing" in words
+
+
+def test_the_forms_of_the_standards(made, data, members):
+    """Roles and places by FMI-LS-REF; SRMD with the checksum of the file beside it; CycloneDX."""
+    root = ElementTree.fromstring(members[documents.RELATED])
+    roles = {node.get("source"): node.get("role") for node in root.findall("Related")}
+    assert {roles[name] for name in roles if name.startswith("vouching/")} == {
+        "report", "meta-data", "signature", "experiment/validation"
+    }  # fmt: skip
+    for source in roles:
+        inside = f"{manifest.LS_REF}/{source}" if not source.startswith("../") else f"extra/{source[3:]}"
+        assert inside in members
+    beside = ElementTree.fromstring((made / "it.srmd").read_bytes())
+    inner = ElementTree.fromstring(members[documents.SRMD])
+    space = "{http://ssp-standard.org/SSPTraceability1/SimulationResourceMetaData}"
+    assert beside.tag == inner.tag == f"{space}SimulationResourceMetaData"
+    assert beside.get("checksum") == manifest.sha3(data) and beside.get("checksumType") == "SHA3-256"
+    assert beside.get("data") == "it.fmu" and inner.get("data") is None and inner.get("version") == "1.0.0"
+    bill = json.loads(members[documents.SBOM])
+    assert (bill["bomFormat"], bill["specVersion"]) == ("CycloneDX", "1.6")
+    hashes = {each["name"]: each["hashes"][0]["content"] for each in bill["components"]}
+    last = {documents.SBOM, manifest.MANIFEST, manifest.SIGNATURE}
+    assert hashes == {name: manifest.sha3(x) for name, x in members.items() if name not in last}
+    assert "chainunit" in {each["name"] for each in bill["metadata"]["tools"]["components"]}
+
+
+def test_the_bill_of_materials_is_valid(members):
+    pytest.importorskip("jsonschema")
+    validation = pytest.importorskip("cyclonedx.validation.json")
+    from cyclonedx.schema import SchemaVersion
+
+    valid = validation.JsonStrictValidator(SchemaVersion.V1_6)
+    bill = members[documents.SBOM].decode()
+    assert valid.validate_str(bill) is None
+    assert valid.validate_str(bill.replace("SHA3-256", "SHA3", 1)) is not None
+
+
+# -- what does not hold
+
+
+def spans(data, stated):
+    """By what a sentence must name, the place of its bytes in the file: members, and the directory at the end."""
+    found = {name: (own.at, own.at + own.length) for name, own in stated.items()}
+    for name in (manifest.MANIFEST, manifest.SIGNATURE):
+        top, _, end = archive.located(data, name)
+        found[name] = top, end
+    found[""] = found[manifest.SIGNATURE][1], len(data)
+    return found
+
+
+def test_500_changes_of_one_bit_are_found_and_named(data):
+    stated = integrity(data).manifest.members
+    places, rng = spans(data, stated), random.Random(34)
+    assert sum(end - begin for begin, end in places.values()) == len(data)
+    names = list(places)
+    for k in range(500):
+        name = names[k % len(names)]
+        bit = rng.randrange(8 * places[name][0], 8 * places[name][1])
+        changed = bytearray(data)
+        changed[bit // 8] ^= 1 << bit % 8
+        (words,) = failing(bytes(changed))
+        if name:
+            assert words.startswith(f"{name}: "), (bit, words)
+        else:
+            assert "its line in the directory" in words or words.startswith("the end of the archive"), (
+                bit,
+                words,
+            )
+
+
+@pytest.mark.parametrize("place", ["modelDescription.xml", manifest.MANIFEST, manifest.SIGNATURE, ""])
+def test_the_command_names_a_changed_bit_and_loads_nothing(tmp_path, data, place):
+    begin, end = spans(data, integrity(data).manifest.members)[place]
+    changed = bytearray(data)
+    changed[(begin + end) // 2] ^= 4
+    (tmp_path / "it.fmu").write_bytes(changed)
+    run = chainunit("verify", "it.fmu", cwd=tmp_path)
+    assert (run.returncode, run.stderr) == (1, "")
+    (words,) = (line for line in run.stdout.splitlines() if line.startswith("FAILS"))
+    assert (place or "the directory") in words
+    assert "holds  reference" not in run.stdout
+    assert re.search(r"it\.fmu: does not hold: 1 of \d lines fail", run.stdout)
+
+
+def test_no_bytes_at_all_make_an_error(data):
+    """Pieces, repetitions and noise end in sentences."""
+    rng = random.Random(5)
+    for k in range(60):
+        piece = data[: rng.randrange(len(data))] if k % 3 else rng.randbytes(rng.randrange(400))
+        if k % 5 == 0:
+            piece = piece + data[-rng.randrange(1, 3000) :]
+        assert failing(bytes(piece))
+    assert failing(b"") and failing(data + b"x") == [
+        "the end of the archive is changed: count of members, place of the directory, or a comment"
+    ]
+
+
+def test_another_key_has_its_own_sentence(made, tmp_path, members, other, data):
+    (tmp_path / "it.fmu").write_bytes(signed(members, other))
+    run = chainunit("verify", "it.fmu", "--key", made / "chainunit.key.pub", cwd=tmp_path)
+    assert run.returncode == 1
+    mine, theirs = (
+        keys.fingerprint(x)
+        for x in (keys.public_key(made / "chainunit.key.pub"), integrity(signed(members, other)).public)
+    )
+    assert f"holds, but by another key: expected {mine}, signed by {theirs}" in run.stdout
+    assert "are not run: a file that is not as signed is not loaded" in run.stdout
+    # whoever puts another key under a signature is found out
+    content = json.loads(members[manifest.SIGNATURE])
+    content["public_key"] = integrity(signed(members, other)).public.hex()
+    forged = manifest.check_signature(members[manifest.MANIFEST], manifest.json_bytes(content))
+    assert "does not hold: it is changed, or was not made by the key" in forged.fault
+
+
+def packed(members, order=sorted, **options):
+    """The members in a zip file of another program."""
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED, **options) as opened:
+        for name in order(members):
+            opened.writestr(name, members[name])
+    return stream.getvalue()
+
+
+def test_missing_added_changed_members_and_another_packer(members):
+    fewer = {n: x for n, x in members.items() if n != "modelDescription.xml"}
+    assert failing(packed(fewer)) == ["modelDescription.xml: is missing"]
+    assert failing(packed({**members, "extra/new.txt": b"1"})) == [
+        "extra/new.txt: was added: it is not signed"
+    ]
+    changed = {**members, "modelDescription.xml": members["modelDescription.xml"] + b" "}
+    assert failing(packed(changed)) == ["modelDescription.xml: its content is changed"]
+    (words,) = failing(packed(members))
+    assert words.startswith("the members are as signed, but another program packed the archive anew")
+    for name in (manifest.MANIFEST, manifest.SIGNATURE):
+        (words,) = failing(packed({n: x for n, x in members.items() if n != name}))
+        assert words.startswith(f"{name}: is missing")
+
+
+def test_a_member_that_stands_twice_is_named(members):
+    stream = io.BytesIO(packed(members))
+    with zipfile.ZipFile(stream, "a") as opened, pytest.warns(UserWarning, match="Duplicate"):
+        opened.writestr("modelDescription.xml", b"other")
+    assert "modelDescription.xml: stands in the archive twice" in failing(stream.getvalue())
+
+
+def test_a_member_under_another_order_of_the_directory_is_found(data):
+    """The same entries with two lines of the directory exchanged, or with a comment."""
+    with zipfile.ZipFile(io.BytesIO(data)) as opened:
+        begin = opened.start_dir
+    tail = data[begin:]
+    first = 46 + int.from_bytes(tail[28:30], "little")
+    second = first + 46 + int.from_bytes(tail[first + 28 : first + 30], "little")
+    swapped = data[:begin] + tail[first:second] + tail[:first] + tail[second:]
+    assert len(swapped) == len(data) and zipfile.ZipFile(io.BytesIO(swapped)).testzip() is None
+    assert all("its line in the directory of the archive is changed" in words for words in failing(swapped))
+    assert len(failing(swapped)) >= 2
+    stream = io.BytesIO(data)
+    with zipfile.ZipFile(stream, "a") as opened:
+        opened.comment = b"signed by me"
+    (words,) = failing(stream.getvalue())
+    assert words.startswith("the end of the archive is changed")
+
+
+def test_an_unsigned_file_no_archive_and_no_file(made, tmp_path):
+    run = chainunit("verify", "plain.fmu", cwd=made)
+    assert run.returncode == 1 and "the file is not signed; chainunit certify FILE signs one" in run.stdout
+    (tmp_path / "text.fmu").write_text("no archive")
+    run = chainunit("verify", "text.fmu", cwd=tmp_path)
+    assert run.returncode == 2 and "is no FMU and no SSP package: it is not a zip archive" in run.stderr
+    assert chainunit("verify", "none.fmu", cwd=tmp_path).returncode == 2
+
+
+@pytest.mark.parametrize(
+    ("version", "words"),
+    [
+        ("0.0.9", "certified by chainunit 0.0.9, older than"),
+        ("99.1", "certified by chainunit 99.1, newer than"),
+    ],
+)
+def test_an_older_and_a_newer_version_have_their_sentences(tmp_path, members, own, version, words):
+    found = checked(tmp_path, signed(members, own, version=version), run=False)
+    assert found["version"].holds is False and found["version"].words.startswith(words)
+    assert found["signature"].holds and found["members"].holds and found["equations"].holds
+
+
+def test_another_form_of_the_manifest_is_said(members, own):
+    text = members[manifest.MANIFEST].replace(manifest.FORM.encode(), b"chainunit vouching 9")
+    assert text != members[manifest.MANIFEST] and manifest.parsed(text) is None
+    for wrong in (
+        b"[]",
+        b"{",
+        b'{"form": 1}',
+        b"\xff",
+        text.replace(b'"members"', b'"more"'),
+        b"[" * 100_000,
+    ):
+        assert manifest.parsed(wrong) is None
+
+
+def test_a_changed_start_value_that_is_signed_again_is_found(tmp_path, members, other):
+    """Whoever has a key of his own can sign anything; the evidence inside then does not fit."""
+    start = f'start="{ChamberForces.Parameters().r!r}"'
+    text = members["modelDescription.xml"].decode()
+    place = text.index('name="r"')
+    at = text.index(start, place)
+    longer = text[:at] + 'start="0.2"' + text[at + len(start) :]
+    found = checked(tmp_path, signed({**members, "modelDescription.xml": longer.encode()}, other))
+    assert found["signature"].holds and found["members"].holds
+    assert found["domain"].holds is False and "differs from the certified one" in found["domain"].words
+
+
+def test_another_library_that_is_signed_again_is_found(tmp_path, members, other):
+    """The library of a machine with another crank, under the identifier of this one."""
+    libraries = [name for name in members if name.startswith("binaries/")]
+    if "sources/model.c" not in members:
+        pytest.skip("no C compiler")
+    export(ChamberForces, tmp_path / "longer.fmu", {"left.material_mass": 45.0, "r": 0.2})
+    theirs = archive.contents((tmp_path / "longer.fmu").read_bytes()).members
+    guid, new = (re.search(rb'guid="([^"]+)"', x["modelDescription.xml"])[1] for x in (members, theirs))
+    swapped = {name: theirs[name].replace(new, guid) for name in libraries}
+    assert all(guid in content for content in swapped.values())
+    found = checked(tmp_path, signed({**members, **swapped}, other))
+    assert found["equations"].holds
+    assert found["reference experiment"].holds is False
+    assert "the FMU here: largest deviation" in found["reference experiment"].words
+    assert found["smooth experiment"].holds is False
+
+
+def test_wrong_results_inside_are_found(tmp_path, members, other):
+    name = next(n for n in members if n.endswith("_co_simulation.csv"))
+    wrong = members[name].decode().splitlines()
+    cells = wrong[5].split(",")
+    cells[1] = repr(float(cells[1]) + 0.01)
+    wrong[5] = ",".join(cells)
+    found = checked(tmp_path, signed({**members, name: "\n".join(wrong).encode()}, other))
+    assert found["reference experiment"].holds is False and found["smooth experiment"].holds
+
+
+def test_without_a_library_for_this_machine_the_equations_are_compared(tmp_path, members, other):
+    bare = {n: x for n, x in members.items() if not n.startswith("binaries/")}
+    found = checked(tmp_path, signed(bare, other))
+    assert found["experiments"].holds is None
+    assert "the FMU has no library that this machine can load; it has none" in found["experiments"].words
+    assert found["equations"].holds and all(each.holds is not False for each in found.values())
+
+
+def test_evidence_of_another_form_is_a_sentence(tmp_path, members, other):
+    for content in (b"[]", b"{}", b"not json"):
+        found = checked(tmp_path, signed({**members, documents.EVIDENCE: content}, other))
+        assert found["evidence"].holds is False
+
+
+def test_meta_data_beside_that_are_of_another_file(made, tmp_path, data):
+    (tmp_path / "it.fmu").write_bytes(data)
+    text = (made / "it.srmd").read_text()
+    (tmp_path / "it.srmd").write_text(text.replace('checksum="', 'checksum="0')[:10_000])
+    found = {each.topic: each for each in verify(tmp_path / "it.fmu", None, run=False, told=silent)}
+    assert found["SRMD"].holds is False and "no checksum of 256 bits" in found["SRMD"].words
+    digit = re.search('checksum="(.)', text)[1]
+    other = "1" if digit == "0" else "0"
+    (tmp_path / "it.srmd").write_text(text.replace(f'checksum="{digit}', f'checksum="{other}'))
+    found = {each.topic: each for each in verify(tmp_path / "it.fmu", None, run=False, told=silent)}
+    assert found["SRMD"].holds is False and "is of another file" in found["SRMD"].words
+
+
+def test_names_that_lead_out_of_a_folder_are_not_unpacked(made, members, own, tmp_path):
+    data = signed({**members, "../evil.txt": b"1"}, own)
+    found = checked(tmp_path, data)
+    assert found["evidence"].holds is False and "leads out of its folder" in found["evidence"].words
+    assert not (tmp_path / "evil.txt").exists() and not (tmp_path.parent / "evil.txt").exists()
+    for name in ("/a", "a/../b", "c:\\x", "a//b", "."):
+        assert archive.unsafe([name]) == [name]
+    assert archive.unsafe(["a/b.txt", "a/"]) == []
+
+
+# -- keys
+
+
+def test_a_key_is_for_its_owner_alone_and_never_written_over(made, tmp_path):
+    assert (made / "chainunit.key").stat().st_mode & 0o777 == 0o600
+    before = (made / "chainunit.key").read_bytes()
+    run = chainunit("key", cwd=made)
+    assert run.returncode == 2 and "is there already; a key is never written over" in run.stderr
+    assert (made / "chainunit.key").read_bytes() == before
+    (tmp_path / "mine.pub").write_text("")
+    run = chainunit("key", "-o", "mine", cwd=tmp_path)
+    assert run.returncode == 2 and not (tmp_path / "mine").exists()
+
+
+def test_files_that_are_no_keys_are_refused(made, tmp_path):
+    from cryptography.hazmat.primitives import serialization as forms
+    from cryptography.hazmat.primitives.asymmetric import ec
+
+    foreign = ec.generate_private_key(ec.SECP256R1())
+    text = foreign.private_bytes(forms.Encoding.PEM, forms.PrivateFormat.PKCS8, forms.NoEncryption())
+    (tmp_path / "ec.key").write_bytes(text)
+    (tmp_path / "text").write_text("-----BEGIN nothing")
+    with pytest.raises(InputError, match=r"is a key of another kind; must be Ed25519"):
+        keys.private_key(tmp_path / "ec.key")
+    with pytest.raises(InputError, match=r"it has a public key: name the file without \.pub"):
+        keys.private_key(made / "chainunit.key.pub")
+    for read in (keys.private_key, keys.public_key):
+        with pytest.raises(InputError, match=r"has no (private|public) key in PEM"):
+            read(tmp_path / "text")
+        with pytest.raises(InputError, match="no such file of a key"):
+            read(tmp_path / "none")
+    assert keys.public_key(made / "chainunit.key") == keys.public_key(made / "chainunit.key.pub")
+    (tmp_path / "open.key").write_bytes((made / "chainunit.key").read_bytes())
+    (tmp_path / "open.key").chmod(0o644)
+    run = chainunit("certify", made / "plain.fmu", "-o", "a.fmu", "--key", "open.key", cwd=tmp_path)
+    assert run.returncode == 0 and "other users of this machine can read this key" in run.stderr
+
+
+# -- what is certified
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ({"modelDescription.xml": b"<a/>"}, "is no FMU"),
+        ({"readme.txt": b"1"}, "is neither an FMU"),
+    ],
+)
+def test_other_files_are_not_certified(made, tmp_path, content, words):
+    (tmp_path / "x.fmu").write_bytes(packed(content))
+    run = chainunit("certify", "x.fmu", "--key", made / "chainunit.key", cwd=tmp_path)
+    assert run.returncode == 2 and words in run.stderr
+
+
+def test_fmus_of_others_and_of_other_versions_are_not_certified(made, own):
+    plain = certify.members_of(made / "plain.fmu")
+    text = plain["modelDescription.xml"]
+    for tool, words in (
+        (b"Other 1.0", "must be an FMU of chainunit"),
+        (b"chainunit 0.0.9", "export it anew first"),
+    ):
+        changed = text.replace(f"chainunit {__version__}".encode(), tool)
+        with pytest.raises(InputError, match=words):
+            certify.certified({**plain, "modelDescription.xml": changed}, "x.fmu", own, None, silent)
+
+
+def test_an_fmu_that_does_not_give_its_results_is_not_certified(made, own):
+    plain = certify.members_of(made / "plain.fmu")
+    name = next(n for n in plain if n.endswith("_set_then_read.csv"))
+    lines = plain[name].decode().splitlines()
+    lines[3] = ",".join(["0.08", *("7.0" for _ in lines[3].split(",")[1:])])
+    with pytest.raises(
+        certify.RunError, match=r"does not give its reference results: .* it is not certified"
+    ):
+        certify.certified({**plain, name: "\n".join(lines).encode()}, "x.fmu", own, None, silent)
+
+
+STUDY = """
+[run]
+crank_speed = 2.4
+"""
+
+
+@pytest.mark.second
+def test_a_study_becomes_a_certified_system(made, tmp_path):
+    """Its model has no name in the package: with the file it is compared, too."""
+    (tmp_path / "mine.toml").write_text(STUDY)
+    run = chainunit("certify", "mine.toml", "--key", made / "chainunit.key", cwd=tmp_path)
+    assert run.returncode == 0 and "ChamberForcesSystem.fmu: certified" in run.stdout, run.stderr
+    assert "went to and fro" in run.stdout and "first goes slack" in run.stdout
+    run = chainunit("verify", "ChamberForcesSystem.fmu", cwd=tmp_path)
+    assert run.returncode == 0 and "name its file by --of" in run.stdout
+    run = chainunit("verify", "ChamberForcesSystem.fmu", "--of", "mine.toml", cwd=tmp_path)
+    assert run.returncode == 0 and "note" not in run.stdout and "the equations in Python here" in run.stdout
+
+
+@pytest.mark.second
+def test_an_ssp_package_with_its_fmus(made, tmp_path):
+    """Its own FMUs are certified themselves, by the same key; a foreign one by its hash."""
+    (tmp_path / "mine.toml").write_text(STUDY)
+    assert chainunit("export-ssp", "mine.toml", "-o", "a.ssp", cwd=tmp_path).returncode == 0
+    read = archive.contents((tmp_path / "a.ssp").read_bytes()).members
+    foreign = {"modelDescription.xml": b'<fmiModelDescription generationTool="other"/>'}
+    theirs = packed(foreign)
+    (tmp_path / "a.ssp").write_bytes(packed({**read, "resources/foreign.fmu": theirs}))
+    assert chainunit("certify", "a.ssp", "--key", made / "chainunit.key", cwd=tmp_path).returncode == 0
+    first = (tmp_path / "a.ssp").read_bytes()
+    assert chainunit("certify", "a.ssp", "--key", made / "chainunit.key", cwd=tmp_path).returncode == 0
+    assert (tmp_path / "a.ssp").read_bytes() == first
+    run = chainunit("verify", "a.ssp", "--key", made / "chainunit.key.pub", cwd=tmp_path)
+    assert run.returncode == 0
+    assert re.search(r"holds  resources/DcMotor\.fmu, reference experiment", run.stdout)
+    assert re.search(r"note   resources/foreign\.fmu +is no FMU of this package", run.stdout)
+    after = archive.contents(first).members
+    assert all(after[n] == x for n, x in read.items() if not n.endswith(".fmu"))
+    assert documents.SRMD in after and after["resources/foreign.fmu"] == theirs
+    changed = bytearray(first)
+    changed[integrity(first).manifest.members["resources/DcMotor.fmu"].at + 5000] ^= 1
+    (words,) = failing(bytes(changed))
+    assert words.startswith("resources/DcMotor.fmu: ")
+
+
+@pytest.mark.second
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("name", list(MODELS))
+def test_every_model_is_certified_and_holds(native_fmus, own, tmp_path, name, fmi):
+    file = native_fmus[name, fmi][0]
+    made = certify.certified(certify.members_of(file), file.name, own, None, silent)
+    (tmp_path / file.name).write_bytes(made.data)
+    found = {each.topic: each for each in verify(tmp_path / file.name, None, told=silent)}
+    assert all(each.holds for each in found.values()), found
+    assert {"reference experiment", "smooth experiment", "step", "points", "equations", "domain"} <= set(
+        found
+    )
+    assert list(validate_fmu(str(tmp_path / file.name))) == []
+
+
+@pytest.mark.second
+def test_a_python_fmu_is_certified_and_holds(fmus, own, tmp_path):
+    made = certify.certified(certify.members_of(fmus["DcMotor"]), "DcMotor.fmu", own, None, silent)
+    (tmp_path / "DcMotor.fmu").write_bytes(made.data)
+    found = verify(tmp_path / "DcMotor.fmu", None, told=silent)
+    assert all(each.holds for each in found)
+    assert "pythonfmu" in made.data.decode("latin-1")
+    bill = json.loads(archive.contents(made.data).members[documents.SBOM])
+    assert "pythonfmu" in {each["name"] for each in bill["metadata"]["tools"]["components"]}
+
+
+# -- the experiments by themselves
+
+
+def test_energy_of_a_pendulum_that_loses_power():
+    """E = 2 + sin t with a loss of 0.3 W: the supply is their rate; a gap of 0.01 J is found."""
+    time = np.linspace(0.0, 3.0, 301)
+    speed = np.full_like(time, 2.0)
+    tau = (np.cos(time) + 0.3) / speed
+    names = ("tau", "w", "kinetic_energy", "potential_energy", "dissipated_power")
+    columns = [tau, speed, 2.0 + np.sin(time), 0.0 * time, 0.3 + 0.0 * time]
+    balance = experiments.balance_of(names)
+    run = rerun.TimeTable(names, time, np.column_stack(columns))
+    missing, flow = experiments.energy_residual(run, balance)
+    assert missing < 1e-9 and flow == pytest.approx(np.trapezoid(np.abs(np.cos(time) + 0.3), time))
+    columns[2] = columns[2] + 0.01 * (time > 1.5)
+    missing, _ = experiments.energy_residual(rerun.TimeTable(names, time, np.column_stack(columns)), balance)
+    assert missing == pytest.approx(0.01, abs=1e-9)
+
+
+def test_which_outputs_make_a_balance():
+    parts = ("kinetic_energy", "potential_energy", "dissipated_power")
+    assert experiments.balance_of(["w", *parts]) is None  # no torque
+    assert experiments.balance_of(["tau", "w", *parts[:2]]) is None  # no losses
+    system = [f"{part}.{each}" for part in ("machine", "line", "model") for each in parts]
+    found = experiments.balance_of(["motor.load_energy", *system])
+    assert found.losses == (
+        "machine.dissipated_power",
+        "line.dissipated_power",
+    )  # the model of the control is no part
+    assert found.supply == ("motor.load_energy",) and len(found.stores) == 4
+
+
+def test_the_power_balance_sees_a_wrong_torque(monkeypatch):
+    interface = certify.interface_of(Accelerator, {})
+    points = experiments.chosen_points(interface)
+    balance = experiments.balance_of([s.name for s in interface.signals if s.causality != "parameter"])
+    assert experiments.power_gap(interface, points, balance) < 1e-12
+    more = balance._replace(stores=(*balance.stores, "kinetic_energy"))
+    assert experiments.power_gap(interface, points, more) > 1e-3
+
+
+LINKAGES = Path(__file__).parents[3] / "examples" / "linkages"
+
+
+@pytest.mark.second
+@pytest.mark.parametrize("name", ["tipper", "scissor_lift", "cylinder_lift", "slider_crank_press"])
+def test_a_linkage_with_any_driver_balances(own, tmp_path, name):
+    """A crank, a ram, a cylinder: their inputs move together, so that the energy balances."""
+    from chainunit.machines.linkages.file import read_linkage
+
+    model = read_linkage(LINKAGES / f"{name}.toml")
+    export(model, tmp_path / "it.fmu")
+    made = certify.certified(certify.members_of(tmp_path / "it.fmu"), "it.fmu", own, model, silent)
+    found = json.loads(archive.contents(made.data).members[documents.EVIDENCE])
+    assert found["energy"]["missing"] < 1e-5 * found["energy"]["flow"]
+    assert found["points"]["power_gap"] < 1e-12
+    (tmp_path / "it.fmu").write_bytes(made.data)
+    assert all(each.holds for each in verify(tmp_path / "it.fmu", None, model, told=silent))
+
+
+def test_an_fmu_whose_energy_does_not_balance_is_not_certified(made, own, monkeypatch):
+    plain = certify.members_of(made / "plain.fmu")
+    for name, limit, words in (
+        ("MISSING", 1e-15, "energy does not balance"),
+        ("POWER_GAP", -1.0, "powers do not"),
+    ):
+        with monkeypatch.context() as changed, pytest.raises(certify.RunError, match=words):
+            changed.setattr(experiments, name, limit)
+            certify.certified(plain, "plain.fmu", own, None, silent)
+
+
+@pytest.mark.second
+def test_the_step_of_a_driveline_has_its_order(native_fmus):
+    """Between masters the driveline is of third order while the shaft moves smoothly; chains of second."""
+    for name, low, high in (("CardanDriveline", 2.7, 3.3), ("ChainUnitFlexible", 1.7, 2.4)):
+        members = certify.members_of(native_fmus[name, 2][0])
+        with rerun.unpacked(members, name) as fmu:
+            interface = certify.interface_for(fmu)
+            given = experiments.smooth_inputs(interface)
+            outputs = [s.name for s in interface.signals_of("output")]
+            found, run = experiments.convergence(fmu, given, outputs)
+        assert low < found.order < high and 0.0 < found.error < found.differences[1] < found.differences[0]
+        assert run.values.shape == (1001, len(outputs))
+
+
+def test_the_sources_hash_changes_with_a_source(monkeypatch, tmp_path):
+    root = Path(certify.__file__).parents[2]
+    copy = tmp_path / "chainunit"
+    copy.mkdir()
+    (copy / "a.py").write_text("1")
+    monkeypatch.setattr(certify.resources, "files", lambda name: copy)
+    first = certify.sources_hash()
+    (copy / "a.py").write_text("2")
+    second = certify.sources_hash()
+    (copy / "a.py").rename(copy / "b.py")
+    assert len({first, second, certify.sources_hash()}) == 3 and (root / "capabilities").is_dir()
