@@ -177,6 +177,10 @@ def test_the_fmu_is_valid_and_its_derivatives_exact(whole):
         known, unknown = ([by_name[n] for n in names] for names in ([*inputs, *states], outputs))
         x = np.array(unit.getReal(known))
         x = x + np.concatenate([rng.uniform(0.1, 1.0, len(inputs)), np.full(len(states), 1e-3)])
+        # a closed contactor has no room above
+        x[: len(inputs)] = np.minimum(
+            x[: len(inputs)], [v.quantity.high - 0.05 for v in model.input_layout.variables]
+        )
 
         def at(values):
             unit.setReal(known[: len(inputs)], list(values[: len(inputs)]))

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from scipy.stats import beta, norm, quantile_test
+from scipy.stats import beta, norm, quantile_test, ttest_1samp
 
-from chainunit.study.quantiles import Estimate, independent_count, quantile, runs_needed, share
+from chainunit.study.quantiles import Estimate, independent_count, mean_share, quantile, runs_needed, share
 
 
 @pytest.mark.parametrize("q", [0.05, 0.5, 0.95, 0.99])
@@ -97,3 +97,13 @@ def test_shares_are_clopper_and_pearsons():
     )
     # in n runs that none fails: 1 - 0.025^(1/n)
     assert share(0, 50).low == 0.0 and share(0, 50).high == pytest.approx(1.0 - 0.025 ** (1.0 / 50))
+
+
+def test_a_mean_share_has_students_interval():
+    shares = np.array([0.9, 0.85, 0.95, 0.8])
+    got, wanted = mean_share(shares), ttest_1samp(shares, 0.0).confidence_interval(0.95)
+    assert (got.value, got.low) == pytest.approx((0.875, wanted.low))
+    assert wanted.high == pytest.approx(got.high)
+    assert mean_share([0.0, 0.5]).low == 0.0 and mean_share([1.0, 0.5]).high == 1.0
+    assert mean_share([0.3, 0.3, 0.3]) == Estimate(pytest.approx(0.3), pytest.approx(0.3), pytest.approx(0.3))
+    assert mean_share([0.3]) == Estimate(0.3, 0.0, 1.0), "one run does not tell how runs differ"

@@ -68,6 +68,7 @@ def test_study_writes_numbers_series_plots_and_fmus(done):
         *study_report.pictures(),
     } - {
         "driveline.png",
+        "energy.png",
         "chain_sweep.png",
         "blade_path.png",
         "flywheel.png",

@@ -155,7 +155,7 @@ class TableList:
     def field(self) -> tuple[Any, Any]:
         """The pydantic field of the list."""
         words = f"{self.description}: tables [[{self.name}]]"
-        return list[Any], Field([], max_length=self.most, description=words)
+        return list[dict[str, Any]], Field([], max_length=self.most, description=words)
 
     def form(self, prefix: str) -> type[BaseModel]:
         """The form of an entry; in a refusal `prefix` stands before its keys."""

@@ -257,14 +257,18 @@ def refusals(error: ValidationError, file: type[BaseModel], prefix: str = "") ->
     """The faults of a table of the form `file`, in the order of its keys; `prefix` stands before their
     names."""
     return [
-        InputError(_line(each, file, prefix), key=prefix + ".".join(map(str, each["loc"])))
-        for each in error.errors()
+        InputError(_line(each, file, prefix), key=prefix + ".".join(_path(each))) for each in error.errors()
     ]
+
+
+def _path(error: ErrorDetails) -> list[str]:
+    """The names of the key with a fault from the file on; the entries of a list count from 1."""
+    return [str(part + 1 if isinstance(part, int) else part) for part in error["loc"]]
 
 
 def _line(error: ErrorDetails, file: type[BaseModel], prefix: str) -> str:
     path = error["loc"]
-    where = prefix + printable(".".join(map(str, path)), 80)
+    where = prefix + printable(".".join(_path(error)), 80)
     if error["type"] == "extra_forbidden":
         table: Any = file
         for part in path[:-1]:

@@ -98,6 +98,20 @@ def share(count: int, runs: int) -> Estimate:
     return Estimate(count / runs, float(interval.low), float(interval.high))
 
 
+def mean_share(shares: Any) -> Estimate:
+    """The mean of the shares of several independent runs, shape (runs,), with the interval of Student's
+    distribution within 0 to 1; of a single run, that is all of it, as nothing tells how runs differ."""
+    from scipy.stats import t
+
+    shares = np.asarray(shares, float)
+    mean = float(np.mean(shares))
+    if len(shares) < 2:
+        return Estimate(mean, 0.0, 1.0)
+    error = float(np.std(shares, ddof=1)) / math.sqrt(len(shares))
+    reach = float(t.ppf(0.5 * (1.0 + CONFIDENCE), len(shares) - 1)) * error
+    return Estimate(mean, max(0.0, mean - reach), min(1.0, mean + reach))
+
+
 def runs_needed(q: float) -> int:
     """The least number of independent runs with which the quantile `q` has an interval. All n runs lie on one
     side of the quantile with the probability q^n or (1 - q)^n, which must be at most (1 - `CONFIDENCE`)/2."""

@@ -32,7 +32,7 @@ from ...study.arrays import peak
 from ...study.cycle import Cycle, cycle
 from ...study.drive import Drive
 from ...study.drive_fmus import export_machine
-from ...study.quantiles import HIGH, independent_count, quantile
+from ...study.quantiles import HIGH, independent_count, mean_share, quantile
 from ...study.record import StudyRecord
 from ...system.instance import Fmu, Instance
 from ...work.interrupts import stoppable
@@ -246,19 +246,22 @@ def numbers_at(
     of_turns = {"crank_torque": peaks(crank), "rocker_torque": peaks(rocker), "snatch": snatches}
     of_peaks: dict[str, float] = {}
     for name, sizes in of_turns.items():
-        estimate = quantile(sizes, HIGH)
-        of_peaks |= {
-            f"{name}_median": float(np.median(sizes)),
-            f"{name}_high": float(np.quantile(sizes, HIGH)),
-            f"{name}_high_from": estimate.low if estimate else math.nan,
-            f"{name}_high_to": estimate.high if estimate else math.nan,
-        }
+        for title, q in (("median", 0.5), ("high", HIGH)):
+            estimate = quantile(sizes, q)
+            of_peaks |= {
+                f"{name}_{title}": float(np.quantile(sizes, q)),
+                f"{name}_{title}_from": estimate.low if estimate else math.nan,
+                f"{name}_{title}_to": estimate.high if estimate else math.nan,
+            }
+    slack_time = mean_share(np.mean(np.any(all_rods, axis=-1), axis=(1, 2)))
     return (
         SpeedNumbers(
             speed=crank_speed,
             crank_torque_rms=float(np.sqrt(np.mean(crank**2))),
             snatch_spread=float(np.max(medians) / np.min(medians)),
-            slack_time=float(np.mean(np.any(all_rods, axis=-1))),
+            slack_time=slack_time.value,
+            slack_time_from=slack_time.low,
+            slack_time_to=slack_time.high,
             slack_rods=float(np.mean(all_rods)),
             fold_largest=float(max(np.max(values[f"{side}.fold_largest"]) for side in SIDES)),
             two_bar_crank_torque=peak(two.crank_torque),

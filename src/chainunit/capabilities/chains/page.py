@@ -20,6 +20,8 @@ from ...study.record import StudyRecord
 from .result import ChainResult
 
 PICTURES = Pictures()
+CERTAIN = 0.02
+"""The tables give the interval of a number where it is wider than this share of the number."""
 _OWN = (
     ("crank torque, peak", ("crank_torque_median", "crank_torque_high", "two_bar_crank_torque")),
     ("crank torque, RMS", ("crank_torque_rms", "", "two_bar_crank_torque_rms")),
@@ -87,7 +89,7 @@ def speeds_to_avoid(s: b.Source) -> Iterator[b.Judgement]:
 
 def _own_speed(s: b.Source, chain: Mapping[str, Any]) -> b.Table:
     rows = [
-        b.TableRow((title, *(s.estimate(f"chain.own_speed.{name}") if name else "" for name in names)))
+        b.TableRow((title, *(_estimate(s, f"chain.own_speed.{name}") if name else "" for name in names)))
         for title, names in _OWN
     ]
     if chain["resonance"]["value"] is not None:
@@ -111,6 +113,18 @@ def _own_speed(s: b.Source, chain: Mapping[str, Any]) -> b.Table:
     return b.Table(tuple(rows), heads, title=s.line(title))
 
 
+def _estimate(s: b.Source, path: str, unknown: str = "starts differ") -> Line:
+    """The number at `path`, with its interval where that is wider than `CERTAIN`; `unknown` where it has none, as the
+    starts differ too much."""
+    try:
+        low, high = s.value(f"{path}_from"), s.value(f"{path}_to")
+    except KeyError:
+        return s.number(path)
+    if low is None or high is None:
+        return unknown
+    return s.estimate(path) if high - low > CERTAIN * abs(s.value(path) or 0.0) else s.number(path)
+
+
 def _sweep(s: b.Source, chain: Mapping[str, Any]) -> b.Table:
     columns = {
         "crank_torque_median": "crank torque: median",
@@ -125,16 +139,18 @@ def _sweep(s: b.Source, chain: Mapping[str, Any]) -> b.Table:
     }
 
     def cell(i: int, name: str) -> Line:
-        is_unknown = chain["sweep"][i].get(f"{name}_from", {"value": 0.0})["value"] is None
-        return "-" if is_unknown else s.number(f"chain.sweep.{i}.{name}")
+        return _estimate(s, f"chain.sweep.{i}.{name}", "-")
 
     rows = (
         b.TableRow((s.number(f"chain.sweep.{i}.speed"), *(cell(i, name) for name in columns)))
         for i in range(len(chain["sweep"]))
     )
-    title = "Chains and two bars over the crank speed; -: the starts differ too much for a quantile"
+    title = (
+        "Chains and two bars over the crank speed; in brackets, where the starts differ: the interval of "
+        "{=chain.confidence} confidence; -: they differ too much for one"
+    )
     return b.Table(
-        tuple(rows), b.heads("crank speed", *map(s.line, columns.values())), title=title, form="long"
+        tuple(rows), b.heads("crank speed", *map(s.line, columns.values())), title=s.line(title), form="long"
     )
 
 

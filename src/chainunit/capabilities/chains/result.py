@@ -17,19 +17,25 @@ class SpeedNumbers:
     """Chains and two bars at one crank speed. Peaks are those of single turns, over all turns of all starts.
 
     The turns of a start are not independent. Where they count as too few independent ones, the interval of a
-    quantile is NaN."""
+    median or a quantile is NaN."""
 
     speed: Value = quantity("rad/s", "crank speed", kind="speed")
     crank_torque_median: Value = quantity("N.m", "crank torque, peak of a turn, median")
+    crank_torque_median_from: Value = quantity("N.m", "interval of that median, from")
+    crank_torque_median_to: Value = quantity("N.m", "interval of that median, to")
     crank_torque_high: Value = quantity("N.m", f"crank torque, peak of a turn, {100 * HIGH:g} % quantile")
     crank_torque_high_from: Value = quantity("N.m", "interval of that quantile, from")
     crank_torque_high_to: Value = quantity("N.m", "interval of that quantile, to")
     crank_torque_rms: Value = quantity("N.m", "crank torque, RMS")
     rocker_torque_median: Value = quantity("N.m", "rocker torque, peak of a turn, median")
+    rocker_torque_median_from: Value = quantity("N.m", "interval of that median, from")
+    rocker_torque_median_to: Value = quantity("N.m", "interval of that median, to")
     rocker_torque_high: Value = quantity("N.m", f"rocker torque, peak of a turn, {100 * HIGH:g} % quantile")
     rocker_torque_high_from: Value = quantity("N.m", "interval of that quantile, from")
     rocker_torque_high_to: Value = quantity("N.m", "interval of that quantile, to")
     snatch_median: Value = quantity("1", "force at A2, peak of a turn over that at rest, median")
+    snatch_median_from: Value = quantity("1", "interval of that median, from")
+    snatch_median_to: Value = quantity("1", "interval of that median, to")
     snatch_high: Value = quantity(
         "1", f"force at A2, peak of a turn over that at rest, {100 * HIGH:g} % quantile"
     )
@@ -40,6 +46,8 @@ class SpeedNumbers:
     )
     snatch_spread: Value = quantity("1", "largest over least of the starts' medians of it")
     slack_time: Value = quantity("1", "share of the time in which a rod is slack", kind="percent")
+    slack_time_from: Value = quantity("1", "interval of that share, from", kind="percent")
+    slack_time_to: Value = quantity("1", "interval of that share, to", kind="percent")
     slack_rods: Value = quantity("1", "share of the rods that are slack, mean over time", kind="percent")
     fold_largest: Value = quantity("rad", "largest angle between neighbouring rods")
     two_bar_crank_torque: Value = quantity("N.m", "crank torque of two bars, peak")
