@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import pickle
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,11 +15,14 @@ from chainunit.core.errors import InputError
 from chainunit.core.quantities import Layout, Value, declaration, quantity
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor
+from chainunit.machines.linkages.file import read_linkage
+from chainunit.machines.machine import Machine
 from chainunit.study import config
 from chainunit.study.catalogue_drive import catalogue_drive
 from chainunit.study.cycle import cycle
 from chainunit.study.drive import Drive
 from chainunit.study.event import TYPES, Event, Role, Timing, angle_of_begin, in_groups
+from chainunit.study.event_table import read_events, read_random_event
 from chainunit.study.events import one_sided_event
 from chainunit.study.readings import crank_angle, only_whole_turns
 from chainunit.study.result import as_dict
@@ -372,3 +377,19 @@ def test_a_new_type_of_event_is_one_class(swell, tmp_path):
     assert isinstance(event, swell) and 1.0 <= event.p.added <= 9.0
     with pytest.raises(InputError, match=r"event\.swell_left\.added = -1 kg: must be >= 0 kg"):
         config.parse('[[event]]\ntype = "swell"\nside = "left"\nadded = -1')
+
+
+def test_events_and_parameters_are_pickled():
+    events = read_events(
+        [{"type": "surge", "input": "press_force"}, {"type": "surge", "input": "left.force"}]
+    )
+    assert list(events) == ["surge_press_force", "surge_left_force"]
+    for event in events.values():
+        again = pickle.loads(pickle.dumps(event))
+        assert again == event and type(again) is type(event) and again.title == event.title
+    model = read_linkage(Path(__file__).parents[1] / "examples" / "linkages" / "slider_crank_press.toml")
+    machine = Machine(model, {"r": 0.07})
+    for instance in (machine.p, model.Feed(press_force=3.0), model.Inputs(phi=1.0)):
+        assert pickle.loads(pickle.dumps(instance)) == instance
+    drawn = read_random_event({"type": "surge", "input": "press_force"}, "monte_carlo.event")
+    assert drawn.ranges == {"factor": (1.5, 4.0)} and drawn.identity()["input"] == "press_force"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import pickle
 import shutil
 from pathlib import Path
 
@@ -16,7 +15,6 @@ from chainunit.core.errors import InputError
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
 from chainunit.study import config
-from chainunit.study.event_table import read_events, read_random_event
 
 pytestmark = pytest.mark.second
 
@@ -79,22 +77,6 @@ def test_random_surges_reach_other_processes(result):
     assert data["status"] == "complete" and data["monte_carlo"]["runs"]["value"] == 2
     drawn = xr.open_zarr(result / data["monte_carlo"]["file"], consolidated=False)["drawn_factor"].values
     assert len(set(drawn)) == 2 and all(1.5 <= factor <= 4.0 for factor in drawn)
-
-
-def test_events_and_parameters_are_pickled():
-    events = read_events(
-        [{"type": "surge", "input": "press_force"}, {"type": "surge", "input": "left.force"}]
-    )
-    assert list(events) == ["surge_press_force", "surge_left_force"]
-    for event in events.values():
-        again = pickle.loads(pickle.dumps(event))
-        assert again == event and type(again) is type(event) and again.title == event.title
-    model = read_linkage(PRESS)
-    machine = Machine(model, {"r": 0.07})
-    for instance in (machine.p, model.Feed(press_force=3.0), model.Inputs(phi=1.0)):
-        assert pickle.loads(pickle.dumps(instance)) == instance
-    drawn = read_random_event({"type": "surge", "input": "press_force"}, "monte_carlo.event")
-    assert drawn.ranges == {"factor": (1.5, 4.0)} and drawn.identity()["input"] == "press_force"
 
 
 @pytest.mark.parametrize(
