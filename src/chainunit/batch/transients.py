@@ -363,7 +363,8 @@ def _method(model: type[Model], operations: Operations) -> str:
     return "INTERPOLATED" if free else "TO_ROWS"
 
 
-def _operations(model: type[Model], outputs: Sequence[str], by: Sequence[str]) -> Operations:
+@lru_cache(maxsize=4)
+def _operations(model: type[Model], outputs: tuple[str, ...], by: tuple[str, ...]) -> Operations:
     """Three groups: the derivatives of the states, these outputs and states, and the states that meet the constraints
     of a model with error control. The derivatives of each group in a direction follow it; the direction consists of
     derivatives of the states, behind the states, and of those `by` names, a fourth argument."""

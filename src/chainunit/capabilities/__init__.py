@@ -10,6 +10,7 @@ from typing import Any
 NAMES = (
     "chains",
     "sizing",
+    "static_inertia",
     "energy",
     "sides",
     "blade",

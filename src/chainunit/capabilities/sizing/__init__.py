@@ -71,15 +71,9 @@ class SizingCapability(Capability):
         plan: SizingPlan | None = config.plans[self.name]
         if plan is None:
             return None
-        from .duty import duty_of
-        from .search import motors_on_offer, size
-        from .task import SizingTask
+        from .chooser import SizingChooser
 
-        task = SizingTask(plan, config.drive, config.machine, config.operation, config.events)
-        motors = motors_on_offer(task, config.file.catalogue)
-        progress("the machine at constant speed", 0.0, 1.0)
-        duty = duty_of(task, config.values, folder, backend)
-        return size(task, motors, duty, folder, progress, backend).proposal(config.drive)
+        return SizingChooser(plan, config, folder, progress, backend).choose(config.machine)
 
     def permitted_temperature(self, plan: SizingPlan | None) -> tuple[str, float] | None:
         """That of its table."""

@@ -16,7 +16,9 @@ from ...core.errors import InterruptedRunError, RunError
 from ...drives.catalogue import CatalogueMotor
 from ...drives.gear_ratios import gear_unit, next_ratio, ratio_on_offer
 from ...study.catalogue_drive import catalogue_drive, with_inertia
+from ...study.drive import Drive
 from ...study.limits import SPEED_DEVIATION
+from ...study.proposal import Judged
 from .candidate import Candidate, TrialResult
 from .duty import CycleNumbers, Duty
 from .inverter import least_boost, misses_by_a_hair
@@ -97,6 +99,12 @@ class MotorTrials:
         except RunError as error:
             c.trial, c.reason = TrialResult(), f"its run failed: {error}"
         return c
+
+    def judged_drive(self, drive: Drive, motor: CatalogueMotor) -> Judged:
+        """A drive as it is by its runs, with the start from the worst crank angle."""
+        c = self.judged(Candidate(motor, drive, margin=self.plan.demands.margin), worst_start=True)
+        missed = sorted((name for name in c.checks if c.exceeds(name)), key=lambda name: -c.sizes[name])
+        return Judged(c.checks, tuple(missed), c.margin, c.reason)
 
     def with_least_boost(self, c: Candidate, *, worst_start: bool = False) -> Candidate:
         """The judged candidate, with an inverter with the least boost with which it starts."""
