@@ -190,6 +190,15 @@ def test_a_machine_that_starts_empty_is_fed_in_delta():
         assert start_up(direct, simulation, lambda time: None, {}).rig.fed_from < 0.4
 
 
+def test_a_motor_on_an_inverter_is_not_cut_off(tmp_path):
+    """The model has neither the current limit of an inverter nor its search for the speed of the motor, so that a
+    reclosing behind it would be that of a line."""
+    study = run_study(parse(STUDY.replace('"star-delta"', '"inverter"')), tmp_path)
+    assert study.failure is None and "interruption" not in study.answers
+    (left_out,) = [remark for remark in study.remarks if remark.kind == "event left out"]
+    assert "no contactor on the line" in left_out.text
+
+
 def test_a_motor_that_is_cut_off_is_asked_for_no_torque():
     """The reserve of an interruption is that of its closing, not that of the open contactor."""
     rig, config = rig_of(DIRECT)

@@ -100,6 +100,8 @@ class Event(metaclass=EventType):
     """whether the event is a start, with signals from rest on"""
     acts_on: ClassVar[tuple[str, ...]] = ()
     """inputs that the event changes"""
+    on_line: ClassVar[bool] = False
+    """whether the event is one of a motor on the line, not of one on an inverter"""
     reads: ClassVar[tuple[str, ...]] = ()
     """outputs whose values at the begin of the event set its signals; these are then single numbers, and the
     inputs jump to them"""

@@ -294,7 +294,7 @@ class Interruption(Event):
     kind, run = "interruption", "interruption"
     words, heading = "the motor is cut off and reclosed", "interruption"
     role, has_side = Role.DISTURBANCE, False
-    acts_on = ("contactor",)
+    acts_on, on_line = ("contactor",), True
 
     @declaration
     class Parameters(Timing):
@@ -311,7 +311,8 @@ class Interruption(Event):
 
     @property
     def without(self) -> str:
-        """See `Event`: a DC motor has its own supply."""
+        """See `Event`: a DC motor has its own supply, and an inverter limits its current and finds the speed of the
+        motor before it switches on."""
         return "this motor's drive has no contactor on the line"
 
     def signals(self, normal: Values, at: float, state: Values) -> Signals:

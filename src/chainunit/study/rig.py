@@ -91,7 +91,9 @@ class Rig:
         return inputs
 
     def takes(self, event: Event) -> bool:
-        """Whether the drive has the inputs that the event acts on."""
+        """Whether the drive has the inputs that the event acts on, and the supply that it needs."""
+        if event.on_line and self.drive.follows:
+            return False
         machine = self.graph.components["machine"].connectors
         return set(event.inputs(event.side)) <= set(self.inputs) and set(event.reads) <= set(machine)
 

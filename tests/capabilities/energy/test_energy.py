@@ -7,10 +7,11 @@ import json
 
 import numpy as np
 import pytest
+from reports import write
 
 from chainunit.app import cli
 from chainunit.capabilities.energy import inverter
-from chainunit.capabilities.energy.analysis import EnergyFindings, year_of
+from chainunit.capabilities.energy.analysis import EnergyFindings, MotorEnergy, compared, year_of
 from chainunit.capabilities.energy.efficiency_class import (
     CLASSES,
     class_of,
@@ -19,10 +20,11 @@ from chainunit.capabilities.energy.efficiency_class import (
     next_class,
     required,
 )
-from chainunit.capabilities.energy.motor_class import MotorClass
-from chainunit.capabilities.energy.running import PLACES, scaled, warm
+from chainunit.capabilities.energy.motor_class import MotorClass, words_of
+from chainunit.capabilities.energy.page import verdict_words
+from chainunit.capabilities.energy.running import PLACES, Losses, scale_faults, scaled, warm
 from chainunit.core.errors import InputError
-from chainunit.core.quantities import Layout
+from chainunit.core.quantities import Layout, declaration, quantity
 from chainunit.drives.catalogue import catalogue
 from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.study.config import parse
@@ -154,6 +156,8 @@ def test_an_inverter_has_losses_and_a_line_has_none(study):
     assert (found(study).own.mean.inverter is not None) == study.drive.follows
     kinds = {remark.kind for remark in study.remarks}
     assert "losses in iron" in kinds and ("losses of the inverter" in kinds) == study.drive.follows
+    # half of the feed goes with the loss of the whole feed in the gear
+    assert "gear at other loads" in kinds
 
 
 # -- inverter
@@ -311,3 +315,103 @@ def test_the_reports_have_the_numbers_of_the_result(tmp_path, monkeypatch, capsy
     assert 'id="energy"' in page and (out / "energy.png").exists()
     for text in (words, said):
         assert "Electric power, and where it goes" in text and "it has paid after" in text
+
+
+# -- limits of the numbers
+
+
+def short_study(start="direct", table="", loads=""):
+    head = STUDY.format(start=start).partition("[[usage")[0].replace("tonnes_per_hour = 4\n", table)
+    return head + loads
+
+
+def test_the_winding_has_the_temperature_of_the_duty(study):
+    """A difference of 5 K would change the energy by more than 0.1 %."""
+    own, drive = found(study).own, study.drive
+    settled = drive.motor.settled_temperature(
+        drive.fmu_parameters, own.mean.winding, own.temperature, own.speed
+    )
+    assert settled == pytest.approx(own.temperature, abs=0.5) and not own.too_hot
+
+
+def test_a_duty_that_is_too_hot_is_warned_of(tmp_path):
+    made = run_study(parse(short_study(loads="[[usage.load]]\nfactor = 10\n")), tmp_path)
+    own = found(made).own
+    assert own.too_hot and own.temperature == made.config.permitted_temperature[1]
+    (warning,) = [
+        remark
+        for remark in made.warnings
+        if remark.kind == "energy of a winding too hot"
+        and own.motor in remark.text.split("winding of")[1][:30]
+    ]
+    assert "120 degC" in warning.text and "usage.load.factor" in warning.text
+
+
+def test_another_motor_that_changes_the_speed_is_no_comparison(tmp_path):
+    """A motor of two poles on the line turns the same gear and crank twice as fast."""
+    made = run_study(parse(short_study(table='other = "IE3 2-pole 1.5 kW, 90S"\n')), tmp_path)
+    assert found(made).other is None and found(made).comparison is None
+    assert "turns at 1.9" in found(made).no_other and "usage.other" in found(made).no_other
+
+
+def test_the_same_motor_takes_the_same_energy(tmp_path):
+    made = run_study(parse(short_study(table='other = "IE3 4-pole 1.5 kW, 90L"\n')), tmp_path)
+    write(made, tmp_path)
+    comparison = found(made).comparison
+    assert (comparison.better, comparison.saving, comparison.pays_after) == ("", 0.0, None)
+    assert "Both motors take the same energy." in (tmp_path / "result.md").read_text("utf-8")
+
+
+def motor_energy(plan, name, power, price):
+    losses = Losses(**dict.fromkeys(Layout(Losses).names) | {"electric": power})
+    return MotorEnergy(name, year_of(plan, power, price), losses, 300.0, False, 150.0, price)
+
+
+@pytest.mark.parametrize(
+    ("price", "words"),
+    [
+        (450.0, "it has paid after"),
+        (380.0, "it costs no more than the other"),
+        (4000.0, "does not pay in a life of"),
+        (None, "not known without the prices"),
+    ],
+)
+def test_the_life_decides_whether_a_motor_pays(study, price, words):
+    plan = study.config.plans["energy"]
+    own = motor_energy(plan, "own", 1000.0, 400.0)
+    other = motor_energy(plan, "other", 950.0, price)
+    comparison = compared(own, other)
+    # 50 W over 10 years of 2000 h at 0.25 a kWh are 250
+    if price is None:
+        assert comparison.life_saving is None and comparison.pays_after is None
+    else:
+        assert comparison.life_saving == pytest.approx(250.0 - (price - 400.0))
+        assert (comparison.pays_after < 10.0) == (comparison.life_saving > 0.0)
+    assert words in verdict_words(comparison)
+
+
+def test_shares_of_a_third_are_complete():
+    three = "".join(f"[[usage.load]]\nshare = '33.3 %'\nfactor = {f}\n" for f in (1, 0.5, 0))
+    plan = parse(short_study(loads=three)).plans["energy"]
+    assert len(plan.loads) == 3
+
+
+def test_a_switch_of_the_feed_stays_and_a_factor_keeps_the_bounds():
+    @declaration
+    class Feed:
+        """A feed with a bound and a count."""
+
+        force: float = quantity("N", "force", default=100.0, min=20.0, max=500.0)
+        lumps: float = quantity("1", "lumps", default=3, min=1, max=9, type="Integer")
+
+    feed = Feed(force=200.0, lumps=4)
+    assert scaled(feed, 0.5) == Feed(force=100.0, lumps=4) and scale_faults(feed, 0.5) == []
+    (words,) = scale_faults(feed, 10.0)
+    assert words == "feed.force comes to 2000 N with it: must be >= 20 N and <= 500 N"
+    assert scale_faults(feed, 0.0)
+
+
+def test_a_motor_of_eight_poles_is_in_the_scope_without_a_known_class():
+    plate = dataclasses.replace(catalogue()[0].nameplate, power=1500.0, poles=8)
+    words = words_of(MotorClass("8", class_of(plate), required(plate), False, 0.8))
+    assert "not known here" in words and "asks IE3" in words

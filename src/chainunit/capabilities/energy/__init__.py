@@ -46,9 +46,16 @@ class EnergyCapability(Capability):
         return read_usage(reading.values["usage"], reading.form.usage)
 
     def faults(self, config: Config) -> Iterable[InputError]:
-        """Refuse another motor that no catalogue has."""
+        """Refuse another motor that no catalogue has, and a factor that takes the feed beyond its bounds."""
         plan: UsagePlan | None = config.plans[self.name]
-        if plan is None or not plan.other:
+        if plan is None:
+            return
+        from .running import scale_faults
+
+        for name, load in plan.loads.items():
+            for words in scale_faults(config.feed, float(load.factor)):
+                yield InputError(f"usage.load.factor = {load.factor:g} ({name}): {words}", "usage.load")
+        if not plan.other:
             return
         from .other_motor import check_other
 

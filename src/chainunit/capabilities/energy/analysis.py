@@ -22,6 +22,10 @@ from .table import Usage, UsagePlan
 
 LARGEST_GAP = 0.01
 """Share of the electric power that may be missing in the balance."""
+_SPEEDS = 0.05
+"""Relative difference of mean speeds up to which two motors have the same duty."""
+_ALIKE = 1e-6
+"""Relative difference of energies up to which two motors take the same."""
 _GIVEN_BACK = 0.01
 """Share of the electric power above which the power that comes back from the motor is worth a remark."""
 
@@ -55,6 +59,9 @@ class MotorEnergy:
     year: Year = part(inline=True)
     mean: Losses = part("mean power over the time of running, by place")
     temperature: float = quantity("K", "temperature of the winding in the duty")
+    too_hot: bool = part(
+        "whether the duty makes the winding hotter than permitted; the energy is that at the limit"
+    )
     speed: float = quantity("rad/s", "speed of the motor, mean", kind="speed")
     price: float | None = quantity("1", "price of the motor")
 
@@ -63,12 +70,15 @@ class MotorEnergy:
 class MotorComparison:
     """The better of two motors, by energy, and what it saves."""
 
-    better: str = part("the motor that takes less energy")
+    better: str = part("the motor that takes less energy; empty where both take the same")
     saving: float = quantity("J", "energy that it saves a year", kind="energy")
     saving_share: float = quantity("1", "the same over the energy with the other motor", kind="percent")
     cost_saving: float | None = quantity("1", "cost that it saves a year")
     extra_price: float | None = quantity("1", "price that it costs more")
-    pays_after: float | None = quantity("1", "years until it has paid")
+    pays_after: float | None = quantity("1", "years until it has paid; 0 where it costs no more")
+    life_saving: float | None = quantity(
+        "1", "cost that it saves over the life, after its price; negative where it does not pay"
+    )
 
 
 @result
@@ -87,6 +97,16 @@ class EnergyFindings(Findings):
     def remark(self, study: StudyRecord) -> None:
         """The assumptions behind the losses."""
         mean = self.own.mean
+        for motor in filter(None, (self.own, self.other)):
+            if motor.too_hot:
+                study.warn(
+                    "energy of a winding too hot",
+                    "with the loads of [usage] the winding of {motor} would get hotter than the permitted {limit}; "
+                    "its energy is that at this temperature, and too low. Take a larger motor, or lower "
+                    "usage.load.factor.",
+                    motor=motor.motor,
+                    limit=(motor.temperature, "K", "temperature"),
+                )
         if abs(mean.missing) > LARGEST_GAP * abs(mean.electric):
             study.warn(
                 "energy balance",
@@ -102,6 +122,12 @@ class EnergyFindings(Findings):
             "catalogue are fitted so that their losses include them at rated load. At light load a real motor loses "
             "more.",
         )
+        if mean.gear and any(load.factor != 1.0 for load in self.loads.values()):
+            study.note(
+                "gear at other loads",
+                "At each load the gear takes the loss that it has with the feed of the study: with less feed its "
+                "teeth lose less than the table says, with more feed they lose more.",
+            )
         if self.inverter:
             study.note("losses of the inverter", f"The losses of the inverter are {self.inverter}.")
         elif study.drive.follows:
@@ -161,7 +187,7 @@ class _Task:
             )
             return None
         own = self._energy(duty, motor.designation if motor else "the motor of the study", self._price(motor))
-        other, no_other = self._other(drive, motor)
+        other, no_other = self._other(drive, motor, duty)
         return EnergyFindings(
             own=own,
             loads={
@@ -170,7 +196,7 @@ class _Task:
             },
             running=self.plan.running,
             other=other,
-            comparison=None if other is None else _compared(own, other),
+            comparison=None if other is None else compared(own, other),
             inverter=self._inverter_words() if inverter else "",
             no_other=no_other,
             given_back=duty.given_back,
@@ -211,8 +237,10 @@ class _Task:
         given = float(table.other_price if is_other else table.motor_price)
         return given or (motor.nameplate.price if motor else 0.0) or None
 
-    def _other(self, drive: Drive, motor: CatalogueMotor | None) -> tuple[MotorEnergy | None, str]:
-        """The energy with the other motor, or the reason why there is none."""
+    def _other(
+        self, drive: Drive, motor: CatalogueMotor | None, own: LoadDuty
+    ) -> tuple[MotorEnergy | None, str]:
+        """The energy with the other motor beside the `own` duty, or the reason why there is none."""
         if motor is None:
             return None, "the motor has no nameplate"
         try:
@@ -228,13 +256,19 @@ class _Task:
             return None, f"the other motor could not be run: {error}"
         if duty.unsteady:
             return None, f"{other.designation} does not run steadily with {', '.join(duty.unsteady)}"
+        speeds = duty.mean(drive.motor_speed) / own.mean(drive.motor_speed)
+        if abs(speeds - 1.0) > _SPEEDS:
+            return None, (
+                f"with {other.designation} behind the same gear the crank turns at {speeds:.3g} times the speed, "
+                "which is another duty; name a motor of the same number of poles in usage.other"
+            )
         return self._energy(duty, other.designation, self._price(other, is_other=True)), ""
 
     def _energy(self, duty: LoadDuty, name: str, price: float | None) -> MotorEnergy:
         losses = duty.losses
         year = year_of(self.plan, float(losses.electric), price)
         speed = duty.mean(self.study.drive.motor_speed)
-        return MotorEnergy(name, year, losses, duty.temperature, speed, price)
+        return MotorEnergy(name, year, losses, duty.temperature, duty.is_too_hot, speed, price)
 
 
 def year_of(plan: UsagePlan, power: float, price: float | None) -> Year:
@@ -254,12 +288,18 @@ def year_of(plan: UsagePlan, power: float, price: float | None) -> Year:
     )
 
 
-def _compared(own: MotorEnergy, other: MotorEnergy) -> MotorComparison:
+def compared(own: MotorEnergy, other: MotorEnergy) -> MotorComparison:
+    """The comparison of two motors with the same duty."""
     better, worse = sorted((own, other), key=lambda each: float(each.year.energy))
     saving = worse.year.energy - better.year.energy
     costs = worse.year.cost, better.year.cost
     cost = None if None in costs else costs[0] - costs[1]
     prices = better.price, worse.price
     extra = None if prices[0] is None or prices[1] is None else prices[0] - prices[1]
+    share = saving / worse.year.energy
+    if share < _ALIKE:
+        return MotorComparison("", 0.0, 0.0, cost, extra, None, None)
     pays = None if not cost or extra is None else max(0.0, extra / cost)
-    return MotorComparison(better.motor, saving, saving / worse.year.energy, cost, extra, pays)
+    lives = worse.year.life_cost, better.year.life_cost
+    life = None if None in lives else lives[0] - lives[1]
+    return MotorComparison(better.motor, saving, share, cost, extra, pays, life)

@@ -14,7 +14,7 @@ class MotorClass(Findings):
     """Class and efficiency of a motor."""
 
     designation: str = part("the motor")
-    efficiency_class: str = part("its class by IEC 60034-30-1; empty where that has none for it")
+    efficiency_class: str = part("its class by IEC 60034-30-1; empty where its limits are not known here")
     required: str = part(
         "the class that EU 2019/1781 asks of it; empty outside of the scope of that regulation"
     )
@@ -58,7 +58,11 @@ class MotorClassAnalysis(Analysis):
 def words_of(found: MotorClass) -> str:
     """Class and demand, in a sentence."""
     if not found.efficiency_class:
-        return "IEC 60034-30-1 has no class for this motor at 50 Hz."
+        asked = f"; EU 2019/1781 asks {found.required}" if found.required else ""
+        return (
+            "The class of the motor is not known here: the limits of IEC 60034-30-1 for 50 Hz and 2, 4 or 6 poles "
+            f"do not hold for it{asked}."
+        )
     if not found.required:
         return f"The motor is {found.efficiency_class}; EU 2019/1781 does not cover it."
     verb = "asks" if not found.falls_short else "asks more,"

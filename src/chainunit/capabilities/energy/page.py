@@ -9,7 +9,7 @@ from ...report import blocks as b
 from ...report import figure as fig
 from ...report.lines import Line, line
 from ...study.record import StudyRecord
-from .analysis import EnergyFindings, Year
+from .analysis import EnergyFindings, MotorComparison, Year
 from .motor_class import MotorClass, words_of
 from .running import PLACES, Losses
 
@@ -28,7 +28,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     yield _figure(findings)
     yield _year(s, findings)
     if findings.comparison is not None:
-        yield b.Text(_verdict(s, findings))
+        yield b.Text(s.line(verdict_words(findings.comparison)))
     else:
         yield b.Text(f"No other motor is compared: {findings.no_other}.", "note")
 
@@ -84,20 +84,31 @@ def _year(s: b.Source, findings: EnergyFindings) -> b.Table:
     return b.Table(tuple(rows), b.heads("", *(line(head) for head in heads)), title=title)
 
 
-def _verdict(s: b.Source, findings: EnergyFindings) -> Line:
-    comparison = findings.comparison
-    assert comparison is not None
+def verdict_words(comparison: MotorComparison) -> str:
+    """Which motor takes less, and whether it pays: a text with the paths of its numbers in braces."""
+    if not comparison.better:
+        return "Both motors take the same energy."
     text = (
         "{energy.comparison.better} takes less: it saves {energy.comparison.saving} a year, "
         "{energy.comparison.saving_share}"
     )
     if comparison.cost_saving is not None:
         text += ", a cost of {energy.comparison.cost_saving} a year"
-    if comparison.pays_after is not None:
-        text += "; it has paid after {energy.comparison.pays_after} years"
-    else:
+    if comparison.pays_after is None or comparison.life_saving is None:
         text += "; when it has paid is not known without the prices of both motors and of the energy"
-    return s.line(text + ".")
+    elif comparison.pays_after <= 0.0:
+        text += "; it costs no more than the other, and saves {energy.comparison.life_saving} over the life"
+    elif comparison.life_saving >= 0.0:
+        text += (
+            "; it has paid after {energy.comparison.pays_after} years, and saves {energy.comparison.life_saving} "
+            "over the life"
+        )
+    else:
+        text += (
+            "; it would have paid after {energy.comparison.pays_after} years, and so does not pay in a life of "
+            "{=usage.years} years"
+        )
+    return text + "."
 
 
 def _figure(findings: EnergyFindings) -> fig.Figure:

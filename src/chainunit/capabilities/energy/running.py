@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from ...core.messages import unit_behind
 from ...core.quantities import Layout, Value, declaration, quantity
 from ...drives.nameplate import Nameplate
 from ...study.drive import Drive
@@ -84,12 +85,22 @@ class SteadyLoad:
 
 
 def scaled(feed: Any, factor: float) -> Any:
-    """The feed with each of its quantities multiplied by the `factor`; one that cannot be so has its start value."""
+    """The feed with each of its quantities multiplied by the `factor`; counts and switches stay."""
     layout = Layout(type(feed))
     pairs = zip(layout.variables, layout.values(feed), strict=True)
-    return layout.instance(
-        [factor * x if v.quantity.admits(factor * x) else v.quantity.start for v, x in pairs]
-    )
+    return layout.instance([factor * x if v.quantity.type == "Real" else x for v, x in pairs])
+
+
+def scale_faults(feed: Any, factor: float) -> list[str]:
+    """The quantities of the feed that the `factor` takes beyond their bounds, each in words; none where it can be
+    `scaled`."""
+    layout = Layout(type(feed))
+    pairs = zip(layout.variables, layout.values(scaled(feed, factor)), strict=True)
+    return [
+        f"feed.{v.name} comes to {x:.6g}{unit_behind(v.unit)} with it: must be {v.quantity.allowed_range}"
+        for v, x in pairs
+        if not v.quantity.admits(x)
+    ]
 
 
 def warm(drive: Drive, temperature: float) -> Drive:

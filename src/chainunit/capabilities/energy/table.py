@@ -92,8 +92,8 @@ FIELDS: Mapping[str, Any] = {
 }
 """Keys of the table that are no quantities, as pydantic fields."""
 
-_WHOLE = 1e-3
-"""Deviation from 100 % up to which shares count as complete."""
+_WHOLE = 5e-3
+"""Deviation from 100 % up to which shares count as complete, as three of 33.3 % do; then they are weights."""
 
 
 @dataclass(frozen=True)
