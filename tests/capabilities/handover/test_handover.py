@@ -33,6 +33,9 @@ date = 2026-03-01
 [machine]
 left = { wall_mass = 540, web_mass = 216 }
 right = { wall_mass = 540, web_mass = 216 }
+[usage]
+hours = 7.5
+days = 220
 [sizing]
 candidates = 3
 poles_least = 4
@@ -239,6 +242,21 @@ def test_a_sized_drive_has_one_number_for_each_utilisation(folder):
     assert f"ratio {sizing['candidates'][0]['ratio']['value']:.6g}" in gear
 
 
+def test_the_hours_of_the_usage_are_handed_over(folder):
+    """Known with a table [usage] alone; half an hour is no whole number of the template, and stands beside it."""
+    data = json.loads((folder / "out" / "handover.json").read_text("utf-8"))
+    profile = "ApplicationRequirements/UsageProfile"
+    names = [f"{profile}/OperatingHoursPerDay", f"{profile}/OperatingDaysPerYear"]
+    if "usage" not in numbers(folder):
+        assert set(names) <= set(data["open"])
+        return
+    assert [value_of(data, name) for name in names] == [7.5, 220.0] and not set(names) & set(data["open"])
+    own, _ = read_by_basyx(folder / "out" / "sizing.json")
+    hours, days = (next(x for p, x in walked(own.submodel_element) if p == f"{ROOT}/{n}") for n in names)
+    assert days.value == 220 and hours.value is None
+    assert [float(each.value) for each in hours.extension] == [7.5]
+
+
 def test_a_long_text_is_cut_at_a_word():
     text = "word " * 400
     (own,) = environment({"SizingResult": {"TextStatement": text}}, "", "")["submodels"]
@@ -315,6 +333,12 @@ def test_wrong_results_are_refused(results):
 
 
 @only("knife")
+def test_a_study_without_a_title_begins_its_sentence(results):
+    save(results, results / "out", aasx=False)
+    assert "\nBy the names of IDTA 02021-1-0-1" in (results / "out" / "handover.md").read_text("utf-8")
+
+
+@only("knife")
 def test_an_earlier_result_is_refused(results):
     import xarray as xr
 
@@ -370,6 +394,10 @@ def test_files_that_are_no_cycle_are_refused(results):
             read_cycle(results / "x.csv")
     with pytest.raises(InputError, match="cannot be read"):
         read_cycle(results / "missing.csv")
+    for content in ("a\n1,2\n", "a\n1,2,3,x\n", "a\n1,2,3,4\n1,2\n", ""):
+        (out / "load_cycle.csv").write_text(content, "utf-8")
+        with pytest.raises(InputError, match=r"load_cycle\.csv: must have four columns of numbers"):
+            read_cycle(out / "sizing.json")
     (out / "cycle.csv").unlink()
     with pytest.raises(InputError, match=r"cannot be read.*names it"):
         read_cycle(out / "sizing.json")

@@ -18,12 +18,14 @@ from fmpy.validation import validate_fmu
 
 from chainunit import ChainUnitMachine, InputError, __version__
 from chainunit.capabilities.vouching import archive, certify, documents, experiments, keys, manifest, rerun
+from chainunit.capabilities.vouching.domain import domain
 from chainunit.capabilities.vouching.integrity import integrity
-from chainunit.capabilities.vouching.verify import verify
+from chainunit.capabilities.vouching.verify import _difference, verify
 from chainunit.fmu.backends import export
 from chainunit.machines.accelerator import Accelerator
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.models import MODELS
+from chainunit.study.verdict import CRANK_GOOD, ROCKER_GOOD, ROCKER_GOOD_EMPTY
 
 pytest.importorskip("cryptography")
 
@@ -156,6 +158,11 @@ def test_the_domain_of_validity_in_numbers(members):
     assert limits["chain_resonance"] == pytest.approx(
         float(machine.chain_modes(*loads).frequency[0]), rel=1e-9
     )
+    mode = limits["chain_resonance"]
+    assert limits["crank_torque_speed"] == pytest.approx(CRANK_GOOD * mode, rel=1e-12)
+    good = ROCKER_GOOD if right else ROCKER_GOOD_EMPTY
+    assert limits["rocker_torque_speed"] == pytest.approx(good * mode, rel=1e-12)
+    assert limits["rocker_torque_speed"] < limits["crank_torque_speed"] < mode < limits["slack_free_speed"]
     subjects = [each["subject"] for each in found["conditions"]]
     assert subjects == [each.subject for each in ChamberForces.required]
     assert all(each["above"] is None or each["value"] > each["above"] for each in found["conditions"])
@@ -437,6 +444,30 @@ def test_meta_data_beside_that_are_of_another_file(made, tmp_path, data):
     assert found["SRMD"].holds is False and "is of another file" in found["SRMD"].words
 
 
+def test_meta_data_of_another_file_are_no_fault_and_are_not_lost(made, tmp_path, data):
+    """Of a study come an FMU and an SSP package of one name, whose meta-data would have one place."""
+    for name, content in (("it.fmu", data), ("it.srmd", (made / "it.srmd").read_bytes())):
+        (tmp_path / name).write_bytes(content)
+    text = (tmp_path / "it.srmd").read_text().replace('data="it.fmu"', 'data="it.ssp"')
+    (tmp_path / "it.srmd").write_text(re.sub('checksum="[0-9a-f]{64}"', f'checksum="{"0" * 64}"', text))
+    found = {each.topic: each for each in verify(tmp_path / "it.fmu", None, run=False, told=silent)}
+    assert found["SRMD"] == (None, "SRMD", "it.srmd beside the file: is that of it.ssp")
+    for content, words in (
+        ((tmp_path / "it.srmd").read_bytes(), "it.srmd: the meta-data there are those of it.ssp"),
+        (b"mine", "it.srmd: the meta-data there are not those of a certified file"),
+    ):
+        (tmp_path / "it.srmd").write_bytes(content)
+        run = chainunit("certify", "it.fmu", "--key", made / "chainunit.key", cwd=tmp_path)
+        assert run.returncode == 2 and words in " ".join(run.stderr.split()) and "-o" in run.stderr
+        assert (tmp_path / "it.srmd").read_bytes() == content and (tmp_path / "it.fmu").read_bytes() == data
+
+
+def test_limits_of_another_c_library_are_the_same():
+    one = {"limits": [{"value": 0.7, "name": "a"}, {"value": None}]}
+    near, far = ({"limits": [{"value": 0.7 * (1.0 + x), "name": "a"}, {"value": None}]} for x in (3e-9, 1e-6))
+    assert _difference(one, near, "") == "" and _difference(one, far, "") == "limits[0].value"
+
+
 def test_names_that_lead_out_of_a_folder_are_not_unpacked(made, members, own, tmp_path):
     data = signed({**members, "../evil.txt": b"1"}, own)
     found = checked(tmp_path, data)
@@ -499,6 +530,28 @@ def test_other_files_are_not_certified(made, tmp_path, content, words):
     (tmp_path / "x.fmu").write_bytes(packed(content))
     run = chainunit("certify", "x.fmu", "--key", made / "chainunit.key", cwd=tmp_path)
     assert run.returncode == 2 and words in run.stderr
+
+
+def test_a_file_whose_name_does_not_fit_is_refused(made, tmp_path):
+    """An error names -o only where it was given."""
+    plain, key = made / "plain.fmu", made / "chainunit.key"
+    (tmp_path / "plain.zip").write_bytes(plain.read_bytes())
+    (tmp_path / "a.ssp").write_bytes(packed({"SystemStructure.ssd": b"<a/>"}))
+    for arguments, words in (
+        ((tmp_path,), "is a folder; must be an FMU, an SSP package, a study file or a linkage file"),
+        (
+            ("plain.zip",),
+            "chainunit: plain.zip: must be a file name that ends in .fmu, as an FMU has it; name one",
+        ),
+        (
+            (plain, "-o", "a.ssp"),
+            "chainunit: -o a.ssp: must be a file name that ends in .fmu, as an FMU has it",
+        ),
+        (("a.ssp", "-o", "b.fmu"), "chainunit: -o b.fmu: must be a file name that ends in .ssp"),
+    ):
+        run = chainunit("certify", *arguments, "--key", key, cwd=tmp_path)
+        assert run.returncode == 2 and words in " ".join(run.stderr.split()), run.stderr
+    assert not (tmp_path / "b.fmu").exists()
 
 
 def test_fmus_of_others_and_of_other_versions_are_not_certified(made, own):
@@ -634,6 +687,54 @@ def test_the_power_balance_sees_a_wrong_torque(monkeypatch):
     assert experiments.power_gap(interface, points, balance) < 1e-12
     more = balance._replace(stores=(*balance.stores, "kinetic_energy"))
     assert experiments.power_gap(interface, points, more) > 1e-3
+
+
+@pytest.mark.parametrize("ratio", [1.0, 53.0])
+def test_points_and_smooth_experiment_reach_every_angle_behind_a_gear(ratio):
+    """The crank stands in each quarter of its turn at some point and moves as far in the smooth experiment, whatever
+    the gear is; at rest it is at the first point alone."""
+    interface = certify.interface_of(ChamberForces, {"ratio": ratio})
+    given = [point.given for point in experiments.chosen_points(interface)]
+    assert len(given) == experiments.POINTS
+    turns = [own["phi"] / own["ratio"] / (2.0 * np.pi) % 1.0 for own in given]
+    assert {int(4.0 * turn) for turn in turns} == set(range(4))
+    speeds = [own["w"] / own["ratio"] for own in given]
+    assert speeds[0] == 0.0 and max(speeds) == pytest.approx(4.75, rel=0.06) and np.all(np.diff(speeds) > 0.0)
+    smooth = experiments.smooth_inputs(interface)
+    way, speed = (smooth.values[:, smooth.names.index(name)] for name in ("phi", "w"))
+    assert np.ptp(way) / ratio == pytest.approx(2.18, abs=0.01)
+    assert np.trapezoid(speed, smooth.time) == pytest.approx(np.ptp(way), rel=1e-5)
+
+
+def test_points_of_a_system_turn_its_motor(tmp_path):
+    """The start of the motor's shaft stands under the name of its component."""
+    from chainunit.report.console import study_file
+    from chainunit.study.package import model_and_start
+
+    (tmp_path / "x.toml").write_text("[machine]\nratio = 20.0\n")
+    model, start = model_and_start(str(tmp_path / "x.toml"), study_file(tmp_path / "x.toml"))
+    given = [point.given for point in experiments.chosen_points(certify.interface_of(model, start))]
+    assert len({own["motor.phi_start"] for own in given}) == len(given) == experiments.POINTS
+    assert max(own["motor.w_start"] for own in given) > 20.0
+
+
+def test_a_point_without_torque_has_no_gap_of_its_powers():
+    """Of a driveline without twist the powers are of rounding alone, a balance of which says nothing."""
+    interface = certify.interface_of(MODELS["CardanDriveline"], {})
+    balance = experiments.balance_of([s.name for s in interface.signals if s.causality != "parameter"])
+    points = experiments.chosen_points(interface)
+    still = points[1]._replace(given=points[1].given | {"phi": points[1].given["phi_start"]})
+    assert experiments.power_gap(interface, [*points, still], balance) < 1e-12
+
+
+def test_a_chain_has_no_limits_of_two_bars(tmp_path):
+    """The lowest natural frequency is also that of the chain; slack webs and resonance are in its model."""
+    model = MODELS["ChainUnitFlexible"]
+    export(model, tmp_path / "it.fmu")
+    members = certify.members_of(tmp_path / "it.fmu")
+    with rerun.unpacked(members, "it.fmu") as fmu:
+        found = domain(fmu, certify.interface_for(fmu), [], [])
+    assert [each["name"] for each in found["limits"]] == ["chain_resonance"]
 
 
 LINKAGES = Path(__file__).parents[3] / "examples" / "linkages"

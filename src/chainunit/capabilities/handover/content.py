@@ -87,8 +87,8 @@ def _requirements(study: StudiedDrive) -> Content:
         **({"OverallSystemRequirements": _known(MainsConnection=mains)} if mains else {}),
         "UsageProfile": {
             "CyclesPerMinute": 60.0 / float(study.steady.time[-1]),
-            "OperatingHoursPerDay": None,
-            "OperatingDaysPerYear": None,
+            "OperatingHoursPerDay": study.number("usage", "hours"),
+            "OperatingDaysPerYear": study.number("usage", "days"),
         },
     }
 

@@ -93,7 +93,7 @@ def read_cycle(file: str | Path, section: str = "RotativeSection") -> ShaftCycle
     cycle = _of_csv(_text(supplement(name), path), path)
     links = _at(_submodel(environment, path), ["SizingProjectInformation"])
     plain = [each["value"] for each in links if str(each.get("value", "")).endswith("load_cycle.csv")]
-    return _with_inertia(cycle, _text(supplement(plain[0]), path)) if plain else cycle
+    return _with_inertia(cycle, _text(supplement(plain[0]), path), f"{path}: {plain[0]}") if plain else cycle
 
 
 def _submodel(environment: Mapping[str, Any], path: Path) -> Mapping[str, Any]:
@@ -139,9 +139,14 @@ def _of_csv(text: str, path: Path) -> ShaftCycle:
     return ShaftCycle(time, angle, speed, acceleration, -torque)
 
 
-def _with_inertia(cycle: ShaftCycle, text: str) -> ShaftCycle:
-    """The cycle with the inertia of a load_cycle.csv, where this has the same instants."""
-    time, *_, inertia = np.array(list(csv.reader(text.splitlines()[1:])), float).T
+def _with_inertia(cycle: ShaftCycle, text: str, name: str) -> ShaftCycle:
+    """The cycle with the inertia of the load_cycle.csv of this `name`, where this has the same instants."""
+    try:
+        time, _, _, inertia = np.array(list(csv.reader(text.splitlines()[1:])), float).T
+    except ValueError as error:
+        raise InputError(
+            f"{name}: must have four columns of numbers: time, speed, torque, inertia ({printable(str(error))})"
+        ) from error
     if time.shape != cycle.time.shape or not np.allclose(time, cycle.time, rtol=1e-8, atol=1e-12):
         return cycle
     return ShaftCycle(cycle.time, cycle.angle, cycle.speed, cycle.acceleration, cycle.torque, inertia)

@@ -83,6 +83,42 @@ def without_certification(members: Mapping[str, bytes]) -> dict[str, bytes]:
     return own
 
 
+def place_of(target: Path, members: Mapping[str, bytes], asked: bool) -> Path:
+    """The place `target` of a certified file with these members; with `asked` the option -o gave it.
+
+    Raises
+    ------
+    InputError
+        where its name does not end as that of such a file.
+    """
+    ending = ".ssp" if "SystemStructure.ssd" in members else ".fmu"
+    if target.suffix.lower() != ending:
+        what = "an SSP package" if ending == ".ssp" else "an FMU"
+        remedy = "" if asked else "; name one with -o"
+        raise InputError(
+            f"{'-o ' if asked else ''}{target}: must be a file name that ends in {ending}, as {what} has it{remedy}"
+        )
+    return target
+
+
+def place_beside(file: Path) -> Path:
+    """The place of the SRMD beside a certified file.
+
+    Raises
+    ------
+    InputError
+        where meta-data of another file stand there, which would be lost.
+    """
+    place = file.with_suffix(".srmd")
+    text = regular_bytes(place)
+    if text is not None and (of := docs.resource_of(text)) != file.name:
+        what = f"those of {printable(of)}" if of else "not those of a certified file"
+        raise InputError(
+            f"{place}: the meta-data there are {what} and would be lost; move them, or name another file with -o"
+        )
+    return place
+
+
 def certified(
     members: Mapping[str, bytes], name: str, key: Ed25519PrivateKey, model: type[Model] | None, told: Told
 ) -> Certified:
@@ -359,11 +395,11 @@ def write(made: Certified, file: Path, name: str) -> Path:
     Raises
     ------
     InputError, WriteError
-        see `atomic_file`.
+        see `atomic_file` and `place_beside`.
     """
+    beside = place_beside(file)
     with atomic_file(file) as part:
         part.write_bytes(made.data)
-    beside = file.with_suffix(".srmd")
     inner = contents(made.data).members
     data = json.loads(inner[docs.EVIDENCE])
     limits = json.loads(inner[docs.DOMAIN]) if docs.DOMAIN in inner else None

@@ -49,9 +49,13 @@ def certify(
     Writes beside it its meta-data (.srmd).
     """
     from ...core.temporary_folders import scratch
-    from .certify import certified, members_of, write
+    from .certify import certified, members_of, place_beside, place_of, write
     from .keys import private_key, readable_by_others
 
+    if file.is_dir():
+        raise InputError(
+            f"{file}: is a folder; must be an FMU, an SSP package, a study file or a linkage file"
+        )
     secret = private_key(key_file)
     if readable_by_others(key_file):
         show_remark(f"{key_file}: other users of this machine can read this key; chmod 600 {key_file}")
@@ -62,10 +66,12 @@ def certify(
             model, source = _exported(file, folder, status.update)
         else:
             model, source = (_model(of) if of else None), file
-        target = output or (Path(source.name) if source != file else file)
-        if target.suffix.lower() not in (".fmu", ".ssp"):
-            raise InputError(f"-o {target}: must be a file name that ends in .fmu or .ssp")
-        made = certified(members_of(source), target.name, secret, model, status.update)
+        members = members_of(source)
+        target = place_of(
+            output or (Path(source.name) if source != file else file), members, output is not None
+        )
+        place_beside(target)
+        made = certified(members, target.name, secret, model, status.update)
         beside = write(made, target, target.name)
     print(f"{target}: certified; {beside}: its meta-data with checksum")
     for line in made.words:

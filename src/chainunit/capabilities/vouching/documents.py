@@ -146,6 +146,14 @@ def srmd(
     return xml_bytes(root)
 
 
+def resource_of(content: bytes) -> str:
+    """The name of the file of which an SRMD tells; empty where it names none, or is no SRMD."""
+    try:
+        return ElementTree.fromstring(content).get("data", "")
+    except ElementTree.ParseError:
+        return ""
+
+
 def sbom(name: str, version: str, members: Mapping[str, bytes]) -> dict[str, Any]:
     """A bill of materials in CycloneDX 1.6: the file, its members with hashes, and what made it."""
     files = [

@@ -4,7 +4,7 @@ parameters, and of a chain unit the speeds up to which two bars are a model of i
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from ...core.engines import MATH
@@ -13,6 +13,7 @@ from ...fmu.description import Interface
 from ...machines.api import ChainUnitMachine
 from ...machines.chain_unit import SIDES, ChamberForces, Feed, SideLoads
 from ...study.organ_limits import slack_and_mode
+from ...study.verdict import speed_limits
 from .experiments import StatePoint
 from .rerun import TimeTable, UnpackedFmu
 
@@ -90,13 +91,13 @@ def _finite(value: Any) -> float | None:
 def _limits(fmu: UnpackedFmu) -> Iterator[dict[str, Any]]:
     """The speeds of the crank up to which two bars are a model of the organs, of a chain unit that the FMU is or has;
     they follow from the names of its variables."""
-    own = ChamberForces.parameter_layout.names
+    names = ChamberForces.parameter_layout.names
     start, loads = fmu.start("parameter"), fmu.start("input")
     for prefix in ("", "machine."):
-        if not all(prefix + name in start for name in own):
+        if not all(prefix + name in start for name in names):
             continue
         try:
-            machine = ChainUnitMachine({name: start[prefix + name] for name in own})
+            machine = ChainUnitMachine({name: start[prefix + name] for name in names})
         except InputError:
             return
         sides = {
@@ -105,16 +106,26 @@ def _limits(fmu: UnpackedFmu) -> Iterator[dict[str, Any]]:
             )
             for side in SIDES
         }
-        slack, mode = slack_and_mode(machine, Feed(**sides))
-        feed: Mapping[str, float] = {
-            f"{prefix}{side}.material_mass": sides[side].material_mass for side in SIDES
-        }
-        for name, value, words in (
-            (
-                "slack_free_speed",
-                slack,
-                "crank speed at which a web first goes slack; above, two bars are no chain",
-            ),
-            ("chain_resonance", mode, "crank speed at the lowest natural frequency of an organ as a chain"),
-        ):
-            yield {"name": name, "unit": "rad/s", "value": _finite(value), "with": feed, "meaning": words}
+        feed = Feed(**sides)
+        slack, mode = slack_and_mode(machine, feed)
+        own = [
+            ("chain_resonance", mode, "crank speed at the lowest natural frequency of an organ as a chain")
+        ]
+        if f"{prefix}left.theta_1" not in fmu.variables:
+            own += _of_two_bars(slack, mode, empty=0.0 in (feed.left.material_mass, feed.right.material_mass))
+        masses = {f"{prefix}{side}.material_mass": sides[side].material_mass for side in SIDES}
+        for name, value, words in own:
+            yield {"name": name, "unit": "rad/s", "value": _finite(value), "with": masses, "meaning": words}
+
+
+def _of_two_bars(slack: float, mode: float, *, empty: bool) -> Iterator[tuple[str, float, str]]:
+    """Name, crank speed [rad/s] and meaning of each limit of two bars in place of chains."""
+    good = {each.topic: each.speed for each in speed_limits(slack, mode, empty)}
+    yield (
+        "slack_free_speed",
+        slack,
+        "crank speed at which a web first goes slack; above, two bars are no chain",
+    )
+    for link in ("crank", "rocker"):
+        words = f"crank speed up to which the {link} torque of two bars is good to 10 %, as a chain resonates above"
+        yield f"{link}_torque_speed", good[f"{link} torque"], words

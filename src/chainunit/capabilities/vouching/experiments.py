@@ -39,6 +39,8 @@ MISSING, POWER_GAP = 1e-2, 1e-6
 largest gap of the power balance, with which an FMU is certified."""
 POINTS, SPREAD = 12, 0.05
 """Number of points, and range of the factors of their parameters about 1."""
+_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
+"""Angle of the crank from a point to the next [rad]: by the golden angle, points spread over the whole turn."""
 
 
 class Deviation(NamedTuple):
@@ -95,13 +97,14 @@ def smooth_inputs(interface: Interface) -> TimeTable:
     """The inputs of the smooth experiment, at its smallest step."""
     course = excitation(interface)
     names = [s.name for s in interface.signals_of("input")]
+    gear = _gear(interface)
     count = round(END / STEP) * 2**HALVINGS
     time = np.linspace(0.0, END, count + 1)
     still = course(0.0)
     values = {name: np.full(len(time), still[name]) for name in names}
     for own in _drivers(interface.model):
         if set(own.values()) <= set(names):
-            values |= dict(zip(own.values(), _motion(course, own, time), strict=True))
+            values |= dict(zip(own.values(), _motion(course, own, time, gear), strict=True))
     columns = np.array([values[name] for name in names], float).T
     return TimeTable(tuple(names), time, columns.reshape(len(time), len(names)))
 
@@ -112,13 +115,22 @@ def _drivers(model: type[Model]) -> list[dict[str, str]]:
     return [{n: own[n] for n in ("phi", "w", "a")} for own in members if {"phi", "w", "a"} <= set(own)]
 
 
-def _motion(course: Callable[[float], Mapping[str, float]], own: Mapping[str, str], time: Any) -> list[Any]:
+def _gear(interface: Interface) -> float:
+    """The turns of the shaft in a turn of the crank, by the start values; 1 for a model without a gear."""
+    ratios = [s.start for s in interface.signals_of("parameter") if s.name.rpartition(".")[2] == "ratio"]
+    return float(ratios[0] or 1.0) if ratios else 1.0
+
+
+def _motion(
+    course: Callable[[float], Mapping[str, float]], own: Mapping[str, str], time: Any, gear: float
+) -> list[Any]:
     """Way, speed and acceleration of a driver, each of shape (n,): those of the reference experiment where they fit
-    each other, as those of a shaft do; else a swing over the same way."""
+    each other, as those of a shaft do, so much faster that the crank behind the gear has them; else a swing over the
+    same way."""
     rows = [course(float(t)) for t in time]
     phi, w, a = (np.array([row[own[n]] for row in rows]) for n in ("phi", "w", "a"))
     if np.allclose(np.gradient(phi, time)[1:-1], w[1:-1], rtol=0.0, atol=1e-3 * float(np.max(np.abs(w)))):
-        return [phi, w, a]
+        return [gear * phi, gear * w, gear * a]
     middle, reach = 0.5 * (phi.max() + phi.min()), 0.5 * (phi.max() - phi.min())
     swing = reach * np.sin(2.0 * time)
     return [middle + swing, 2.0 * reach * np.cos(2.0 * time), -4.0 * swing]
@@ -220,20 +232,24 @@ class StatePoint(NamedTuple):
 
 def chosen_points(interface: Interface) -> list[StatePoint]:
     """Points about the start values with the outputs by the equations in Python; always the same. At the first one
-    the parameters have their start values. Parameters with which the model does not work are left as they are."""
+    the parameters have their start values. The crank stands at another angle of its turn at each point. Parameters
+    with which the model does not work are left as they are."""
     rng = np.random.default_rng(20)
-    course = excitation(interface)
+    course, gear = excitation(interface), _gear(interface)
     parameters = interface.signals_of("parameter")
     start = {s.name: float(s.start or 0.0) for s in parameters}
+    at_rest = [n for n, x in start.items() if x == 0.0 and n.rpartition(".")[2] in ("phi_start", "w_start")]
     real = [s for s in parameters if s.variable.type == "Real" and s.start and s.name.find("solver.") < 0]
     points = []
     for k in range(POINTS):
-        inputs = {name: float(x) for name, x in course(0.08 * k).items()}
+        inputs = _turned(interface, {name: float(x) for name, x in course(0.08 * k).items()}, gear, k)
         values = dict(start)
         # all at once; where that makes no machine, one by one
         factors = {s.name: float(1.0 + SPREAD * (2.0 * rng.random() - 1.0)) for s in real} if k else {}
         if k:
-            start |= {n: x for n, x in (("phi_start", 0.5 * k), ("w_start", 0.2 * k)) if start.get(n) == 0.0}
+            at = {"phi_start": gear * _ANGLE * k, "w_start": gear * 0.2 * k}
+            moved = {n: at[n.rpartition(".")[2]] for n in at_rest}
+            start |= {n: _within(interface, n, x) for n, x in moved.items()}
             values = dict(start)
         for changes in ([factors], [{name: x} for name, x in factors.items()]):
             for change in changes:
@@ -248,6 +264,20 @@ def chosen_points(interface: Interface) -> list[StatePoint]:
         if outputs is not None:
             points.append(StatePoint(values | inputs, outputs))
     return points
+
+
+def _turned(interface: Interface, inputs: dict[str, float], gear: float, k: int) -> dict[str, float]:
+    """The inputs of the point `k`, with each shaft that has no bounds so far on and so fast that the crank behind the
+    gear stands at an angle of its own, and has the speed of the course."""
+    quantities = {s.name: s.variable.quantity for s in interface.signals_of("input")}
+    for own in _drivers(interface.model):
+        if not set(own.values()) <= set(inputs):
+            continue
+        angle = quantities[own["phi"]]
+        if not math.isfinite(angle.high - angle.low):
+            inputs[own["phi"]] += _ANGLE * k
+            inputs |= {name: gear * inputs[name] for name in own.values()}
+    return inputs
 
 
 def _within(interface: Interface, name: str, x: float) -> float:
@@ -313,8 +343,9 @@ def _largest(fmu: UnpackedFmu, got: Mapping[str, float], wanted: Mapping[str, fl
 
 def power_gap(interface: Interface, points: Sequence[StatePoint], balance: EnergyBalance) -> float | None:
     """The largest gap of the power balance at the points, by the second route: the rate of the stored energy is its
-    exact derivative along the motion, which the torque does not use. Over the sum of the powers' sizes; None for
-    models whose supply is no torque."""
+    exact derivative along the motion, which the torque does not use. Over the sum of the powers' sizes, at least a
+    millionth of the largest one, as a point without torque has rounding alone; None for models whose supply is no
+    torque."""
     import casadi
 
     if len(balance.supply) != 2:
@@ -333,7 +364,7 @@ def power_gap(interface: Interface, points: Sequence[StatePoint], balance: Energ
     given = columns[balance.supply[0]] * columns[balance.supply[1]]
     lost = casadi.SX(sum(columns[n] for n in balance.losses))
     powers = casadi.Function("powers", symbols, [casadi.vertcat(given, lost, rate)])
-    worst = 0.0
+    gaps, flows = [0.0], [0.0]
     for point in points:
         p = model.with_derived(
             MATH, model.parameter_layout.from_names(_of(point, model.parameter_layout.names))
@@ -342,9 +373,10 @@ def power_gap(interface: Interface, points: Sequence[StatePoint], balance: Energ
         x = model.state_layout.values(model.begin(p, u)) if model.state_layout else []
         at = [model.parameter_layout.values(p), model.input_layout.values(u), x, getattr(p, "derived", [])]
         supply, loss, rise = (float(v) for v in powers(*at).full().ravel())
-        size = abs(supply) + abs(loss) + abs(rise)
-        worst = max(worst, abs(supply - loss - rise) / size if size > 0.0 else 0.0)
-    return worst
+        gaps.append(abs(supply - loss - rise))
+        flows.append(abs(supply) + abs(loss) + abs(rise))
+    least = 1e-6 * max(flows) or 1.0
+    return max(gap / max(flow, least) for gap, flow in zip(gaps, flows, strict=True))
 
 
 def _of(point: StatePoint, names: Sequence[str]) -> dict[str, float]:
