@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import logging
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -24,6 +25,9 @@ from .live_block import Live
 from .motion import Animation
 
 NAME = "sheet.pdf"
+_BEGIN = re.compile(r'(<(?:th|h3|span class="said")\b[^>]*>(?:<[^>]+>)*)([a-z])')
+"""The first letter of a heading, of a row's title, and of a warning: a capital on paper. (`::first-letter` would do it,
+as on the screen, but WeasyPrint nests such a box again each time that it lays out a column or a page.)"""
 _SIGNED = ("Prepared", "Checked", "Released")
 _MISSING = (
     "--pdf: needs the library WeasyPrint and the text engine Pango ({}); pip install 'chainunit[pdf]', and Pango by "
@@ -58,12 +62,12 @@ class _PrintedPage(Page):
         return super().block(block)
 
     def blocks(self, blocks: Sequence[b.Block]) -> str:
-        """Blocks in order; consecutive warnings form one list."""
+        """Blocks in order, with capitals where a line begins; consecutive warnings form one list."""
         parts = []
         for warns, together in groupby(blocks, lambda each: getattr(each, "severity", "") == "warning"):
             texts = list(filter(None, map(self.block, together)))
             parts += [f'<ul class="verdicts">{"".join(texts)}</ul>'] if warns and texts else texts
-        return "\n".join(parts)
+        return _BEGIN.sub(lambda found: found[1] + found[2].upper(), "\n".join(parts))
 
     def _printed(self, figure: Figure) -> str:
         file = self._pictures.get(figure.file or "")
