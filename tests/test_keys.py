@@ -93,6 +93,10 @@ def _one_key(table, key):
         return "".join(text + (own if name == table.name else "") for name, text in needed.items())
     if table.name == "bearing.NAME":
         return f'[bearing.C]\nkind = "ball"\nC = "50 kN"\n{key.name} = {key.left_out}\n'
+    if table.name == "section.NAME":
+        needed = 'arm = 0.1\nnotch = "none"\ndiameter = "50 mm"\n'
+        needed += 'tensile_strength = "700 MPa"\nyield_strength = "490 MPa"\n'
+        return f"[section.A]\n{needed}{key.name} = {key.left_out}\n"
     if table.name == "watch":
         return f"[watch]\nfile = 'a.csv'\n{key.name} = {key.left_out}\n"
     if table.name == "optimize":

@@ -20,18 +20,21 @@ class TripClass:
 
 MULTIPLE = 7.2
 CLASSES = (
+    TripClass("5", 0.5, 5.0),
     TripClass("10A", 2.0, 10.0),
     TripClass("10", 4.0, 10.0),
     TripClass("20", 6.0, 20.0),
     TripClass("30", 9.0, 30.0),
 )
-"""The classes in common use, the fastest first. Class 10A trips as surely as class 10, and may trip earlier: none is
-recommended for it."""
+"""The classes in common use, the fastest first. Class 10A trips as surely as class 10, and may trip earlier: no start
+is recommended for it, nor for class 5."""
 LIGHT, HEAVIEST = 10, 30
 """The usual class, and the heaviest."""
 HEAVIER = 40
 """The class of a start during which a relay of class 30 may trip."""
-_PICK_UP = 1.1  # middle of the range 1.05 .. 1.2 in which such a relay has to trip
+HOLDS_AT, TRIPS_AT = 1.05, 1.2
+"""A relay must not trip within two hours at the first multiple of its setting, and must within them at the second."""
+_PICK_UP = 1.1  # between the two
 
 
 def start_class(time: Any, current: Any, rated: float) -> int:
@@ -41,9 +44,17 @@ def start_class(time: Any, current: Any, rated: float) -> int:
     The heat of the start is that of the square of the RMS `current` [A] over `time` [s], both of shape (n,). The
     relay's cooling is left out, which is on the safe side.
     """
-    heat = float(np.trapezoid(np.square(np.asarray(current) / rated), np.asarray(time)))
-    holding = (int(each.name) for each in CLASSES[1:] if heat <= each.shortest * MULTIPLE**2)
-    return next(holding, HEAVIER)
+    seconds = start_seconds(time, current, rated)
+    usual = [each for each in CLASSES if each.name.isdigit() and int(each.name) >= LIGHT]
+    return next((int(each.name) for each in usual if seconds <= each.shortest), HEAVIER)
+
+
+def start_seconds(time: Any, current: Any, setting: float) -> float:
+    """The time [s] for which `MULTIPLE` times the `setting` [A] heats a relay as much as the `current` [A] over
+    `time` [s], both of shape (n,), without its cooling: a cold relay surely holds up to the shortest time of its
+    class."""
+    share = np.square(np.asarray(current) / (MULTIPLE * setting))
+    return float(np.trapezoid(share, np.asarray(time)))
 
 
 def class_words(trip_class: int) -> str:
@@ -51,23 +62,31 @@ def class_words(trip_class: int) -> str:
     return f"class {trip_class}" if trip_class <= HEAVIEST else f"heavier than class {HEAVIEST}"
 
 
-def time_constant(trip_class: int) -> float:
-    """Time constant [s] of a thermal image that trips at the end of its class, after so many seconds at `MULTIPLE`
-    times the setting, from cold."""
+def time_constant(seconds: float, pick_up: float = _PICK_UP) -> float:
+    """Time constant [s] of a thermal image that trips after so many `seconds` at `MULTIPLE` times the setting, from
+    cold, and after a long time at `pick_up` times the setting; with the number of a class it trips at its end."""
     heating = MULTIPLE**2
-    return trip_class / math.log(heating / (heating - _PICK_UP**2))
+    return seconds / math.log(heating / (heating - pick_up**2))
 
 
-def relay_image(time: Any, current: Any, setting: float, before: float, trip_class: int = LIGHT) -> Any:
+def relay_image(
+    time: Any,
+    current: Any,
+    setting: float,
+    before: float,
+    seconds: float = LIGHT,
+    pick_up: float = _PICK_UP,
+) -> Any:
     """Thermal image of a relay, set to `setting` [A], over `time` [s] with `current` [A], shape (n,); it
     trips at 1.
 
-    The image is of first order in the square of the current; `before` is the RMS current before the run [A].
+    The image is of first order in the square of the current; `before` is the RMS current before the run [A]. For
+    `seconds` and `pick_up` see `time_constant`.
     """
-    tau = time_constant(trip_class)
-    heating = (np.asarray(current) / (setting * _PICK_UP)) ** 2
+    tau = time_constant(seconds, pick_up)
+    heating = (np.asarray(current) / (setting * pick_up)) ** 2
     image = np.empty(len(heating))
-    image[0] = (before / (setting * _PICK_UP)) ** 2
+    image[0] = (before / (setting * pick_up)) ** 2
     step = np.diff(np.asarray(time))
     decay = np.exp(-step / tau)
     middle = 0.5 * (heating[1:] + heating[:-1])
@@ -77,15 +96,21 @@ def relay_image(time: Any, current: Any, setting: float, before: float, trip_cla
 
 
 def relay_trip(
-    time: Any, current: Any, setting: float, before: float, holds: float, trip_class: int = LIGHT
+    time: Any,
+    current: Any,
+    setting: float,
+    before: float,
+    holds: float,
+    seconds: float = LIGHT,
+    pick_up: float = _PICK_UP,
 ) -> float | None:
     """Time at which the relay trips [s], also after the run, with the lasting current `holds` [A]; None where
     it never trips. Other arguments as in `relay_image`."""
-    image = relay_image(time, current, setting, before, trip_class)
+    image = relay_image(time, current, setting, before, seconds, pick_up)
     over = np.flatnonzero(image >= 1.0)
     if over.size:
         return float(time[over[0]])
-    final = (holds / (setting * _PICK_UP)) ** 2
+    final = (holds / (setting * pick_up)) ** 2
     if final <= 1.0:
         return None
-    return float(time[-1]) + time_constant(trip_class) * math.log((final - image[-1]) / (final - 1.0))
+    return float(time[-1]) + time_constant(seconds, pick_up) * math.log((final - image[-1]) / (final - 1.0))

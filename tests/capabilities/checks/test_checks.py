@@ -364,3 +364,16 @@ def test_a_machine_of_somebody_else_has_no_known_pins(tmp_path):
     done = chainunit("study", "s.toml", "-o", "out", cwd=tmp_path)
     assert done.returncode == 2
     assert re.search(r"s.toml:3: bearing: needs the pins of the machine, which is an FMU", done.stderr)
+
+
+def test_a_crank_that_stands_has_no_cycle_to_check(tmp_path):
+    """A jaw crusher whose motor is too weak for its feed."""
+    crusher = Path(__file__).parents[3] / "examples" / "linkages" / "blake_jaw_crusher.toml"
+    text = f'event = []\n[system]\nmachine = "{crusher}"\n[motor_shaft]\noverhung_load = 2000\n'
+    (tmp_path / "s.toml").write_text(text, "utf-8")
+    chainunit("study", "s.toml", "-o", "out", cwd=tmp_path)
+    checks = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))["checks"]
+    assert checks["rows"] == [] and checks["rolling"] == {} and "motor_shaft" not in checks
+    missing = {each["what"]: each["why"] for each in checks["not_checked"]}
+    cycle = "bearings, gear, shaft of the motor, coupling, shaft sections"
+    assert missing[cycle] == "the eccentric does not make a whole turn"

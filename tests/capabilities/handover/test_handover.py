@@ -215,6 +215,19 @@ def test_the_numbers_are_those_of_the_result(folder):
     assert value_of(data, f"{whole}/MassInertiaRatio") == pytest.approx(outside / rotor, rel=1e-12)
 
 
+def test_the_checks_have_one_number_for_each_utilisation(folder):
+    rows = numbers(folder)["checks"]["rows"]
+    assert (folder / "out" / "checks.csv").exists() == bool(rows)
+    if rows:
+        with (folder / "out" / "checks.csv").open(newline="", encoding="utf-8") as file:
+            written = list(csv.DictReader(file, delimiter=";"))
+        assert [each["title"] for each in written] == [row["title"] for row in rows]
+        for own, row in zip(written, rows, strict=True):
+            assert float(own["utilisation"]) == row["utilisation"]["value"]
+            assert float(own["value"]) == row["value"]["value"] and own["unit"] == row["limit"]["unit"]
+            assert own["holds"] == ("yes" if row["holds"] else "no")
+
+
 @only("sized")
 def test_a_sized_drive_has_one_number_for_each_utilisation(folder):
     data, sizing = (

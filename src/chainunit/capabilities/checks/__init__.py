@@ -8,22 +8,76 @@ from ...report.capability import Capability, Contents
 from ...report.lines import Line
 from ...study.analysis import Analysis
 from ...study.file_reading import FileReading
-from ...study.file_section import of_named
+from ...study.file_section import FileSection, of_named
 from ...study.record import StudyRecord
-from ...study.rules import MACHINE_FMU, Rule
+from ...study.rules import MACHINE_FMU, MOTOR_FMU, Rule
 from .plan import CheckPlan, read_plan
-from .tables import BEARINGS
+from .tables import (
+    BEARINGS,
+    COUPLING_KEYS,
+    RELAY_KEYS,
+    SECTIONS,
+    FlexibleCouplingTable,
+    GearRatingTable,
+    MotorShaftTable,
+    RelayTable,
+    StartingTable,
+)
 
 
 class CheckCapability(Capability):
-    """The capability, with the tables [bearing.NAME]."""
+    """The capability, with a table for each kind of part that is checked."""
 
     name = "checks"
-    tables = {"bearing": of_named(BEARINGS)}  # noqa: RUF012
+    tables = {  # noqa: RUF012
+        "bearing": of_named(BEARINGS),
+        "section": of_named(SECTIONS),
+        "relay": FileSection(
+            RelayTable,
+            optional=True,
+            keys=RELAY_KEYS,
+            title="Thermal overload relay",
+            follows={
+                "trip_class": "10, or the heavier one that the start needs",
+                "setting": "the rated current of the motor",
+                "stall_time": "that of the nameplate",
+                "stall_current": "that of the nameplate",
+            },
+        ),
+        "starting": FileSection(
+            StartingTable,
+            optional=True,
+            title="Starts per hour",
+            follows={
+                "per_hour": "sizing.starts_per_hour, if the file has [sizing]",
+                "permitted": "those of the catalogue, if it has them",
+            },
+        ),
+        "gear_rating": FileSection(
+            GearRatingTable,
+            optional=True,
+            title="Ratings of the gear",
+            follows={
+                "rated_torque": "gear.torque_limit, if the file gives it",
+                "peak_factor": "gear.start_factor",
+            },
+        ),
+        "flexible_coupling": FileSection(
+            FlexibleCouplingTable,
+            optional=True,
+            keys=COUPLING_KEYS,
+            title="Flexible coupling",
+            follows={"start_factor": "by the starts an hour"},
+        ),
+        "motor_shaft": FileSection(MotorShaftTable, optional=True, title="Shaft of the motor"),
+    }
 
     def rules(self) -> Iterable[Rule]:
-        """Bearings are those of a machine whose pins are known."""
-        yield Rule("bearing", MACHINE_FMU, "needs the pins of the machine, which is an FMU; leave it out")
+        """Bearings are those of a machine whose pins are known, a relay sees the current of a motor that is known."""
+        for table in ("bearing", "section"):
+            yield Rule(table, MACHINE_FMU, "needs the pins of the machine, which is an FMU; leave it out")
+        for table in ("relay", "starting", "gear_rating", "motor_shaft", "flexible_coupling"):
+            yield Rule(table, MOTOR_FMU, "needs a model of the motor, which is an FMU; leave it out")
 
     def plan(self, reading: FileReading) -> CheckPlan:
         """The plan, also of a file without these tables: it says what is not checked."""
@@ -41,6 +95,7 @@ class CheckCapability(Capability):
 
         return {
             "checks": Contents("Checks by clause", page.blocks),
+            "relay_classes": Contents("Classes of the thermal relay", page.relay, analysis="checks"),
             "not_checked": Contents("What was not checked", page.missing, analysis="checks"),
         }
 
@@ -56,7 +111,12 @@ class CheckCapability(Capability):
         if found is None:
             yield "bearings, shaft sections, gear and couplings: the study ended before"
             return
-        yield from (f"{each.what}: {each.why}" for each in found.not_checked)
+        absent = [each for each in found.not_checked if each.table]
+        if absent:
+            # the pins by name stand in the report
+            parts = (f"{each.what.partition(' at ')[0]} ([{each.table}])" for each in absent)
+            yield f"parts without data in the file: {'; '.join(parts)}"
+        yield from (f"{each.what}: {each.why}" for each in found.not_checked if not each.table)
 
 
 CAPABILITY = CheckCapability()

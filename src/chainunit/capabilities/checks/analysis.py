@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -11,15 +11,22 @@ from ...reading.results import part, result
 from ...reading.text import number
 from ...study.analysis import Analysis, Findings, Work
 from ...study.bearings import hardest_run
-from ...study.readings import crank_angle, machine_series
+from ...study.readings import crank_angle, has_turn, machine_series
 from ...study.record import StudyRecord
 from ...study.window import whole_turns
-from . import plain, rigid, rolling
+from . import coupling, gear, plain, relay, rigid, rolling, section, starting
+from .coupling import CouplingCheck
+from .gear import GearCheck, ShaftLoad
 from .plain import PlainBearing
 from .plan import CheckPlan, turning_pins
+from .relay import RelayFindings
 from .rolling import RollingBearing
 from .row import CheckRow, NotChecked
+from .section import ShaftSection
+from .starting import Starting
 from .tables import PLAIN
+
+T = TypeVar("T")
 
 
 @result
@@ -28,8 +35,16 @@ class CheckFindings(Findings):
 
     rolling: Mapping[str, RollingBearing] = part("rolling bearings, by the pin")
     plain: Mapping[str, PlainBearing] = part("plain bearings, by the pin")
-    rows: tuple[CheckRow, ...] = part("the checks")
-    not_checked: tuple[NotChecked, ...] = part("what was not checked")
+    section: Mapping[str, ShaftSection] = part("shaft sections, by name", default_factory=dict)
+    relay: RelayFindings | None = part(
+        "thermal overload relay, where it is checked", optional=True, default=None
+    )
+    starting: Starting | None = part("starts per hour, where they are checked", optional=True, default=None)
+    gear: GearCheck | None = part("the gear beside its ratings", optional=True, default=None)
+    motor_shaft: ShaftLoad | None = part("the shaft of the motor", optional=True, default=None)
+    flexible_coupling: CouplingCheck | None = part("the flexible coupling", optional=True, default=None)
+    rows: tuple[CheckRow, ...] = part("the checks", default=())
+    not_checked: tuple[NotChecked, ...] = part("what was not checked", default=())
 
     def remark(self, study: StudyRecord) -> None:
         """Warn of each check that does not hold."""
@@ -60,9 +75,22 @@ class CheckAnalysis(Analysis):
         """The checks over steady running, and of the largest loads of all runs."""
         plan: CheckPlan = study.config.plans[CheckAnalysis.name]
         found = _Found()
-        _bearings(study, plan, found)
+        turns = has_turn(study.drive, study.steady)
+        if turns:
+            _bearings(study, plan, found)
         found.add(rigid.checks(study))
-        return CheckFindings(found.rolling, found.plain, tuple(found.rows), tuple(found.missing))
+        parts: dict[str, Any] = {
+            "relay": found.of(*relay.find(study, plan.relay)),
+            "starting": found.of(*starting.find(study, plan.starting, plan.starts_per_hour)),
+        }
+        if turns:
+            parts |= _of_cycle(study, plan, found)
+        else:
+            what = "bearings, gear, shaft of the motor, coupling, shaft sections"
+            found.add([NotChecked(what, f"the {study.driver_noun} does not make a whole turn")])
+        return CheckFindings(
+            found.rolling, found.plain, rows=tuple(found.rows), not_checked=tuple(found.missing), **parts
+        )
 
 
 class _Found:
@@ -81,6 +109,22 @@ class _Found:
                 self.rows.append(each)
             else:
                 self.missing.append(each)
+
+    def of(self, findings: T, checks: Iterable[CheckRow | NotChecked]) -> T:
+        """The findings of a part, whose checks are added."""
+        self.add(checks)
+        return findings
+
+
+def _of_cycle(study: StudyRecord, plan: CheckPlan, found: _Found) -> dict[str, Any]:
+    """The findings on parts that carry the cycle, by name; their checks are added."""
+    starts = plan.starts_per_hour
+    return {
+        "gear": found.of(*gear.find(study, plan.gear)),
+        "motor_shaft": found.of(*gear.motor_shaft(study, plan.motor_shaft)),
+        "flexible_coupling": found.of(*coupling.find(study, plan.coupling, plan.coupling_place, starts)),
+        "section": found.of(*section.find(study, plan.sections)),
+    }
 
 
 def _bearings(study: StudyRecord, plan: CheckPlan, found: _Found) -> None:
@@ -121,7 +165,7 @@ def _without(pins: Iterable[str], asked: Mapping[str, Any]) -> Iterator[NotCheck
     """The pins without data."""
     if missing := [pin for pin in pins if pin not in asked]:
         why = f"the file has no table for {'them' if len(missing) > 1 else 'it'}; add [bearing.{_key(missing[0])}]"
-        yield NotChecked(f"bearings at {', '.join(missing)}", why)
+        yield NotChecked(f"bearings at {', '.join(missing)}", why, f"bearing.{_key(missing[0])}")
 
 
 def _key(pin: str) -> str:

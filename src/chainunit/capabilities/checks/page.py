@@ -49,6 +49,36 @@ def missing(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         )
 
 
+def relay(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+    """The classes of the relay, beside the start and the stall of the motor; nothing where no relay is checked."""
+    found = CheckFindings.of_study(study).relay
+    if found is None:
+        return
+    rows = []
+    for name in found.classes:
+        path = f"checks.relay.classes.{name}"
+        rows.append(
+            b.TableRow(
+                (
+                    name,
+                    s.number(f"{path}.shortest"),
+                    s.number(f"{path}.stall_trip", none="never"),
+                    "yes" if name in found.suitable else "no",
+                )
+            )
+        )
+    lead = s.line(
+        "The start heats a relay as {checks.relay.start_seconds} at 7.2 times its setting of "
+        "{checks.relay.setting}; the rotor may be locked for {checks.relay.stall_time}. A cold relay surely holds "
+        "up to the least trip time of its class, and the slowest relay of the class has to trip before that time."
+    )
+    yield b.Text(lead, "lead", "long")
+    heads = b.heads(
+        "class", "holds up to", "trips with the rotor locked", "lets the start through, and protects"
+    )
+    yield b.Table(tuple(rows), heads, form="long")
+
+
 def _row(s: b.Source, found: CheckFindings, k: int, *, short: bool = False) -> b.TableRow:
     row, path = found.rows[k], f"checks.rows.{k}"
     title = line(s.words(f"{path}.of"), ": ", s.words(f"{path}.title"))

@@ -10,7 +10,22 @@ from ...core.errors import Faults, meant
 from ...reading.lists import Entry
 from ...reading.tables import instance
 from ...study.file_reading import FileReading
-from .tables import BEARINGS, KINDS, NEEDED, OF_PLAIN, OF_ROLLING, PLAIN, STATIC_SAFETY, BearingTable
+from .section_plan import SectionPlan, read_sections
+from .tables import (
+    BEARINGS,
+    KINDS,
+    NEEDED,
+    OF_PLAIN,
+    OF_ROLLING,
+    PLAIN,
+    STATIC_SAFETY,
+    BearingTable,
+    FlexibleCouplingTable,
+    GearRatingTable,
+    MotorShaftTable,
+    RelayTable,
+    StartingTable,
+)
 
 
 @dataclass(frozen=True)
@@ -22,10 +37,27 @@ class BearingPlan:
 
 
 @dataclass(frozen=True)
+class RelayPlan:
+    """The values of the table [relay], and the name of the trip class; empty where the file gives none."""
+
+    table: RelayTable = field(default_factory=RelayTable)
+    trip_class: str = ""
+
+
+@dataclass(frozen=True)
 class CheckPlan:
-    """The bearings by the title of their pin."""
+    """The bearings by the title of their pin, and the tables of the other checks."""
 
     bearings: Mapping[str, BearingPlan] = field(default_factory=dict)
+    relay: RelayPlan = field(default_factory=RelayPlan)
+    starting: StartingTable = field(default_factory=StartingTable)
+    starts_per_hour: float = 0.0
+    """the starts an hour that the file asks for; 0 where it does not say"""
+    gear: GearRatingTable = field(default_factory=GearRatingTable)
+    motor_shaft: MotorShaftTable = field(default_factory=MotorShaftTable)
+    coupling: FlexibleCouplingTable | None = None
+    coupling_place: str = "motor"
+    sections: Mapping[str, SectionPlan] = field(default_factory=dict)
 
 
 def read_plan(reading: FileReading) -> CheckPlan:
@@ -37,11 +69,42 @@ def read_plan(reading: FileReading) -> CheckPlan:
         with a line for each fault: an unknown pin, a missing key, a key of another kind of bearing.
     """
     faults = Faults()
-    plan = CheckPlan()
+    bearings, sections = {}, dict[str, SectionPlan]()
     if reading.machine is not None:
-        plan = CheckPlan(_bearings(reading, faults))
+        bearings = _bearings(reading, faults)
+        titles = turning_pins(reading.machine.model)
+        sections = read_sections(reading.data.get("section", {}), titles, faults)
     faults.refuse()
-    return plan
+    starting = reading.values.get("starting") or StartingTable()
+    # the table of another capability, if the program has it
+    demands = reading.values.get("sizing") if "sizing" in reading.data else None
+    asked = starting.per_hour or getattr(demands, "starts_per_hour", 0.0)
+    return CheckPlan(
+        bearings,
+        _relay(reading),
+        starting,
+        float(asked),
+        reading.values.get("gear_rating") or GearRatingTable(),
+        reading.values.get("motor_shaft") or MotorShaftTable(),
+        *_coupling(reading),
+        sections,
+    )
+
+
+def _relay(reading: FileReading) -> RelayPlan:
+    if "relay" not in reading.data:
+        return RelayPlan()
+    return RelayPlan(reading.values["relay"], reading.form.relay.trip_class or "")
+
+
+def _coupling(reading: FileReading) -> tuple[FlexibleCouplingTable | None, str]:
+    """The flexible coupling, if the file has one, and its place."""
+    name = "flexible_coupling"
+    return (
+        (reading.values[name], reading.form.flexible_coupling.place)
+        if name in reading.data
+        else (None, "motor")
+    )
 
 
 def turning_pins(model: Any) -> list[str]:

@@ -13,7 +13,9 @@ def checks(study: StudyRecord) -> Iterator[CheckRow | NotChecked]:
     """The lowest natural frequency of the line over the turns of the driver."""
     line = study.statics.rigid_line
     if line is None:
-        yield NotChecked("rigid model of the drive", "the file gives no elastic line; add [driveline]")
+        yield NotChecked(
+            "rigid model of the drive", "the file gives no elastic line; add [driveline]", "driveline"
+        )
         return
     yield CheckRow(
         "shaft line",

@@ -49,3 +49,5 @@ class NotChecked:
 
     what: str = part("the check")
     why: str = part("the reason, and the remedy")
+    table: str = ""
+    """the table that the file does not have, where that is the reason"""

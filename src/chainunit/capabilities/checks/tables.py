@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, StrictBool
 
 from ...core.quantities import Value, declaration, quantity
+from ...drives.gear_rating import GearRating
 from ...reading.lists import TableList
+from ...study.relay import CLASSES
 
 ROLLING, PLAIN = ("ball", "roller"), "plain"
 KINDS = (*ROLLING, PLAIN)
@@ -80,4 +82,230 @@ BEARINGS = TableList(
         ],
     },
     follows={"static_safety": "1.5 for balls, 3 for rollers"},
+)
+
+
+@declaration
+class RelayTable:
+    """A thermal overload relay, and the stall of the motor that it protects."""
+
+    setting: Value = quantity(
+        "A", "setting of the relay; 0: the rated current of the motor", default=0.0, min=0.0
+    )
+    stall_time: Value = quantity(
+        "s",
+        "time for which the rotor of a warm motor may be locked; 0: that of the nameplate",
+        default=0.0,
+        min=0.0,
+        max=1e4,
+    )
+    stall_current: Value = quantity(
+        "A", "current with the rotor locked; 0: that of the nameplate", default=0.0, min=0.0
+    )
+
+
+RELAY_KEYS = {
+    "trip_class": (
+        Literal[tuple(each.name for each in CLASSES)],
+        Field(None, description="trip class of IEC 60947-4-1"),
+    ),
+}
+"""Keys of [relay] that are no quantities, as pydantic fields."""
+
+
+@declaration
+class StartingTable:
+    """The starts of a motor on the line."""
+
+    per_hour: Value = quantity(
+        "1", "starts an hour that are asked for; 0: those of [sizing]", default=0.0, min=0.0, max=1e4
+    )
+    permitted: Value = quantity(
+        "1",
+        "permitted starts an hour of the bare rotor without load; 0: those of the catalogue",
+        default=0.0,
+        min=0.0,
+        max=1e5,
+    )
+
+
+@declaration
+class GearRatingTable(GearRating):
+    """The ratings of the gear that is checked, and what its maker permits in peaks."""
+
+    exponent: Value = quantity(
+        "1",
+        "exponent p of Woehler's line of its teeth, for the torque of equal damage; 0: the largest torque of the "
+        "cycle in place of it, as the same teeth meet it in each turn",
+        default=0.0,
+        min=0.0,
+        max=50.0,
+    )
+    peak_factor: Value = quantity(
+        "1",
+        "permitted torque in peaks and starts over the rated torque; 0: gear.start_factor",
+        default=0.0,
+        min=0.0,
+        max=20.0,
+    )
+    peak_overhung_load: Value = quantity(
+        "N", "permitted radial force on the output shaft in events; 0: unknown", default=0.0, min=0.0
+    )
+
+
+PLACES = ("motor", "crank")
+"""The places of a flexible coupling: on the motor's shaft, or on the crank's shaft behind the gear."""
+
+
+@declaration
+class FlexibleCouplingTable:
+    """A flexible coupling by DIN 740-2; 0 stands for a value that is unknown."""
+
+    rated_torque: Value = quantity("N.m", "rated torque TKN", default=0.0, min=0.0)
+    peak_torque: Value = quantity("N.m", "peak torque TKmax", default=0.0, min=0.0)
+    alternating_torque: Value = quantity(
+        "N.m", "alternating torque TKW that it carries for ever at 10 Hz", default=0.0, min=0.0
+    )
+    stiffness: Value = quantity("N.m/rad", "dynamic torsional stiffness CTdyn", default=0.0, min=0.0)
+    damping: Value = quantity(
+        "1",
+        "relative damping psi: energy of damping over elastic energy of a swing",
+        default=0.0,
+        min=0.0,
+        max=10.0,
+    )
+    temperature_factor: Value = quantity(
+        "1", "temperature factor St, by its maker for the elastic part", default=1.0, min=1.0, max=10.0
+    )
+    start_factor: Value = quantity(
+        "1",
+        "start factor SZ; 0: 1 up to 120 starts an hour, 1.3 up to 240",
+        default=0.0,
+        min=0.0,
+        max=10.0,
+    )
+    surge_factor: Value = quantity(
+        "1",
+        "surge factor SA: torque of the elastic coupling over the sudden torque of a rigid one; 2 is that of a jump "
+        "without damping",
+        default=2.0,
+        min=1.0,
+        max=10.0,
+    )
+
+
+COUPLING_KEYS = {
+    "place": (Literal[PLACES], Field("motor", description="shaft that it is on")),
+}
+"""Keys of [flexible_coupling] that are no quantities, as pydantic fields."""
+
+
+@declaration
+class MotorShaftTable:
+    """The shaft of the motor; 0 stands for a value that is unknown."""
+
+    overhung_load: Value = quantity("N", "permitted radial force on the shaft", default=0.0, min=0.0)
+    pulley_diameter: Value = quantity("m", "diameter of a pulley on it", default=0.0, min=0.0, max=10.0)
+    tension_factor: Value = quantity(
+        "1",
+        "radial force of the belt over that of the torque at the rim, by its maker",
+        default=0.0,
+        min=0.0,
+        max=10.0,
+    )
+
+
+GIVEN_NOTCH, SHOULDER, KEYWAY, PRESS_FIT = "given", "shoulder", "keyway", "press fit"
+NOTCHES = ("none", GIVEN_NOTCH, SHOULDER, KEYWAY, PRESS_FIT)
+NOTCH_KEYS = {
+    GIVEN_NOTCH: ("beta_bending", "beta_tension", "beta_torsion"),
+    SHOULDER: ("radius", "outer_diameter"),
+}
+"""By notch, the keys that it alone has."""
+STEELS = ("structural", "quenched", "nitrided", "case-hardened", "case-hardened CrNiMo")
+PARTS = ("crank", "frame", "link")
+"""The parts on which a section is: it turns with the crank, stands in the frame, or is on a link whose angle to the
+force is not known."""
+RATIO, CONSTANT = "ratio", "constant"
+
+
+@declaration
+class SectionTable:
+    """A round section of a shaft, an axle or a link."""
+
+    diameter: Value = quantity("m", "diameter of the section", above=0.0, max=0.5, kind="millimetres")
+    bore: Value = quantity("m", "bore in it", default=0.0, min=0.0, max=0.5, kind="millimetres")
+    arm: Value = quantity("m", "lever arm by which the force of the pin bends it", min=0.0, max=10.0)
+    torsion_share: Value = quantity(
+        "1", "share of the torque of the {driver} that it carries", default=1.0, min=0.0, max=1.0
+    )
+    axial_share: Value = quantity(
+        "1", "share of the force of the pin that pulls and pushes it", default=0.0, min=0.0, max=1.0
+    )
+    tensile_strength: Value = quantity("N/m2", "tensile strength", above=0.0, max=5e9, kind="stress")
+    yield_strength: Value = quantity("N/m2", "yield strength", above=0.0, max=5e9, kind="stress")
+    effective_diameter: Value = quantity(
+        "m",
+        "diameter in the heat treatment; 0: the largest of the section",
+        default=0.0,
+        min=0.0,
+        max=0.5,
+        kind="millimetres",
+    )
+    roughness: Value = quantity(
+        "m", "roughness Rz of the surface", default=2e-5, min=0.0, max=1e-3, usual=(1e-7, 1e-3)
+    )
+    hardening_factor: Value = quantity(
+        "1", "factor KV of a surface that is hardened or rolled", default=1.0, min=1.0, max=3.0
+    )
+    beta_bending: Value = quantity("1", "notch factor of bending, of the notch given", min=1.0, max=10.0)
+    beta_tension: Value = quantity("1", "notch factor of tension, of the notch given", min=1.0, max=10.0)
+    beta_torsion: Value = quantity("1", "notch factor of torsion, of the notch given", min=1.0, max=10.0)
+    radius: Value = quantity(
+        "m", "radius of the fillet of a shoulder", above=0.0, max=0.5, kind="millimetres"
+    )
+    outer_diameter: Value = quantity(
+        "m", "larger diameter of a shoulder", above=0.0, max=1.0, kind="millimetres"
+    )
+    safety: Value = quantity("1", "safety that is asked for", default=1.2, min=1.0, max=10.0)
+
+
+SECTION_NEEDS = ("diameter", "arm", "notch", "tensile_strength", "yield_strength")
+"""The keys that a section must have."""
+
+SECTIONS = TableList(
+    "section",
+    title="Section of a shaft, an axle or a link, by a name of its own",
+    description="sections",
+    most=100,
+    declared=SectionTable,
+    keys={
+        "pin": (
+            str,
+            Field("", description="pin whose force bends it, by the first word of its title, or all of it"),
+        ),
+        "on": (Literal[PARTS], Field(PARTS[0], description="part that it is on")),
+        "notch": (Literal[NOTCHES], Field(None, description="notch in it")),
+        "steel": (
+            Literal[STEELS],
+            Field(None, description="kind of steel, whose strengths fall with the diameter"),
+        ),
+        "hard_surface": (StrictBool, Field(False, description="whether its surface layer is hard")),
+        "mean_stress": (
+            Literal[RATIO, CONSTANT],
+            Field(
+                RATIO,
+                description="whether mean stress and amplitude grow in one ratio, or the mean is constant",
+            ),
+        ),
+    },
+    conditions={"required": list(SECTION_NEEDS)},
+    follows={
+        "pin": "the bearing of the crank",
+        "steel": "strengths are those at the diameter",
+        "effective_diameter": "the largest diameter of the section",
+        "beta_bending": "1",
+        "beta_tension": "1",
+        "beta_torsion": "1",
+    },
 )

@@ -1,1 +1,1 @@
-"""Files for others: the sizing of a drive as an asset administration shell, and its cycle and candidates as CSV."""
+"""Files for others: the sizing of a drive as an asset administration shell; cycle, candidates and checks as CSV."""

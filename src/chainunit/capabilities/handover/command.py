@@ -23,7 +23,8 @@ def handover(
     """Write the files of a sized drive for other programs, from the folder of a study: no run is made.
 
     Writes sizing.aasx and sizing.json (IDTA 02021, Sizing of Power Drive Trains), the load of the motor's shaft as
-    CSV, the candidates of sizing as CSV, and a page that lists what the files say and what they leave open."""
+    CSV, the candidates of sizing and the checks by clause as CSV, and a page that lists what the files say and what
+    they leave open."""
     from .page import TASK, HandoverQuestion
 
     carry_out(TASK, HandoverQuestion(results, aasx), output)

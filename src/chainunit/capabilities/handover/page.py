@@ -17,6 +17,7 @@ from ...report.task import Task, Writer
 from ...study.record import LOAD_CYCLE
 from ...work.progress import TaskProgress
 from .candidates import CANDIDATES, candidates_csv
+from .checks import CHECKS, checks_csv
 from .content import CYCLE, MEDIA_TYPES, RUN, STUDY, content_of
 from .cycle import as_csv
 from .shell import Content, LinkedFile, TextRange, aasx_writer, environment
@@ -171,6 +172,8 @@ def _writers(found: Handover, report: b.Report, folder: Path, of_report: list[Wr
     files = {JSON: json.dumps(shell, indent=1, ensure_ascii=False).encode("utf-8")} | dict(found.files)
     if found.study.candidates:
         files[CANDIDATES] = candidates_csv(found.study.candidates).encode("utf-8")
+    if found.study.checks:
+        files[CHECKS] = checks_csv(found.study.checks).encode("utf-8")
     own: list[Writer] = [partial(_write, name, content, folder) for name, content in files.items()]
     if found.write_aasx is not None:
         own.insert(0, partial(_write_aasx, found, folder))
@@ -186,7 +189,7 @@ TASK: Task[HandoverQuestion, Handover] = Task(
     "handover",
     _compute,
     handover_report,
-    files=(AASX, JSON, CYCLE, RUN, LOAD_CYCLE, STUDY, CANDIDATES),
+    files=(AASX, JSON, CYCLE, RUN, LOAD_CYCLE, STUDY, CANDIDATES, CHECKS),
     writers=_writers,
 )
 

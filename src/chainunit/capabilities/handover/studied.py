@@ -74,6 +74,12 @@ class StudiedDrive:
         return [as_mapping(each) for each in found] if isinstance(found, list) else []
 
     @property
+    def checks(self) -> list[Mapping[str, Any]]:
+        """The checks by clause; none without."""
+        found = as_mapping(self.result.data.get("checks")).get("rows")
+        return [as_mapping(each) for each in found] if isinstance(found, list) else []
+
+    @property
     def best(self) -> Mapping[str, Any]:
         """The candidate with which all runs are; empty without sizing."""
         sizing = as_mapping(self.result.data.get("sizing"))

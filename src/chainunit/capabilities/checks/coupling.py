@@ -1,0 +1,239 @@
+"""A flexible coupling by DIN 740-2: rated, peak and alternating torque, and the passage through resonance.
+
+The torque is that of the runs at the place of the coupling, where the shaft is rigid or as stiff as [driveline] says.
+The coupling amplifies each part of it that swings: of a torque at one side of two inertias, the coupling carries the
+share of the rigid shaft times V = (1 + j psi/2pi)/(1 - (f/fe)^2 + j psi/2pi).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from ...core.quantities import Value, declaration, quantity
+from ...reading.results import part, result
+from ...study.arrays import peak
+from ...study.readings import load_inertia
+from ...study.record import StudyRecord
+from ...study.torques import gear_torque
+from ...study.window import mean, whole_turns
+from .row import CheckRow, NotChecked
+from .runs import runs_from_events
+from .tables import FlexibleCouplingTable
+
+_CLAUSE = "DIN 740-2:1986"
+_TURN = 2.0 * math.pi
+FREQUENCY = 10.0
+"""Frequency [Hz] up to which the permitted alternating torque holds; above it the heat of the elastic part counts."""
+START_FACTORS = ((120.0, 1.0), (240.0, 1.3))
+"""Up to so many starts an hour, the start factor; beyond them the maker says it."""
+
+
+@declaration
+class CouplingDuty:
+    """The torque at the place of the coupling, and the two inertias."""
+
+    mean: Value = quantity("N.m", "mean torque of steady running")
+    rms: Value = quantity("N.m", "RMS torque of steady running")
+    largest: Value = quantity("N.m", "largest torque of all runs, without the coupling's elasticity")
+    drive_inertia: Value = quantity("kg.m2", "inertia on the side of the motor")
+    load_inertia: Value = quantity("kg.m2", "mean inertia on the side of the machine")
+
+
+@declaration
+class CouplingFactors:
+    """The factors of the coupling."""
+
+    temperature: Value = quantity("1", "temperature factor St")
+    start: Value = quantity("1", "start factor SZ")
+    surge: Value = quantity("1", "surge factor SA")
+    resonance: Value = quantity("1", "resonance factor VR; none without damping")
+
+
+@declaration
+class Swinging:
+    """The part of the torque that swings in steady running."""
+
+    natural_frequency: Value = quantity("rad/s", "natural frequency of the two inertias", kind="frequency")
+    rigid: Value = quantity("N.m", "half of its range with a rigid shaft")
+    elastic: Value = quantity("N.m", "half of its range with the coupling")
+    weighted: Value = quantity(
+        "N.m", "half of its range with the coupling, each part above 10 Hz times the frequency factor"
+    )
+    passed: Value = quantity(
+        "N.m", "largest part with a rigid shaft whose frequency passes the natural one in the start; 0: none"
+    )
+
+
+@result
+class CouplingCheck:
+    """A flexible coupling, and the torques that it has to carry, factors included."""
+
+    place: str = part("shaft that it is on")
+    run: str = part("the run with the largest torque")
+    duty: CouplingDuty = part(inline=True)
+    factors: CouplingFactors = part("factors")
+    swinging: Swinging | None = part("the swinging torque; none without stiffness or damping", optional=True)
+    rated: float = quantity("N.m", "rated torque that it needs")
+    peak: float = quantity("N.m", "peak torque that it needs")
+    alternating: float | None = quantity("N.m", "alternating torque that it needs")
+    passage: float | None = quantity("N.m", "peak torque that it needs for the passage through resonance")
+
+
+def start_factor(starts: float) -> float | None:
+    """The start factor by the `starts` an hour; None beyond those of the standard."""
+    return next((factor for most, factor in START_FACTORS if starts <= most), None)
+
+
+def amplification(frequency: Any, natural: float, damping: float) -> Any:
+    """Complex ratio of the torque in the coupling to that of a rigid shaft, at a `frequency` beside the `natural` one
+    (in one unit), with the relative `damping` psi."""
+    loss = 1j * damping / _TURN
+    return (1.0 + loss) / (1.0 - (np.asarray(frequency) / natural) ** 2 + loss)
+
+
+def natural_frequency(stiffness: float, drive: float, load: float) -> float:
+    """Natural frequency [rad/s] of two inertias [kg m2] on a shaft of that `stiffness` [N m/rad]."""
+    return math.sqrt(stiffness * (1.0 / drive + 1.0 / load))
+
+
+def swinging(time: Any, torque: Any, natural: float, damping: float) -> Swinging:
+    """The swinging part of a `torque` [N m] over `time` [s], both of shape (n,), in steady running over whole turns,
+    with the coupling of that `natural` frequency [rad/s] and relative `damping`."""
+    span, count = float(time[-1] - time[0]), len(time)
+    even = np.interp(time[0] + span * np.arange(count) / count, time, torque)
+    parts = np.fft.rfft(even)
+    parts[0] = 0.0
+    frequency = np.arange(len(parts)) / span * _TURN
+    elastic = parts * amplification(frequency, natural, damping)
+    heating = np.sqrt(np.maximum(1.0, frequency / (_TURN * FREQUENCY)))
+    above = np.abs(parts[frequency > natural])
+    return Swinging(
+        natural_frequency=natural,
+        **{
+            name: 0.5 * float(np.ptp(np.fft.irfft(of, count)))
+            for name, of in (("rigid", parts), ("elastic", elastic), ("weighted", elastic * heating))
+        },
+        passed=2.0 / count * float(np.max(above)) if len(above) else 0.0,
+    )
+
+
+def coupling_check(
+    duty: CouplingDuty, factors: CouplingFactors, swing: Swinging | None, place: str = "motor", run: str = ""
+) -> CouplingCheck:
+    """The torques that a coupling needs."""
+    steady, temperature = abs(duty.mean), factors.temperature
+    surge = max(0.0, duty.largest - steady) * factors.surge
+    return CouplingCheck(
+        place=place,
+        run=run,
+        duty=duty,
+        factors=factors,
+        swinging=swing,
+        rated=duty.rms * temperature,
+        peak=(steady + surge * factors.start) * temperature,
+        alternating=None if swing is None else swing.weighted * temperature,
+        passage=None
+        if swing is None
+        else (steady + swing.passed * factors.resonance * factors.start) * temperature,
+    )
+
+
+def coupling_rows(
+    of: CouplingCheck, table: FlexibleCouplingTable, titles: Mapping[str, str]
+) -> Iterator[CheckRow | NotChecked]:
+    """The rows of a coupling; `titles` are those of runs."""
+    at = "checks.flexible_coupling"
+    factors = {"St": f"{at}.factors.temperature"}
+    impact = {"TL": f"{at}.mean", "SZ": f"{at}.factors.start", **factors}
+    rows = (
+        (
+            "rated torque",
+            "rated_torque",
+            "rated",
+            "TKN >= T St, T: RMS of steady running",
+            {"T": f"{at}.rms", **factors},
+        ),
+        (
+            f"peak torque ({titles.get(of.run, of.run)})",
+            "peak_torque",
+            "peak",
+            "TKmax >= (TL + (T - TL) SA SZ) St",
+            {"T": f"{at}.largest", "SA": f"{at}.factors.surge", **impact},
+        ),
+        (
+            "alternating torque",
+            "alternating_torque",
+            "alternating",
+            "TKW >= half range of sum V(f) Sf(f) T(f), times St",
+            {"rigid": f"{at}.swinging.rigid", "elastic": f"{at}.swinging.elastic", **factors},
+        ),
+        (
+            "passage through resonance",
+            "peak_torque",
+            "passage",
+            "TKmax >= (TL + Ti VR SZ) St",
+            {"Ti": f"{at}.swinging.passed", "VR": f"{at}.factors.resonance", **impact},
+        ),
+    )
+    for title, key, name, formula, numbers in rows:
+        limit, value = getattr(table, key), getattr(of, name)
+        if not limit:
+            yield NotChecked(f"coupling, {title}", f"add [flexible_coupling] with {key}, by its maker")
+        elif value is None:
+            words = "add [flexible_coupling] with stiffness and damping, by its maker"
+            yield NotChecked(f"coupling, {title}", words)
+        else:
+            yield CheckRow("coupling", title, _CLAUSE, formula, value, limit, f"{at}.{name}", numbers, "N.m")
+
+
+def find(
+    study: StudyRecord, table: FlexibleCouplingTable | None, place: str, starts: float
+) -> tuple[CouplingCheck | None, list[CheckRow | NotChecked]]:
+    """The coupling of a study, which makes so many `starts` an hour, and its checks, or the reason against them."""
+    if table is None:
+        return None, [
+            NotChecked(
+                "flexible coupling",
+                "the file does not have one; add [flexible_coupling]",
+                "flexible_coupling",
+            )
+        ]
+    factor = table.start_factor or start_factor(starts)
+    if factor is None:
+        why = (
+            f"{starts:g} starts an hour are more than the 240 of the standard; add start_factor, by its maker"
+        )
+        return None, [NotChecked("flexible coupling", why)]
+    drive = study.drive
+    turns = whole_turns(drive, study.steady)
+    largest, run = max((peak(_torque(study, run, place)), name) for name, run in runs_from_events(study))
+    ratio = drive.ratio if place == "crank" else 1.0
+    torque, time = _torque(study, turns, place), turns["time"].values
+    duty = CouplingDuty(
+        mean=mean(turns, torque),
+        rms=math.sqrt(mean(turns, torque**2)),
+        largest=largest,
+        drive_inertia=float(drive.fmu_parameters.rotor.J) * ratio**2,
+        load_inertia=float(np.mean(load_inertia(drive, turns))) * ratio**2,
+    )
+    swing = None
+    if table.stiffness and table.damping and duty.load_inertia > 0.0:
+        natural = natural_frequency(table.stiffness, duty.drive_inertia, duty.load_inertia)
+        swing = swinging(time, torque, natural, table.damping)
+    factors = CouplingFactors(
+        temperature=table.temperature_factor,
+        start=factor,
+        surge=table.surge_factor,
+        resonance=abs(complex(amplification(1.0, 1.0, table.damping))) if table.damping else None,
+    )
+    found = coupling_check(duty, factors, swing, place, run)
+    return found, list(coupling_rows(found, table, study.titles))
+
+
+def _torque(study: StudyRecord, run: Any, place: str) -> Any:
+    """The torque at the place of the coupling [N m], shape (n,)."""
+    return gear_torque(study.drive, run) if place == "crank" else run["motor.tau"].values

@@ -1,0 +1,282 @@
+"""A gear beside its ratings: application factor, largest torque, thermal rating, overhung load, speed; and the
+overhung load of the motor's shaft.
+
+ISO 6336-6 takes the application factor from the spectrum of the torque: KA = Teq/Tn, with Teq of the same damage by
+Woehler's line of exponent p and Palmgren and Miner's rule. A wheel on the crank's shaft meets each angle of the crank
+with the same teeth: they carry the largest torque of the turn in each turn, so that without an exponent Teq is that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from ...core.quantities import Value, declaration, quantity
+from ...drives.gear_rating import GearRating
+from ...reading.results import part, result
+from ...study.arrays import peak
+from ...study.bearings import hardest_run, mean_load
+from ...study.drive import Drive
+from ...study.readings import crank_angle, machine_series, shaft_power
+from ...study.record import StudyRecord
+from ...study.starts import StartFindings
+from ...study.torques import gear_torque
+from ...study.window import mean, whole_turns
+from .row import CheckRow, NotChecked
+from .runs import runs_from_events
+from .tables import GearRatingTable, MotorShaftTable
+
+_MAKER = "Rating of the maker of the gear"
+_UNTURNED = 1e-6
+"""Angle [rad] up to which a pin turns with the crank."""
+
+
+@declaration
+class GearDuty:
+    """The load of the gear; None for what is not known."""
+
+    ratio: Value = quantity("1", "ratio")
+    exponent: Value = quantity("1", "exponent of Woehler's line; none where Teq is the largest torque")
+    equivalent: Value = quantity("N.m", "torque of equal damage Teq at the output, in steady running")
+    mean: Value = quantity("N.m", "mean of the size of the torque at the output, in steady running")
+    largest: Value = quantity("N.m", "largest torque at the output, of all runs")
+    power: Value = quantity("W", "mean of the size of the power in steady running")
+    radial: Value = quantity("N", "largest reaction of the {driver}'s bearing in steady running")
+    largest_radial: Value = quantity("N", "largest reaction of the {driver}'s bearing, of all runs")
+    speed: Value = quantity("rad/s", "largest speed of the input shaft, of all runs", kind="speed")
+
+
+@result
+class GearCheck:
+    """The gear. Its application factors are the torque of equal damage over its rated torque, and over the mean."""
+
+    run: str = part("the run with the largest torque")
+    bearing: str = part(
+        "pin whose reaction the output shaft carries; empty where none turns with the {driver}"
+    )
+    load: GearDuty = part(inline=True)
+    application_factor: float | None = quantity("1", "application factor of the cycle, Teq over rated torque")
+    over_mean: float | None = quantity("1", "torque of equal damage over the mean one")
+    torque_limit: float | None = quantity("N.m", "permitted torque of the output in peaks")
+
+
+@result
+class ShaftLoad:
+    """The radial force on the motor's shaft."""
+
+    torque: float | None = quantity(
+        "N.m", "largest torque of the motor in steady running; none without a pulley"
+    )
+    radial: float = quantity("N", "largest radial force on the shaft in steady running")
+
+
+def equivalent_torque(torque: Any, angle: Any, exponent: float) -> float:
+    """Torque of equal damage [N m] of a `torque` [N m] over the `angle` of its shaft [rad], both of shape (n,):
+    (integral of |T|^p |d angle| / integral of |d angle|)^(1/p). With an exponent of 0, the largest torque."""
+    return mean_load(np.abs(torque), angle, exponent) if exponent else peak(torque)
+
+
+def driver_pin(titles: Mapping[str, str], turned: Mapping[str, Any], angle: Any) -> str:
+    """The title of the first pin that turns with the crank, which is its bearing in the frame; empty where none does.
+
+    Parameters
+    ----------
+    titles : by title, the output of the pin
+    turned, angle : by output, the angle of the pin, and that of the crank [rad], each of shape (n,)
+    """
+    span = np.asarray(angle) - angle[0]
+    for title, output in titles.items():
+        if output in turned:
+            own = np.abs(turned[output] - turned[output][0])
+            if float(np.max(np.abs(own - np.abs(span)))) <= _UNTURNED * max(1.0, peak(span)):
+                return title
+    return ""
+
+
+def gear_check(
+    load: GearDuty, rating: GearRating, peak_factor: float, run: str = "", bearing: str = ""
+) -> GearCheck:
+    """The gear under its load."""
+    rated = rating.rated_torque
+    return GearCheck(
+        run=run,
+        bearing=bearing,
+        load=load,
+        application_factor=load.equivalent / rated if rated else None,
+        over_mean=load.equivalent / load.mean if load.mean else None,
+        torque_limit=rated * peak_factor if rated else None,
+    )
+
+
+def gear_rows(
+    of: GearCheck, rating: GearRating, permitted_peak: float, titles: Mapping[str, str]
+) -> Iterator[CheckRow | NotChecked]:
+    """The rows of a gear; `permitted_peak` is the permitted radial force in events [N], 0 where it is unknown, and
+    `titles` are those of runs."""
+    own, at = of.load, "checks.gear"
+    if of.application_factor is not None and of.torque_limit is not None:
+        by = "p of the file" if own.exponent else "the largest torque"
+        yield CheckRow(
+            "gear",
+            "application factor",
+            "ISO 6336-6:2019, annex on KA from a load spectrum",
+            f"KA = Teq/T, Teq = (sum |T|^p |dphi| / sum |dphi|)^(1/p), {by}",
+            of.application_factor,
+            rating.application_factor,
+            f"{at}.application_factor",
+            {"Teq": f"{at}.equivalent", "mean |T|": f"{at}.mean"},
+        )
+        yield CheckRow(
+            "gear",
+            f"largest torque of the output ({titles.get(of.run, of.run)})",
+            _MAKER,
+            "T <= peak factor x rated torque",
+            own.largest,
+            of.torque_limit,
+            f"{at}.largest",
+            {"permitted": f"{at}.torque_limit"},
+            "N.m",
+        )
+    else:
+        yield _lacks("application factor and largest torque", "rated_torque")
+    ratings = (
+        ("mean power", "thermal_power", "mean of |P| <= thermal rating", "power", "W", ""),
+        ("overhung load", "overhung_load", "largest |F| of the bearing <= permitted", "radial", "N", ""),
+        ("speed of the input shaft", "largest_speed", "largest |w| of all runs", "speed", "rad/s", "speed"),
+    )
+    for title, key, formula, name, unit, kind in ratings:
+        limit, value = getattr(rating, key), getattr(own, name)
+        if value is None:
+            yield NotChecked(f"gear, {title}", "no pin of the machine turns with the output shaft")
+        elif not limit:
+            yield _lacks(title, key)
+        else:
+            yield CheckRow("gear", title, _MAKER, formula, value, limit, f"{at}.{name}", {}, unit, kind)
+    if own.largest_radial is not None and rating.overhung_load:
+        title = "overhung load of all runs"
+        if permitted_peak:
+            yield CheckRow(
+                "gear", title, _MAKER, "largest |F| of the bearing <= permitted in events",
+                own.largest_radial, permitted_peak, f"{at}.largest_radial", {}, "N",
+            )  # fmt: skip
+        else:
+            yield _lacks(title, "peak_overhung_load")
+
+
+def _lacks(title: str, key: str) -> NotChecked:
+    return NotChecked(f"gear, {title}", f"the file does not give it; add [gear_rating] with {key}")
+
+
+def bearing_force(study: StudyRecord, turns: Any) -> tuple[str, Any, float | None]:
+    """The bearing of the crank by its title, its force over whole `turns` [N], shape (n,), and the largest of all
+    runs [N]; an empty title, and None, where no pin turns with the crank."""
+    drive = study.drive
+    if drive.foreign_machine:
+        return "", None, None
+    machine = drive.simulated_machine
+    turned = machine.pin_turns(machine_series(turns))
+    title = driver_pin(machine.model.pins, turned, crank_angle(drive, turns))
+    if not title:
+        return "", None, None
+    output = machine.model.pins[title]
+    force = np.hypot(*(turns[f"machine.{output}.{axis}"].values for axis in ("fx", "fy")))
+    return title, force, study.pins[hardest_run(study.pins, title)][title]["peak"]
+
+
+def find(study: StudyRecord, table: GearRatingTable) -> tuple[GearCheck | None, list[CheckRow | NotChecked]]:
+    """The gear of a study and its checks; none for a drive without a gear."""
+    drive, tables = study.drive, study.config.drive
+    if drive.ratio == 1.0:
+        return None, []
+    given = tables.gear if "gear.torque_limit" in tables.given else None
+    rated = table.rated_torque or (given.torque_limit if given else 0.0)
+    ratings = (rated, table.thermal_power, table.overhung_load, table.largest_speed)
+    if not any(ratings):
+        why = "the file gives no rating of the gear; add [gear_rating]"
+        return None, [NotChecked("gear", why, "gear_rating")]
+    if drive.foreign is not None:
+        return None, [NotChecked("gear", "the motor is an FMU, whose torque is not known")]
+    turns = whole_turns(drive, study.steady)
+    torque, largest, run = gear_torque(drive, turns), *_largest_torque(drive, runs_from_events(study))
+    starts = StartFindings.found_in(study)
+    if starts is not None and starts.worst.gear_torque > largest:
+        largest, run = starts.worst.gear_torque, "start_up"
+    title, force, largest_radial = bearing_force(study, turns)
+    load = GearDuty(
+        ratio=drive.ratio,
+        exponent=table.exponent or None,
+        equivalent=equivalent_torque(torque, crank_angle(drive, turns), table.exponent),
+        mean=mean(turns, np.abs(torque)),
+        largest=largest,
+        power=mean(turns, np.abs(shaft_power(drive, turns))),
+        radial=None if force is None else peak(force),
+        largest_radial=largest_radial,
+        speed=max(peak(each[drive.motor_speed].values) for _, each in runs_from_events(study)),
+    )
+    rating = GearRating(
+        rated_torque=rated,
+        application_factor=table.application_factor,
+        thermal_power=table.thermal_power,
+        overhung_load=table.overhung_load,
+        largest_speed=table.largest_speed,
+    )
+    found = gear_check(load, rating, table.peak_factor or tables.gear.start_factor, run, title)
+    return found, list(gear_rows(found, rating, table.peak_overhung_load, study.titles))
+
+
+def _largest_torque(drive: Drive, runs: Iterable[tuple[str, Any]]) -> tuple[float, str]:
+    """The largest torque at the output of the gear [N m], and the run in which it is."""
+    return max((peak(gear_torque(drive, run)), name) for name, run in runs)
+
+
+def motor_shaft(
+    study: StudyRecord, table: MotorShaftTable
+) -> tuple[ShaftLoad | None, list[CheckRow | NotChecked]]:
+    """The radial force on the motor's shaft and its check, or the reason against it."""
+    what = "overhung load of the motor's shaft"
+    direct = study.drive.ratio == 1.0
+    if not table.overhung_load:
+        why = "the file gives no permitted load; add [motor_shaft] with overhung_load"
+        belt = "" if direct else ", and for a belt on it with pulley_diameter and tension_factor"
+        return None, [NotChecked(what, why + belt, "motor_shaft")]
+    turns = whole_turns(study.drive, study.steady)
+    torque = None
+    if table.pulley_diameter and table.tension_factor:
+        torque = peak(turns[study.drive.motor_torque].values)
+        radial = pulley_force(torque, table.pulley_diameter, table.tension_factor)
+        formula = "F = 2 T f/d, T: largest torque of the motor in steady running"
+        numbers = {"T": "checks.motor_shaft.torque"}
+    elif direct:
+        title, force, _ = bearing_force(study, turns)
+        if not title:
+            return None, [NotChecked(what, "no pin of the machine turns with the shaft")]
+        radial, formula, numbers = peak(force), f"largest reaction of {title} in steady running", {}
+    else:
+        return None, [
+            NotChecked(what, "a belt or wheel on it is not known; add pulley_diameter and tension_factor")
+        ]
+    found = ShaftLoad(torque, radial)
+    return found, [shaft_row(found, table.overhung_load, formula, numbers)]
+
+
+def pulley_force(torque: float, diameter: float, factor: float) -> float:
+    """Radial force [N] of a belt on a pulley of that `diameter` [m] with the `torque` [N m]; the `factor` is the
+    force over that of the torque at the rim, as the tension of the belt adds to it."""
+    return 2.0 * torque * factor / diameter
+
+
+def shaft_row(of: ShaftLoad, limit: float, formula: str, numbers: Mapping[str, str]) -> CheckRow:
+    """The row of the motor's shaft."""
+    return CheckRow(
+        "motor",
+        "overhung load of the shaft",
+        "Permitted radial force of the maker of the motor",
+        formula,
+        of.radial,
+        limit,
+        "checks.motor_shaft.radial",
+        numbers,
+        "N",
+    )

@@ -1,0 +1,211 @@
+"""The thermal overload relay of a motor on the line: the class that lets the start through, and the time at which it
+trips in a stall, beside the time for which the motor may stand.
+
+IEC 60947-4-1 gives each class a band of trip times: a relay of the class may be as fast as the one end, where a start
+must not trip it, and as slow as the other, where it must still save the motor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from ...core.quantities import Value, declaration, quantity
+from ...reading.results import part, result
+from ...study.event_torques import from_event_on
+from ...study.record import StudyRecord
+from ...study.relay import CLASSES, LIGHT, MULTIPLE, TRIPS_AT, TripClass, relay_trip, start_seconds
+from ...study.window import Phase
+from .plan import RelayPlan
+from .row import CheckRow, NotChecked
+
+_CLAUSE = "IEC 60947-4-1, trip classes"
+_WHAT = "thermal overload relay"
+_LASTING = 5
+"""One part in so many at the end of a run has the current that flows on."""
+
+
+@declaration
+class RelaySetting:
+    """The relay and the motor behind it."""
+
+    setting: Value = quantity("A", "setting")
+    before: Value = quantity("A", "RMS current of steady running")
+    start_seconds: Value = quantity("s", "the start as time at 7.2 times the setting")
+    stall_current: Value = quantity("A", "current with the rotor locked")
+    stall_time: Value = quantity("s", "time for which the rotor of a warm motor may be locked")
+
+
+@declaration
+class RelayOfClass:
+    """A relay of a trip class."""
+
+    shortest: Value = quantity("s", "least trip time of a cold relay at 7.2 times its setting")
+    longest: Value = quantity("s", "largest trip time of a cold relay at 7.2 times its setting")
+    stall_trip: Value = quantity(
+        "s", "trip time of the slowest relay, warm from running, with the rotor locked"
+    )
+
+
+@declaration
+class StallHeat:
+    """An event in which the motor stalls, or a relay trips."""
+
+    trip_time: Value = quantity("s", "time after the event at which the slowest relay trips")
+    seconds: Value = quantity("s", "heat of the motor until then, as time with the rotor locked")
+
+
+@result
+class RelayFindings:
+    """The relay: its class is that of the file, or else the usual one, or the heavier one that the start needs."""
+
+    trip_class: str = part("name of the class")
+    numbers: RelaySetting = part(inline=True)
+    classes: Mapping[str, RelayOfClass] = part("relays by their class")
+    suitable: tuple[str, ...] = part(
+        "classes that let the start through and trip within the time of the stall"
+    )
+    events: Mapping[str, StallHeat] = part("events, with the relay of the class")
+
+
+def stall_trip(of: TripClass, setting: float, before: float, current: float) -> float | None:
+    """Time [s] after which the slowest relay of a class trips at a steady `current` [A], warm from the RMS current
+    `before` [A]; None where it never does."""
+    # a record without a row of the stall: all of it is the current that flows on
+    return relay_trip([0.0], [current], setting, before, current, of.longest, TRIPS_AT)
+
+
+def stall_heat(
+    of: TripClass, time: Any, current: Any, setting: float, before: float, stall_current: float
+) -> StallHeat | None:
+    """An event: the trip of the slowest relay of a class, and the heat of the motor until then. `time` [s] since the
+    event and `current` [A] are of shape (n,); the RMS current of the last fifth flows on. None where the relay never
+    trips."""
+    lasts = float(np.sqrt(np.mean(current[-max(1, len(current) // _LASTING) :] ** 2)))
+    trip = relay_trip(time, current, setting, before, lasts, of.longest, TRIPS_AT)
+    if trip is None:
+        return None
+    until = time <= trip
+    heat = float(np.trapezoid((current[until] / stall_current) ** 2, time[until]))
+    heat += max(0.0, trip - float(time[-1])) * (lasts / stall_current) ** 2
+    return StallHeat(trip_time=trip, seconds=heat)
+
+
+def relay_findings(
+    trip_class: str, numbers: RelaySetting, runs: Mapping[str, tuple[Any, Any, float]], least: int = LIGHT
+) -> RelayFindings:
+    """The relay with these `numbers`.
+
+    Parameters
+    ----------
+    trip_class : name of its class; empty for the class `least`, or the heaviest
+    runs : by event, the time since it began [s] and the current [A], shape (n,), and the RMS current before [A]
+    least : the least class that all starts need, by `chainunit.study.relay.start_class`
+    """
+    classes: dict[str, RelayOfClass] = {}
+    starting = []
+    for each in CLASSES:
+        trip = stall_trip(each, numbers.setting, numbers.before, numbers.stall_current)
+        classes[each.name] = RelayOfClass(shortest=each.shortest, longest=each.longest, stall_trip=trip)
+        enough = least <= LIGHT or each.longest >= least
+        if numbers.start_seconds <= each.shortest and enough:
+            starting.append(each)
+    named = {each.name: each for each in CLASSES}
+    own = named[trip_class] if trip_class else named.get(str(least), CLASSES[-1])
+    trips = {name: classes[name].stall_trip for name in (each.name for each in starting)}
+    suitable = [name for name, trip in trips.items() if trip is not None and trip <= numbers.stall_time]
+    heats = {
+        name: stall_heat(own, time, current, numbers.setting, before, numbers.stall_current)
+        for name, (time, current, before) in runs.items()
+    }
+    events = {name: heat for name, heat in heats.items() if heat is not None}
+    return RelayFindings(own.name, numbers, classes, tuple(suitable), events)
+
+
+def find(study: StudyRecord, plan: RelayPlan) -> tuple[RelayFindings | None, list[CheckRow | NotChecked]]:
+    """The relay of a study and its checks, or the reason against them."""
+    if study.drive.follows and study.drive.foreign is None:
+        what = f"{_WHAT}, starts per hour"
+        return None, [NotChecked(what, "the motor is controlled; its converter limits and protects it")]
+    if why := _why_none(study):
+        return None, [NotChecked(_WHAT, why)]
+    plate = None if study.plate is None else study.plate.nameplate
+    given = {
+        "setting": plan.table.setting or study.drive.rated_current or 0.0,
+        "stall_time": plan.table.stall_time or (plate.locked_time if plate else 0.0),
+        "stall_current": plan.table.stall_current
+        or (plate.rated_current * plate.locked_current_ratio if plate else 0.0),
+    }
+    if missing := [name for name, value in given.items() if not value]:
+        return None, [NotChecked(_WHAT, f"the motor has no nameplate; add [relay] with {', '.join(missing)}")]
+    assert study.start is not None
+    window = study.window(Phase.STEADY, study.steady)
+    name, before = window.current, window.rms(window.current)
+    rise = study.runs["start_up"].sel(time=slice(None, study.start.start_time))
+    seconds = start_seconds(rise["time"].values, np.abs(rise[name].values), given["setting"])
+    runs: dict[str, tuple[Any, Any, float]] = {}
+    for event in study.overloads:
+        # behind a coupling that opens no load is left that could trip the relay
+        if study.answers[event].coupling_trip_time is None:
+            run = from_event_on(study, event)
+            from_rest = study.config.events[event].from_rest
+            time = run["time"].values - study.event[event]
+            runs[event] = time, np.abs(run[name].values), 0.0 if from_rest else before
+    numbers = RelaySetting(before=before, start_seconds=seconds, **given)
+    found = relay_findings(plan.trip_class, numbers, runs, study.relay_class)
+    return found, list(relay_rows(found, {event: study.title_of(event) for event in found.events}))
+
+
+def _why_none(study: StudyRecord) -> str:
+    """The reason why no relay is checked; empty where one is."""
+    if study.drive.foreign is not None:
+        return "the motor is an FMU, whose current is not known"
+    if study.start is None or study.start.start_time is None:
+        return "the motor does not come to its speed"
+    return ""
+
+
+def relay_rows(of: RelayFindings, titles: Mapping[str, str]) -> Iterator[CheckRow]:
+    """The rows of a relay; `titles` are those of its events."""
+    own, at = of.classes[of.trip_class], "checks.relay"
+    here = f"{at}.classes.{of.trip_class}"
+    name = f"thermal relay of class {of.trip_class}"
+    yield CheckRow(
+        name,
+        "start",
+        _CLAUSE,
+        f"t = sum (I/({MULTIPLE:g} Ir))^2 dt <= least trip time of the class at {MULTIPLE:g} Ir, cold",
+        of.numbers.start_seconds,
+        own.shortest,
+        f"{at}.start_seconds",
+        {"Ir": f"{at}.setting", "limit": f"{here}.shortest"},
+        "s",
+    )
+    numbers = {"Ir": f"{at}.setting", "IA": f"{at}.stall_current", "I0": f"{at}.before"}
+    if own.stall_trip is not None:
+        yield CheckRow(
+            name,
+            "trip with the rotor locked",
+            f"{_CLAUSE}; locked-rotor time of the maker of the motor",
+            f"t = T ln(((IA/Ir)^2 - (I0/Ir)^2)/((IA/Ir)^2 - {TRIPS_AT:g}^2)), T from the largest trip time of the "
+            "class",
+            own.stall_trip,
+            of.numbers.stall_time,
+            f"{here}.stall_trip",
+            numbers | {"largest": f"{here}.longest"},
+            "s",
+        )
+    for event, heat in of.events.items():
+        yield CheckRow(
+            name,
+            f"heat of the motor until the trip ({titles[event]})",
+            f"{_CLAUSE}; locked-rotor time of the maker of the motor",
+            "t = sum (I/IA)^2 dt until the slowest relay trips",
+            heat.seconds,
+            of.numbers.stall_time,
+            f"{at}.events.{event}.seconds",
+            {"IA": f"{at}.stall_current", "trip": f"{at}.events.{event}.trip_time"},
+            "s",
+        )

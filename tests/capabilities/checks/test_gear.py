@@ -1,0 +1,204 @@
+"""The checks of the gear and of the motor's shaft: the worked example of docs/checks.md, the limit cases of the
+torque of equal damage, the directions, and a study whose numbers are computed once more from its stored runs."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from command import chainunit
+
+from chainunit.capabilities.checks.gear import (
+    GearDuty,
+    ShaftLoad,
+    driver_pin,
+    equivalent_torque,
+    gear_check,
+    gear_rows,
+    pulley_force,
+    shaft_row,
+)
+from chainunit.capabilities.checks.row import CheckRow
+from chainunit.core.errors import InputError
+from chainunit.drives.gear_rating import GearRating
+from chainunit.report.blocks import at
+from chainunit.study.config import parse
+
+DOCS = (Path(__file__).parents[3] / "docs" / "checks.md").read_text("utf-8")
+RATING = GearRating(
+    rated_torque=1000.0,
+    application_factor=1.25,
+    thermal_power=5000.0,
+    overhung_load=9000.0,
+    largest_speed=188.5,
+)
+LOAD = GearDuty(
+    ratio=50.0, exponent=6.6, equivalent=721.4, mean=600.0, largest=1700.0, power=600.0, radial=6000.0,
+    largest_radial=9500.0, speed=160.0,
+)  # fmt: skip
+
+
+def used(load=LOAD, rating=RATING, peak_factor=2.0, permitted_peak=12e3):
+    found = gear_check(load, rating, peak_factor, "start_up")
+    rows = gear_rows(found, rating, permitted_peak, {"start_up": "start-up"})
+    return {row.title: row.utilisation for row in rows if isinstance(row, CheckRow)}
+
+
+def test_the_example():
+    for each in ("721.4 N m", "57.7 %", "64.0 %", "85.0 %", "12.0 %", "66.7 %", "437.5 N", "62.5 %"):
+        assert each in DOCS, each
+    angle = np.linspace(0.0, 2.0 * np.pi, 10_001)
+    torque = np.where(angle < np.pi, 400.0, 800.0)
+    by_hand = ((400.0**6.6 + 800.0**6.6) / 2.0) ** (1.0 / 6.6)
+    assert by_hand == pytest.approx(721.4, rel=1e-3)
+    assert equivalent_torque(torque, angle, 6.6) == pytest.approx(by_hand, rel=1e-3)
+    assert equivalent_torque(torque, angle, 0.0) == 800.0
+    shares = used()
+    assert shares["application factor"] == pytest.approx(0.577, rel=0.01)
+    assert used(replace(LOAD, equivalent=800.0))["application factor"] == pytest.approx(0.64, rel=0.01)
+    assert shares["largest torque of the output (start-up)"] == pytest.approx(0.85, rel=0.01)
+    assert shares["mean power"] == pytest.approx(0.12, rel=0.01)
+    assert shares["overhung load"] == pytest.approx(0.667, rel=0.01)
+    radial = pulley_force(20.0, 0.16, 1.75)
+    assert radial == pytest.approx(437.5, rel=0.01)
+    assert shaft_row(ShaftLoad(20.0, radial), 700.0, "", {}).utilisation == pytest.approx(0.625, rel=0.01)
+
+
+def test_the_torque_of_equal_damage_lies_between_mean_and_largest_and_grows_with_the_exponent():
+    angle = np.linspace(0.0, 2.0 * np.pi, 2001)
+    torque = 300.0 * np.sin(angle) + 100.0
+    means = [equivalent_torque(torque, angle, p) for p in (1.0, 3.0, 6.6, 20.0, 50.0, 0.0)]
+    assert means[0] == pytest.approx(np.mean(np.abs(torque)), rel=1e-2)
+    assert np.all(np.diff(means) > 0.0) and means[-1] == pytest.approx(400.0, rel=1e-9)
+    assert equivalent_torque(torque, -angle, 3.0) == pytest.approx(means[1], rel=1e-12)
+
+
+SIGNS = {
+    "application factor": ("equivalent", "application_factor"),
+    "largest torque of the output (start-up)": ("largest", "rated_torque"),
+    "mean power": ("power", "thermal_power"),
+    "overhung load": ("radial", "overhung_load"),
+    "speed of the input shaft": ("speed", "largest_speed"),
+    "overhung load of all runs": ("largest_radial", ""),
+}
+
+
+@pytest.mark.parametrize("title", SIGNS)
+def test_the_used_share_rises_with_its_load_and_falls_with_its_rating(title):
+    load, rating = SIGNS[title]
+    for name in SIGNS.values():
+        shares = [
+            used(replace(LOAD, **{name[0]: getattr(LOAD, name[0]) * factor}))[title] for factor in (1.0, 1.3)
+        ]
+        assert (np.diff(shares) > 0.0) == (name[0] == load)
+    for name in vars(RATING):
+        both = (rating, "rated_torque") if title == "application factor" else (rating,)
+        shares = [
+            used(rating=replace(RATING, **{name: getattr(RATING, name) * factor}))[title]
+            for factor in (1.0, 1.3)
+        ]
+        assert (np.diff(shares) < 0.0) == (name in both)
+    assert (used(permitted_peak=13e3)[title] < used()[title]) == (title == "overhung load of all runs")
+    assert (used(peak_factor=2.5)[title] < used()[title]) == title.startswith("largest torque")
+
+
+def test_what_nobody_gives_is_named():
+    nothing = GearRating()
+    rows = list(gear_rows(gear_check(LOAD, nothing, 2.0), nothing, 0.0, {}))
+    assert [row.why.rpartition(" ")[2] for row in rows] == [
+        "rated_torque", "thermal_power", "overhung_load", "largest_speed",
+    ]  # fmt: skip
+    rows = list(gear_rows(gear_check(LOAD, RATING, 2.0), RATING, 0.0, {}))
+    assert rows[-1].why.endswith("add [gear_rating] with peak_overhung_load")
+    without = replace(LOAD, radial=None, largest_radial=None)
+    rows = list(gear_rows(gear_check(without, RATING, 2.0), RATING, 0.0, {}))
+    assert [row.why for row in rows if not isinstance(row, CheckRow)] == [
+        "no pin of the machine turns with the output shaft"
+    ]
+
+
+def test_the_bearing_of_the_crank_is_the_pin_that_turns_with_it():
+    angle = np.linspace(3.0, 15.0, 400)
+    turned = {"a": 0.1 * np.sin(angle), "b": 3.0 - angle, "c": angle - 0.2 * np.sin(angle)}
+    assert driver_pin({"A": "a", "C": "c", "O1": "b"}, turned, angle) == "O1"
+    assert driver_pin({"A": "a", "C": "c", "X": "x"}, turned, angle) == ""
+
+
+# -- a study
+
+STUDY = """
+title = "Gear"
+[system]
+motor = "IE3 4-pole 0.75 kW, 80M"
+[run]
+settle_turns = 2
+[[event]]
+type = "jam"
+side = "left"
+[gear_rating]
+rated_torque = 200
+application_factor = 1.4
+thermal_power = "2 kW"
+overhung_load = "3 kN"
+largest_speed = "3000 rev/min"
+exponent = 6.6
+[motor_shaft]
+overhung_load = 500
+pulley_diameter = "120 mm"
+tension_factor = 1.75
+"""
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("gear")
+    (folder / "mine.toml").write_text(STUDY, "utf-8")
+    assert chainunit("study", "mine.toml", "-o", "out", cwd=folder).returncode == 0
+    return folder / "out"
+
+
+def test_the_numbers_of_a_study_follow_from_its_runs(done):
+    result = json.loads((done / "result.json").read_text("utf-8"))
+    found, shaft = result["checks"]["gear"], result["checks"]["motor_shaft"]
+    with xr.open_dataset(done / "result.nc", group="start_up") as run:
+        angle = run["machine.phi0"].values / found["ratio"]["value"]
+        turns = run.sel(time=angle >= angle[-1] - 2.0 * np.pi * result["run"]["turns"]["value"])
+        torque = turns["machine.tau"].values * found["ratio"]["value"]
+        power = turns["machine.tau"].values * turns["machine.w0"].values
+        force = np.hypot(turns["machine.crank_bearing.fx"].values, turns["machine.crank_bearing.fy"].values)
+        way = np.diff(turns["machine.phi0"].values)
+        fastest, largest = np.max(run["motor.w"].values), np.max(np.abs(turns["motor.tau"].values))
+    middle = 0.5 * np.abs(torque[1:] + torque[:-1])
+    equivalent = (np.sum(middle**6.6 * way) / np.sum(way)) ** (1.0 / 6.6)
+    assert found["bearing"] == "O1 crank bearing"
+    assert found["equivalent"]["value"] == pytest.approx(equivalent, rel=2e-3)
+    assert found["application_factor"]["value"] == pytest.approx(equivalent / 200.0, rel=2e-3)
+    assert found["power"]["value"] == pytest.approx(np.mean(np.abs(power)), rel=2e-3)
+    assert found["radial"]["value"] == pytest.approx(np.max(force), rel=1e-3)
+    assert found["speed"]["value"] == pytest.approx(fastest, rel=1e-9)
+    assert found["largest"]["value"] >= result["starts"]["worst"]["gear_torque"]["value"]
+    assert found["largest_radial"]["value"] == max(
+        pins["O1 crank bearing"]["peak"]["value"] for pins in result["pins"].values()
+    )
+    assert shaft["radial"]["value"] == pytest.approx(2.0 * largest * 1.75 / 0.12, rel=1e-3)
+    for row in result["checks"]["rows"]:
+        if row["of"] in ("gear", "motor"):
+            assert at(result, row["number"])["value"] == row["value"]["value"]
+            assert all(at(result, place)["value"] is not None for place in row["numbers"].values())
+    missing = {each["what"]: each["why"] for each in result["checks"]["not_checked"]}
+    assert missing["gear, overhung load of all runs"].endswith("[gear_rating] with peak_overhung_load")
+
+
+def test_ratings_out_of_bounds_are_refused():
+    for text, words in (
+        ("rated_torque = -1", "gear_rating.rated_torque = -1"),
+        ("thermal_power = '3 m'", "gear_rating.thermal_power"),
+        ("power = 3", "gear_rating.power: unknown key"),
+    ):
+        with pytest.raises(InputError) as refusal:
+            parse(f"[gear_rating]\n{text}")
+        assert words in str(refusal.value)

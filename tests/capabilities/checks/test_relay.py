@@ -1,0 +1,153 @@
+"""The check of the thermal relay: the worked example of docs/checks.md, the bands of the classes, the directions, and
+a study with a motor on the line."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from command import chainunit
+
+from chainunit.capabilities.checks.relay import RelaySetting, relay_findings, relay_rows, stall_trip
+from chainunit.core.errors import InputError
+from chainunit.report.blocks import at
+from chainunit.study.config import parse
+from chainunit.study.relay import CLASSES, start_seconds
+
+DOCS = (Path(__file__).parents[3] / "docs" / "checks.md").read_text("utf-8")
+BASE = {"setting": 20.0, "before": 16.0, "start_seconds": 1.890, "stall_current": 140.0, "stall_time": 12.0}
+JAM = np.linspace(0.0, 10.0, 10_001), np.full(10_001, 120.0), 16.0
+
+
+def used(trip_class="10", jam=JAM, **values):
+    found = relay_findings(trip_class, RelaySetting(**BASE | values), {"jam": jam})
+    return {row.title: row for row in relay_rows(found, {"jam": "a jam"})}
+
+
+def test_the_example():
+    for each in ("1.890 s <= 4 s, 47.3 %", "355.0 s", "5.921 s <= 12 s, 49.3 %", "8.123 s", "5.968 s"):
+        assert each in DOCS, each
+    time = np.linspace(0.0, 3.0, 30_001)
+    seconds = start_seconds(time, np.where(time < 2.0, 140.0, 0.0), 20.0)
+    assert seconds == pytest.approx(2.0 * (140.0 / 144.0) ** 2, rel=1e-3)
+    rows = used(start_seconds=seconds)
+    assert rows["start"].utilisation == pytest.approx(0.473, rel=0.01)
+    assert rows["trip with the rotor locked"].value == pytest.approx(5.921, rel=0.01)
+    assert rows["trip with the rotor locked"].utilisation == pytest.approx(0.493, rel=0.01)
+    heat = rows["heat of the motor until the trip (a jam)"]
+    assert heat.value == pytest.approx(5.968, rel=0.01) and heat.utilisation == pytest.approx(0.497, rel=0.01)
+
+
+@pytest.mark.parametrize("of", CLASSES, ids=lambda each: each.name)
+def test_the_slowest_relay_trips_at_the_end_of_its_band_and_is_an_ode(of):
+    assert stall_trip(of, 5.0, 0.0, 36.0) == pytest.approx(of.longest, rel=1e-9)
+    # the image by Euler's steps: T dx/dt = (I/(1.2 Ir))^2 - x
+    T = of.longest / math.log(51.84 / (51.84 - 1.44))
+    x, t, step = (4.0 / 6.0) ** 2, 0.0, of.longest / 50_000.0
+    while x < 1.0:
+        x, t = x + step / T * ((25.0 / 6.0) ** 2 - x), t + step
+    assert stall_trip(of, 5.0, 4.0, 25.0) == pytest.approx(t, rel=1e-3)
+    assert stall_trip(of, 5.0, 4.0, 5.99) is None
+
+
+def test_a_jam_whose_end_is_not_simulated_goes_on_with_its_current():
+    short = tuple(x[:2001] for x in JAM[:2])
+    (long, cut) = (
+        used(jam=jam)["heat of the motor until the trip (a jam)"].value for jam in (JAM, (*short, 16.0))
+    )
+    assert cut == pytest.approx(long, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("title", "name", "sign"),
+    [
+        ("start", "start_seconds", 1),
+        ("start", "stall_time", 0),
+        ("start", "before", 0),
+        ("trip with the rotor locked", "setting", 1),
+        ("trip with the rotor locked", "before", -1),
+        ("trip with the rotor locked", "stall_current", -1),
+        ("trip with the rotor locked", "stall_time", -1),
+        ("heat of the motor until the trip (a jam)", "setting", 1),
+        ("heat of the motor until the trip (a jam)", "stall_current", -1),
+        ("heat of the motor until the trip (a jam)", "stall_time", -1),
+    ],
+)
+def test_the_used_share_moves_in_the_right_direction(title, name, sign):
+    shares = [used(**{name: BASE[name] * factor})[title].utilisation for factor in (1.0, 1.05, 1.15)]
+    steps = np.diff(shares)
+    assert np.all(sign * steps > 0.0) if sign else np.allclose(steps, 0.0)
+
+
+def test_a_heavier_class_lets_more_of_the_start_through_and_trips_later():
+    rows = [used(each.name) for each in CLASSES]
+    starts = [each["start"].utilisation for each in rows]
+    stalls = [each["trip with the rotor locked"].utilisation for each in rows]
+    assert np.all(np.diff(starts) < 0.0) and np.all(np.diff(stalls) >= 0.0)
+
+
+def test_the_classes_that_let_the_start_through_and_protect():
+    def suitable(least=10, **values):
+        return relay_findings("", RelaySetting(**BASE | values), {}, least)
+
+    assert suitable().suitable == ("10A", "10", "20") and suitable().trip_class == "10"
+    assert suitable(start_seconds=5.0).suitable == ("20",)
+    # a start from another angle needs class 20
+    assert suitable(least=20).suitable == ("20",) and suitable(least=20).trip_class == "20"
+    assert suitable(stall_time=4.0).suitable == ()
+    heaviest = suitable(least=40, start_seconds=10.0)
+    assert heaviest.trip_class == "30" and not heaviest.suitable
+    assert not next(relay_rows(heaviest, {})).holds
+
+
+# -- a study
+
+STUDY = """
+title = "Relay"
+[system]
+motor = "IE3 4-pole 0.75 kW, 80M"
+[run]
+settle_turns = 2
+"""
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("relay")
+    (folder / "mine.toml").write_text(STUDY + '[relay]\ntrip_class = "20"\n', "utf-8")
+    assert chainunit("study", "mine.toml", "-o", "out", cwd=folder).returncode == 0
+    return folder / "out"
+
+
+def test_the_numbers_of_a_study_follow_from_its_run(done):
+    result = json.loads((done / "result.json").read_text("utf-8"))
+    found = result["checks"]["relay"]
+    plate = 750.0 / (0.825 * 0.75 * math.sqrt(3.0) * 400.0)
+    assert found["setting"]["value"] == pytest.approx(plate, rel=1e-9)
+    assert found["stall_current"]["value"] == pytest.approx(5.4 * plate, rel=1e-9)
+    assert found["trip_class"] == "20" and found["suitable"] == ["5", "10A", "10"]
+    start = result["start_up"]["start_time"]["value"]
+    with xr.open_dataset(done / "result.nc", group="start_up") as run:
+        current, time = np.abs(run["motor.i"].values), run["time"].values
+    until = time <= start
+    expected = np.trapezoid((current[until] / (7.2 * plate)) ** 2, time[until])
+    assert found["start_seconds"]["value"] == pytest.approx(expected, rel=1e-6)
+    # a relay of class 20 is too slow for a stall of 14 s
+    rows = [row for row in result["checks"]["rows"] if row["of"] == "thermal relay of class 20"]
+    assert [row["holds"] for row in rows] == [True, False]
+    for row in rows:
+        assert at(result, row["number"])["value"] == row["value"]["value"]
+        assert all(at(result, place)["value"] is not None for place in row["numbers"].values())
+    page = (done / "report.html").read_text("utf-8")
+    assert "Classes of the thermal relay" in page
+
+
+def test_a_relay_of_an_unknown_class_and_of_an_fmu_are_refused():
+    with pytest.raises(InputError, match="trip_class"):
+        parse('[relay]\ntrip_class = "15"')
+    with pytest.raises(InputError, match="needs a model of the motor, which is an FMU; leave it out"):
+        parse('[system]\nmotor = "m.fmu"\n[relay]\nsetting = 3')

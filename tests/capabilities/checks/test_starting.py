@@ -1,0 +1,120 @@
+"""The check of the starts per hour: the worked example of docs/checks.md, the heat of the slip by its integral, the
+directions, and a study."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from command import chainunit
+
+from chainunit.capabilities.checks.starting import (
+    StartingData,
+    start_torques,
+    starting,
+    starting_rows,
+)
+from chainunit.study.config import parse
+
+DOCS = (Path(__file__).parents[3] / "docs" / "checks.md").read_text("utf-8")
+BASE = {
+    "per_hour": 60.0, "bare": 1800.0, "rotor_inertia": 0.014, "inertia": 0.042, "motor_torque": 45.0,
+    "counter_torque": 15.0, "current": 4.0, "rated_current": 6.2,
+}  # fmt: skip
+
+
+def row(**values):
+    (only,) = starting_rows(starting(StartingData(**BASE | values)))
+    return only
+
+
+def test_the_example():
+    for each in ("FI = 0.042/0.014 = 3.00", "0.667", "0.584", "233.5 an hour", "25.7 %"):
+        assert each in DOCS, each
+    assert row().limit == pytest.approx(233.5, rel=0.01)
+    assert row().utilisation == pytest.approx(0.257, rel=0.01)
+
+
+def test_the_heat_of_the_slip_is_larger_than_that_of_the_bare_rotor_by_the_factors():
+    """The integral of slip speed times torque, beside 1/2 J ws^2 of a start without load."""
+    ws, motor, counter, inertia, bare = 157.0, 45.0, 15.0, 0.042, 0.014
+    time = np.linspace(0.0, inertia * ws / (motor - counter), 20_001)
+    speed = (motor - counter) / inertia * time
+    heat = np.trapezoid((ws - speed) * motor, time)
+    found = starting(StartingData(**BASE | {"current": 0.0}))
+    share = found.permitted / found.bare
+    assert heat / (0.5 * bare * ws**2) == pytest.approx(1.0 / share, rel=1e-6)
+    assert start_torques(time, np.full_like(time, motor), speed, inertia) == pytest.approx((motor, counter))
+
+
+@pytest.mark.parametrize(
+    ("name", "sign"),
+    [
+        ("per_hour", 1),
+        ("bare", -1),
+        ("rotor_inertia", -1),
+        ("inertia", 1),
+        ("motor_torque", -1),
+        ("counter_torque", 1),
+        ("current", 1),
+        ("rated_current", -1),
+    ],
+)
+def test_the_used_share_moves_in_the_right_direction(name, sign):
+    steps = np.diff([row(**{name: BASE[name] * factor}).utilisation for factor in (1.0, 1.1, 1.5)])
+    assert np.all(sign * steps > 0.0)
+
+
+def test_a_motor_at_its_rated_current_may_not_start_again():
+    assert row(current=6.2).limit == 0.0 and not row(current=6.2).holds
+    # a load that drives takes no share
+    assert start_torques(np.array([0.0, 1.0]), np.ones(2), np.array([0.0, 10.0]), 1.0)[1] == 0.0
+
+
+# -- a study
+
+STUDY = """
+title = "Starts"
+[system]
+motor = "IE3 4-pole 0.75 kW, 80M"
+[run]
+settle_turns = 2
+[starting]
+per_hour = 30
+permitted = 2000
+"""
+
+
+def test_the_numbers_of_a_study_follow_from_its_run(tmp_path):
+    (tmp_path / "mine.toml").write_text(STUDY, "utf-8")
+    assert chainunit("study", "mine.toml", "-o", "out", cwd=tmp_path).returncode == 0
+    result = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))
+    found = {name: each["value"] for name, each in result["checks"]["starting"].items()}
+    start = result["start_up"]["start_time"]["value"]
+    with xr.open_dataset(tmp_path / "out" / "result.nc", group="start_up") as run:
+        names = ("time", "motor.air_gap_tau", "motor.w", "machine.J")
+        rise, after = (
+            {name: run[name].sel(time=of).values for name in names}
+            for of in (slice(None, start), slice(start, None))
+        )
+    impulse = np.trapezoid(rise["motor.air_gap_tau"], rise["time"])
+    assert found["motor_torque"] == pytest.approx(impulse / start, rel=1e-9)
+    total = found["rotor_inertia"] + np.mean(after["machine.J"])
+    assert found["inertia"] == pytest.approx(total, rel=0.02)
+    counter = max(0.0, (impulse - found["inertia"] * rise["motor.w"][-1]) / start)
+    assert found["counter_torque"] == pytest.approx(counter, rel=1e-6)
+    assert found["rated_current"] == pytest.approx(750.0 / (0.825 * 0.75 * 3.0**0.5 * 400.0), rel=1e-9)
+    expected = 2000.0 * found["rotor_inertia"] / found["inertia"] * (1.0 - counter / found["motor_torque"])
+    expected *= 1.0 - (found["current"] / found["rated_current"]) ** 2
+    (check,) = (each for each in result["checks"]["rows"] if each["title"] == "starts per hour")
+    assert check["limit"]["value"] == pytest.approx(expected, rel=1e-9)
+    assert check["utilisation"]["value"] == pytest.approx(30.0 / expected, rel=1e-9)
+
+
+def test_the_starts_of_sizing_are_asked_for_where_the_table_does_not_say():
+    assert parse("[sizing]\nstarts_per_hour = 12").plans["checks"].starts_per_hour == 12.0
+    assert parse("[sizing]\n[starting]\nper_hour = 7").plans["checks"].starts_per_hour == 7.0
+    assert parse("").plans["checks"].starts_per_hour == 0.0
