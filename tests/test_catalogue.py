@@ -11,17 +11,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import chainunit
 
 from chainunit.core import engines
 from chainunit.core.errors import InputError
 from chainunit.core.integrators import rk4
 from chainunit.core.quantities import Layout
-from chainunit.drives.catalogue import LAYOUT, catalogue, heading, motor_of_catalogue
-from chainunit.drives.gearing import KINDS, W_REST, Transmission, motor_side
+from chainunit.drives.catalogue import KINDS, LAYOUT, catalogue, motor_of_catalogue, offer
+from chainunit.drives.catalogue_rows import heading
+from chainunit.drives.gearing import KINDS as TRANSMISSIONS
+from chainunit.drives.gearing import W_REST, Transmission, motor_side
 from chainunit.drives.induction_motor import InductionMotor
 from chainunit.drives.induction_steady import breakdown, steady
 from chainunit.drives.nameplate import LAYOUT as NAMEPLATE
 from chainunit.drives.nameplate import TYPICAL, Assumptions, Nameplate, check, identify
+from chainunit.study.config import parse
+from chainunit.study.study_file import changed_tables
 
 MOTORS = catalogue()
 STATES = InductionMotor.state_layout
@@ -358,11 +363,14 @@ def test_all_wrong_headings_are_told_at_once(tmp_path):
         catalogue(file)
     messages = [line.removeprefix(f"{file}:1: ") for line in str(refusal.value).splitlines()]
     assert messages[0].startswith('heading "pwer [kW]": unknown; was "power" meant?')
-    assert messages[1:] == [
+    assert messages[1:4] == [
         'heading "speed [kg]": must have a unit such as speed [rev/min]',
         'heading "source [m]": has no unit',
-        "column poles: stands twice",
+        "column poles: stands twice; take one of both out",
     ]
+    # a column whose heading is wrong is there, and is not missing, too
+    missing = "efficiency power_factor breakdown_ratio locked_torque_ratio locked_current_ratio J locked_time"
+    assert [line.split(":")[0] for line in messages[4:]] == [f"column {name}" for name in missing.split()]
 
 
 def test_missing_columns_are_told_once_beside_wrong_cells(tmp_path):
@@ -406,7 +414,7 @@ def test_wrong_values_of_a_toml_catalogue_have_their_own_lines(tmp_path):
         (
             "a.csv",
             "designation;power\n",
-            'heading "designation;power": unknown; known here: designation, source, pow',
+            'heading "designation;power": unknown; known here: designation, order_number, source, pow',
         ),
         ("a.csv", "designation,colour\n", 'heading "colour": unknown'),
         ("a.csv", "power [W],power [kW]\n", "a.csv:1: column power: stands twice"),
@@ -418,8 +426,8 @@ def test_wrong_values_of_a_toml_catalogue_have_their_own_lines(tmp_path):
         ("a.csv", f"{','.join(ROW)}\nx\n", f"a.csv:2: has 1 cells; must have {len(ROW)}"),
         ("a.csv", 'designation\n"x\n', "a.csv:2: no valid CSV"),
         ("a.toml", "x = ", "a.toml:1: no valid TOML"),
-        ("a.toml", "x = 1", '"x": unknown; each motor is a table'),
-        ("a.toml", "", "has no motor; each motor must be a table"),
+        ("a.toml", "x = 1", '"x": unknown; each thing is a table [[motor]] or [[gear]] or [[coupling]]'),
+        ("a.toml", "", "is empty; each thing is a table [[motor]]"),
         ("a.toml", "motor = 1", "motor = 1: each motor must be a table"),
         ("a.toml", f"{TOML}\ncolour = 1", 'a.toml:13: motor 1: "colour": unknown; known here: designation'),
         ("a.toml", TOML.replace("'pump, old'", "1"), "motor 1: designation = 1: must be a text of one line"),
@@ -432,8 +440,10 @@ def test_bad_files_are_refused(tmp_path, name, text, said):
     file.write_text(text)
     with pytest.raises(InputError) as refusal:
         catalogue(file)
-    assert str(refusal.value).startswith(f"{file}:") and said in str(refusal.value)
-    assert "\n" not in str(refusal.value)
+    lines = str(refusal.value).splitlines()
+    assert said in lines[0] and all(line.startswith(f"{file}:") for line in lines)
+    # beside a wrong heading, columns may be missing
+    assert all("is missing; add the heading" in line for line in lines[1:])
 
 
 def test_unreadable_files_are_refused(tmp_path):
@@ -443,6 +453,126 @@ def test_unreadable_files_are_refused(tmp_path):
     file.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(InputError, match="is not UTF-8 text"):
         catalogue(file)
+
+
+# --- gears and couplings, templates, and the command ---
+
+GEAR = {
+    "designation": "G 99",
+    "order_number": "4711",
+    "ratio": "99.7",
+    "rated_torque [kN.m]": "1.6",
+    "efficiency": "94 %",
+    "largest_speed [rev/min]": "3000",
+    "backlash [arcmin]": "6",
+    "price": "1180",
+}
+COUPLING = {"designation": "S", "setting_least [N.m]": "5", "setting_most [N.m]": "20"}
+
+
+def test_gears_and_couplings_stand_in_files_of_their_own_or_in_one(tmp_path):
+    (tmp_path / "g").mkdir()
+    gears, couplings = csv_file(tmp_path / "g", GEAR), csv_file(tmp_path, COUPLING)
+    both = tmp_path / "both.toml"
+    both.write_text(
+        "[[gear]]\ndesignation = 'G 99'\norder_number = '4711'\nratio = 99.7\nrated_torque = '1.6 kNm'\n"
+        "efficiency = '94 %'\nlargest_speed = '3000 rev/min'\nbacklash = '6 arcmin'\nprice = 1180\n"
+        f"[[coupling]]\ndesignation = 'S'\nsetting_least = 5\nsetting_most = 20\n{TOML}\n"
+    )
+    for found, motors in ((offer(gears, couplings), 0), (offer(both), 1)):
+        (gear,), (coupling,) = found.gears, found.couplings
+        assert (gear.designation, gear.order_number, gear.price) == ("G 99", "4711", 1180.0)
+        transmission = Transmission(ratio=99.7, efficiency=0.94, torque_limit=1600.0, start_factor=2.0)
+        assert vars(gear.transmission) == pytest.approx(vars(transmission))
+        assert gear.data.largest_speed == pytest.approx(3000.0 * RPM)
+        assert gear.data.backlash == pytest.approx(math.radians(0.1))
+        assert (coupling.price, coupling.data.release_time) == (None, 0.005)
+        assert [coupling.can_be_set(torque, 100.0) for torque in (4.9, 5.0, 20.0, 20.1)] == [0, 1, 1, 0]
+        assert len(found.motors) == motors
+    # each kind has names of its own, over all files
+    with pytest.raises(InputError, match=r'own\.csv:2: column designation = "G 99": stands in the catalogue'):
+        offer(both, gears)
+
+
+def test_the_application_factor_widens_the_rating_of_a_gear(tmp_path):
+    """Running may put rated_torque x application_factor on the output, a start start_factor times that."""
+    row = GEAR | {"application_factor": "1.5", "start_factor": "1.8"}
+    (gear,) = offer(csv_file(tmp_path, row)).gears
+    assert gear.transmission.torque_limit == pytest.approx(2400.0)
+    assert gear.transmission.start_limit == pytest.approx(1.8 * 2400.0)
+
+
+def test_all_faults_of_all_files_are_told_at_once(tmp_path):
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+    gears = csv_file(
+        tmp_path / "a",
+        GEAR | {"ratio": "0", "colour": "blue"},
+        GEAR | {"designation": "", "efficiency": "94", "colour": ""},
+    )
+    couplings = csv_file(tmp_path / "b", COUPLING | {"setting_most [N.m]": "4"})
+    with pytest.raises(InputError) as refusal:
+        offer(gears, couplings)
+    messages = str(refusal.value).splitlines()
+    begins = [
+        f'{gears}:1: heading "colour": unknown; known here: designation, order_number, source, ratio, rated_torque',
+        f"{gears}:2: column ratio = 0: must be > 0 and <= 10000 (real ratio",
+        f'{gears}:3: column designation = "": must be a text of one line',
+        f"{gears}:3: column efficiency = 94: must be >= 0.05 and <= 1 (efficiency while the motor",
+        f"{couplings}:2: column setting_most = 4 N m: must be >= setting_least = 5 N m",
+    ]
+    assert len(messages) == len(begins)
+    for line, begin in zip(messages, begins, strict=True):
+        assert line.startswith(begin), line
+    assert 'was "94 %" meant?' in messages[3]
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+def test_templates_follow_from_the_declarations(tmp_path, kind):
+    """A template has every column, its rows are right, and the reader tells its kind by its headings."""
+    file = tmp_path / "template.csv"
+    file.write_text(kind.template(), encoding="utf-8")
+    first = next(csv.reader(io.StringIO(kind.template())))
+    assert [each.partition(" ")[0] for each in first] == [*kind.columns]
+    found = offer(file)
+    (item,) = {"motor": found.motors, "gear": found.gears, "coupling": found.couplings}[kind.name]
+    assert "made up" in item.source and item.order_number and item.price
+
+
+def test_the_command_writes_templates_and_checks_files(tmp_path):
+    written = chainunit("catalogue", "--template", cwd=tmp_path)
+    assert written.returncode == 0 and "each row needs designation, ratio, rated_torque" in written.stdout
+    files = sorted((tmp_path / "catalogue").iterdir())
+    assert [file.name for file in files] == ["gears.csv", "motors.csv", "safety_couplings.csv"]
+    names = [str(file) for file in files]
+    right = chainunit("catalogue", *names, cwd=tmp_path)
+    assert right.returncode == 0 and "every row is right" in right.stdout and "1 gear" in right.stdout
+    gears = files[0]
+    gears.write_text(gears.read_text().replace(",0.94,", ",94,").replace("99.7,1600", "99.7,-1"))
+    wrong = chainunit("catalogue", *names, cwd=tmp_path)
+    lines = wrong.stderr.splitlines()
+    assert wrong.returncode == 2 and len(lines) == 2
+    assert f"{gears}:2: column rated_torque = -1 N m: must be > 0 N m" in lines[0]
+    assert f"{gears}:2: column efficiency = 94: must be >= 0.05 and <= 1" in lines[1]
+    again = chainunit("catalogue", "--template", cwd=tmp_path)
+    assert again.returncode == 2 and "is there already; name another folder by -o" in again.stderr
+    both = chainunit("catalogue", "--template", names[0], cwd=tmp_path)
+    assert both.returncode == 2 and "checks none" in both.stderr
+    assert "real ratio" in chainunit("catalogue", cwd=tmp_path).stdout
+
+
+def test_a_study_file_names_several_catalogues(tmp_path):
+    csv_file(tmp_path, GEAR).rename(tmp_path / "gears.csv")
+    csv_file(tmp_path, ROW)
+    source = str(tmp_path / "study.toml")
+    config = parse("catalogue = ['own.csv', 'gears.csv']\n[system]\nmotor = 'pump, old'", source)
+    assert config.file.catalogues == (tmp_path / "own.csv", tmp_path / "gears.csv")
+    assert config.plate.designation == "pump, old"
+    tables = changed_tables(config, {}, "moved", tmp_path / "below")
+    assert tables["catalogue"] == ["../own.csv", "../gears.csv"]
+    for wrong in ("[]", "['a.csv', 1]", "1", "['']"):
+        with pytest.raises(InputError, match=r"catalogue = .*must be the name of a file, or a list of"):
+            parse(f"catalogue = {wrong}\n[sizing]", source)
 
 
 # --- transmission ---
@@ -464,14 +594,14 @@ def test_transmission_loses_power_whichever_way_it_flows():
 
 
 def test_transmission_at_rest_and_in_arrays():
-    t = KINDS["gear"]
+    t = TRANSMISSIONS["gear"]
     assert motor_side(engines.MATH, t, 60.0, 0.0) == 60.0 / t.ratio
     w = np.array([-W_REST, 0.0, W_REST, 10.0])
     every = motor_side(engines.numpy_(), t, np.array([60.0]), w)
     np.testing.assert_array_equal(every, [motor_side(engines.MATH, t, 60.0, float(x)) for x in w])
     assert np.all(np.diff(every[:3]) > 0.0)
-    direct = KINDS["direct"]
+    direct = TRANSMISSIONS["direct"]
     assert motor_side(engines.MATH, direct, 60.0, 10.0) == 60.0
-    for kind in KINDS.values():
+    for kind in TRANSMISSIONS.values():
         for v, x in zip(Layout(Transmission).variables, dataclasses.astuple(kind), strict=True):
             assert v.quantity.admits(x)

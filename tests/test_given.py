@@ -216,7 +216,7 @@ def test_a_study_can_be_repeated_from_its_result(text, tmp_path):
     for each in dataclasses.fields(again):
         if each.name not in ("file", "machine", "events", "plans"):
             assert getattr(again, each.name) == getattr(study.config, each.name), each.name
-    for name in ("catalogue", "labels", "is_packaged"):
+    for name in ("catalogues", "labels", "is_packaged"):
         assert getattr(again.file, name) == getattr(study.config.file, name), name
     assert again.machine.by_name == pytest.approx(study.config.machine.by_name, rel=1e-12)
     for name, plan in study.config.plans.items():

@@ -61,7 +61,7 @@ def test_each_type_of_event_has_a_table():
 
 
 def test_each_key_says_what_it_means():
-    for table in (*key_tables(), catalogue_columns()):
+    for table in (*key_tables(), *catalogue_columns()):
         assert table.title
         for key in table.keys:
             assert key.description and key.allowed, (table.heading, key.name)

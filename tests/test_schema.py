@@ -71,7 +71,7 @@ BLOCKS = [
 ]
 RIGHT = [
     *(
-        file.read_text("utf-8").replace('"linkages/', f'"{ROOT.as_posix()}/examples/linkages/')
+        re.sub(r'"(linkages|catalogue)/', rf'"{ROOT.as_posix()}/examples/\1/', file.read_text("utf-8"))
         for file in sorted((ROOT / "examples").glob("*.toml"))
     ),
     *map(example, EXAMPLES),

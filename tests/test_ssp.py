@@ -414,7 +414,7 @@ def test_feed_forward_and_sizing(tmp_path, monkeypatch):
     ]
     assert ("model.tau", "motor.tau_ff") in connections(tmp_path / "x.ssp")
     first = catalogue()[0]
-    monkeypatch.setattr(sizing, "catalogue", lambda extra: [first])
+    monkeypatch.setattr(sizing, "catalogue", lambda *files: [first])
     with pytest.raises(
         RunError, match=r"no motor of the catalogue fits \(1 of 1 were tried\); IE3 .*inertia"
     ):

@@ -104,7 +104,7 @@ def test_no_start_is_permitted_where_running_alone_is_too_hot():
     none = Check("starts per hour", 2.0, 0.0, "1", forbidden=words)
     assert none.over and none.excess == words and as_data(none)["forbidden"] == words
     assert Check("starts per hour", 0.0, 0.0, "1", forbidden=words).utilisation == 0.0
-    (motor,) = [m for m in sizing.catalogue(None) if m.designation == "IE3 4-pole 0.55 kW, 80M"]
+    (motor,) = [m for m in sizing.catalogue() if m.designation == "IE3 4-pole 0.55 kW, 80M"]
     drive = SimpleNamespace(added_inertia=0.0, ratio=50.0)
     hot = Check("rise of temperature", 100.0, 80.0, "K", "difference")
     lost = Check("time to start", None, 10.0, "s")

@@ -250,12 +250,12 @@ def test_what_a_run_refuses_names_file_and_line(tmp_path):
     (tmp_path / "own.toml").write_text(OWN_MOTOR)
     study = Study.from_file(tmp_path / "mine.toml")
     # beside the study file, as for the command
-    assert study.config.file.catalogue == tmp_path / "own.toml"
+    assert study.config.file.catalogues == (tmp_path / "own.toml",)
     variant = study.with_values({"sizing.temperature": 400.0})
     (tmp_path / "own.toml").unlink()
     with pytest.raises(InputError, match=r"mine.toml:1: catalogue = .*own.toml: cannot be read"):
         study.run()
-    assert variant.config.file.catalogue == tmp_path / "own.toml"
+    assert variant.config.file.catalogues == (tmp_path / "own.toml",)
     with pytest.raises(InputError, match=r"^catalogue = .*own.toml: cannot be read"):
         variant.run(tmp_path / "out")
     assert not (tmp_path / "out").exists()

@@ -20,6 +20,7 @@ from ..core.files import full, written
 from ..report.command_options import BackendOption, OutputFolder
 from ..report.console import carry_out, exit_status, study_file, terminal_console
 from ..work import interrupts
+from .catalogue_command import catalogue
 from .export_command import ExportCommand, export, export_ssp
 
 
@@ -130,6 +131,7 @@ for module in modules("command"):
         app.command()(command)
 app.command(cls=ExportCommand)(export)
 app.command("export-ssp")(export_ssp)
+app.command()(catalogue)
 
 
 @app.command()

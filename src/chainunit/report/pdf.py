@@ -26,8 +26,8 @@ from .motion import Animation
 
 NAME = "sheet.pdf"
 _BEGIN = re.compile(r'(<(?:th|h3|span class="said")\b[^>]*>(?:<[^>]+>)*)([a-z])')
-"""The first letter of a heading, of a row's title, and of a warning: a capital on paper. (`::first-letter` would do it,
-as on the screen, but WeasyPrint nests such a box again each time that it lays out a column or a page.)"""
+"""The first letter of a heading, of a row's title, and of a warning: a capital on paper. (`::first-letter` would do
+it, as on the screen, but WeasyPrint nests such a box again each time that it lays out a column or a page.)"""
 _SIGNED = ("Prepared", "Checked", "Released")
 _MISSING = (
     "--pdf: needs the library WeasyPrint and the text engine Pango ({}); pip install 'chainunit[pdf]', and Pango by "

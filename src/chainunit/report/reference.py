@@ -16,7 +16,7 @@ from ..models import MODELS
 from ..reading.results import documented, results_in
 from ..study.analyses import all_analyses
 from ..study.keys import Key, KeyTable, catalogue_columns, key_tables
-from .blocks import Block, Report, Section, Table, TableRow, Text, heads
+from .blocks import Block, Column, Report, Section, Table, TableRow, Text, heads
 
 _KEY_COLUMNS = heads("key", "default", "allowed", "meaning")
 
@@ -24,7 +24,7 @@ _KEY_COLUMNS = heads("key", "default", "allowed", "meaning")
 def overview() -> Report:
     """The tables of a study file with their contents and their number of keys."""
     hint = Text("chainunit keys TABLE shows the keys of a table, such as run, event or ChamberForces.")
-    tables = (*key_tables(), catalogue_columns())
+    tables = (*key_tables(), *catalogue_columns())
     return Report("Keys of a study file", "reference", {}, (_contents(tables), hint), ())
 
 
@@ -62,14 +62,14 @@ def keys_of(name: str) -> Report:
     name = name.strip("[]")
     tables = [
         table
-        for table in (*key_tables(), catalogue_columns())
+        for table in (*key_tables(), *catalogue_columns())
         if name in (table.name, table.of, _kind(table))
     ]
     if not tables:
         tables = list(_with_key(name))
     if not tables:
         table_names = dict.fromkeys(table.name for table in key_tables() if table.name)
-        kinds = dict.fromkeys(_kind(table) for table in (*key_tables(), catalogue_columns()) if table.of)
+        kinds = dict.fromkeys(_kind(table) for table in (*key_tables(), *catalogue_columns()) if table.of)
         near = near_name(name, (*table_names, *kinds, *_key_names())) or ";"
         raise InputError(
             f"{name}: no such table and no such key{near} tables: {', '.join(table_names)}; tables of single types: "
@@ -101,7 +101,12 @@ def _key_names() -> Iterator[str]:
 
 
 def _block(table: KeyTable, title: str = "") -> Table:
-    return Table(tuple(map(_row, table.keys)), _KEY_COLUMNS, title=title, numeric=False)
+    return Table(*key_rows(table), title=title, numeric=False)
+
+
+def key_rows(table: KeyTable) -> tuple[tuple[TableRow, ...], tuple[Column, ...]]:
+    """A row for each key of a table, and the heads of the columns."""
+    return tuple(map(_row, table.keys)), _KEY_COLUMNS
 
 
 def _row(key: Key) -> TableRow:
@@ -119,7 +124,7 @@ def reference(
             f"{table.heading}: {table.title}" if table.title else table.heading,
             (_block(table),),
         )
-        for table in (*key_tables(), catalogue_columns())
+        for table in (*key_tables(), *catalogue_columns())
     ]
     sections += [Section(name, f"FMU {name}", tuple(_variables(model))) for name, model in MODELS.items()]
     sections += [

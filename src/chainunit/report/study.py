@@ -147,7 +147,7 @@ def _values(s: b.Source, section: GivenSection, unused_names: Iterable[str]) -> 
         elif isinstance(choice, float):
             content = s.number(place, as_given=True)
         else:
-            content = ", ".join(f"{x:g}" for x in choice)
+            content = ", ".join(x if isinstance(x, str) else f"{x:g}" for x in choice)
         yield b.GivenValue(name, description(name), content, s.origin(name))
 
 

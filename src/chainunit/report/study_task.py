@@ -25,7 +25,7 @@ from .task import Task, Writer
 
 def _accept(config: Config, *, scheduler: str | None = None, **options: Any) -> None:
     with config.file.refusals():
-        check_motor(config.motor, config.drive, config.plans, config.file.catalogue)
+        check_motor(config.motor, config.drive, config.plans, config.file.catalogues)
     if scheduler is not None:
         for part in registered():
             part.check_scheduler(config.plans[part.name], scheduler)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from ..core.engines import MATH
 from .drive import Drive
 from .readings import machine_series
 from .window import mean, whole_turns
@@ -33,6 +34,19 @@ def pin_loads(drive: Drive, run: xr.Dataset) -> dict[str, dict[str, float | None
             "equivalent": mean_load(forces_of_turns, angles[name]) if name in angles else None,
         }
     return table
+
+
+def driver_force(drive: Drive, run: xr.Dataset) -> Any:
+    """Reaction at the bearing of the driver, such as O1 of a crank [N], shape (time,); None for a machine of whose
+    driver none is known."""
+    machine = drive.simulated_machine
+    if drive.foreign_machine:
+        return None
+    bar = getattr(machine.model.linkage(MATH, machine.p, machine.model.Inputs()).driver, "bar", None)
+    for output, joint in machine.model.joints.items():
+        if bar is not None and joint == (bar.pin, bar.name):
+            return np.hypot(run[f"machine.{output}.fx"].values, run[f"machine.{output}.fy"].values)
+    return None
 
 
 _ALIKE = 1e-3

@@ -3,7 +3,7 @@ the file names."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -62,10 +62,10 @@ def choose_for(
 
 
 def check_motor(
-    motor: MotorSource | None, tables: DriveTables, plans: Mapping[str, Any], own_motors: Path | None
+    motor: MotorSource | None, tables: DriveTables, plans: Mapping[str, Any], catalogues: Sequence[Path]
 ) -> None:
     """Refuse files of a study that it cannot use: that of its motor or, where a capability chooses the motor, the
-    catalogue of own motors.
+    catalogues of one's own.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def check_motor(
         motor.check(tables, plans)
         return
     with refusal_prefix("catalogue = ", "catalogue"):
-        check_own(own_motors)
+        check_own(catalogues)
 
 
 def _with_line(drive: Drive, plans: Mapping[str, Any], turn: Cycle) -> Drive:

@@ -38,7 +38,7 @@ from .first_checks import check_values, independent, missing_recordings, plate_o
 from .foreign_machine import ForeignMachine, ForeignModel
 from .motor_sources import ForeignMotor, MotorSource, NamedMotor, OwnMotor
 from .operation import OperatingConditions
-from .parts import Parts, beside, example, motor_is_left, over_example, with_linkage
+from .parts import Parts, beside, catalogues_of, example, motor_is_left, over_example, with_linkage
 from .registry import registered
 from .run_checks import endless, loads_beyond
 from .sections import (
@@ -62,8 +62,8 @@ class FileContents:
     values"""
     choices: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     """by name, all values that are no quantities, such as "start" or "driveline.place", given or not"""
-    catalogue: Path | None = None
-    """the catalogue of own motors that it names"""
+    catalogues: tuple[Path, ...] = ()
+    """the catalogues of one's own that it names"""
     unusual: tuple[UnusualValue, ...] = ()
     """values whose unit is likely mistaken"""
     tables: Mapping[str, Any] = dataclasses.field(default_factory=dict)
@@ -292,15 +292,15 @@ def _config(checked: Any, parts: Parts, events: Mapping[str, Event], contents: F
         for name, each in sections.items()
         if name not in _OF_PARTS
     }
-    own_motors = None
+    catalogues: tuple[Path, ...] = ()
     with faults.collected(), refusal_prefix("catalogue = ", "catalogue"):
-        own_motors = beside(checked.catalogue, source) if checked.catalogue else None
+        catalogues = catalogues_of(checked.catalogue, source)
     machine: Any = None
     plate = None
     with faults.collected():
         machine = _machine(parts, tables["machine"], tables["ratios"])
     with faults.collected():
-        plate = plate_of(parts.designation, own_motors)
+        plate = plate_of(parts.designation, catalogues)
     with faults.collected(), refusal_prefix("motor: ", "motor"):
         if parts.gives_motor:
             parts.motor.check(values["motor"])
@@ -327,7 +327,7 @@ def _config(checked: Any, parts: Parts, events: Mapping[str, Event], contents: F
         events=events,
         empty_start=checked.empty_start,
         simulation=checked.simulation,
-        file=dataclasses.replace(contents, catalogue=own_motors),
+        file=dataclasses.replace(contents, catalogues=catalogues),
         units=chosen_units(checked.report.units),
         values={name: x for name, x in of_study.items() if name not in (*_OWN_TABLES, *_OF_DRIVE)},
         plans=plans,

@@ -11,6 +11,7 @@ from ..core.errors import InputError
 from ..core.quantities import Layout
 from ..drives.contactor import CONTACTOR_EDGE, StarDelta
 from ..drives.gear import Gear
+from ..drives.gear_rating import GearRating
 from ..drives.motor import Motor
 from ..drives.speed_control import Tuning
 from ..machines.api import ChainUnitMachine
@@ -68,6 +69,12 @@ class Drive:
     gear_inertia: float = 0.0
     gear_friction: float = 0.0
     """inertia [kg m2] and friction [N m s/rad] of the gear of a catalogue motor, at the motor's shaft"""
+
+    gear_name: str = ""
+    """designation of the gear, if it is one of a catalogue"""
+
+    gear_rating: GearRating | None = None
+    """its ratings"""
 
     observer: ModelComponent | None = None
     """a load observer, which takes signals of the motor"""

@@ -26,6 +26,23 @@ Entered = Annotated[Any, BeforeValidator(_admitted)]
 """A number, or a text with a unit."""
 
 
+def _file_names(given: Any) -> Any:
+    """A name of a file, or a list of names."""
+    if isinstance(given, str):
+        return given
+    are_names = isinstance(given, list) and all(isinstance(name, str) and name for name in given)
+    if are_names and 0 < len(given) <= MOST_FILES:
+        return given
+    words = "must be the name of a file, or a list of at least one and at most {most} names of files"
+    raise PydanticCustomError("file_names", words, {"most": MOST_FILES})
+
+
+MOST_FILES = 100
+"""Largest number of files that a list names."""
+FileNames = Annotated[str | list[str], BeforeValidator(_file_names)]
+"""The name of a file, or a list of names."""
+
+
 def entered(description: str) -> Any:
     """The key of a number, or a text with a unit, as a pydantic field; without a value where it is left out."""
     return Entered, Field(None, description=description)

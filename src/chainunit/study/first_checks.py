@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import Faults, InputError, refusal_prefix, shown
-from ..drives.catalogue import CatalogueMotor, catalogue, motor_of_catalogue
+from ..drives.catalogue import CatalogueMotor, motor_of_catalogue, offer
 from ..drives.motors import MOTORS
 from ..models import MACHINES
 from ..reading.tables import read_table
 from ..reading.text import chosen_units
 from .checks import lower_limits
 from .event_table import read_events, read_random_event
-from .parts import Parts, beside, is_designation, named_table, parts_of
+from .parts import Parts, beside, catalogues_of, is_designation, named_table, parts_of
 from .registry import registered
 from .rules import refusals
 from .sections import all_sections
@@ -63,14 +63,13 @@ def _without_repeated(faults: Sequence[InputError]) -> list[InputError]:
 
 def _check_catalogue(data: Mapping[str, Any], source: str) -> None:
     """Refuse a catalogue that cannot be read or has wrong values, and a motor that no catalogue has."""
-    name, file = data.get("catalogue"), None
-    if isinstance(name, str) and name:
-        with refusal_prefix("catalogue = ", "catalogue"):
-            file = beside(name, source)
-            catalogue(file)
+    files: tuple[Path, ...] = ()
+    with refusal_prefix("catalogue = ", "catalogue"):
+        files = catalogues_of(data.get("catalogue"), source)
+        offer(*files)
     motor = named_table(data, "system").get("motor")
     if isinstance(motor, str) and is_designation(motor):
-        plate_of(motor, file)
+        plate_of(motor, files)
 
 
 def missing_recordings(data: Mapping[str, Any], source: str) -> Iterator[InputError]:
@@ -82,7 +81,7 @@ def missing_recordings(data: Mapping[str, Any], source: str) -> Iterator[InputEr
                 yield InputError(f"{file.key} = {shown(name)}: there is no such file", file.key)
 
 
-def plate_of(designation: str, file: Path | None) -> CatalogueMotor | None:
+def plate_of(designation: str, files: Sequence[Path]) -> CatalogueMotor | None:
     """The motor of the catalogue that [system] names.
 
     Raises
@@ -93,7 +92,7 @@ def plate_of(designation: str, file: Path | None) -> CatalogueMotor | None:
     if not designation:
         return None
     with refusal_prefix("system.motor = ", "system.motor"):
-        return motor_of_catalogue(designation, file, MOTORS)
+        return motor_of_catalogue(designation, files, MOTORS)
 
 
 def without(data: Mapping[str, Any], faults: Collection[InputError]) -> dict[str, Any]:

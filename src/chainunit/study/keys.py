@@ -4,6 +4,7 @@ commented example and the schema for editors are made from them."""
 from __future__ import annotations
 
 import dataclasses
+import types
 import typing
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -15,8 +16,8 @@ from pydantic.fields import FieldInfo
 
 from ..core.quantities import Layout, Variable, variables, written
 from ..core.units import shortest_text
-from ..drives.catalogue import LAYOUT as CATALOGUE
-from ..drives.catalogue import TEXTS
+from ..drives.catalogue import KINDS as CATALOGUES
+from ..drives.catalogue_rows import TEXTS
 from ..drives.motors import MOTORS
 from ..models import MACHINES
 from ..reading.lists import TableList
@@ -42,6 +43,7 @@ NONE: Mapping[str, str] = MappingProxyType({})
 NAME = "NAME"
 """It stands for a name that the file chooses."""
 _VALUE = "a number, or a text with a unit"
+_TEXTS = "a text, or a list of texts"
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ class Key:
     """the quantity of the key; None for a word, a switch or a list"""
     words: tuple[str, ...] = ()
     """the allowed values, as a file writes them; empty where any text is allowed"""
-    sort: typing.Literal["number", "text", "switch", "list", "table", "value"] = "number"
+    sort: typing.Literal["number", "text", "texts", "switch", "list", "table", "value"] = "number"
     """a value is a number or a text with a unit, of a quantity that another key names"""
     left_out: str = ""
     """the value of a key that a file leaves out, as a file would write it; empty where there is none"""
@@ -77,7 +79,9 @@ class Key:
             return self.variable.quantity.allowed_range
         if self.words:
             return ", ".join(self.words)
-        return {"text": "a text", "list": "a list", "table": "a table", "value": _VALUE}.get(self.sort, "")
+        return {"text": "a text", "texts": _TEXTS, "list": "a list", "table": "a table", "value": _VALUE}.get(
+            self.sort, ""
+        )
 
 
 @dataclass(frozen=True)
@@ -160,10 +164,18 @@ def key_tables() -> tuple[KeyTable, ...]:
     )
 
 
-def catalogue_columns() -> KeyTable:
-    """The columns of a catalogue of motors, and keys of its [[motor]] tables."""
-    texts = (Key(name, description, sort="text") for name, description in TEXTS.items())
-    return KeyTable("motor", "Catalogue of motors", (*texts, *quantity_keys(CATALOGUE.cls)), "a catalogue")
+def catalogue_columns() -> tuple[KeyTable, ...]:
+    """The columns of catalogues, and keys of their tables [[motor]], [[gear]] and [[coupling]]."""
+    texts = tuple(Key(name, description, sort="text") for name, description in TEXTS.items())
+    return tuple(
+        KeyTable(
+            kind.name,
+            f"Catalogue of {kind.plural}",
+            (*texts, *quantity_keys(kind.declared)),
+            "a catalogue",
+        )
+        for kind in CATALOGUES
+    )
 
 
 @cache
@@ -286,9 +298,11 @@ def _of_field(name: str, annotation: Any, field: FieldInfo, value: Any) -> Key:
     items = next((each for each in more if isinstance(each, Variable)), None)
     lengths = [limit.max_length for each in more for limit in getattr(each, "metadata", ())]
     words: tuple[str, ...] = ()
-    sort: typing.Literal["text", "switch", "list", "table", "value"] = "text"
+    sort: typing.Literal["text", "texts", "switch", "list", "table", "value"] = "text"
     if base is Any:
         sort = "value"
+    elif isinstance(base, types.UnionType):
+        sort = "texts"
     elif typing.get_origin(base) is typing.Literal:
         words = tuple(f'"{word}"' for word in typing.get_args(base))
     elif base is bool:

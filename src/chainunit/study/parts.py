@@ -259,6 +259,18 @@ def beside(name: str, source: str) -> Path:
     return Path(source).parent / name
 
 
+def catalogues_of(names: Any, source: str) -> tuple[Path, ...]:
+    """The catalogues that a study file names by a text or a list of texts; none for another value.
+
+    Raises
+    ------
+    InputError
+        see `beside`.
+    """
+    listed = names if isinstance(names, list) else [names]
+    return tuple(beside(name, source) for name in listed if isinstance(name, str) and name)
+
+
 LENGTHS = ("r", "l", "h", "c", "hy", "e", "l1", "l2", "z")
 
 

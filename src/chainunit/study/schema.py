@@ -15,6 +15,7 @@ from ..core.quantities import Variable
 from ..drives.catalogue import catalogue
 from ..reading.tables import may_be_share
 from ..reading.unit_patterns import pattern, zero
+from .entry_values import MOST_FILES
 from .event import TYPES
 from .event_table import LONGEST_NAME, PLACED, RESERVED
 from .keys import Key, KeyTable, entry_tables, key_tables
@@ -180,6 +181,10 @@ class _Schema:
             return self._list(key) | description
         if key.sort == "value":
             return dict(_VALUE) | description
+        if key.sort == "texts":
+            one = {"type": "string"} | dict(_further(key.name) or {})
+            listed = {"type": "array", "items": one | {"minLength": 1}, "minItems": 1, "maxItems": MOST_FILES}
+            return {"anyOf": [one, listed]} | description
         if key.sort == "table":
             return {"type": "object"} | description
         choices = [word.strip('"') for word in key.words if word.startswith('"')]

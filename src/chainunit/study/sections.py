@@ -15,6 +15,7 @@ from ..drives.induction_motor import InverterControl, SoftStart
 from ..drives.motor import Motor
 from ..mechanism.models import MachineModel
 from ..system import NAMES
+from .entry_values import FileNames
 from .file_section import FileSection
 from .registry import registered
 
@@ -144,8 +145,12 @@ CHOICES: Mapping[str, Any] = {
         ),
     ),
     "catalogue": (
-        str,
-        Field("", description="file with motors of your own, beside the packaged ones (CSV or TOML)"),
+        FileNames,
+        Field(
+            "",
+            description="file with motors, gears or safety couplings of your own (CSV or TOML), or a list of such "
+            "files; the motors stand beside the packaged ones",
+        ),
     ),
 }
 """Keys of every study file that stand before all tables, as pydantic fields."""

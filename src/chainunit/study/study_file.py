@@ -43,6 +43,8 @@ def changed_tables(config: Config, values: Mapping[str, float], title: str, fold
         inner = tables.get(table, {}) if table else tables
         if isinstance(inner.get(key), str) and inner[key].lower().endswith((".toml", ".fmu", ".csv")):
             inner[key] = _from(folder, Path(config.file.source).parent / inner[key])
+    if isinstance(names := tables.get("catalogue"), list):
+        tables["catalogue"] = [_from(folder, Path(config.file.source).parent / name) for name in names]
     for file in (file for part in registered() for file in part.files(tables)):
         if file.name in file.table:
             file.table[file.name] = _from(folder, Path(config.file.source).parent / file.table[file.name])

@@ -20,9 +20,11 @@ from chainunit.capabilities.checks.gear import (
     gear_check,
     gear_rows,
     pulley_force,
+    rating_of,
     shaft_row,
 )
 from chainunit.capabilities.checks.row import CheckRow
+from chainunit.capabilities.checks.tables import GearRatingTable
 from chainunit.core.errors import InputError
 from chainunit.drives.gear_rating import GearRating
 from chainunit.report.blocks import at
@@ -202,3 +204,13 @@ def test_ratings_out_of_bounds_are_refused():
         with pytest.raises(InputError) as refusal:
             parse(f"[gear_rating]\n{text}")
         assert words in str(refusal.value)
+
+
+def test_ratings_of_the_file_come_before_those_of_the_catalogue():
+    sold = GearRating(rated_torque=500.0, application_factor=1.4, thermal_power=3e3, overhung_load=6e3)
+    assert rating_of(GearRatingTable(), sold, 700.0) == sold
+    # a rated torque brings its own application factor
+    given = rating_of(GearRatingTable(rated_torque=800.0, overhung_load=7e3), sold, 700.0)
+    assert given == replace(sold, rated_torque=800.0, application_factor=1.0, overhung_load=7e3)
+    limit = rating_of(GearRatingTable(application_factor=1.3, largest_speed=300.0), None, 700.0)
+    assert limit == GearRating(rated_torque=700.0, application_factor=1.3, largest_speed=300.0)

@@ -278,8 +278,8 @@ def heavy(*runs):
 
 def ran(text, folder, monkeypatch):
     """A study with the motor of 1.1 kW and 4 poles."""
-    one = [m for m in sizing.catalogue(None) if (m.nameplate.power, m.nameplate.poles) == (1100.0, 4.0)]
-    monkeypatch.setattr(sizing, "catalogue", lambda extra: one)
+    one = [m for m in sizing.catalogue() if (m.nameplate.power, m.nameplate.poles) == (1100.0, 4.0)]
+    monkeypatch.setattr(sizing, "catalogue", lambda *files: one)
     return run_study(config.parse(text), folder)
 
 
@@ -851,8 +851,8 @@ def test_a_start_under_load_opens_a_given_coupling(tmp_path):
 def test_the_coming_of_the_feed_belongs_to_the_start_of_a_coupling(tmp_path, monkeypatch):
     """It puts more on the coupling than running does, and so does the start before it."""
     empty = "empty_start = true\n" + event_line("jam_left", force=2000.0, turns=1)
-    one = [m for m in sizing.catalogue(None) if (m.nameplate.power, m.nameplate.poles) == (550.0, 4.0)]
-    monkeypatch.setattr(sizing, "catalogue", lambda extra: one)
+    one = [m for m in sizing.catalogue() if (m.nameplate.power, m.nameplate.poles) == (550.0, 4.0)]
+    monkeypatch.setattr(sizing, "catalogue", lambda *files: one)
     sized = run_study(
         config.parse(empty + "[sizing]\ncandidates = 1\n[run]\nturns = 2\n"), tmp_path / "sized"
     )

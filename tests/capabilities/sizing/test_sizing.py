@@ -308,7 +308,7 @@ def one_candidate(more, **asked):
 
 def test_a_fixed_ratio_is_kept_and_must_give_the_speed(tmp_path, monkeypatch):
     """With 62 in place of 52 the crank turns a sixth too slowly."""
-    monkeypatch.setattr(sizing, "catalogue", lambda extra: small(1))
+    monkeypatch.setattr(sizing, "catalogue", lambda *files: small(1))
     result = sized_by(one_candidate("[gear]\nratio = 62\n", fluctuation=0.5), tmp_path)
     (c,) = result.candidates
     assert c.drive.ratio == 62.0 and c.verdict is Standing.INSUFFICIENT and result.chosen_candidate is None
@@ -322,7 +322,7 @@ def small(number, skipped=0):
 
 
 def test_without_a_fit_the_whole_catalogue_is_tried_and_the_nearest_is_named(tmp_path, monkeypatch):
-    monkeypatch.setattr(sizing, "catalogue", lambda extra: small(4))
+    monkeypatch.setattr(sizing, "catalogue", lambda *files: small(4))
     outcome = sized_by(
         one_candidate("[gear]\ntorque_limit = 150\n", fluctuation=0.5), tmp_path, lambda *said: None
     )
@@ -344,7 +344,7 @@ def test_motors_that_are_too_weak_by_the_nameplate_are_counted(tmp_path, monkeyp
         dataclasses.replace(one, nameplate=dataclasses.replace(one.nameplate, power=power))
         for power in (20.0, 40.0)
     ]
-    monkeypatch.setattr(sizing, "catalogue", lambda extra: [*weak, *small(3)])
+    monkeypatch.setattr(sizing, "catalogue", lambda *files: [*weak, *small(3)])
     result = sized_by(one_candidate("[gear]\ntorque_limit = 150\n"), tmp_path)
     assert (len(result.candidates), result.motors, result.weak) == (3, 5, 2)
     assert "3 of 5 were tried, 2 are too weak by the nameplate" in result.answer
@@ -363,7 +363,7 @@ def test_the_remedy_of_the_rejected_example_works(tmp_path):
 
 def test_sizing_climbs_until_one_fits(tmp_path, monkeypatch):
     """One is asked for; the smaller ones get too hot with so many starts, and the largest are spared."""
-    monkeypatch.setattr(sizing, "catalogue", lambda extra: small(8))
+    monkeypatch.setattr(sizing, "catalogue", lambda *files: small(8))
     config = one_candidate("", starts_per_hour=700.0, fluctuation=0.9)
     result = sized_by(config, tmp_path)
     assert result.chosen_candidate is not None and 1 < len(result.candidates) < result.motors
@@ -373,7 +373,7 @@ def test_sizing_climbs_until_one_fits(tmp_path, monkeypatch):
 
 
 def test_a_limit_of_the_inertia_ratio_is_for_who_asks_for_it(tmp_path, monkeypatch):
-    monkeypatch.setattr(sizing, "catalogue", lambda extra: small(1, 1))
+    monkeypatch.setattr(sizing, "catalogue", lambda *files: small(1, 1))
 
     def found(more):
         return sized_by(one_candidate(more, fluctuation=0.5), tmp_path)
@@ -411,7 +411,7 @@ def test_without_a_fit_the_study_goes_on_with_the_nearest(tmp_path, monkeypatch)
     """All that was asked is run, marked as insufficient, and the command ends with 1."""
     from chainunit.app import cli
 
-    monkeypatch.setattr(sizing, "catalogue", lambda extra: small(2))
+    monkeypatch.setattr(sizing, "catalogue", lambda *files: small(2))
     (tmp_path / "weak.toml").write_text(
         event_line("feed_right") + HEAVY + "fluctuation = 0.5\n[gear]\ntorque_limit = 150\n"
     )
@@ -479,7 +479,7 @@ def test_a_motor_at_its_rated_load_is_as_warm_as_its_nameplate_says():
 
 def test_above_the_corner_an_inverter_has_less_torque(tmp_path, monkeypatch):
     """Twice the rated frequency: the breakdown torque of the check is a quarter, roughly, of that at 50 Hz."""
-    monkeypatch.setattr(sizing, "catalogue", lambda extra: small(1))
+    monkeypatch.setattr(sizing, "catalogue", lambda *files: small(1))
     config = one_candidate("[gear]\nratio = 104\n", fluctuation=0.9)
     config = dataclasses.replace(config, drive=dataclasses.replace(config.drive, start="inverter"))
     # with a shorter ramp the start from the worst angle takes too long

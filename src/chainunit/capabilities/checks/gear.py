@@ -191,9 +191,8 @@ def find(study: StudyRecord, table: GearRatingTable) -> tuple[GearCheck | None, 
     if drive.ratio == 1.0:
         return None, []
     given = tables.gear if "gear.torque_limit" in tables.given else None
-    rated = table.rated_torque or (given.torque_limit if given else 0.0)
-    ratings = (rated, table.thermal_power, table.overhung_load, table.largest_speed)
-    if not any(ratings):
+    rating = rating_of(table, drive.gear_rating, given.torque_limit if given else 0.0)
+    if not any((rating.rated_torque, rating.thermal_power, rating.overhung_load, rating.largest_speed)):
         why = "the file gives no rating of the gear; add [gear_rating]"
         return None, [NotChecked("gear", why, "gear_rating")]
     if drive.foreign is not None:
@@ -215,15 +214,22 @@ def find(study: StudyRecord, table: GearRatingTable) -> tuple[GearCheck | None, 
         largest_radial=largest_radial,
         speed=max(peak(each[drive.motor_speed].values) for _, each in runs_from_events(study)),
     )
-    rating = GearRating(
-        rated_torque=rated,
-        application_factor=table.application_factor,
-        thermal_power=table.thermal_power,
-        overhung_load=table.overhung_load,
-        largest_speed=table.largest_speed,
-    )
     found = gear_check(load, rating, table.peak_factor or tables.gear.start_factor, run, title)
     return found, list(gear_rows(found, rating, table.peak_overhung_load, study.titles))
+
+
+def rating_of(table: GearRatingTable, sold: GearRating | None, torque_limit: float) -> GearRating:
+    """The ratings in the `table` of the file; for those that it leaves out, those of the gear that is `sold` in a
+    catalogue, and else for the rated torque the `torque_limit` of [gear]."""
+    sold = sold or GearRating(rated_torque=torque_limit, application_factor=table.application_factor)
+    torque = table if table.rated_torque else sold
+    return GearRating(
+        rated_torque=torque.rated_torque,
+        application_factor=torque.application_factor,
+        thermal_power=table.thermal_power or sold.thermal_power,
+        overhung_load=table.overhung_load or sold.overhung_load,
+        largest_speed=table.largest_speed or sold.largest_speed,
+    )
 
 
 def _largest_torque(drive: Drive, runs: Iterable[tuple[str, Any]]) -> tuple[float, str]:

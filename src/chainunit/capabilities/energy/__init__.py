@@ -59,7 +59,7 @@ class EnergyCapability(Capability):
             return
         from .other_motor import check_other
 
-        error = check_other(plan.other, config.file.catalogue)
+        error = check_other(plan.other, config.file.catalogues)
         if error is not None:
             yield error
 

@@ -244,7 +244,7 @@ class _Task:
         if motor is None:
             return None, "the motor has no nameplate"
         try:
-            other = other_motor(motor, self.plan.other, self.study.config.file.catalogue)
+            other = other_motor(motor, self.plan.other, self.study.config.file.catalogues)
             if other is None:
                 return (
                     None,

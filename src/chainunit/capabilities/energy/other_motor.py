@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,9 +17,9 @@ _SAME = 1e-3
 """Relative difference of rated powers that count as equal."""
 
 
-def other_motor(motor: CatalogueMotor, designation: str, own_motors: Path | None) -> CatalogueMotor | None:
-    """The motor with that `designation` in the packaged catalogue or that of `own_motors`; without one the motor of
-    the catalogues of the same power and poles that reaches the next efficiency class, or else the same motor with the
+def other_motor(motor: CatalogueMotor, designation: str, own_motors: Sequence[Path]) -> CatalogueMotor | None:
+    """The motor with that `designation` in the packaged catalogue or the files `own_motors`; without one that of the
+    catalogues of the same power and poles that reaches the next efficiency class, or else the same motor with the
     efficiency and the slip of that class. None where no class is above that of the motor.
 
     Raises
@@ -34,7 +35,7 @@ def other_motor(motor: CatalogueMotor, designation: str, own_motors: Path | None
     name, efficiency = above
     better = [
         each
-        for each in catalogue(own_motors)
+        for each in catalogue(*own_motors)
         if abs(each.nameplate.power / plate.power - 1.0) <= _SAME
         and each.nameplate.poles == plate.poles
         and each.nameplate.frequency == plate.frequency
@@ -49,6 +50,7 @@ def other_motor(motor: CatalogueMotor, designation: str, own_motors: Path | None
         motor,
         designation=f"{name} in the size of {motor.designation}",
         nameplate=replace(plate, efficiency=efficiency, speed=speed, current=0.0, price=0.0),
+        order_number="",
         source=f"efficiency: {name} limit of IEC 60034-30-1; slip: in proportion to the losses; else as the motor",
     )
 
@@ -75,7 +77,7 @@ def with_motor(drive: Drive, tables: DriveTables, motor: CatalogueMotor) -> Driv
     return with_inertia(tables, other, drive.added_inertia)
 
 
-def check_other(designation: str, own_motors: Path | None) -> InputError | None:
+def check_other(designation: str, own_motors: Sequence[Path]) -> InputError | None:
     """The refusal of a `designation` that no catalogue has; None for one that is there."""
     try:
         motor_of_catalogue(designation, own_motors)

@@ -29,6 +29,11 @@ def _cells(rank: int, candidate: Mapping[str, Any]) -> dict[str, str]:
     """The cells of a candidate by their heads."""
     cells = {"rank": str(rank), "motor": _text(candidate, "motor")} | _entry("ratio", candidate.get("ratio"))
     cells |= {name: _text(candidate, name) for name in ("gear", "series", "verdict", "criterion", "reason")}
+    for each in candidate.get("parts") or ():
+        part = _text(as_mapping(each), "part").replace(" ", "_")
+        cells |= {f"{part}.{name}": _text(as_mapping(each), name) for name in ("designation", "order_number")}
+        cells |= _entry(f"{part}.price", as_mapping(each).get("price"))
+    cells |= _entry("total_price", candidate.get("total_price")) if "total_price" in candidate else {}
     for name, check in as_mapping(candidate.get("checks")).items():
         for part in _PARTS:
             cells |= _entry(f"{name}.{part}", as_mapping(check).get(part))

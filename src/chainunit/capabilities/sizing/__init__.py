@@ -6,10 +6,12 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
+from ...core.errors import InputError
 from ...fmu.backends import Backend
 from ...machines.machine import Machine
 from ...report.blocks import Block, Source
 from ...report.capability import Capability, Contents
+from ...report.lines import Line
 from ...study.analysis import Analysis
 from ...study.conditions import given, has_entries, is_one_of
 from ...study.config import Config
@@ -58,7 +60,27 @@ class SizingCapability(Capability):
         if "sizing" not in reading.data:
             return None
         form = reading.form.sizing
-        return SizingPlan(reading.values["sizing"], form.gear_kind, form.ratio_series, form.ratios)
+        return SizingPlan(
+            reading.values["sizing"],
+            form.gear_kind,
+            form.ratio_series,
+            form.ratios,
+            form.objective,
+            form.own_only,
+            form.separate_bearing,
+        )
+
+    def faults(self, config: Config) -> Iterable[InputError]:
+        """Refuse values of a gear beside gears of a catalogue, which have their own."""
+        plan: SizingPlan | None = config.plans[self.name]
+        if plan is None:
+            return
+        from ...drives.catalogue import offer
+        from .gear_rows import gear_faults
+
+        torque = float(plan.demands.gear_torque)
+        if gears := offer(*config.file.catalogues).gears:
+            yield from gear_faults(gears, config.file.given, config.drive.gear.ratio, torque)
 
     def unused_values(self, machine: Machine) -> Iterable[str]:
         """A machine without sides has no one-sided feed."""
@@ -96,6 +118,16 @@ class SizingCapability(Capability):
         from . import page
 
         return page.answer(s)
+
+    def unchecked(self, study: StudyRecord) -> Iterator[Line]:
+        """The limits of the gear that its catalogue does not give."""
+        from .findings import SizingFindings
+        from .gear_rows import unknown_limits
+
+        found = SizingFindings.found_in(study)
+        if found is not None and found.best.sold is not None:
+            for words in unknown_limits(found.best.sold):
+                yield f"{words} of the gear: the catalogue does not give it"
 
     def judgements(self, s: Source, study: StudyRecord) -> Iterator[Block]:
         """The alarm where no motor fits."""

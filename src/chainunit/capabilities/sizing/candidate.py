@@ -9,6 +9,7 @@ from enum import StrEnum
 
 from ...core.quantities import Value, declaration, quantity
 from ...drives.catalogue import CatalogueMotor
+from ...drives.catalogue_gears import CatalogueGear
 from ...drives.disc import Disc, steel_disc
 from ...drives.gear_ratios import GearUnit
 from ...reading.results import derived, part, result
@@ -16,9 +17,10 @@ from ...reading.text import number
 from ...study.drive import Drive
 from ...study.limits import Check
 from ...study.torques import DutyPeak
+from .parts import OrderedPart, total_price
 
-TOLERANCES = ("crank_speed",)
-"""Checks of a tolerance, which a drive may use wholly: the gear's ratio takes it, and no load does."""
+TOLERANCES = ("crank_speed", "gear_speed")
+"""Checks of a speed, which a drive may use wholly: the gear's ratio takes it, and no load does."""
 _HARD = ("gear_start",)
 """Checks of a limit that leaves room by itself, which a drive may use wholly, too: a gear permits a multiple of its
 rated torque in a start. A margin on top would prefer two gear units, or a flywheel, to a shock of 91 % of it."""
@@ -71,6 +73,7 @@ class Criterion(StrEnum):
     choice."""
 
     MARGIN = "margin"
+    PRICE = "price"
     LARGER = "larger"
     FIELD = "field"
     GEAR = "gear"
@@ -133,6 +136,11 @@ class Candidate:
         "the criterion by which a candidate that fits stands behind the chosen one", default=None
     )
     reason: str = part("the reason of its standing", default="")
+    sold: CatalogueGear | None = None
+    """the gear, if it is one of a catalogue"""
+    runs_with: str | None = part(
+        "the gear whose runs rule out this one, which was not tried itself", default=None, optional=True
+    )
     remedy: str = ""
     """what makes a candidate fit that only fails in the torque of the gear in its start, in words"""
 
@@ -211,6 +219,17 @@ class Candidate:
         if not self.motor.nameplate.mass:
             return None
         return float(self.motor.nameplate.mass + (self.disc.mass if self.disc else 0.0))
+
+    @derived()
+    def parts(self) -> list[OrderedPart]:
+        """The parts that are ordered from catalogues."""
+        of_gear = [] if self.sold is None else [OrderedPart.of("gear", self.sold)]
+        return [OrderedPart.of("motor", self.motor), *of_gear]
+
+    @derived("1", name="total_price")
+    def price(self) -> float | None:
+        """The sum of the prices of its parts; none where one is unknown, as that of any flywheel is."""
+        return None if self.drive.added_inertia else total_price(self.parts)
 
     @property
     def flywheel_words(self) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ...drives.catalogue import CatalogueMotor
+from ...drives.catalogue import CatalogueMotor, offer
 from ...fmu.backends import Backend
 from ...machines.machine import Machine
 from ...study.config import Config
@@ -13,6 +13,7 @@ from ...study.drive import Drive
 from ...study.proposal import DriveProposal, Judged
 from ...work.progress import TaskProgress
 from .duty import Duty, duty_of
+from .gear_rows import strong_enough
 from .motor_trials import MotorTrials
 from .search import motors_on_offer, size
 from .table import SizingPlan
@@ -32,13 +33,16 @@ class SizingChooser:
     """the duty of the machine for which it has chosen"""
 
     def _task(self, machine: Machine) -> SizingTask:
-        config = self.config
-        return SizingTask(self.plan, config.drive, machine, config.operation, config.events)
+        config, own = self.config, offer(*self.config.file.catalogues)
+        gears = strong_enough(own.gears, float(self.plan.demands.gear_torque))
+        return SizingTask(
+            self.plan, config.drive, machine, config.operation, config.events, gears, own.couplings
+        )
 
     def choose(self, machine: Machine) -> DriveProposal:
         """See `chainunit.study.proposal.Chooser`."""
         task = self._task(machine)
-        motors = motors_on_offer(task, self.config.file.catalogue)
+        motors = motors_on_offer(task, self.config.file.catalogues)
         self.progress("the machine at constant speed", 0.0, 1.0)
         duty = duty_of(task, self.config.values, self.folder, self.backend)
         # another machine is no model that an FMU can be made of

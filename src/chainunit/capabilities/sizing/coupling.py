@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 import xarray as xr
 
+from ...drives.catalogue_couplings import CatalogueCoupling
+from ...study.arrays import peak
 from ...study.coupling import hardest_start, pull_out
 from ...study.event import Role
 from ...study.event_torques import from_event_on, peaks_in_events, running_peak
@@ -16,13 +18,15 @@ from ...study.record import StudyRecord
 from ...study.sections import Coupling
 from ...study.torques import at_gear, gear_torque
 from ...study.verdict import STEADY
+from .parts import coupling_for
 from .protection import CouplingEffect, Setting, goal
 
 
-def recommended_setting(study: StudyRecord) -> Setting | None:
+def recommended_setting(study: StudyRecord, couplings: Sequence[CatalogueCoupling] = ()) -> Setting | None:
     """The recommended safety coupling of a sized drive, judged by the events of the study. None where no motor fits,
     where the file gives a coupling, as that one cuts off the peaks from which the setting follows, or where the study
-    ended before steady running."""
+    ended before steady running. One of the `couplings` of a catalogue that can be set so is tried with its own
+    release time."""
     if study.insufficient or study.config.coupling or STEADY not in study.answers:
         return None
     events, wrong = study.config.events, wrong_runs(study)
@@ -39,8 +43,18 @@ def recommended_setting(study: StudyRecord) -> Setting | None:
     )
     if setting.obstacle is not None:
         return setting
-    tried = effects(study, setting.least)
+    sold = coupling_of(study, setting, couplings)
+    tried = effects(study, setting.least, release=None if sold is None else float(sold.data.release_time))
     return replace(setting, effects={n: tried[n] for n in setting.opens})
+
+
+def coupling_of(
+    study: StudyRecord, setting: Setting, couplings: Sequence[CatalogueCoupling]
+) -> CatalogueCoupling | None:
+    """The safety coupling of the catalogues for that setting, see `coupling_for`; it turns with the motor's shaft."""
+    drive = study.drive
+    fastest = peak(study.steady[drive.motor_speed].values)
+    return coupling_for(couplings, setting.least / drive.ratio, fastest)
 
 
 def effects(

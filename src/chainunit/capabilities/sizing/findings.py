@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
+from ...core.quantities import ROUNDING
+from ...drives.catalogue_couplings import CatalogueCoupling
+from ...drives.catalogue_gears import CatalogueGear
 from ...reading.results import GIVEN, as_data, derived, part, result
+from ...reading.text import number
 from ...study.analysis import Analysis, Findings, Work
 from ...study.catalogue_drive import as_used
 from ...study.coupling import remark_on_rams
@@ -15,9 +20,13 @@ from ...study.proposal import DriveProposal
 from ...study.record import StudyRecord
 from .alternatives import alternatives
 from .candidate import Candidate, Flywheel, Standing
-from .coupling import recommended_setting
+from .coupling import coupling_of, recommended_setting
 from .duty import Duty
-from .preference import ORDER, poles_rank
+from .gear_order import GearOrder, gear_order
+from .gear_rows import stronger, unknown_limits
+from .gear_tables import with_gear
+from .parts import OrderedPart, PartsList, parts_list
+from .preference import order_words, poles_rank
 from .protection import Alternative, Obstacle, Setting
 from .result import drive_protection, ordered_gear
 from .table import Sizing, SizingPlan
@@ -49,6 +58,10 @@ class SizingFindings(Findings):
         unit="1",
         default=0,
     )
+    tried: int = part("number of motors that were tried", unit="1", default=0)
+    gears: Sequence[CatalogueGear] = ()
+    couplings: Sequence[CatalogueCoupling] = ()
+    """the gears and safety couplings of catalogues"""
     setting: Setting | None = None
     """the recommended safety coupling, see `chainunit.capabilities.sizing.coupling.recommended_setting`"""
     alternatives: tuple[Alternative, ...] = ()
@@ -67,7 +80,7 @@ class SizingFindings(Findings):
     @property
     def answer(self) -> str:
         """The result of sizing, in a sentence; with the words of `rank`."""
-        count = f"{len(self.candidates)} of {self.motors} were tried"
+        count = f"{self.tried} of {self.motors} were tried"
         if self.weak:
             count += f", {self.weak} {'is' if self.weak == 1 else 'are'} too weak by the nameplate"
         best = f"{self.best.motor.designation}: {self.best.reason}"
@@ -100,15 +113,10 @@ class SizingFindings(Findings):
         """The flywheel of the drive."""
         return self.best.flywheel_numbers
 
-    @derived("1")
-    def tried(self) -> int:
-        """Number of motors that were tried."""
-        return len(self.candidates)
-
     @derived()
     def order(self) -> list[str]:
         """The order of preference among candidates that fit."""
-        return [words.format(larger=f"{self.plan.demands.larger:g}") for words in ORDER.values()]
+        return order_words(self.plan.demands.larger, self.plan.objective)
 
     @derived(name="trade")
     def traded(self) -> list[int] | None:
@@ -133,7 +141,7 @@ class SizingFindings(Findings):
             self,
             best.drive,
             best.motor,
-            as_used(tables, best.drive, self.plan.offer),
+            as_used(with_gear(tables, best.sold) if best.sold else tables, best.drive, self.plan.offer),
             "Which motor, gear and flywheel does {noun} need? Its {driver} turns at {=run.crank_speed:4}.",
             self.answer,
             insufficient="" if fits else INSUFFICIENT,
@@ -145,15 +153,45 @@ class SizingFindings(Findings):
 
     def coupling(self, study: StudyRecord) -> Setting | None:
         """The recommended safety coupling; of a study that ended before it was judged, by the runs up to there."""
-        return self.setting or recommended_setting(study)
+        return self.setting or recommended_setting(study, self.couplings)
+
+    def parts(self, study: StudyRecord, setting: Setting | None) -> PartsList | None:
+        """The parts to order, with a coupling of that `setting`; None where no motor fits, and for a packaged motor
+        alone, which nobody sells."""
+        best = self.best
+        if study.insufficient or (best.sold is None and best.motor.is_packaged):
+            return None
+        items, wanted = best.parts, ""
+        if setting is not None and setting.torque is not None:
+            if sold := coupling_of(study, setting, self.couplings):
+                items = [*items, OrderedPart.of("safety coupling", sold)]
+            else:
+                torque = number(setting.torque / study.drive.ratio, "N.m")
+                wanted = f"a safety coupling that opens at {torque} on the motor's shaft"
+        unknown = [] if best.sold is None else unknown_limits(best.sold)
+        flywheel = f"a flywheel of {best.flywheel_words}" if best.disc else ""
+        listed = parts_list(items, unknown, flywheel, wanted)
+        if (needed := self._gear_needed(study, setting)) is not None:
+            order, remedy = needed
+            words = (
+                f"{order.decides.words} takes one with a rated output torque of {number(order.rated, 'N.m')}"
+            )
+            listed = replace(listed, open=[f"The gear is too weak: {words}; {remedy}.", *listed.open])
+        if best.motor.is_packaged:
+            words = "The motor is one of the packaged table, which is typical data: nobody sells it."
+            listed = replace(listed, open=[words, *listed.open])
+        return listed
 
     def data(self, study: StudyRecord) -> dict[str, Any]:
         """Its declared parts, with the gear to order and the protection."""
         setting, rated = self.coupling(study), self.best.motor.nameplate.rated_current
-        ordered = {
+        ordered: dict[str, Any] = {
             "gear": ordered_gear(study, setting, self.plan.demands.margin),
             "protection": drive_protection(study, setting, self.alternatives, rated),
         }
+        parts = self.parts(study, setting)
+        if parts is not None:
+            ordered["parts"] = parts
         return super().data(study) | {
             name: {} if each is None else as_data(each, titled=True, driver=study.driver_noun)
             for name, each in ordered.items()
@@ -165,6 +203,7 @@ class SizingFindings(Findings):
             study.note("sizing", "{text}", text=text)
         if study.insufficient:
             study.warn("insufficient motor", "{answer}. All runs are with it.", answer=self.answer)
+        self._remark_on_gear(study)
         if study.statics.modes is not None:
             rigid = "Sizing took the shafts as rigid and the driveline as massless; the runs include it."
             study.note("sized without line", rigid)
@@ -174,6 +213,36 @@ class SizingFindings(Findings):
             remark_on_rams(study, setting.least)
         elif setting is not None:
             remark_on_rams(study, setting.least_in_running, "set for running alone ")
+
+    def _gear_needed(self, study: StudyRecord, setting: Setting | None) -> tuple[GearOrder, str] | None:
+        """The gear to order and the remedy in words, where it has to carry more than the chosen one of the catalogue;
+        else None."""
+        sold = self.best.sold
+        order = None if sold is None else gear_order(study, setting, 0.0)
+        if sold is None or order is None or order.rated <= sold.transmission.torque_limit * (1.0 + ROUNDING):
+            return None
+        if other := stronger(self.gears, sold, order.rated):
+            return order, f"{other.designation} of the catalogue does so; give sizing.gear_torque"
+        return order, "the catalogue has none of this ratio"
+
+    def _remark_on_gear(self, study: StudyRecord) -> None:
+        """Warn where the runs ask more of the gear than its catalogue permits."""
+        sold, needed = self.best.sold, self._gear_needed(study, self.coupling(study))
+        if sold is None or needed is None:
+            return
+        order, remedy = needed
+        study.warn(
+            "gear too weak",
+            "The gear {gear} permits {limit} in running and {start} in a start or an overload; {case} puts {torque} "
+            "on it. A gear with a rated output torque of {rated} carries it: {remedy}.",
+            gear=sold.designation,
+            limit=(sold.transmission.torque_limit, "N.m"),
+            start=(sold.transmission.start_limit, "N.m"),
+            case=order.decides.words,
+            torque=(order.decides.torque, "N.m"),
+            rated=(order.rated, "N.m"),
+            remedy=remedy,
+        )
 
 
 class ProtectionAnalysis(Analysis):
@@ -191,6 +260,6 @@ class ProtectionAnalysis(Analysis):
     def find(study: StudyRecord, work: Work) -> None:
         """Judge the coupling by the runs of the study, and try each way."""
         sizing = SizingFindings.of_study(study)
-        sizing.setting = recommended_setting(study)
+        sizing.setting = recommended_setting(study, sizing.couplings)
         if sizing.setting is not None:
             sizing.alternatives = alternatives(study, sizing.setting, work.rig, work.progress)

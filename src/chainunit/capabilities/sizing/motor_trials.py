@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 from ...core.errors import InterruptedRunError, RunError
 from ...drives.catalogue import CatalogueMotor
+from ...drives.catalogue_gears import CatalogueGear
 from ...drives.gear_ratios import gear_unit, next_ratio, ratio_on_offer
 from ...study.catalogue_drive import catalogue_drive, with_inertia
 from ...study.drive import Drive
@@ -21,6 +22,7 @@ from ...study.limits import SPEED_DEVIATION
 from ...study.proposal import Judged
 from .candidate import Candidate, TrialResult
 from .duty import CycleNumbers, Duty
+from .gear_rows import helps, rows_for, spent, unit_of
 from .inverter import least_boost, misses_by_a_hair
 from .table import SizingPlan
 from .task import SizingTask
@@ -65,10 +67,12 @@ class MotorTrials:
         """Whether the ratios are those of gears that there are: the file gives one, or a list of them."""
         return self.has_given_ratio or self.plan.offer.is_made
 
-    def candidate(self, motor: CatalogueMotor, chosen: float | None = None) -> Candidate:
-        """A candidate without a flywheel, with the `chosen` ratio, or that which the file gives, or the ratio on
-        offer that is nearest to the one at which the crank has its speed."""
-        plan, task, series = self.plan, self.task, ""
+    def candidate(
+        self, motor: CatalogueMotor, chosen: float | None = None, gear: CatalogueGear | None = None
+    ) -> Candidate:
+        """A candidate without a flywheel, with a `gear` of the catalogue, or with the `chosen` ratio, or that of the
+        file, or the ratio on offer that is nearest to the one at which the crank has its speed."""
+        plan, task, series = self.plan, self.task.of_gear(gear), ""
         with_ratio = partial(
             catalogue_drive,
             task.tables,
@@ -79,6 +83,11 @@ class MotorTrials:
             offer=plan.offer,
         )
         drive = with_ratio(gear_ratio=chosen)
+        if gear is not None:
+            drive = dataclasses.replace(drive, gear_name=gear.designation, gear_rating=gear.rating)
+            return Candidate(
+                motor, drive, margin=plan.demands.margin, unit=unit_of(gear), series="catalogue", sold=gear
+            )
         if chosen is not None:
             series = "own list" if plan.ratios else "R80"
         elif not self.has_given_ratio:
@@ -92,7 +101,8 @@ class MotorTrials:
         angle."""
         c.worst_start = worst_start
         try:
-            trial = try_motor(self.task, c.motor, c.drive, self.duty, self.files, worst_start=worst_start)
+            task = self.task.of_gear(c.sold)
+            trial = try_motor(task, c.motor, c.drive, self.duty, self.files, worst_start=worst_start)
             c.trial = trial.result()
         except InterruptedRunError:
             raise
@@ -102,13 +112,65 @@ class MotorTrials:
 
     def judged_drive(self, drive: Drive, motor: CatalogueMotor) -> Judged:
         """A drive as it is by its runs, with the start from the worst crank angle."""
-        c = self.judged(Candidate(motor, drive, margin=self.plan.demands.margin), worst_start=True)
+        sold = next((gear for gear in self.task.gears if gear.designation == drive.gear_name), None)
+        c = self.judged(Candidate(motor, drive, margin=self.plan.demands.margin, sold=sold), worst_start=True)
         missed = sorted((name for name in c.checks if c.exceeds(name)), key=lambda name: -c.sizes[name])
         return Judged(c.checks, tuple(missed), c.margin, c.reason)
 
     def with_least_boost(self, c: Candidate, *, worst_start: bool = False) -> Candidate:
         """The judged candidate, with an inverter with the least boost with which it starts."""
         return least_boost(c, partial(self.judged, worst_start=worst_start), self.has_given_boost)
+
+    def candidates_of(
+        self, motor: CatalogueMotor, judge: Callable[[Candidate], Candidate] | None = None
+    ) -> list[Candidate]:
+        """The candidates with this motor, each as the function `judge` judges one without a flywheel, by default as
+        `best_of`. With gears of a catalogue there is one for each gear that has the ratio, up to the first with which
+        the motor fits with the margin, from every crank angle; a gear that the runs with another one surely rule out
+        has the values of these runs."""
+        if not self.task.gears:
+            return [self.best_of(motor) if judge is None else judge(self.candidate(motor))]
+        flywheel = partial(least_boost, judged=self.with_flywheel, is_given=self.has_given_boost)
+        judge = judge or flywheel
+        needed = self.task.tables.gear.ratio if self.has_given_ratio else self._needed_ratio(motor)
+        tried = self._over_gears(motor, needed, judge)
+        last = tried[-1]
+        if last.drive.follows and not self.has_given_ratio and misses_by_a_hair(last):
+            above = next_ratio(last.drive.ratio, [gear.data.ratio for gear in self.task.gears])
+            known = {c.gear for c in tried}
+            more = [] if above is None else self._over_gears(motor, above, judge)
+            tried += [c for c in more if c.gear not in known]
+        return tried
+
+    def _needed_ratio(self, motor: CatalogueMotor) -> float:
+        """The ratio at which the crank has its speed."""
+        plan, task = self.plan, self.task
+        drive = catalogue_drive(
+            task.tables, task.machine, self.duty.normal, motor, plan.demands.ambient, offer=plan.offer
+        )
+        return drive.ratio
+
+    def _over_gears(
+        self, motor: CatalogueMotor, ratio: float, judge: Callable[[Candidate], Candidate]
+    ) -> list[Candidate]:
+        """The candidates with the gears about this ratio, up to the first that fits with the margin."""
+        judged: list[Candidate] = []
+        run: list[Candidate] = []
+        for gear in rows_for(self.task.gears, ratio, _TOLERANCE, self.plan.objective):
+            if not helps(gear, run):
+                continue
+            c = self.candidate(motor, gear=gear)
+            if (ruled_out := spent(c, run)) is not None:
+                judged.append(ruled_out)
+                continue
+            c = judge(c)
+            if c.fits and not c.worst_start:
+                c = self.with_least_boost(c, worst_start=True)
+            judged.append(c)
+            run.append(c)
+            if c.keeps_margin:
+                break
+        return judged
 
     def best_of(self, motor: CatalogueMotor) -> Candidate:
         """The candidate with the least flywheel, and with an inverter with the least boost. Where it then misses its

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from ...report import blocks as b
@@ -37,6 +37,7 @@ def answer(s: b.Source) -> Iterator[b.Block]:
         ),
     ]
     yield b.Cards(tuple(cards))
+    yield from _parts(s)
     checks = b.at(s.result, f"{path}.checks")
     rows = tuple(
         b.TableRow((capital(check.get("title", spoken(name))), _check(s, f"{path}.checks.{name}")))
@@ -45,6 +46,34 @@ def answer(s: b.Source) -> Iterator[b.Block]:
     if rows:
         title = "Share of each limit that the drive takes; the line in the bar is the limit"
         yield b.Table(rows, b.heads("check", "share"), title=title, numeric=False, form="long")
+
+
+def _parts(s: b.Source) -> Iterator[b.Block]:
+    """The parts to order from catalogues, with what these leave open."""
+    listed = s.result["sizing"].get("parts")
+    if not listed:
+        return
+    rows = []
+    for k, each in enumerate(listed["parts"]):
+        path = f"sizing.parts.parts.{k}"
+        number = s.words(f"{path}.order_number") if each["order_number"] else "-"
+        price = s.number(f"{path}.price", as_given=True, none="-")
+        rows.append(b.TableRow((capital(each["part"]), s.words(f"{path}.designation"), number, price)))
+    if len(rows) > 1 and listed["total"]["value"] is not None:
+        rows.append(b.TableRow(("Together", "", "", s.number("sizing.parts.total", as_given=True))))
+    columns = b.heads("part", "designation", "order number", "price")
+    yield b.Table(tuple(rows), columns, title="Parts to order", numeric=False, form="long")
+    yield from (b.Text(each, form="long") for each in s.lines("sizing.parts.open"))
+
+
+def _how_to_order(s: b.Source, k: int) -> Iterator[Line]:
+    """Order number and price of a part of a catalogue, as far as it has them."""
+    parts, path = s.result["sizing"].get("parts", {}).get("parts", ()), f"sizing.parts.parts.{k}"
+    if k < len(parts):
+        if parts[k]["order_number"]:
+            yield line(", order number ", s.words(f"{path}.order_number"))
+        if parts[k]["price"]["value"] is not None:
+            yield line(", price ", s.number(f"{path}.price", as_given=True))
 
 
 def judgements(s: b.Source) -> Iterator[b.Block]:
@@ -182,6 +211,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         row_count = len(candidates) if plan is None else int(plan.demands.candidates)
         yield from _trade(s)
         yield _candidates(s, row_count)
+        yield from _gears(s)
         if len(candidates) > row_count:
             yield b.Text(
                 f"{len(candidates) - row_count} more were tried; report.html lists them.", form="short"
@@ -192,6 +222,9 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     tables = []
     # a machine without sides has no one-sided feed
     side_keys = () if study.config.machine.model.sides else ("one_sided_share", "torque_peak_one_sided")
+    if all(_sold(candidate) is None for candidate in candidates or ()):
+        # it is a demand on gears of a catalogue
+        side_keys = (*side_keys, "gear_torque")
     for name in ("asked", "cycle", "flywheel", "gear", "protection"):
         # the sentences on the coupling are too long for a cell of a narrow table, and stand above with the ways to it
         leaves = [
@@ -228,8 +261,15 @@ def _best(s: b.Source, path: str, word: str) -> Iterator[b.Block]:
     begin = "Chosen: " if word == "Motor" else "Insufficient: "
     yield b.Text(line(sentence, doubt, "."), form="short")
     # a motor that does not suffice is not ordered
+    parts = s.result["sizing"].get("parts", {}).get("parts", ())
     motor = [line("motor ", s.words(f"{path}.motor"), " of ", each) for each in _data(s)]
-    order: list[Line] = [*motor, *_gear_torque(s), *_starter(s, path)]
+    order: list[Line] = [line(each, *_how_to_order(s, 0)) for each in motor]
+    if not any(each["part"] == "gear" for each in parts):
+        order += _gear_torque(s)
+    for k in range(1, len(parts)):
+        named = s.words(f"sizing.parts.parts.{k}.designation")
+        order.append(line(f"{parts[k]['part']} ", named, *_how_to_order(s, k)))
+    order += _starter(s, path)
     if order and word == "Motor":
         yield b.Text(line("Order: ", join(order, "; "), "."), form="short")
     yield b.Text(line(begin, s.words(f"{path}.reason"), doubt, "."))
@@ -265,15 +305,15 @@ def _leaf(s: b.Source, path: str) -> Line:
 def _candidates(s: b.Source, row_count: int) -> b.Table:
     """The table of candidates, best first; the terminal shows the first `row_count` rows."""
     candidates = s.result["sizing"]["candidates"]
-    checks: dict[str, str] = {}
-    for candidate in candidates:
-        for name, check in candidate["checks"].items():
-            checks.setdefault(name, check.get("title", spoken(name)))
+    checks = _titles(candidates)
+    if any(_sold(candidate) is not None for candidate in candidates):
+        # the gears have a table of their own
+        checks = {name: title for name, title in checks.items() if not name.startswith("gear")}
     rows = []
     for i, candidate in enumerate(candidates):
         path = f"sizing.candidates.{i}"
         verdict = candidate["verdict"]
-        motor = line(s.words(f"{path}.motor"), Aside(s.line(f"ratio {{={path}.ratio:4}}")))
+        motor = line(s.words(f"{path}.motor"), Aside(_behind(s, path)))
         cells = (_check(s, f"{path}.checks.{name}") if name in candidate["checks"] else "" for name in checks)
         parts = (_flywheel(s, path), _mass(s, path)) if "flywheel" in candidate else ()
         rows.append(
@@ -291,6 +331,40 @@ def _candidates(s: b.Source, row_count: int) -> b.Table:
     long = (b.Column(title, form="long") for title in (*more, *checks.values()))
     columns = (*b.heads("motor", "verdict"), *long)
     return b.Table(tuple(rows), columns, title=title, note_title="because", numeric=False)
+
+
+def _titles(candidates: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+    """The title of each check of the candidates, by name."""
+    titles: dict[str, str] = {}
+    for candidate in candidates:
+        for name, check in candidate["checks"].items():
+            titles.setdefault(name, check.get("title", spoken(name)))
+    return titles
+
+
+def _gears(s: b.Source) -> Iterator[b.Table]:
+    """The gears of the catalogue that were tried with the motors, with the share of each of its limits."""
+    candidates = s.result["sizing"]["candidates"]
+    titles = {name: title for name, title in _titles(candidates).items() if name.startswith("gear")}
+    rows = []
+    for i, candidate in enumerate(candidates):
+        path = f"sizing.candidates.{i}"
+        if (k := _sold(candidate)) is None:
+            continue
+        price = s.number(f"{path}.parts.{k}.price", as_given=True, none="-")
+        checks = candidate["checks"]
+        cells = (_check(s, f"{path}.checks.{name}") if name in checks else "not known" for name in titles)
+        gear = s.words(f"{path}.parts.{k}.designation")
+        note = (
+            line("ruled out by the runs with ", s.words(f"{path}.runs_with"))
+            if "runs_with" in candidate
+            else ()
+        )
+        rows.append(b.TableRow((gear, s.words(f"{path}.motor"), price, *cells), note))
+    if rows:
+        title = "Gears of the candidates, in their order"
+        columns = b.heads("gear", "motor", "price", *titles.values())
+        yield b.Table(tuple(rows), columns, title=title, numeric=False, note_title="because", form="long")
 
 
 def _ways(s: b.Source, study: StudyRecord) -> b.Table:
@@ -323,6 +397,20 @@ def _trade(s: b.Source) -> Iterator[b.Block]:
         yield b.Table(
             tuple(rows), b.heads("motor", "flywheel", "start, worst angle", "mass", "verdict"), title=title
         )
+
+
+def _behind(s: b.Source, candidate: str) -> Line:
+    """The gear of a candidate, if it is one of a catalogue, else its ratio."""
+    gear = _sold(b.at(s.result, candidate))
+    if gear is None:
+        return s.line(f"ratio {{={candidate}.ratio:4}}")
+    return s.words(f"{candidate}.parts.{gear}.designation")
+
+
+def _sold(candidate: Mapping[str, Any]) -> int | None:
+    """The place of the gear among the parts of a candidate; None for a gear of no catalogue."""
+    parts = candidate.get("parts", ())
+    return next((k for k, each in enumerate(parts) if each["part"] == "gear"), None)
 
 
 def _flywheel(s: b.Source, candidate: str) -> Line:

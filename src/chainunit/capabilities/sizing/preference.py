@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 from ...reading.text import number
 from .candidate import TOLERANCES, Candidate, Criterion, Standing
+from .parts import price_words
+from .table import PREFERENCE, PRICE
 
 ALIKE = 0.05
 """Difference of utilisations, or relative difference of costs, up to which they count as equal, as the search for
@@ -29,20 +32,37 @@ ORDER: Mapping[Criterion, str] = {
 """The criteria in their order, in words; `larger` stands for the number of that key."""
 
 
+_BY_PRICE = (
+    "the price of motor and gear is lower; a drive of which a part has no price comes last, and so does one with a "
+    "flywheel, which no catalogue prices"
+)
+
+
+def order_words(larger: float, objective: str) -> list[str]:
+    """The criteria of `choice` in their order, in words."""
+    words = dict(ORDER)
+    if objective == PRICE:
+        rest = {
+            name: text for name, text in words.items() if name not in (Criterion.MARGIN, Criterion.LARGER)
+        }
+        words = {Criterion.MARGIN: words[Criterion.MARGIN], Criterion.PRICE: _BY_PRICE} | rest
+    return [text.format(larger=f"{larger:g}") for text in words.values()]
+
+
 def poles_rank(poles: float) -> float:
     """The place of a number of poles in the order of preference; a smaller one is better."""
     return {4.0: 0.0, 6.0: 1.0, 2.0: 2.0}.get(poles, poles)
 
 
-def rank(candidates: list[Candidate], larger: float) -> None:
+def rank(candidates: list[Candidate], larger: float, objective: str = PREFERENCE) -> None:
     """Order the candidates by rank and set their reasons. First come candidates that fit, by the order of preference,
     then candidates whose start alone is too hard for the gear, by the same order, then the others, by their largest
-    utilisation; among candidates that do not start at all a larger motor comes first. For `larger` see
-    `chainunit.capabilities.sizing.table`."""
+    utilisation; among candidates that do not start at all a larger motor comes first. For `larger` and `objective`
+    see `chainunit.capabilities.sizing.table`."""
     for c in candidates:
         _judge(c)
-    ranking, behind = _ranking([c for c in candidates if c.fits], larger)
-    hard, _ = _ranking([c for c in candidates if c.breaks_gear], larger)
+    ranking, behind = _ranking([c for c in candidates if c.fits], larger, objective)
+    hard, _ = _ranking([c for c in candidates if c.breaks_gear], larger, objective)
     others = [c for c in candidates if not c.fits and not c.breaks_gear]
     others.sort(key=lambda c: (not c.starts, c.violation, -c.power, c.motor.designation))
     candidates[:] = ranking + hard + others
@@ -54,39 +74,49 @@ def rank(candidates: list[Candidate], larger: float) -> None:
     for c in ranking[1:]:
         c.criterion = behind[id(c)]
         c.reason = f"{_behind(c, best)}; {c.reason}"
-    best.verdict, best.reason = Standing.CHOSEN, f"{_chosen(best, ranking)}; {best.reason}"
+    best.verdict, best.reason = Standing.CHOSEN, f"{_chosen(best, ranking, objective)}; {best.reason}"
 
 
-def _ranking(left: list[Candidate], larger: float) -> tuple[list[Candidate], dict[int, Criterion]]:
+def _ranking(
+    left: list[Candidate], larger: float, objective: str
+) -> tuple[list[Candidate], dict[int, Criterion]]:
     """Candidates in the order of preference, and by the `id` of each but the first the criterion by which it was left
     out."""
     ranking = []
     behind: dict[int, Criterion] = {}
     while left:
-        best, dropped = choice(left, larger)
+        best, dropped = choice(left, larger, objective)
         behind = behind or dropped
         ranking.append(best)
         left.remove(best)
     return ranking, behind
 
 
-def choice(fitting: Sequence[Candidate], larger: float) -> tuple[Candidate, dict[int, Criterion]]:
+def choice(
+    fitting: Sequence[Candidate], larger: float, objective: str = PREFERENCE
+) -> tuple[Candidate, dict[int, Criterion]]:
     """The preferred one of candidates that fit, and by the `id` of each other one the criterion by which it was
     left out."""
-    left = sorted(fitting, key=lambda c: c.motor.designation)
+    left = sorted(fitting, key=lambda c: (c.motor.designation, c.gear))
     dropped: dict[int, Criterion] = {}
-    for criterion, keep in _steps(larger):
+    for criterion, keep in _steps(larger, objective):
         kept = keep(left)
         dropped |= {id(c): criterion for c in left if not any(c is each for each in kept)}
         left = kept
     return left[0], dropped | {id(c): Criterion.USE for c in left[1:]}
 
 
-def _steps(larger: float) -> Sequence[tuple[Criterion, Callable[[list[Candidate]], list[Candidate]]]]:
+def _steps(
+    larger: float, objective: str
+) -> Sequence[tuple[Criterion, Callable[[list[Candidate]], list[Candidate]]]]:
     """The criteria in the order of preference, each with the function that keeps the preferred ones of candidates."""
+    most: Callable[[list[Candidate]], list[Candidate]] = partial(_powerful, most=larger)
+    cheapest: Callable[[list[Candidate]], list[Candidate]] = partial(
+        _least, value=lambda c: math.inf if c.price is None else c.price
+    )
     return (
         (Criterion.MARGIN, _with_margin),
-        (Criterion.LARGER, partial(_powerful, most=larger)),
+        (Criterion.PRICE, cheapest) if objective == PRICE else (Criterion.LARGER, most),
         (Criterion.FIELD, partial(_least, value=lambda c: float(c.weakened))),
         (Criterion.GEAR, partial(_least, value=lambda c: float(c.unit is None))),
         (Criterion.START, partial(_least, value=lambda c: c.trial.start_class or 0)),
@@ -118,8 +148,8 @@ def _powerful(left: list[Candidate], most: float) -> list[Candidate]:
 def _cheaper(left: list[Candidate]) -> list[Candidate]:
     """Those with the lowest cost, to a twentieth: the prices, where each motor has one and no drive a flywheel, else
     the masses, where each is known."""
-    costs: list[float | None] = [c.motor.nameplate.price or None for c in left]
-    if None in costs or any(c.drive.added_inertia for c in left):
+    costs = [c.price for c in left]
+    if None in costs:
         costs = [c.mass for c in left]
     known = [cost for cost in costs if cost is not None]
     if len(known) < len(left):
@@ -170,10 +200,14 @@ def _unstarted(c: Candidate) -> str:
     return reason
 
 
-def _chosen(best: Candidate, ranking: Sequence[Candidate]) -> str:
+def _chosen(best: Candidate, ranking: Sequence[Candidate], objective: str) -> str:
     """The reason for the chosen candidate."""
     if not best.keeps_margin:
         return f"no motor keeps the margin of {_margin(best)}; the nearest to it"
+    if objective == PRICE:
+        if best.price is None:
+            return "the first that fits, of drives of which none has a price for each part"
+        return f"the cheapest that fits: {price_words(best.price)}"
     smaller = [c for c in ranking[1:] if c.keeps_margin and c.power < best.power]
     if not smaller:
         barely = any(c.power < best.power for c in ranking[1:])
@@ -197,9 +231,19 @@ def _chosen(best: Candidate, ranking: Sequence[Candidate]) -> str:
 
 def _behind(c: Candidate, best: Candidate) -> str:
     """The reason why a candidate that fits comes after the best one."""
+    if c.criterion is Criterion.PRICE:
+        if c.drive.added_inertia:
+            return "its flywheel has no price"
+        if c.price is None:
+            lacking = " and ".join(part.kind for part in c.parts if part.price is None)
+            return f"its {lacking} {'have' if ' and ' in lacking else 'has'} no price"
+        return f"dearer: {price_words(c.price)}"
     if c.criterion is Criterion.COST:
-        is_priced = c.motor.nameplate.price and not c.drive.added_inertia
-        return "dearer than the chosen one" if is_priced else f"heavier than the chosen one: {_mass(c)}"
+        return (
+            "dearer than the chosen one"
+            if c.price is not None
+            else f"heavier than the chosen one: {_mass(c)}"
+        )
     if c.criterion is Criterion.USE:
         is_more = c.use > best.use + ALIKE
         return "more used than the chosen one" if is_more else "as good as the chosen one"

@@ -15,6 +15,7 @@ from pathlib import Path
 from ...batch.transients import can_run
 from ...core.errors import InputError
 from ...drives.catalogue import CatalogueMotor, catalogue
+from ...drives.catalogue_gears import CatalogueGear
 from ...drives.gear_ratios import UNITS, nearest
 from ...fmu.backends import Backend
 from ...reading.text import number
@@ -30,15 +31,16 @@ from .findings import SizingFindings
 from .inverter import inverter_needs
 from .motor_trials import MotorTrials
 from .preference import choice, poles_rank, rank
+from .table import PRICE
 from .task import SizingTask
 
 _WORSE_WITH_POWER = ("gear_start",)
 """Checks that a larger motor makes worse."""
 
 
-def motors_on_offer(task: SizingTask, own: Path | None) -> list[CatalogueMotor]:
+def motors_on_offer(task: SizingTask, own: Sequence[Path]) -> list[CatalogueMotor]:
     """The motors of the catalogue with the requested numbers of poles, the smallest first, with the motors of the
-    file of `own` ones.
+    files of `own` ones.
 
     Raises
     ------
@@ -46,15 +48,28 @@ def motors_on_offer(task: SizingTask, own: Path | None) -> list[CatalogueMotor]:
         for a catalogue that cannot be read or has no such motor, and as `check_ratios`.
     """
     limits, tables = task.plan.demands, task.tables
-    motors = [m for m in catalogue(own) if limits.poles_least <= m.nameplate.poles <= limits.poles_most]
+    motors = [m for m in catalogue(*own) if limits.poles_least <= m.nameplate.poles <= limits.poles_most]
+    if task.plan.own_only:
+        motors = [m for m in motors if not m.is_packaged]
+        if not motors:
+            raise InputError(
+                "sizing.own_only: the catalogues have no motor of their own with so many poles; name one by "
+                "catalogue, or leave it out",
+                "sizing.own_only",
+            )
     motors.sort(key=lambda m: (m.nameplate.power, poles_rank(m.nameplate.poles)))
     if not motors:
         raise InputError(
             f"sizing.poles_least = {limits.poles_least:g}, sizing.poles_most = {limits.poles_most:g}: the catalogue "
             "has no motor with so many poles"
         )
+    if limits.gear_torque and not task.gears:
+        words = "sizing.gear_torque: is of gears of a catalogue; name one by catalogue, or leave it out"
+        raise InputError(words, "sizing.gear_torque")
     if tables.start != "inverter" and "gear.ratio" not in tables.given:
         check_ratios(task.plan.ratios, task.operation.crank_speed, motors)
+        of_gears = [gear.data.ratio for gear in task.gears]
+        check_ratios(of_gears, task.operation.crank_speed, motors, "catalogue")
     return motors
 
 
@@ -95,6 +110,8 @@ def size(
         )
         strong = [m for m in motors if m.nameplate.power == motors[-1].nameplate.power]
     trials = MotorTrials(task, duty)
+    if task.plan.objective == PRICE:
+        notes += _without_price(strong, task.gears)
     candidates = _search(_with_files(trials, strong[0], folder, progress, backend), strong, progress)
     notes += [
         f"{c.motor.designation} would be preferred, but for its start: {c.reason}."
@@ -102,12 +119,39 @@ def size(
         if c.remedy
     ]
     notes += _needs(candidates[0], trials)
-    return SizingFindings(task.plan, duty, candidates, notes, len(motors), len(motors) - len(strong))
+    tried = len({c.motor.designation for c in candidates})
+    return SizingFindings(
+        task.plan,
+        duty,
+        candidates,
+        notes,
+        len(motors),
+        len(motors) - len(strong),
+        tried=tried,
+        gears=task.gears,
+        couplings=task.couplings,
+    )
 
 
-def check_ratios(ratios: Sequence[float], crank_speed: float, motors: Sequence[CatalogueMotor]) -> None:
-    """Refuse `sizing.ratios` with which none of the `motors`, the smallest first, keeps the speed of the crank
-    [rad/s] on the line, at any slip up to the rated one. An inverter keeps the speed with any ratio.
+def _without_price(motors: Sequence[CatalogueMotor], gears: Sequence[CatalogueGear]) -> Iterator[str]:
+    """The note on rows without a price, where the lowest price is wanted."""
+    counts = {"motor": sum(m.price is None for m in motors), "gear": sum(g.price is None for g in gears)}
+    words = [f"{n} {noun}{'s' if n > 1 else ''}" for noun, n in counts.items() if n]
+    if words:
+        have = "have" if sum(counts.values()) > 1 else "has"
+        yield f"{' and '.join(words)} of the catalogues {have} no price: drives with them come last."
+    if not gears:
+        yield "The catalogues have no gear: the price is that of the motor alone."
+
+
+def check_ratios(
+    ratios: Sequence[float],
+    crank_speed: float,
+    motors: Sequence[CatalogueMotor],
+    key: str = "sizing.ratios",
+) -> None:
+    """Refuse the ratios of that `key` with which none of the `motors`, the smallest first, keeps the speed of the
+    crank [rad/s] on the line, at any slip up to the rated one. An inverter keeps the speed with any ratio.
 
     Raises
     ------
@@ -127,10 +171,10 @@ def check_ratios(ratios: Sequence[float], crank_speed: float, motors: Sequence[C
     near, _ = min(wanted, key=lambda each: abs(math.log(each[0] / nearest(each[0], ratios))))
     words = " or ".join(f"{number(ratio, '1', digits=2)} ({poles:g} poles)" for ratio, poles in wanted)
     raise InputError(
-        f"sizing.ratios: no ratio on offer brings the crank to {number(w, 'rad/s', 'speed')} with a motor of the "
+        f"{key}: no ratio on offer brings the crank to {number(w, 'rad/s', 'speed')} with a motor of the "
         f"catalogue: about {words} is needed, the nearest on offer is {nearest(near, ratios):g}; add such a ratio, "
         "change run.crank_speed, or take an inverter (start)",
-        "sizing.ratios",
+        key,
     )
 
 
@@ -148,20 +192,28 @@ def _with_files(
 def _search(trials: MotorTrials, motors: list[CatalogueMotor], progress: TaskProgress) -> list[Candidate]:
     """The candidates that `size` tries of the `motors`, in the order of their rank. The start of the best one is that
     from the worst crank angle; a candidate that fails in it makes room for the next."""
-    demands = trials.plan.demands
+    demands, objective = trials.plan.demands, trials.plan.objective
     candidates: list[Candidate] = []
-    rest = iter(motors)
+    tried: set[str] = set()
+    gears = [gear.price or math.inf for gear in trials.task.gears]
+    cheapest_gear = min(gears, default=0.0)
+    rest = iter(sorted(motors, key=lambda m: m.price or math.inf) if objective == PRICE else motors)
     following = next(rest, None)
 
     def is_over() -> bool:
         if following is None:
             return True
-        return len(candidates) >= demands.candidates and _is_settled(candidates, following, demands.larger)
+        if len(tried) < demands.candidates:
+            return False
+        if objective == PRICE and following.price is not None:
+            return _is_cheapest(candidates, following.price + cheapest_gear)
+        return _is_settled(candidates, following, demands.larger)
 
     while not candidates or not is_over():
         while following is not None and not is_over():
-            progress(f"simulating {following.designation}", float(len(candidates)), float(len(motors)))
-            candidates.append(trials.best_of(following))
+            progress(f"simulating {following.designation}", float(len(tried)), float(len(motors)))
+            candidates += trials.candidates_of(following)
+            tried.add(following.designation)
             following = next(rest, None)
         _from_all_angles(trials, candidates)
     if candidates[0].fits and candidates[0].drive.added_inertia:
@@ -170,11 +222,11 @@ def _search(trials: MotorTrials, motors: list[CatalogueMotor], progress: TaskPro
             candidates.append(larger)
             _from_all_angles(trials, candidates)
     hard = [c for c in candidates if c.breaks_gear]
-    best, _ = choice([candidates[0], *hard], demands.larger) if hard else (candidates[0], {})
+    best, _ = choice([candidates[0], *hard], demands.larger, objective) if hard else (candidates[0], {})
     if best.breaks_gear:
         progress("a softer start", 0.0, 1.0)
         best.remedy = _remedy(trials, best)
-        rank(candidates, demands.larger)
+        rank(candidates, demands.larger, objective)
     return candidates
 
 
@@ -190,7 +242,7 @@ def _remedy(trials: MotorTrials, c: Candidate) -> str:
     softly = dataclasses.replace(
         trials, task=dataclasses.replace(trials.task, tables=soft_tables, operation=operation)
     )
-    soft = softly.candidate(c.motor, c.drive.ratio)
+    soft = softly.candidate(c.motor, c.drive.ratio, c.sold)
     soft.drive = dataclasses.replace(soft.drive, added_inertia=c.drive.added_inertia)
     if not softly.judged(soft, worst_start=True).fits:
         return SOFTER["direct"]
@@ -200,11 +252,11 @@ def _remedy(trials: MotorTrials, c: Candidate) -> str:
 
 def _from_all_angles(trials: MotorTrials, candidates: list[Candidate]) -> None:
     """Rank the candidates, with the start of the best one from all crank angles."""
-    larger = trials.plan.demands.larger
-    rank(candidates, larger)
+    larger, objective = trials.plan.demands.larger, trials.plan.objective
+    rank(candidates, larger, objective)
     while candidates[0].fits and not candidates[0].worst_start:
         candidates[0] = trials.with_least_boost(candidates[0], worst_start=True)
-        rank(candidates, larger)
+        rank(candidates, larger, objective)
 
 
 def _needs(best: Candidate, trials: MotorTrials) -> Iterator[str]:
@@ -224,6 +276,12 @@ def _needs(best: Candidate, trials: MotorTrials) -> Iterator[str]:
             else (f"ends at about {largest.largest:g}")
         )
         yield f"A ratio of {best.drive.ratio:g} takes two gear units: a {largest.title} {end}."
+
+
+def _is_cheapest(candidates: list[Candidate], price: float) -> bool:
+    """Whether a candidate keeps the margin at a price that no drive of this least `price` or more undercuts."""
+    prices = [c.price for c in candidates if c.keeps_margin and c.price is not None]
+    return bool(prices) and min(prices) <= price
 
 
 def _is_settled(candidates: list[Candidate], following: CatalogueMotor, larger: float) -> bool:
@@ -264,7 +322,7 @@ def _without_flywheel(
     least = None
     while rest:
         middle = len(rest) // 2
-        candidate = trials.with_least_boost(trials.candidate(rest[middle]))
+        candidate = trials.candidates_of(rest[middle], trials.with_least_boost)[-1]
         if candidate.keeps_margin:
             least = candidate
         too_weak = any(candidate.exceeds(name) for name in candidate.checks if name not in _WORSE_WITH_POWER)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from pydantic import Field
+from pydantic import Field, StrictBool
 
 from ...core.quantities import Value, declaration, quantity
 from ...drives.gear_ratios import UNITS
@@ -69,6 +69,12 @@ class Sizing:
         min=1.0,
         max=100.0,
     )
+    gear_torque: Value = quantity(
+        "N.m",
+        "least permitted torque in running of a gear of the catalogue, such as the one that the overloads ask for",
+        default=0.0,
+        min=0.0,
+    )
     candidates: Value = quantity(
         "1",
         "least number of motors that are tried; more follow until one fits and none behind it can be preferred",
@@ -81,6 +87,10 @@ class Sizing:
 
 RATIO_SERIES = ("preferred", "exact")
 """The ratios that sizing may take: preferred numbers, or any."""
+
+PREFERENCE, PRICE = "preference", "price"
+OBJECTIVES = (PREFERENCE, PRICE)
+"""What is wanted of the drives that fit: the first by the order of preference, or the cheapest."""
 
 SIZING_KEYS: Mapping[str, Any] = {
     "gear_kind": (
@@ -98,6 +108,26 @@ SIZING_KEYS: Mapping[str, Any] = {
         numbers(Transmission, "ratio", "sizing.ratios", 500, is_empty_allowed=False),
         Field([], description="gear ratios on offer, of a catalogue of gears, in place of the series"),
     ),
+    "objective": (
+        Literal[OBJECTIVES],
+        Field(
+            PREFERENCE,
+            description="the drive that is chosen of those that fit: the first by the order of preference, or the "
+            "one of the lowest price of motor and gear",
+        ),
+    ),
+    "own_only": (
+        StrictBool,
+        Field(False, description="whether only motors of catalogues of your own are tried, no packaged ones"),
+    ),
+    "separate_bearing": (
+        StrictBool,
+        Field(
+            False,
+            description="whether the crank has bearings of its own, so that the shaft of a gear of the catalogue "
+            "does not carry its reaction",
+        ),
+    ),
 }
 
 
@@ -109,6 +139,9 @@ class SizingPlan:
     gear_kind: str
     ratio_series: str
     ratios: Sequence[float]
+    objective: str = PREFERENCE
+    own_only: bool = False
+    separate_bearing: bool = False
 
     @property
     def offer(self) -> GearOffer:

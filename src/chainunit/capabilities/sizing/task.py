@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
+from ...drives.catalogue_couplings import CatalogueCoupling
+from ...drives.catalogue_gears import CatalogueGear
 from ...machines.machine import Machine
 from ...study.drive_tables import DriveTables
 from ...study.event import Event
 from ...study.operation import OperatingConditions
+from .gear_tables import with_gear
 from .table import SizingPlan
 
 
@@ -22,3 +25,13 @@ class SizingTask:
     operation: OperatingConditions
     events: Mapping[str, Event]
     """the events of the study, of which events that bring all feed to one side count"""
+    gears: Sequence[CatalogueGear] = ()
+    """the gears of catalogues, of which one is chosen; without them any gear of the plan's kind"""
+    couplings: Sequence[CatalogueCoupling] = ()
+    """the safety couplings of catalogues"""
+    gear: CatalogueGear | None = None
+    """the gear of the drive on trial, if it is one of a catalogue"""
+
+    def of_gear(self, gear: CatalogueGear | None) -> SizingTask:
+        """The task with a drive that has this gear, whose values stand in the `tables`."""
+        return self if gear is None else replace(self, gear=gear, tables=with_gear(self.tables, gear))

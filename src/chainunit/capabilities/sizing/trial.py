@@ -43,6 +43,7 @@ from ...study.window import BURNT, is_settled
 from ...system import Simulation
 from .candidate import TrialResult
 from .duty import Duty, rms
+from .gear_rows import gear_checks
 from .table import Sizing
 from .task import SizingTask
 
@@ -298,6 +299,9 @@ class Trial:
             hardest = max([at_gear(self.drive, self.start), *(s.gear_torque for s in self.starts)])
             title = "torque of the gear in a start"
             checks["gear_start"] = Check(title, hardest, gear.start_limit, "N.m")
+        if self.task.gear is not None:
+            separate = self.task.plan.separate_bearing
+            checks |= gear_checks(self.task.gear, self.drive, self._running, self._cases, separate)
         return checks
 
 
