@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
-from itertools import groupby, starmap
+from itertools import groupby, starmap, zip_longest
 from operator import itemgetter
 from pathlib import Path
 
@@ -28,6 +28,8 @@ NAME = "sheet.pdf"
 _BEGIN = re.compile(r'(<(?:th|h3|span class="said")\b[^>]*>(?:<[^>]+>)*)([a-z])')
 """The first letter of a heading, of a row's title, and of a warning: a capital on paper. (`::first-letter` would do
 it, as on the screen, but WeasyPrint nests such a box again each time that it lays out a column or a page.)"""
+_BARS = 2
+"""Shares in a row up to which they have bars."""
 _SIGNED = ("Prepared", "Checked", "Released")
 _MISSING = (
     "--pdf: needs the library WeasyPrint and the text engine Pango ({}); pip install 'chainunit[pdf]', and Pango by "
@@ -52,6 +54,7 @@ class _PrintedPage(Page):
     def __init__(self, units: Units, pictures: Mapping[str, Path]) -> None:
         super().__init__(units)
         self._pictures = pictures
+        self._has_bars = True
 
     def block(self, block: b.Block) -> str:
         """One block; nothing for one that moves, and for a figure that has no file."""
@@ -68,6 +71,16 @@ class _PrintedPage(Page):
             texts = list(filter(None, map(self.block, together)))
             parts += [f'<ul class="verdicts">{"".join(texts)}</ul>'] if warns and texts else texts
         return _BEGIN.sub(lambda found: found[1] + found[2].upper(), "\n".join(parts))
+
+    def _table(self, table: b.Table) -> str:
+        """A table; one with many shares has no bars, for which paper has no room."""
+        self._has_bars = sum(isinstance(cell, b.Share) for cell in table.rows[0].cells) <= _BARS
+        return super()._table(table)
+
+    def _inside(self, cell: b.Cell) -> str:
+        if isinstance(cell, b.Share) and not self._has_bars:
+            return self.number(cell.utilisation)
+        return super()._inside(cell)
 
     def _printed(self, figure: Figure) -> str:
         file = self._pictures.get(figure.file or "")
@@ -121,9 +134,9 @@ def page_text(sheet: Sheet, pictures: Mapping[str, Path]) -> str:
         for number, each, _ in numbered
     )
     sections = "".join(starmap(_section, numbered))
-    rows = "".join(
-        f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in sheet.block.items()
-    )
+    labels = [f"<th>{escape(name)}</th><td>{escape(value)}</td>" for name, value in sheet.block.items()]
+    half = (len(labels) + 1) // 2
+    rows = "".join(f"<tr>{a}{z}</tr>" for a, z in zip_longest(labels[:half], labels[half:], fillvalue=""))
     signed = "".join(f"<td><span>{each}</span></td>" for each in _SIGNED)
     return (
         f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{escape(sheet.title)}</title>'

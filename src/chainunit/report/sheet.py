@@ -3,7 +3,7 @@ not checked; the whole report is its annex."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,8 @@ _BEYOND = (
     "noise, dust, temperature of the surroundings beyond that of the study; safety of persons",
 )
 """Questions that the program does not answer."""
+_OF_START = {"soft_start": "soft", "inverter": "inverter", "star_delta": "star-delta"}
+"""The groups of values that one way of starting has, by that way."""
 _LABELS = ("project", "author", "date", "revision")
 
 
@@ -35,7 +37,9 @@ def sheet(study: StudyRecord, report: b.Report) -> Sheet:
         *(given[name] for name in sheets),
         b.Section("demands", "Demands on the drive", tuple(_demands(s, study))),
         b.Section(
-            "assumptions", "Assumptions: values that the study file does not give", tuple(_assumed(given))
+            "assumptions",
+            "Assumptions: values that the study file does not give",
+            tuple(_assumed(given, _unused(study))),
         ),
         *([replace(given["basis"], heading="Basis and validity")] if "basis" in given else []),
         b.Section("unchecked", "What was not checked", tuple(_unchecked(study))),
@@ -69,11 +73,22 @@ def _demands(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         yield replace(table, rows=tuple(row for row in table.rows if row.form != "long"), form="long")
 
 
-def _assumed(given: dict[str, b.Section]) -> Iterator[b.Block]:
-    """The values that the file leaves out, of all sections of given values."""
+def _unused(study: StudyRecord) -> set[str]:
+    """The groups of values that a motor of a catalogue has for other ways of starting than that of the study."""
+    if study.plate is None:
+        return set()
+    start = study.config.drive.start
+    return {group for group, way in _OF_START.items() if way != start} | {"solver"}
+
+
+def _assumed(given: dict[str, b.Section], unused: Set[str]) -> Iterator[b.Block]:
+    """The values that the file leaves out, of all sections of given values but those of `unused` groups."""
     for block in given["given"].blocks if "given" in given else ():
         if isinstance(block, b.Given):
-            kept = ((title, tuple(filter(_is_assumed, values))) for title, values in block.sections)
+            kept = (
+                (title, tuple(x for x in values if _is_assumed(x) and not unused & set(x.name.split("."))))
+                for title, values in block.sections
+            )
             yield b.Given(tuple((title, values) for title, values in kept if values))
 
 

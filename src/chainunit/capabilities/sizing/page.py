@@ -324,9 +324,7 @@ def _candidates(s: b.Source, row_count: int) -> b.Table:
                 "both" if i < row_count else "long",
             )
         )
-    title = (
-        "Candidates, best first. Cell: the share of its limit that a check takes; line in the bar: the limit."
-    )
+    title = "Candidates, best first. Cell: the share of its limit that a check takes."
     more = ("flywheel", "mass") if "flywheel" in candidates[0] else ()
     long = (b.Column(title, form="long") for title in (*more, *checks.values()))
     columns = (*b.heads("motor", "verdict"), *long)
