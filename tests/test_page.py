@@ -451,6 +451,7 @@ def test_a_run_whose_energy_balance_is_not_kept_is_no_verdict_on_the_motor(study
     assert "its reserve of torque is not known" in motor["text"]
 
 
+@pytest.mark.second
 def test_the_speed_after_the_event_is_a_sentence(study):
     def caption(**answers):
         runs = study.answers | {"jam_left": dataclasses.replace(study.answers["jam_left"], **answers)}
@@ -494,6 +495,7 @@ def test_a_motor_that_sizing_found_insufficient_is_not_praised(study, monkeypatc
     assert motor["holds"] == "in part" and "insufficient" in motor["text"]
 
 
+@pytest.mark.second
 def test_a_speed_that_is_not_reached_does_not_head_the_table(study):
     answers = dict(study.answers)
     answers["steady"] = dataclasses.replace(answers["steady"], speed_mean=3.74)
@@ -850,6 +852,7 @@ def test_each_snatch_is_in_parts_of_its_own_rest(chains):
     assert all(math.isnan(x) for x in rest_forces(weightless, "left", feed, 8))
 
 
+@pytest.mark.second
 def test_the_rods_of_chains_move_as_simulated(chains):
     moving = pictures(study_motion.motion(chains))
     walls, webs = chains.drive.simulated_machine.rods

@@ -72,7 +72,7 @@ def test_wrong_cells_of_a_catalogue_stand_behind_the_faults_of_the_file(tmp_path
 
 
 WRONG = ("{ type = 'jams' }", "['a']", "nan", "-inf", "07:32:00", "[[1, 2], [3]]", "true", "1979-05-27")
-PYTHON = re.compile(r"True|False|None|\{'|\['|datetime|input_|validation|should|tuple|dict|\(at line")
+PYTHON = re.compile(r"True|False|None|\{'|\['|datetime|input_|validation|\bshould\b|tuple|dict|\(at line")
 
 
 def _head(table):

@@ -123,6 +123,7 @@ def done(tmp_path_factory):
     return folder / "out"
 
 
+@pytest.mark.second
 def test_the_numbers_of_a_study_follow_from_its_run(done):
     result = json.loads((done / "result.json").read_text("utf-8"))
     found = result["checks"]["relay"]

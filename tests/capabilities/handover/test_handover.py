@@ -18,6 +18,8 @@ from chainunit.capabilities.handover.page import HandoverQuestion, hand_over, sa
 from chainunit.capabilities.handover.shell import LONGEST, environment
 from chainunit.capabilities.handover.template import ROOT, elements
 
+pytestmark = pytest.mark.second
+
 TEMPLATE = json.loads((Path(__file__).parents[2] / "data" / "idta_02021.json").read_text("utf-8"))
 LINKAGES = Path(__file__).parents[3] / "examples" / "linkages"
 SHORT = "event = []\n[run]\nramp = 0.3\nsettle_turns = 1\n"

@@ -290,6 +290,7 @@ def on_line(tmp_path_factory):
         return ran(heavy(*SIX), tmp_path_factory.mktemp("on_line"), patch)
 
 
+@pytest.mark.second
 def test_a_drive_whose_start_is_harder_than_its_shocks_has_no_coupling(on_line):
     """The study says so, with the numbers, and gives ways to one that can be bought."""
     setting = sizing_of(on_line).setting
