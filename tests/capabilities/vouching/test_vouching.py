@@ -216,6 +216,44 @@ def test_the_bill_of_materials_is_valid(members):
     assert valid.validate_str(bill.replace("SHA3-256", "SHA3", 1)) is not None
 
 
+SCHEMAS = Path(__file__).parents[2] / "data" / "schemas"
+"""The schemas of FMI-LS-REF and of the parts of FMI 3.0 that it names, of the FMI project (2-clause BSD licence)."""
+_ATTRIBUTES = "".join(
+    f'<xs:attribute name="{name}" type="xs:string"/>' for name in ("type", "href", "role", "label", "title")
+)
+XLINK = (
+    '<xs:schema xmlns:xs="http://www.w3.org/2001/XMLSchema" targetNamespace="http://www.w3.org/1999/xlink">'
+    f'{_ATTRIBUTES}<xs:attribute name="arcrole" type="xs:string"/><xs:attribute name="from" type="xs:string"/>'
+    '<xs:attribute name="to" type="xs:string"/></xs:schema>'
+)
+
+
+@pytest.mark.second
+def test_the_manifest_of_fmi_ls_ref_is_valid_by_its_schema(members, tmp_path):
+    xmlschema = pytest.importorskip("xmlschema")
+    for file in SCHEMAS.glob("*.xsd"):
+        text = re.sub(r'(schemaLocation=")https://[^"]*/', r"\1", file.read_text("utf-8"))
+        (tmp_path / file.name).write_text(text, "utf-8")
+    schema = xmlschema.XMLSchema10(tmp_path / "fmi3LayeredStandardReferenceManifest.xsd")
+    text = members[documents.RELATED].decode()
+    assert list(schema.iter_errors(text)) == []
+    assert list(schema.iter_errors(text.replace('role="report"', 'role="reports"', 1)))
+
+
+@pytest.mark.second
+def test_the_meta_data_are_valid_by_the_schema_of_srmd(made, members, tmp_path):
+    xmlschema = pytest.importorskip("xmlschema")
+    resources = Path(pytest.importorskip("pyssp_standard").__file__).parent / "resources"
+    for name in ("SRMD11.xsd", "STC11.xsd", "SystemStructureCommon.xsd"):
+        text = re.sub(r'(schemaLocation=")https://[^"]*/', r"\1", (resources / name).read_text("utf-8"))
+        (tmp_path / name).write_text(text, "utf-8")
+    (tmp_path / "xlink.xsd").write_text(XLINK, "utf-8")
+    schema = xmlschema.XMLSchema11(tmp_path / "SRMD11.xsd")
+    for content in (members[documents.SRMD].decode(), (made / "it.srmd").read_text("utf-8")):
+        assert list(schema.iter_errors(content)) == []
+        assert list(schema.iter_errors(content.replace(" name=", " title=", 1)))
+
+
 # -- what does not hold
 
 
