@@ -6,6 +6,7 @@ import dataclasses
 import math
 from pathlib import Path
 
+import control
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -122,6 +123,21 @@ def test_tuning_scales_with_inertia_and_refuses_a_loop_without_margin():
     assert one.crossover == pytest.approx(30.0, rel=0.05)
     with pytest.raises(InputError, match="phase margin"):
         tune(arm, 0.004, crossover_share=1.0)
+
+
+@pytest.mark.parametrize("share", [0.02, 0.1, 0.3])
+def test_the_margin_of_the_tuning_is_that_of_python_control(share):
+    arm, inertia = DcMotor.Parameters().armature, 0.4
+    tuned = tune(arm, inertia, 250.0, share)
+    kp, ki, inner_kp, inner_ki = tuned.parameters.values()
+    s = control.tf("s")
+    inner = control.feedback((inner_kp + inner_ki / s) / (arm.L * s + arm.R), 1)
+    _, phase, _, at = control.margin(
+        control.minreal((kp + ki / s) * inner * arm.k / (inertia * s), verbose=False)
+    )
+    assert tuned.phase_margin == pytest.approx(phase, rel=1e-6) and tuned.crossover == pytest.approx(
+        at, rel=1e-6
+    )
 
 
 def test_the_loop_is_that_of_the_tuning_and_of_the_motor():
