@@ -5,15 +5,21 @@ from __future__ import annotations
 import builtins
 import json
 import re
+from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
 from chainunit import InputError
+from chainunit.report import blocks as b
 from chainunit.report import pdf
 from chainunit.report import study as study_report
+from chainunit.report.figure import Figure
+from chainunit.report.lines import Number
 from chainunit.report.sheet import sheet
 from chainunit.report.study_task import SHEET_TASK, TASK
 from chainunit.study import config
+from chainunit.study.organ_limits import limits_of_organs
 from chainunit.study.run import run_study
 
 TEXT = """
@@ -49,7 +55,7 @@ def made(study):
 def test_the_sheet_has_each_section_once(study, made):
     names = [each.name for each in (*made.sections, *made.annex)]
     assert len(names) == len(set(names))
-    assert names[:3] == ["question", "answer", "demands"] and "unchecked" in names
+    assert names[:3] == ["question", "answer", "assumptions"] and {"unchecked", "runs"} <= set(names)
     whole = {each.name for each in study_report.report(study).sections}
     assert whole - set(names) == {"live", "motion"}, "what moves is not on paper, all else is"
     assert made.block["Project"] == "Quarry 7" and made.block["Revision"] == "B"
@@ -60,6 +66,60 @@ def test_assumptions_are_the_numbers_that_the_file_leaves_out(study, made):
     shown = {value.name for block in section.blocks for _, values in block.sections for value in values}
     assert {"machine.crank.m", "motor.armature.R", "run.turns"} <= shown
     assert not shown & study.config.file.given and not any(name.startswith("event.") for name in shown)
+
+
+def test_values_that_were_chosen_and_those_of_a_motor_of_a_catalogue_are_no_assumptions(study):
+    names = {"sizing.margin": "declared", "machine.ratio": "sizing", "motor.rotor.J": "declared"}
+    names |= {"motor.ambient.T": "declared", "gear.J": "file", "starter.inverter.lag": "declared"}
+    values = tuple(b.GivenValue(name, name, Number(1.0, "1"), origin) for name, origin in names.items())
+    chosen = replace(
+        study, proposal=SimpleNamespace(name="sizing", insufficient="", motor=object(), duty=None, keys={})
+    )
+    whole = study_report.report(study)
+    given = b.Section("given", "Given values", (b.Given((("all", values),)),))
+    sections = (*(each for each in whole.sections if each.name != "given"), given)
+    made = sheet(chosen, replace(whole, sections=sections))
+    (section,) = (each for each in made.sections if each.name == "assumptions")
+    lists, _ = section.blocks
+    assert [each.name for each in lists.sections[0][1]] == ["sizing.margin", "motor.ambient.T"]
+    assert "Given values" in pdf.page_text(replace(made, sections=(section,), annex=()), {})
+    assert given in made.annex, "the annex lists all"
+
+
+def test_it_says_up_to_which_speed_it_holds(study, made):
+    (basis,) = (each for each in made.sections if each.name == "basis")
+    text = pdf.page_text(replace(made, sections=(basis,), annex=()), {})
+    limits = {
+        each.topic: each.speed for each in limits_of_organs(study.drive.machine, study.config.feed, ["N.m"])
+    }
+    shown = dict(re.findall(r'data-path="organs.limits.(\w+)" value="([^"]+)"', text))
+    assert float(shown["crank_torque_speed"]) == limits["crank torque"]
+    assert float(shown["rocker_torque_speed"]) == limits["rocker torque"] < limits["crank torque"]
+    assert float(shown["slack_speed"]) == limits["slack speed"]
+    chain = replace(study)
+    report = study_report.report(chain)
+    report.result["verdict"]["model"]["model"] = "chains"
+    assert "No highest speed was computed" in pdf.page_text(sheet(chain, report), {})
+
+
+def test_it_names_each_pin_whose_bearing_was_not_checked(made):
+    (section,) = (each for each in made.sections if each.name == "unchecked")
+    text = pdf.page_text(replace(made, sections=(section,), annex=()), {})
+    assert "bearings at O1 crank bearing, A crank pin, Bd coupler pin" in text
+
+
+def test_figures_of_its_sections_and_the_versions_are_in_the_annex(study):
+    whole = study_report.report(study)
+    (plots,) = (each for each in whole.sections if each.name == "plots")
+    picture = next(each for each in plots.blocks if isinstance(each, Figure))
+    energy = b.Section("energy", "Energy", (b.Text("so much", form="long"), picture))
+    made = sheet(study, replace(whole, sections=(*whole.sections, energy)))
+    on_sheet = {each.name: each for each in made.sections}
+    in_annex = {each.name: each for each in made.annex}
+    assert on_sheet["energy"].blocks == energy.blocks[:1]
+    assert in_annex["energy_figures"].blocks == (picture,)
+    assert len(in_annex["software"].blocks) == 1
+    assert not set(in_annex["software"].blocks) & set(on_sheet["basis"].blocks)
 
 
 def test_its_text_escapes_the_file_and_numbers_its_sections(made):
@@ -128,5 +188,5 @@ def test_the_pdf_is_two_to_four_pages_and_an_annex(study, made, tmp_path):
     ]
     assert re.search(rb"pdfaid:part>3<|pdfaid:part=.3", packet.get_data())
     first = " ".join(pages[:annex])
-    for words in ("Quarry 7", "Prepared", "What was not checked", "Demands on the drive", "The question"):
+    for words in ("Quarry 7", "Prepared", "What was not checked", "Basis and validity", "The question"):
         assert words in first

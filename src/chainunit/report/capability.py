@@ -76,6 +76,10 @@ class Capability(StudyCapability):
         """Names of its sections that belong on the sheet of a study, not in the annex alone."""
         return ()
 
+    def up_to_speed(self, s: Source, study: StudyRecord) -> Iterator[Line]:
+        """Sentences on the speed up to which the numbers of a study hold, for its sheet."""
+        return iter(())
+
     def unchecked(self, study: StudyRecord) -> Iterator[Line]:
         """What the study could have checked by this capability and did not."""
         return iter(())

@@ -1,9 +1,9 @@
-"""The sheet of a study that an engineer signs: question, drawing, answer, demands, assumptions, basis, and what was
-not checked; the whole report is its annex."""
+"""The sheet of a study that an engineer signs: question, drawing, answer, checks, energy, assumptions, basis, and
+what was not checked; the rest of the report is its annex."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Set
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,9 +11,10 @@ from typing import Any
 from ..study.record import StudyRecord
 from . import blocks as b
 from .capability import capabilities
+from .figure import Figure
 from .lines import Line, Number, capital, line
 from .pdf import Sheet
-from .runs import table_of_runs
+from .study import SOFTWARE
 
 _FIRST = ("question", "answer")
 _BEYOND = (
@@ -34,25 +35,65 @@ def sheet(study: StudyRecord, report: b.Report) -> Sheet:
     sheets = [name for part in capabilities() for name in part.on_sheet() if name in given]
     sections = [
         *(given[name] for name in _FIRST if name in given),
-        *(given[name] for name in sheets),
-        b.Section("demands", "Demands on the drive", tuple(_demands(s, study))),
+        *(_without_figures(given[name]) for name in sheets),
         b.Section(
             "assumptions",
             "Assumptions: values that the study file does not give",
-            tuple(_assumed(given, _unused(study))),
+            tuple(_assumed(given, study)),
         ),
-        *([replace(given["basis"], heading="Basis and validity")] if "basis" in given else []),
+        *([_basis(s, study, given["basis"])] if "basis" in given else []),
         b.Section("unchecked", "What was not checked", tuple(_unchecked(study))),
     ]
     shown = {*_FIRST, *sheets, "basis", "live", "motion"}
-    annex = tuple(each for each in report.sections if each.name not in shown)
+    annex = [each for each in report.sections if each.name not in shown]
+    annex += (each for name in sheets for each in _figures_of(given[name]))
+    if "basis" in given:
+        annex.append(b.Section("software", SOFTWARE, tuple(filter(_is_of_software, given["basis"].blocks))))
     return Sheet(
         report.title or capital(report.kind),
         _title_block(study, report),
         tuple(sections),
-        annex,
+        tuple(annex),
         report.units,
     )
+
+
+def _without_figures(section: b.Section) -> b.Section:
+    """A section for the sheet: its figures, which repeat numbers of its tables, are in the annex."""
+    return replace(section, blocks=tuple(x for x in section.blocks if not isinstance(x, Figure)))
+
+
+def _figures_of(section: b.Section) -> Iterator[b.Section]:
+    """The section of the annex with the figures of a section of the sheet, if it has any."""
+    figures = tuple(each for each in section.blocks if isinstance(each, Figure))
+    if figures:
+        yield b.Section(f"{section.name}_figures", f"{section.heading}: figures", figures)
+
+
+def _basis(s: b.Source, study: StudyRecord, section: b.Section) -> b.Section:
+    """Basis and validity, with the speed up to which the numbers hold at its head."""
+    head = (b.Text(each, "note", "long") for part in capabilities() for each in part.up_to_speed(s, study))
+    rest = (each for each in section.blocks if not _is_of_software(each))
+    return b.Section(section.name, "Basis and validity", (*_speed(s, study), *head, *rest))
+
+
+def _is_of_software(block: b.Block) -> bool:
+    return isinstance(block, b.Table) and block.title == SOFTWARE
+
+
+def _speed(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+    """The speed of the runs, and the reach of rigid links."""
+    if not s.result["answers"]:
+        return
+    words = f"The runs ask for a speed of the {study.driver_noun} of {{=run.crank_speed:4}}."
+    if study.drive.foreign_machine or not study.drive.machine.model.sides:
+        words += " No highest speed was computed up to which the numbers hold"
+        words += (
+            "."
+            if study.drive.foreign_machine
+            else ": rigid links set none. Another speed asks for another study."
+        )
+    yield b.Text(s.line(words), "note", "long")
 
 
 def _title_block(study: StudyRecord, report: b.Report) -> dict[str, str]:
@@ -67,35 +108,36 @@ def _title_block(study: StudyRecord, report: b.Report) -> dict[str, str]:
     }
 
 
-def _demands(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
-    if s.result["answers"]:
-        table = table_of_runs(s, study)
-        yield replace(table, rows=tuple(row for row in table.rows if row.form != "long"), form="long")
-
-
-def _unused(study: StudyRecord) -> set[str]:
-    """The groups of values that a motor of a catalogue has for other ways of starting than that of the study."""
-    if study.plate is None:
-        return set()
-    start = study.config.drive.start
-    return {group for group, way in _OF_START.items() if way != start} | {"solver"}
-
-
-def _assumed(given: dict[str, b.Section], unused: Set[str]) -> Iterator[b.Block]:
-    """The values that the file leaves out, of all sections of given values but those of `unused` groups."""
+def _assumed(given: dict[str, b.Section], study: StudyRecord) -> Iterator[b.Block]:
+    """The values that the file leaves out, but those that were chosen, which are the answer, and those of a motor of
+    a catalogue beside its surroundings."""
+    chosen = "" if study.proposal is None else study.proposal.name
     for block in given["given"].blocks if "given" in given else ():
         if isinstance(block, b.Given):
             kept = (
-                (title, tuple(x for x in values if _is_assumed(x) and not unused & set(x.name.split("."))))
+                (title, tuple(each for each in values if _is_assumed(each, study, chosen)))
                 for title, values in block.sections
             )
             yield b.Given(tuple((title, values) for title, values in kept if values))
+    if study.plate is not None:
+        words = 'Values of the motor, and those that were chosen: section "Given values" of the annex.'
+        yield b.Text(words, "note", "long")
 
 
-def _is_assumed(value: b.GivenValue) -> bool:
-    """Whether the file leaves out a number, beside those of the events."""
-    of_event = value.name.startswith("event.")
-    return value.origin not in ("", "file") and isinstance(value.value, Number) and not of_event
+def _is_assumed(value: b.GivenValue, study: StudyRecord, chosen: str) -> bool:
+    """Whether the file leaves out a number that is neither `chosen` nor of an event; beside a motor of a catalogue,
+    neither its own nor of a starter that is not used."""
+    if value.origin in ("", "file", chosen) or not isinstance(value.value, Number):
+        return False
+    of, _, name = value.name.partition(".")
+    if study.plate is None:
+        return of != "event"
+    start = study.config.drive.start
+    return of != "event" and (
+        name.startswith("ambient.")
+        if of == "motor"
+        else _OF_START.get(name.partition(".")[0], start) == start
+    )
 
 
 def _unchecked(study: StudyRecord) -> Iterator[b.Block]:
@@ -104,4 +146,4 @@ def _unchecked(study: StudyRecord) -> Iterator[b.Block]:
         "The following was not computed, and the numbers above say nothing about it:", "lead", "long"
     )
     for each in (*lines, *_BEYOND):
-        yield b.Text(line("– ", each), "plain", "long")
+        yield b.Text(line("– ", each), "note", "long")

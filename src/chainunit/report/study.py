@@ -24,7 +24,7 @@ from .live.study import of_study
 from .live_block import Live
 from .study_motion import motion
 
-DRAWING, QUESTION = "machine.svg", "question"
+DRAWING, QUESTION, SOFTWARE = "machine.svg", "question", "Models and software"
 _DRAWING_CAPTION = (
     "Pins and links, and dimensions by their names in a study file. φ is the {driver} angle, {counts}."
 )
@@ -179,7 +179,7 @@ def _basis(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         b.TableRow(("speed control", control)),
         b.TableRow(("versions", s.line("chainunit {chainunit}{libraries}", libraries=libraries))),
     )
-    yield b.Table(rows, title="Models and software", numeric=False, form="long")
+    yield b.Table(rows, title=SOFTWARE, numeric=False, form="long")
     hint = (
         "Every number in the text of this page comes from result.json, which the page contains whole. Point at a "
         "number to see its place in result.json and more digits."
@@ -195,7 +195,7 @@ def _certificate(
         "machine stored and dissipated, computed in the machine. The table shows the missing share of the energy "
         "moved."
     )
-    yield b.Text(words, form="long")
+    yield b.Text(words, "note", "long")
     titles = {run: study.title_of(run) for run in certificate}
     yield runs.matrix(s, "certificate", titles, "Energy certificate", "run", form="long")
     for name in dict.fromkeys(name for shares in certificate.values() for name in shares):

@@ -307,7 +307,7 @@ def test_page_markdown_and_result_have_one_share(done, result):
         line = next(line for line in text.splitlines() if line.startswith(f"| {row['of']}: {row['title']} |"))
         assert number(row["utilisation"]["value"], "1", "used") in line
         assert row["clause"] in line
-    assert "What was not checked" in page and "the file gives no permitted pv" in text
+    assert "Parts that were not checked" in page and "the file gives no permitted pv" in text
 
 
 def test_the_rigid_model_has_both_numbers(result):

@@ -252,7 +252,7 @@ def test_the_cheapest_that_fits_comes_first_and_drives_without_a_price_last(tmp_
     candidates[-1] = with_checks(candidates[-1], peak_torque=0.95)
     rank(candidates, 2.0, "price")
     assert [c.motor.designation for c in candidates[:2]] == ["cheap", "dear"]
-    assert candidates[0].reason.startswith("the cheapest that fits: 350;")
+    assert candidates[0].reason.startswith("the cheapest that fits: 350 without a safety coupling;")
     reasons = {c.motor.designation: c.reason.split(";")[0] for c in candidates[1:]}
     assert reasons == {
         "dear": "dearer: 1100",

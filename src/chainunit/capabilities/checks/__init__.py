@@ -96,7 +96,7 @@ class CheckCapability(Capability):
         return {
             "checks": Contents("Checks by clause", page.blocks),
             "relay_classes": Contents("Classes of the thermal relay", page.relay, analysis="checks"),
-            "not_checked": Contents("What was not checked", page.missing, analysis="checks"),
+            "not_checked": Contents("Parts that were not checked", page.missing, analysis="checks"),
         }
 
     def on_sheet(self) -> tuple[str, ...]:
@@ -113,8 +113,7 @@ class CheckCapability(Capability):
             return
         absent = [each for each in found.not_checked if each.table]
         if absent:
-            # the pins by name stand in the report
-            parts = (f"{each.what.partition(' at ')[0]} ([{each.table}])" for each in absent)
+            parts = (f"{each.what} ([{each.table}])" for each in absent)
             yield f"parts without data in the file: {'; '.join(parts)}"
         yield from (f"{each.what}: {each.why}" for each in found.not_checked if not each.table)
 

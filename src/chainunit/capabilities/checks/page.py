@@ -20,6 +20,11 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
             "of the limit that is used. A check holds up to 100 %. docs/checks.md has each formula with its "
             "simplifications and an example."
         )
+        if study.proposal is not None:
+            lead += (
+                " The values are of the runs of this study; the shares of limits under the answer are of the duty "
+                f"of {study.proposal.name}, so that both may differ."
+            )
         yield b.Text(lead, "lead", "long")
         yield b.Table(
             tuple(_row(s, found, k) for k in range(len(found.rows))),

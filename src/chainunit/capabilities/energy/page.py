@@ -44,7 +44,7 @@ def _lead(s: b.Source, findings: EnergyFindings) -> Line:
         text += (
             " and stands for {energy.own.co2} of CO2" if year.cost is not None else "; CO2: {energy.own.co2}"
         )
-    return s.line(text + ". Its winding is at {energy.own.temperature}.")
+    return s.line(text + ". Its winding, as warm as this duty makes it, is at {energy.own.temperature}.")
 
 
 def _known(findings: EnergyFindings) -> list[str]:

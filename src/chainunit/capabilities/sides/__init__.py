@@ -3,9 +3,11 @@ them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
+from ...report.blocks import Source
 from ...report.capability import Capability, Contents
+from ...report.lines import Line
 from ...report.supplement import Supplement
 from ...study.analysis import Analysis
 from ...study.record import StudyRecord
@@ -27,6 +29,12 @@ class SidesCapability(Capability):
         from . import page
 
         return {"organs": Contents("One side against both", page.blocks, page.PICTURES.files)}
+
+    def up_to_speed(self, s: Source, study: StudyRecord) -> Iterator[Line]:
+        """The limits of two bars in place of chains."""
+        from . import page
+
+        return page.up_to_speed(s)
 
     def supplement(self, study: StudyRecord) -> Supplement | None:
         """The organs in motion."""

@@ -19,6 +19,7 @@ from ...study.drive import Drive
 from ...study.load_cases import OverloadFactors, cycle_alone, overload_factors
 from ...study.organ_limits import slack_and_mode
 from ...study.record import StudyRecord
+from ...study.verdict import speed_limits
 
 
 @result
@@ -107,6 +108,12 @@ class Limits:
     chain_resonance: Value = quantity(
         "rad/s", "crank speed at the lowest natural frequency of an organ as a chain", kind="speed"
     )
+    crank_torque_speed: Value = quantity(
+        "rad/s", "crank speed up to which the crank torque of two bars is good to 10 %", kind="speed"
+    )
+    rocker_torque_speed: Value = quantity(
+        "rad/s", "crank speed up to which the rocker torque of two bars is good to 10 %", kind="speed"
+    )
     rocker_extreme_right: Value = quantity("rad", "right extreme of the rocker")
     rocker_extreme_left: Value = quantity("rad", "left extreme of the rocker")
     margin: Value = quantity("1", "least |sin| of the transmission angles over the turn")
@@ -151,6 +158,9 @@ class OrganAnalysis(Analysis):
         machine, feed, speed = study.drive.chain_unit, study.config.feed, study.config.run.crank_speed
         (right, _), (left, _) = machine.rocker_extremes()
         slack, mode = slack_and_mode(machine, feed)
+        empties = any(study.config.events[name].empties for name in study.overloads)
+        empty = empties or 0.0 in (feed.left.material_mass, feed.right.material_mass)
+        good = {each.topic: each.speed for each in speed_limits(slack, mode, empty)}
         return OrganFindings(
             factors={side: overload_factors(machine, speed, feed, side) for side in SIDES},
             sides=sides_over_speed(machine, feed),
@@ -158,6 +168,8 @@ class OrganAnalysis(Analysis):
                 slack_speed=slack,
                 slack_speed_empty=machine.slack_speed(),
                 chain_resonance=mode,
+                crank_torque_speed=good["crank torque"],
+                rocker_torque_speed=good["rocker torque"],
                 rocker_extreme_right=right,
                 rocker_extreme_left=left,
                 margin=float(np.min(study.statics.normal.outputs.margin)),

@@ -8,7 +8,7 @@ from ...core.quantities import Layout
 from ...machines.chain_unit import SIDES
 from ...report import blocks as b
 from ...report import figure as fig
-from ...report.lines import capital
+from ...report.lines import Line, capital
 from ...report.pictures import Pictures
 from ...study.load_cases import OverloadFactors
 from ...study.record import StudyRecord
@@ -63,6 +63,28 @@ def _limits(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     if cases:
         yield b.Text(s.line(capital("; ".join(cases)) + "."))
     yield b.Table(s.rows(Limits, "organs.limits", none="none"), title="Limits of the model", form="long")
+
+
+def up_to_speed(s: b.Source) -> Iterator[Line]:
+    """The crank speeds up to which two bars stand for chains; nothing where no run has two bars."""
+    verdict = s.result["verdict"]["model"]
+    if "organs" not in s.result or verdict is None:
+        return
+    if verdict["model"] != "two bars":
+        yield "No highest speed was computed up to which the numbers hold; the limits of two bars do not apply."
+        return
+    limits = {
+        "crank_torque_speed": "the crank torque is good to 10 % up to {}",
+        "rocker_torque_speed": "the rocker torque up to {}",
+        "slack_speed": "a web goes slack from {} on",
+    }
+    parts = [
+        words.format(f"{{organs.limits.{name}}}")
+        for name, words in limits.items()
+        if s.value(f"organs.limits.{name}") is not None
+    ]
+    if parts:
+        yield s.line(f"Speed of the crank, for two bars in place of chains: {'; '.join(parts)}.")
 
 
 _GOOD = {"crank": CRANK_GOOD, "rocker": ROCKER_GOOD_EMPTY}

@@ -44,7 +44,8 @@ def answer(s: b.Source) -> Iterator[b.Block]:
         for name, check in checks.items()
     )
     if rows:
-        title = "Share of each limit that the drive takes; the line in the bar is the limit"
+        one_sided = " and the feed on one side at times" if s.result["sizing"].get("one_sided") else ""
+        title = f"Share of each limit (the line in the bar) in the duty of sizing, with the worst start{one_sided}"
         yield b.Table(rows, b.heads("check", "share"), title=title, numeric=False, form="long")
 
 
@@ -52,6 +53,11 @@ def _parts(s: b.Source) -> Iterator[b.Block]:
     """The parts to order from catalogues, with what these leave open."""
     listed = s.result["sizing"].get("parts")
     if not listed:
+        words = (
+            "Order numbers: none, as motor and gear are typical data that nobody sells; order by these values, or "
+            "give catalogues of makers (catalogue = [...])."
+        )
+        yield b.Text(words, "note", "long")
         return
     rows = []
     for k, each in enumerate(listed["parts"]):
