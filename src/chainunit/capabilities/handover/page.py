@@ -133,8 +133,8 @@ def handover_report(found: Handover) -> b.Report:
 
 
 def _opening(s: b.Source) -> Iterator[b.Block]:
-    title = "{title}: by" if s.result["title"] else "By"
-    yield b.Text(s.line(f"{title} the names of {{template}}, Sizing of Power Drive Trains."))
+    begin = "{title}: by" if s.result["title"] else "By"
+    yield b.Text(s.line(f"{begin} the names of {{template}}, Sizing of Power Drive Trains."))
     rows = []
     for name, entry in s.result["said"].items():
         value = entry["value"]
