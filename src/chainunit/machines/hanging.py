@@ -22,8 +22,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.linalg import eigh, null_space
-from scipy.optimize import minimize
 
 from ..core.errors import GeometryError
 
@@ -114,6 +112,8 @@ def catenary(lengths: Any, weights: Any, reach: Any) -> Hanging:
 def _least(parts: Any, reach: Any, length: float, weight: float) -> Any:
     """The p at the minimum of the function f(p) + p . reach; `parts` gives value, gradient and second derivatives of
     f."""
+    from scipy.optimize import minimize
+
     distance = float(np.hypot(*reach))
     if not length > distance:
         raise GeometryError(
@@ -175,6 +175,8 @@ def modes(lengths: Any, weights: Any, rest: Hanging, g: float) -> Modes:
     length times pull of each rod. The inertia is that of the chain that hangs from A1; the pin A2 removes two
     degrees of freedom.
     """
+    from scipy.linalg import eigh, null_space
+
     l, m = np.asarray(lengths, float), np.asarray(weights, float) / g
     N = len(l)
     after = np.concatenate([np.cumsum(m[::-1])[::-1][1:], [0.0]])  # mass behind each rod
