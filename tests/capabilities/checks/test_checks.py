@@ -131,7 +131,7 @@ def test_a_constant_force_is_its_own_equivalent_load_and_round_turning_has_no_sw
 
 def used(kind, force=8e3, swing=0.8, speed=1.0, largest=20e3, **values):
     """By title, the used shares of a bearing under an uneven force."""
-    sizes = {"ball": {"C": 60e3, "C0": 50e3, "elements": 12.0, "static_safety": 1.5}}
+    sizes = {"ball": {"C": 60e3, "C0": 50e3, "elements": 30.0, "static_safety": 1.5}}
     sizes["roller"] = sizes["ball"]
     sizes["plain"] = {"diameter": 0.06, "width": 0.05, "pressure": 20e6, "speed": 0.1, "pv": 0.3e6}
     given = table(**sizes[kind] | values)
@@ -143,7 +143,7 @@ def used(kind, force=8e3, swing=0.8, speed=1.0, largest=20e3, **values):
     else:
         found = rolling.rolling_bearing(kind, given, time / speed, 3.0, cycle, angle, largest, "jam")
         rows = rolling.checks("C", found, given, "x", "jam")
-    return {row.title: row.utilisation for row in rows}
+    return {row.title: row.utilisation for row in rows if isinstance(row, CheckRow)}
 
 
 ROLLING = {
@@ -253,7 +253,8 @@ def rows_of(result, pin):
 
 def test_each_check_names_its_clause_and_the_place_of_its_number(result):
     rows = result["checks"]["rows"]
-    assert len(rows) == 3 + 4 + 2 + 2 + 1
+    # the rocker swings too little for a rating life
+    assert len(rows) == 3 + 3 + 2 + 2 + 1 and "rating life" not in rows_of(result, "C rocker pivot")
     for row in rows:
         there = at(result, row["number"])
         assert there["value"] == row["value"]["value"] and there["unit"] == row["value"]["unit"]
@@ -288,6 +289,10 @@ def test_the_numbers_follow_from_the_stored_runs(done, result):
     # the swing of the rocker is below 4 pi/(24 x 0.9) = 33.3 deg
     row = rows_of(result, "C rocker pivot")["swing"]
     assert not row["holds"] and row["limit"]["value"] == pytest.approx(math.radians(100.0 / 3.0), rel=1e-9)
+    whys = {each["what"]: each["why"] for each in result["checks"]["not_checked"]}
+    assert whys["C rocker pivot, rating life"].startswith(
+        "its swing of 17.3 deg stays below 33.3 deg, from where on"
+    )
     (warning,) = (each for each in result["warnings"] if each["kind"] == "check")
     assert warning["text"].startswith("C rocker pivot: swing 17.3 deg, and at least 33.3 deg are needed")
 

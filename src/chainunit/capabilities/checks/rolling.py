@@ -10,13 +10,14 @@ factors.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
 from ...core.quantities import Value, declaration, quantity
 from ...reading.results import part, result
+from ...reading.text import number
 from ...study.bearings import mean_load
 from .row import CheckRow, NotChecked
 
@@ -115,20 +116,15 @@ def checks(pin: str, of: RollingBearing, table: Any, path: str, run: str) -> Ite
     """The checks of a bearing whose numbers stand at `path` of the result; `run` is the title of the run with the
     largest force."""
     own, at = of.numbers, {name: f"{path}.{name}" for name in vars(of.numbers)}
-    p = "3" if of.kind == "ball" else "10/3"
-    yield CheckRow(
-        pin,
-        "rating life",
-        _CLAUSE[of.kind],
-        f"L = a (C/P)^p 10^6 turns, p = {p}; P = (sum F^p |dphi| / sum |dphi|)^(1/p)",
-        own.life,
-        table.life,
-        at["life"],
-        {"a": at["life_factor"], "C": at["C"], "P": at["load"], "mean |dphi/dt|": at["speed"]},
-        "s",
-        "hours",
-        at_least=True,
-    )
+    least = own.critical_swing
+    if own.swing is not None and least is not None and own.swing < least:
+        why = (
+            f"its swing of {number(own.swing, 'rad')} stays below {number(least, 'rad')}, from where on the formula "
+            "holds; take a plain bearing, or ask the maker"
+        )
+        yield NotChecked(f"{pin}, rating life", why)
+    else:
+        yield _life_row(pin, of, table, at)
     rows = {"P": at["load"], "C": at["C"]} | ({"C0": at["C0"]} if table.C0 else {})
     most = MOST_LOAD * table.C
     yield CheckRow(
@@ -172,5 +168,23 @@ def checks(pin: str, of: RollingBearing, table: Any, path: str, run: str) -> Ite
         at["swing"],
         {"least": at["critical_swing"]},
         "rad",
+        at_least=True,
+    )
+
+
+def _life_row(pin: str, of: RollingBearing, table: Any, at: Mapping[str, str]) -> CheckRow:
+    """The rating life beside the one that is asked for; `at` are the places of the numbers."""
+    p = "3" if of.kind == "ball" else "10/3"
+    return CheckRow(
+        pin,
+        "rating life",
+        _CLAUSE[of.kind],
+        f"L = a (C/P)^p 10^6 turns, p = {p}; P = (sum F^p |dphi| / sum |dphi|)^(1/p)",
+        of.numbers.life,
+        table.life,
+        at["life"],
+        {"a": at["life_factor"], "C": at["C"], "P": at["load"], "mean |dphi/dt|": at["speed"]},
+        "s",
+        "hours",
         at_least=True,
     )
