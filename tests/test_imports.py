@@ -27,7 +27,7 @@ DEPENDENCIES = {
     [
         ("import chainunit", set()),
         ("from chainunit.app.cli import app; app(['--help'], standalone_mode=False)", {"typer", "rich"}),
-        ("import chainunit; chainunit.ChainUnitMachine", {"numpy", "scipy"}),
+        ("import chainunit; chainunit.ChainUnitMachine", {"numpy"}),
     ],
 )
 def test_imports_no_more_than_is_needed(code, needed):
