@@ -127,7 +127,7 @@ def study(
 
 
 for module in modules("command"):
-    for command in module.COMMANDS if hasattr(module, "COMMANDS") else (module.COMMAND,):
+    for command in module.COMMANDS:
         app.command()(command)
 app.command(cls=ExportCommand)(export)
 app.command("export-ssp")(export_ssp)

@@ -31,10 +31,10 @@ NAMES = (
 
 
 def modules(name: str) -> Iterator[Any]:
-    """The module of this name of each folder that has one: ``command``, whose ``COMMAND`` typer takes, or each of
-    its ``COMMANDS``, with the kinds of results that they leave (``KINDS``, by command); and ``study_method``, with a
-    method of `chainunit.Study` (``METHOD``) and the class of its result (``RESULT``). Nothing else of a folder is
-    imported, so that the command line answers at once."""
+    """The module of this name of each folder that has one: ``command``, whose ``COMMANDS`` typer takes, with the
+    kinds of results that they leave (``KINDS``, by command); and ``study_method``, with a method of
+    `chainunit.Study` (``METHOD``) and the class of its result (``RESULT``). Nothing else of a folder is imported, so
+    that the command line answers at once."""
     for folder in NAMES:
         if files(__name__).joinpath(folder, f"{name}.py").is_file():
             yield import_module(f"{__name__}.{folder}.{name}")

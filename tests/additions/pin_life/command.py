@@ -26,5 +26,5 @@ def pin_life(
     carry_out(TASK, question, output)
 
 
-COMMAND = pin_life
+COMMANDS = (pin_life,)
 KINDS = {"pin-life": ResultKind("the rating life of a pin", "pin_life.json")}

@@ -26,5 +26,5 @@ def compare(
     carry_out(TASK, (first, second), output)
 
 
-COMMAND = compare
+COMMANDS = (compare,)
 KINDS = {"compare": ResultKind("a comparison", "comparison.json")}

@@ -30,5 +30,5 @@ def handover(
     carry_out(TASK, HandoverQuestion(results, aasx), output)
 
 
-COMMAND = handover
+COMMANDS = (handover,)
 KINDS = {"handover": ResultKind("a handover", "handover.json")}

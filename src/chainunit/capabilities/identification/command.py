@@ -34,5 +34,5 @@ def identify(
     carry_out(TASK, question, output, errors, before_fit=before_fit)
 
 
-COMMAND = identify
+COMMANDS = (identify,)
 KINDS = {"identify": ResultKind("an identification", key="proposals")}

@@ -54,5 +54,5 @@ def linearize(
     carry_out(TASK, LinearQuestion(name, at, pairs, config, inverse), output)
 
 
-COMMAND = linearize
+COMMANDS = (linearize,)
 KINDS = {"linearize": ResultKind("a linear model", "linear.json")}

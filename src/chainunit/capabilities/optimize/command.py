@@ -27,5 +27,5 @@ def optimize(
     carry_out(TASK, question, output, backend=backend and backend.value)
 
 
-COMMAND = optimize
+COMMANDS = (optimize,)
 KINDS = {"optimize": ResultKind("a search for the best machine", key="objectives")}

@@ -40,5 +40,5 @@ def sweep(
     carry_out(TASK, question, output, workers=workers, scheduler=scheduler)
 
 
-COMMAND = sweep
+COMMANDS = (sweep,)
 KINDS = {"sweep": ResultKind("a sweep", key="best_by")}

@@ -26,5 +26,5 @@ def watch(
     carry_out(TASK, question, output)
 
 
-COMMAND = watch
+COMMANDS = (watch,)
 KINDS = {"watch": ResultKind("a watched recording", key="learned")}
