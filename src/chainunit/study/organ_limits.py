@@ -22,6 +22,16 @@ def slack_and_mode(machine: ChainUnitMachine, feed: Any) -> tuple[float, float]:
     return slack, math.inf if modes is None else float(modes.frequency[0])
 
 
+def two_bar_limits(
+    machine: ChainUnitMachine, feed: Any, *, empties: bool = False
+) -> tuple[float, tuple[SpeedLimit, ...]]:
+    """The lowest natural frequency of an organ as a chain [rad/s], infinite where there is none, and the limits of
+    the crank speed for two bars. With `empties` a side is empty at times."""
+    slack, mode = slack_and_mode(machine, feed)
+    empty = empties or 0.0 in (feed.left.material_mass, feed.right.material_mass)
+    return mode, speed_limits(slack, mode, empty)
+
+
 def limits_of_organs(
     machine: Machine, feed: Any, units: Sequence[str], *, empties: bool = False
 ) -> tuple[SpeedLimit, ...]:
@@ -31,5 +41,4 @@ def limits_of_organs(
         return ()
     if all(unit in _UNITS_OF_MOTION for unit in units):
         return ()
-    slack, mode = slack_and_mode(machine, feed)
-    return speed_limits(slack, mode, empties or 0.0 in (feed.left.material_mass, feed.right.material_mass))
+    return two_bar_limits(machine, feed, empties=empties)[1]

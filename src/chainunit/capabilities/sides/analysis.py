@@ -17,9 +17,8 @@ from ...study.arrays import peak
 from ...study.cycle import cycle
 from ...study.drive import Drive
 from ...study.load_cases import OverloadFactors, cycle_alone, overload_factors
-from ...study.organ_limits import slack_and_mode
+from ...study.organ_limits import two_bar_limits
 from ...study.record import StudyRecord
-from ...study.verdict import speed_limits
 
 
 @result
@@ -157,15 +156,14 @@ class OrganAnalysis(Analysis):
         """The findings for two bars, also where the organs are chains."""
         machine, feed, speed = study.drive.chain_unit, study.config.feed, study.config.run.crank_speed
         (right, _), (left, _) = machine.rocker_extremes()
-        slack, mode = slack_and_mode(machine, feed)
         empties = any(study.config.events[name].empties for name in study.overloads)
-        empty = empties or 0.0 in (feed.left.material_mass, feed.right.material_mass)
-        good = {each.topic: each.speed for each in speed_limits(slack, mode, empty)}
+        mode, limits = two_bar_limits(machine, feed, empties=empties)
+        good = {each.topic: each.speed for each in limits}
         return OrganFindings(
             factors={side: overload_factors(machine, speed, feed, side) for side in SIDES},
             sides=sides_over_speed(machine, feed),
             limits=Limits(
-                slack_speed=slack,
+                slack_speed=good["slack speed"],
                 slack_speed_empty=machine.slack_speed(),
                 chain_resonance=mode,
                 crank_torque_speed=good["crank torque"],
