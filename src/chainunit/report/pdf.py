@@ -10,7 +10,7 @@ import base64
 import logging
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from itertools import groupby, starmap, zip_longest
 from operator import itemgetter
@@ -54,7 +54,6 @@ class _PrintedPage(Page):
     def __init__(self, units: Units, pictures: Mapping[str, Path]) -> None:
         super().__init__(units)
         self._pictures = pictures
-        self._has_bars = True
 
     def block(self, block: b.Block) -> str:
         """One block; nothing for one that moves, and for a figure that has no file."""
@@ -73,14 +72,10 @@ class _PrintedPage(Page):
         return _BEGIN.sub(lambda found: found[1] + found[2].upper(), "\n".join(parts))
 
     def _table(self, table: b.Table) -> str:
-        """A table; one with many shares has no bars, for which paper has no room."""
-        self._has_bars = sum(isinstance(cell, b.Share) for cell in table.rows[0].cells) <= _BARS
+        """A table; one with many shares has the numbers alone, as paper has no room for their bars."""
+        if sum(isinstance(cell, b.Share) for cell in table.rows[0].cells) > _BARS:
+            table = replace(table, rows=tuple(map(_without_bars, table.rows)))
         return super()._table(table)
-
-    def _inside(self, cell: b.Cell) -> str:
-        if isinstance(cell, b.Share) and not self._has_bars:
-            return self.number(cell.utilisation)
-        return super()._inside(cell)
 
     def _printed(self, figure: Figure) -> str:
         file = self._pictures.get(figure.file or "")
@@ -91,6 +86,12 @@ class _PrintedPage(Page):
             f'<figure class="printed"><img src="data:image/png;base64,{picture}" alt="{escape(figure.alt)}">'
             f"<figcaption>{escape(figure.title)}. {self.line(figure.caption)}</figcaption></figure>"
         )
+
+
+def _without_bars(row: b.TableRow) -> b.TableRow:
+    return replace(
+        row, cells=tuple(cell.utilisation if isinstance(cell, b.Share) else cell for cell in row.cells)
+    )
 
 
 def check_library() -> None:

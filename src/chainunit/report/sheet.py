@@ -14,7 +14,7 @@ from .capability import capabilities
 from .figure import Figure
 from .lines import Line, Number, capital, line
 from .pdf import Sheet
-from .study import SOFTWARE
+from .study import basis, software
 
 _FIRST = ("question", "answer")
 _BEYOND = (
@@ -41,14 +41,14 @@ def sheet(study: StudyRecord, report: b.Report) -> Sheet:
             "Assumptions: values that the study file does not give",
             tuple(_assumed(given, study)),
         ),
-        *([_basis(s, study, given["basis"])] if "basis" in given else []),
+        *([_basis(s, study)] if "basis" in given else []),
         b.Section("unchecked", "What was not checked", tuple(_unchecked(study))),
     ]
     shown = {*_FIRST, *sheets, "basis", "live", "motion"}
     annex = [each for each in report.sections if each.name not in shown]
     annex += (each for name in sheets for each in _figures_of(given[name]))
     if "basis" in given:
-        annex.append(b.Section("software", SOFTWARE, tuple(filter(_is_of_software, given["basis"].blocks))))
+        annex.append(b.Section("software", "Models and software", (software(s),)))
     return Sheet(
         report.title or capital(report.kind),
         _title_block(study, report),
@@ -70,15 +70,10 @@ def _figures_of(section: b.Section) -> Iterator[b.Section]:
         yield b.Section(f"{section.name}_figures", f"{section.heading}: figures", figures)
 
 
-def _basis(s: b.Source, study: StudyRecord, section: b.Section) -> b.Section:
+def _basis(s: b.Source, study: StudyRecord) -> b.Section:
     """Basis and validity, with the speed up to which the numbers hold at its head."""
     head = (b.Text(each, "note", "long") for part in capabilities() for each in part.up_to_speed(s, study))
-    rest = (each for each in section.blocks if not _is_of_software(each))
-    return b.Section(section.name, "Basis and validity", (*_speed(s, study), *head, *rest))
-
-
-def _is_of_software(block: b.Block) -> bool:
-    return isinstance(block, b.Table) and block.title == SOFTWARE
+    return b.Section("basis", "Basis and validity", (*_speed(s, study), *head, *basis(s, study)))
 
 
 def _speed(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
@@ -130,14 +125,12 @@ def _is_assumed(value: b.GivenValue, study: StudyRecord, chosen: str) -> bool:
     if value.origin in ("", "file", chosen) or not isinstance(value.value, Number):
         return False
     of, _, name = value.name.partition(".")
-    if study.plate is None:
+    if of == "event" or study.plate is None:
         return of != "event"
+    if of == "motor":
+        return name.startswith("ambient.")
     start = study.config.drive.start
-    return of != "event" and (
-        name.startswith("ambient.")
-        if of == "motor"
-        else _OF_START.get(name.partition(".")[0], start) == start
-    )
+    return _OF_START.get(name.partition(".")[0], start) == start
 
 
 def _unchecked(study: StudyRecord) -> Iterator[b.Block]:

@@ -24,7 +24,7 @@ from .live.study import of_study
 from .live_block import Live
 from .study_motion import motion
 
-DRAWING, QUESTION, SOFTWARE = "machine.svg", "question", "Models and software"
+DRAWING, QUESTION = "machine.svg", "question"
 _DRAWING_CAPTION = (
     "Pins and links, and dimensions by their names in a study file. φ is the {driver} angle, {counts}."
 )
@@ -163,9 +163,24 @@ def _live(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
 
 
 def _basis(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+    yield from basis(s, study)
+    yield software(s)
+    hint = (
+        "Every number in the text of this page comes from result.json, which the page contains whole. Point at a "
+        "number to see its place in result.json and more digits."
+    )
+    yield b.Text(hint, "hint", "long")
+
+
+def basis(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
+    """The notes on a study, and its energy certificate."""
     yield from (b.Text(each, "note") for each in s.lines("notes"))
     if s.result["certificate"]:
         yield from _certificate(s, study, s.result["certificate"])
+
+
+def software(s: b.Source) -> b.Table:
+    """The FMUs, the control of the speed, and the versions of a study."""
     gains = s.result["control"]
     control: Line = (
         join(s.line(f"{spoken(name)} {{control.{name}}}") for name in gains)
@@ -179,12 +194,7 @@ def _basis(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         b.TableRow(("speed control", control)),
         b.TableRow(("versions", s.line("chainunit {chainunit}{libraries}", libraries=libraries))),
     )
-    yield b.Table(rows, title=SOFTWARE, numeric=False, form="long")
-    hint = (
-        "Every number in the text of this page comes from result.json, which the page contains whole. Point at a "
-        "number to see its place in result.json and more digits."
-    )
-    yield b.Text(hint, "hint", "long")
+    return b.Table(rows, title="Models and software", numeric=False, form="long")
 
 
 def _certificate(
