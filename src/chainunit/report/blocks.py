@@ -278,15 +278,26 @@ class Source:
                 )
         return text
 
-    def estimate(self, path: str, low: str = "_from", high: str = "_to") -> Line:
+    def estimate(
+        self,
+        path: str,
+        low: str = "_from",
+        high: str = "_to",
+        *,
+        unknown: str = "starts differ",
+        certain: float | None = None,
+    ) -> Line:
         """The number at `path` and, where the result has one, its interval, whose ends stand at `path` + `low` and
-        `path` + `high`. Where the starts or runs differ too much for an interval, the line says so."""
+        `path` + `high`; the number alone where the interval is no wider than the share `certain` of it. Where the
+        starts or runs differ too much for an interval, the line is `unknown`."""
         try:
-            least = self.value(path + low)
+            least, most = self.value(path + low), self.value(path + high)
         except KeyError:
             return self.number(path)
-        if least is None:
-            return "starts differ"
+        if least is None or most is None:
+            return unknown
+        if certain is not None and most - least <= certain * abs(self.value(path) or 0.0):
+            return self.number(path)
         ends = line(self.number(path + low), " to ", self.number(path + high))
         return line(self.number(path), Aside(ends))
 

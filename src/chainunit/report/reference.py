@@ -21,11 +21,15 @@ from .blocks import Block, Column, Report, Section, Table, TableRow, Text, heads
 _KEY_COLUMNS = heads("key", "default", "allowed", "meaning")
 
 
+def _tables() -> tuple[KeyTable, ...]:
+    """The tables of a study file, and those of the columns of catalogues."""
+    return (*key_tables(), *catalogue_columns())
+
+
 def overview() -> Report:
     """The tables of a study file with their contents and their number of keys."""
     hint = Text("chainunit keys TABLE shows the keys of a table, such as run, event or ChamberForces.")
-    tables = (*key_tables(), *catalogue_columns())
-    return Report("Keys of a study file", "reference", {}, (_contents(tables), hint), ())
+    return Report("Keys of a study file", "reference", {}, (_contents(_tables()), hint), ())
 
 
 def _contents(tables: Iterable[KeyTable], head: str = "table") -> Table:
@@ -60,16 +64,12 @@ def keys_of(name: str) -> Report:
         where neither a table nor a key has this name.
     """
     name = name.strip("[]")
-    tables = [
-        table
-        for table in (*key_tables(), *catalogue_columns())
-        if name in (table.name, table.of, _kind(table))
-    ]
+    tables = [table for table in _tables() if name in (table.name, table.of, _kind(table))]
     if not tables:
         tables = list(_with_key(name))
     if not tables:
         table_names = dict.fromkeys(table.name for table in key_tables() if table.name)
-        kinds = dict.fromkeys(_kind(table) for table in (*key_tables(), *catalogue_columns()) if table.of)
+        kinds = dict.fromkeys(_kind(table) for table in _tables() if table.of)
         near = near_name(name, (*table_names, *kinds, *_key_names())) or ";"
         raise InputError(
             f"{name}: no such table and no such key{near} tables: {', '.join(table_names)}; tables of single types: "
@@ -124,7 +124,7 @@ def reference(
             f"{table.heading}: {table.title}" if table.title else table.heading,
             (_block(table),),
         )
-        for table in (*key_tables(), *catalogue_columns())
+        for table in _tables()
     ]
     sections += [Section(name, f"FMU {name}", tuple(_variables(model))) for name, model in MODELS.items()]
     sections += [

@@ -88,10 +88,10 @@ def speeds_to_avoid(s: b.Source) -> Iterator[b.Judgement]:
 
 
 def _own_speed(s: b.Source, chain: Mapping[str, Any]) -> b.Table:
-    rows = [
-        b.TableRow((title, *(_estimate(s, f"chain.own_speed.{name}") if name else "" for name in names)))
-        for title, names in _OWN
-    ]
+    def cell(name: str) -> Line:
+        return s.estimate(f"chain.own_speed.{name}", certain=CERTAIN) if name else ""
+
+    rows = [b.TableRow((title, *map(cell, names))) for title, names in _OWN]
     if chain["resonance"]["value"] is not None:
         rows += [
             b.TableRow(("resonance of an organ, crank speed", s.number("chain.resonance"), "", "")),
@@ -113,18 +113,6 @@ def _own_speed(s: b.Source, chain: Mapping[str, Any]) -> b.Table:
     return b.Table(tuple(rows), heads, title=s.line(title))
 
 
-def _estimate(s: b.Source, path: str, unknown: str = "starts differ") -> Line:
-    """The number at `path`, with its interval where that is wider than `CERTAIN`; `unknown` where it has none, as the
-    starts differ too much."""
-    try:
-        low, high = s.value(f"{path}_from"), s.value(f"{path}_to")
-    except KeyError:
-        return s.number(path)
-    if low is None or high is None:
-        return unknown
-    return s.estimate(path) if high - low > CERTAIN * abs(s.value(path) or 0.0) else s.number(path)
-
-
 def _sweep(s: b.Source, chain: Mapping[str, Any]) -> b.Table:
     columns = {
         "crank_torque_median": "crank torque: median",
@@ -139,7 +127,7 @@ def _sweep(s: b.Source, chain: Mapping[str, Any]) -> b.Table:
     }
 
     def cell(i: int, name: str) -> Line:
-        return _estimate(s, f"chain.sweep.{i}.{name}", "-")
+        return s.estimate(f"chain.sweep.{i}.{name}", unknown="-", certain=CERTAIN)
 
     rows = (
         b.TableRow((s.number(f"chain.sweep.{i}.speed"), *(cell(i, name) for name in columns)))
