@@ -8,44 +8,30 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from induction import (
+    COLD,
+    LAYOUT,
+    SATURATED,
+    SKIN,
+    advanced,
+    at_rest,
+    inputs,
+    outputs,
+    parameters,
+    random_states,
+    rates,
+)
 from scipy.integrate import solve_ivp
 
 from chainunit.core import engines
-from chainunit.core.integrators import rk4
 from chainunit.drives.contactor import connection
 from chainunit.drives.induction_motor import InductionMotor
 from chainunit.drives.induction_steady import steady
 
-LAYOUT = InductionMotor.state_layout
-COLD = {"stator.alpha": 0.0}
-SATURATED = {"main.beta": 0.85}  # 1/L grows by 0.4 at rated flux
-SKIN = {"cage.skin_R": 0.9, "cage.skin_L": 0.3}
 LOAD = {"load.tau_bias": 5.0, "load.J": 0.02}
 OPEN = {"contactor": 0.0}
 W, PSI = LAYOUT.names.index("w"), [LAYOUT.names.index(f"stator.psi.{axis}") for axis in "dq"]
 PSI_R = [LAYOUT.names.index(f"cage.psi.{axis}") for axis in "dq"]
-
-
-def parameters(given=None):
-    p = InductionMotor.parameter_layout.from_names(given or {})
-    InductionMotor.check(p)
-    return p
-
-
-def inputs(given=None):
-    return InductionMotor.input_layout.from_names(given or {})
-
-
-def at_rest(p):
-    return LAYOUT.values(InductionMotor.initial_states(engines.MATH, p))
-
-
-def outputs(p, u, y, xp=engines.MATH):
-    return InductionMotor.evaluate(xp, p, u, LAYOUT.instance(y))[0]
-
-
-def rates(p, u):
-    return lambda _, y: InductionMotor.derivatives(engines.MATH, p, u, LAYOUT.instance(y))
 
 
 def followed(p, u, x, duration, rows=2, *, tight=True):
@@ -54,7 +40,7 @@ def followed(p, u, x, duration, rows=2, *, tight=True):
     if tight:
         of = rates(p, u)
         done = solve_ivp(
-            lambda t, y: of(t, y.tolist()),
+            lambda t, y: of(y.tolist()),
             (0.0, duration),
             x,
             "DOP853",
@@ -66,7 +52,7 @@ def followed(p, u, x, duration, rows=2, *, tight=True):
         return done.y
     longest, states = InductionMotor.internal_step(engines.MATH, p), [list(x)]
     for h in np.diff(times):
-        states.append(rk4(rates(p, u), states[-1], float(h), longest))
+        states.append(advanced(p, u, states[-1], float(h), longest))
     return np.array(states).T
 
 
@@ -411,19 +397,6 @@ def test_the_ratio_of_star():
 # --- energy ---
 
 
-def random_states(rng):
-    values = {
-        "phi": 0.3,
-        "w": rng.uniform(-200.0, 200.0),
-        "stator.T": rng.uniform(250.0, 450.0),
-        "supply.frequency": rng.uniform(0.0, 80.0),
-        "supply.ramp": rng.uniform(0.2, 1.0),
-        "load_energy": 0.0,
-        **{f"{side}.psi.{axis}": rng.uniform(-1.2, 1.2) for side in ("stator", "cage") for axis in "dq"},
-    }
-    return [values[name] for name in LAYOUT.names]
-
-
 def test_supply_power_is_losses_arcs_field_and_shaft():
     """At random states and any share of contactor and star; the field's power by exact differentiation."""
     rng = np.random.default_rng(7)
@@ -439,7 +412,7 @@ def test_supply_power_is_losses_arcs_field_and_shaft():
             }
         )
         x = random_states(rng)
-        seeded = [engines.Dual(v, d) for v, d in zip(x, rates(p, u)(0.0, x), strict=True)]
+        seeded = [engines.Dual(v, d) for v, d in zip(x, rates(p, u)(x), strict=True)]
         out = outputs(p, u, x)
         field = engines.slope(outputs(p, u, seeded, engines.dual(engines.MATH)).magnetic_energy)
         shaft = out.air_gap_tau * x[W]

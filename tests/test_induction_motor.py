@@ -7,46 +7,30 @@ import math
 
 import numpy as np
 import pytest
+from induction import (
+    COLD,
+    LAYOUT,
+    SATURATED,
+    SKIN,
+    advanced,
+    at_rest,
+    inputs,
+    outputs,
+    parameters,
+    random_states,
+    rates,
+)
 from scipy.integrate import solve_ivp
 
 from chainunit.core import engines
-from chainunit.core.integrators import rk4
 from chainunit.drives.induction_motor import InductionMotor
 from chainunit.drives.induction_steady import breakdown, skin, steady, volts_per_hertz
 from chainunit.drives.motor import T_RATED
 
-LAYOUT = InductionMotor.state_layout
-SKIN = {"cage.skin_R": 0.9, "cage.skin_L": 0.3}
-SATURATED = {"main.beta": 0.85}  # 1/L grows by 0.4 at rated flux
-COLD = {"stator.alpha": 0.0}
-
-
-def parameters(given=None):
-    p = InductionMotor.parameter_layout.from_names(given or {})
-    InductionMotor.check(p)
-    return p
-
-
-def inputs(given=None):
-    return InductionMotor.input_layout.from_names(given or {})
-
-
-def rates(p, u, xp=engines.MATH):
-    return lambda y: InductionMotor.derivatives(xp, p, u, LAYOUT.instance(y))
-
-
-def outputs(p, u, y, xp=engines.MATH):
-    return InductionMotor.evaluate(xp, p, u, LAYOUT.instance(y))[0]
-
-
-def advanced(p, u, start, stop, longest):
-    of = rates(p, u)
-    return rk4(lambda _, y: of(y), start, stop, longest)
-
 
 def run(p, u, stop, start=None, step=None):
     """States at the end, with the integrator of the FMU."""
-    start = LAYOUT.values(InductionMotor.initial_states(engines.MATH, p)) if start is None else start
+    start = at_rest(p) if start is None else start
     return advanced(p, u, start, stop, step or InductionMotor.internal_step(engines.MATH, p))
 
 
@@ -139,19 +123,6 @@ def test_start_is_motulators(beta):
 
 
 # --- energy ---
-
-
-def random_states(rng):
-    values = {
-        "phi": 0.3,
-        "w": rng.uniform(-200.0, 200.0),
-        "stator.T": rng.uniform(250.0, 450.0),
-        "supply.frequency": rng.uniform(0.0, 80.0),
-        "supply.ramp": rng.uniform(0.2, 1.0),
-        "load_energy": 0.0,
-        **{f"{side}.psi.{axis}": rng.uniform(-1.2, 1.2) for side in ("stator", "cage") for axis in "dq"},
-    }
-    return [values[name] for name in LAYOUT.names]
 
 
 def test_supply_power_is_losses_field_and_shaft():
