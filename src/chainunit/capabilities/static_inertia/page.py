@@ -3,18 +3,15 @@ have been chosen, and a turn."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
-from typing import Any
 
-import numpy as np
 import xarray as xr
 
 from ...core.quantities import Layout
 from ...report import blocks as b
 from ...report import figure as fig
 from ...report.lines import Line
-from ...report.turn import angle_axis
+from ...report.turn import angle_axis, last_turn
 from ...study.drive import Drive
 from ...study.readings import crank_motion
 from ...study.record import StudyRecord
@@ -202,8 +199,8 @@ def _figure(study: StudyRecord, findings: StaticInertiaFindings) -> fig.Figure:
     speed: list[fig.Item] = []
     for look, (name, drive, run) in enumerate(models):
         angle, w = crank_motion(drive, run)
-        torque.append(fig.Curve(name, *_last_turn(angle, gear_torque(drive, run)), look))
-        speed.append(fig.Curve(name, *_last_turn(angle, w), look, in_legend=False))
+        torque.append(fig.Curve(name, *last_turn(angle, gear_torque(drive, run)), look))
+        speed.append(fig.Curve(name, *last_turn(angle, w), look, in_legend=False))
     x = angle_axis(study)
     return fig.Figure(
         "static-inertia",
@@ -216,12 +213,3 @@ def _figure(study: StudyRecord, findings: StaticInertiaFindings) -> fig.Figure:
         file=PICTURE,
         heights=(1.3, 0.9),
     )
-
-
-def _last_turn(angle: Any, y: Any) -> tuple[Any, Any]:
-    """The last turn of a run over the crank angle from 0 to 2 pi."""
-    turn = 2.0 * math.pi
-    last = angle > angle[-1] - turn
-    place = angle[last] % turn
-    order = np.argsort(place)
-    return place[order], y[last][order]
