@@ -39,19 +39,14 @@ def answer(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     findings = StaticInertiaFindings.found_in(study)
     if findings is None or (findings.choice is not None and findings.choice.differs):
         return
-    text = (
-        "A sizing program with one inertia, {static_inertia.inertia.mean} at the {driver}, and no terms of inertia "
-        "in the torque"
+    same = "" if findings.choice is None else " would have chosen the same drive; it"
+    yield b.Text(
+        s.line(
+            "A sizing program with one inertia, {static_inertia.inertia.mean} at the {driver}, and no terms of "
+            f"inertia in the torque{same} takes {{static_inertia.static.gear_torque_rms}} RMS at the output of the "
+            "gear for {static_inertia.machine.gear_torque_rms}."
+        )
     )
-    if findings.choice is not None:
-        text += " would have chosen the same drive;"
-    text += (
-        " takes {static_inertia.static.gear_torque_rms} RMS at the output of the gear for "
-        "{static_inertia.machine.gear_torque_rms}."
-    )
-    if findings.choice is not None:
-        text = text.replace("; takes", "; it takes")
-    yield b.Text(s.line(text))
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
@@ -73,8 +68,8 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         s.line(
             "RMS torque at the {driver} over a turn at constant speed, without a motor: "
             "{static_inertia.constant_speed.static} without the terms of inertia, "
-            "{static_inertia.constant_speed.machine} with them. Energy residual of the runs with one inertia: at "
-            "most {static_inertia.residual} of the energy moved."
+            "{static_inertia.constant_speed.machine} with them. Energy residual of start-up and steady running "
+            "with one inertia: at most {static_inertia.residual} of the energy moved."
         ),
         "note",
         "long",
@@ -188,12 +183,11 @@ def _check(s: b.Source, path: str, name: str, over: bool) -> b.Cell:
 
 
 def _figure(study: StudyRecord, findings: StaticInertiaFindings) -> fig.Figure:
-    turns = findings.turns
-    assert turns is not None
+    runs = findings.runs
     models: list[tuple[str, Drive, xr.Dataset]] = [
         ("J over the angle", study.drive, study.steady),
-        ("one J, without terms of inertia", turns.drive, turns.runs.turns),
-        ("one J, with terms at constant speed", turns.drive, turns.runs.turns_with_terms),
+        ("one J, without terms of inertia", runs.drive, runs.turns),
+        ("one J, with terms at constant speed", runs.drive, runs.turns_with_terms),
     ]
     torque: list[fig.Item] = []
     speed: list[fig.Item] = []
