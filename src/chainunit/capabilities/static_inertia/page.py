@@ -154,32 +154,24 @@ def _choice(s: b.Source, findings: StaticInertiaFindings) -> Iterator[b.Block]:
         yield b.Text("Both choose the same drive.", "note", "long")
         return
     yield b.Text(trial_words(choice), "note", "long")
-    columns = (("checks", choice.missed), ("own_checks", choice.own_missed))
-    names = dict.fromkeys((*choice.checks, *choice.own_checks))
+    columns = (
+        ("checks", choice.checks, choice.missed),
+        ("own_checks", choice.own_checks, choice.own_missed),
+    )
     checks = []
-    for name in names:
+    for name in {**choice.checks, **choice.own_checks}:
         of = "checks" if name in choice.checks else "own_checks"
-        check = s.words(f"{_ROOT}.choice.{of}.{name}.title")
-        cells = (_check(s, f"{_ROOT}.choice.{key}", name, name in missed) for key, missed in columns)
-        checks.append(b.TableRow((check, *cells)))
+        cells = (
+            s.check(f"{_ROOT}.choice.{key}.{name}", name in missed) if name in its else "-"
+            for key, its, missed in columns
+        )
+        checks.append(b.TableRow((s.words(f"{_ROOT}.choice.{of}.{name}.title"), *cells)))
     heads = b.heads(
         "share of each limit that is used",
         s.line("{static_inertia.choice.static.motor} in the machine"),
         s.line("{static_inertia.choice.own.motor} with one J"),
     )
     yield b.Table(tuple(checks), heads, title="Each drive by the other inertia", form="long")
-
-
-def _check(s: b.Source, path: str, name: str, over: bool) -> b.Cell:
-    checks = b.at(s.result, path)
-    if name not in checks:
-        return "-"
-    path, check = f"{path}.{name}", checks[name]
-    none = "none permitted" if "forbidden" in check else "no value"
-    used = s.number(f"{path}.utilisation", none=none, over=over)
-    if "forbidden" in check:
-        return b.Share(used, s.words(f"{path}.forbidden"))
-    return b.Share(used, s.line(f"{{{path}.value}} of {{{path}.limit}}") if "value" in check else ())
 
 
 def _figure(study: StudyRecord, findings: StaticInertiaFindings) -> fig.Figure:
