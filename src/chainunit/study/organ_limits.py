@@ -22,6 +22,11 @@ def slack_and_mode(machine: ChainUnitMachine, feed: Any) -> tuple[float, float]:
     return slack, math.inf if modes is None else float(modes.frequency[0])
 
 
+def has_empty_side(feed: Any) -> bool:
+    """Whether a side of a chain unit carries no material."""
+    return 0.0 in (feed.left.material_mass, feed.right.material_mass)
+
+
 def limits_of_organs(
     machine: Machine, feed: Any, units: Sequence[str], *, empties: bool = False
 ) -> tuple[SpeedLimit, ...]:
@@ -32,4 +37,4 @@ def limits_of_organs(
     if all(unit in _UNITS_OF_MOTION for unit in units):
         return ()
     slack, mode = slack_and_mode(machine, feed)
-    return speed_limits(slack, mode, empties or 0.0 in (feed.left.material_mass, feed.right.material_mass))
+    return speed_limits(slack, mode, empties or has_empty_side(feed))

@@ -17,7 +17,7 @@ from ...study.arrays import peak
 from ...study.cycle import cycle
 from ...study.drive import Drive
 from ...study.load_cases import OverloadFactors, cycle_alone, overload_factors
-from ...study.organ_limits import slack_and_mode
+from ...study.organ_limits import has_empty_side, slack_and_mode
 from ...study.record import StudyRecord
 from ...study.verdict import speed_limits
 
@@ -159,8 +159,8 @@ class OrganAnalysis(Analysis):
         (right, _), (left, _) = machine.rocker_extremes()
         slack, mode = slack_and_mode(machine, feed)
         empties = any(study.config.events[name].empties for name in study.overloads)
-        empty = empties or 0.0 in (feed.left.material_mass, feed.right.material_mass)
-        good = {each.topic: each.speed for each in speed_limits(slack, mode, empty)}
+        limits = speed_limits(slack, mode, empties or has_empty_side(feed))
+        good = {each.topic: each.speed for each in limits}
         return OrganFindings(
             factors={side: overload_factors(machine, speed, feed, side) for side in SIDES},
             sides=sides_over_speed(machine, feed),
