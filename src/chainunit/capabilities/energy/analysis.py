@@ -118,9 +118,9 @@ class EnergyFindings(Findings):
             )
         study.note(
             "losses in iron",
-            "The model of the motor has no iron and stray losses of their own: the windings of a motor of the "
-            "catalogue are fitted so that their losses include them at rated load. At light load a real motor loses "
-            "more.",
+            "The model of the motor has no separate losses in iron and no stray losses: the windings of a motor of "
+            "the catalogue are fitted so that their losses include them at rated load. At light load a real motor "
+            "loses more.",
         )
         if mean.gear and any(load.factor != 1.0 for load in self.loads.values()):
             study.note(

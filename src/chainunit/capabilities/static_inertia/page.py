@@ -44,7 +44,7 @@ def answer(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         s.line(
             "A sizing program with one inertia, {static_inertia.inertia.mean} at the {driver}, and no terms of "
             f"inertia in the torque{same} takes {{static_inertia.static.gear_torque_rms}} RMS at the output of the "
-            "gear for {static_inertia.machine.gear_torque_rms}."
+            "gear, where the machine takes {static_inertia.machine.gear_torque_rms}."
         )
     )
 
@@ -58,7 +58,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
             "load as one number. Here this drive runs with the same weights, processing and friction and the mean "
             "inertia {static_inertia.inertia.mean}; the inertia of the machine goes from "
             "{static_inertia.inertia.least} to {static_inertia.inertia.largest} at the {driver}. The torque of the "
-            "load is without terms of inertia, or has those of a constant speed of {static_inertia.speed:4}."
+            "load is without terms of inertia, or has the terms at a constant speed of {static_inertia.speed:4}."
         ),
         "lead",
         "long",
