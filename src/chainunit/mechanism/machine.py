@@ -74,11 +74,7 @@ class Mechanism:
     def with_bodies(self, linkage: Linkage) -> Mechanism:
         """The same motion with the bodies and loads of another linkage of the same lengths."""
         other = copy.copy(self)
-        other.linkage = linkage
-        bars = (bar for group in (linkage.driver, *linkage.groups) for bar in group.bars)
-        other.bodies = {
-            bar.name: body_on(self.links[bar.name], bar.mass) for bar in bars if bar.mass is not None
-        }
+        other.linkage, other.bodies = linkage, bodies_on(self.links, linkage)
         return other
 
     def third_derivatives(self) -> tuple[dict[str, Third], dict[str, Vec2]]:
@@ -192,6 +188,12 @@ class _OnDemand(dict[str, Any]):
     def __missing__(self, name: str) -> Any:
         value = self[name] = self._make(name)
         return value
+
+
+def bodies_on(links: Mapping[str, Link], linkage: Linkage) -> dict[str, Body]:
+    """The bodies of a linkage on these `links`, by name."""
+    bars = (bar for group in (linkage.driver, *linkage.groups) for bar in group.bars)
+    return {bar.name: body_on(links[bar.name], bar.mass) for bar in bars if bar.mass is not None}
 
 
 class LiftedMechanism:

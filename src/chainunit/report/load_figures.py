@@ -12,6 +12,7 @@ from ..study.drive import Drive
 from ..study.readings import crank_motion, crank_torque, shaft_power
 from ..study.window import mean
 from . import figure as fig
+from .turn import last_turn
 
 _CLASSES = 40
 """Classes of a histogram."""
@@ -20,16 +21,12 @@ _CLASSES = 40
 def power_over_turn(drive: Drive, steady: xr.Dataset, angle: fig.Axis) -> fig.Figure:
     """The power at crank and motor over the last turn of steady running."""
     phi, speed = crank_motion(drive, steady)
-    last = phi > phi[-1] - 2.0 * math.pi
-    turned = phi[last] % (2.0 * math.pi)
-    order = np.argsort(turned)
     driver = drive.driver_noun
     powers = {driver: crank_torque(drive, steady) * speed, "shaft of the motor": shaft_power(drive, steady)}
     if "motor.supply_power" in steady:
         powers["supply of the motor"] = steady["motor.supply_power"].values
     curves = [
-        fig.Curve(name, turned[order], power[last][order], look)
-        for look, (name, power) in enumerate(powers.items())
+        fig.Curve(name, *last_turn(phi, power), look) for look, (name, power) in enumerate(powers.items())
     ]
     return fig.Figure(
         "power-turn",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +22,15 @@ def angle_axis(study: StudyRecord) -> fig.Axis:
     """The axis of the crank angle over a turn."""
     counts = study.drive.machine.model.angle_counts
     return fig.Axis(f"{study.driver_noun} angle {counts}", "rad", low=0.0, high=2.0 * math.pi, step=45.0)
+
+
+def last_turn(angle: Any, y: Any) -> tuple[Any, Any]:
+    """The last turn of a run with these crank angles [rad]: the angles from 0 to 2 pi, and `y` over them."""
+    turn = 2.0 * math.pi
+    last = angle > angle[-1] - turn
+    place = angle[last] % turn
+    order = np.argsort(place)
+    return place[order], y[last][order]
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:

@@ -9,7 +9,7 @@ from ..reading.results import part, result
 from ..reading.text import number
 from . import verdict
 from .limits import Check, given_motor, reaches
-from .organ_limits import slack_and_mode
+from .organ_limits import has_empty_side, slack_and_mode
 from .readings import has_turn
 from .record import StudyRecord
 from .registry import registered
@@ -35,7 +35,6 @@ def model_verdict(study: StudyRecord) -> Verdict:
         if (judged := capability.model_verdict(study, speed, mean, residuals)) is not None:
             return judged
     empty = {name for name in study.overloads if config.events[name].empties}
-    always = 0.0 in (config.feed.left.material_mass, config.feed.right.material_mass)
     slack_speed, resonance = slack_and_mode(study.drive.chain_unit, config.feed)
     return verdict.two_bars(
         speed,
@@ -43,7 +42,7 @@ def model_verdict(study: StudyRecord) -> Verdict:
         slack_speed,
         study.pulls,
         residuals,
-        empty={""} if always else empty,
+        empty={""} if has_empty_side(config.feed) else empty,
         actual=mean,
         finer="; ".join(other.remedy for other in other_models()),
     )

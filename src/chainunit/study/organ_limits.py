@@ -22,14 +22,18 @@ def slack_and_mode(machine: ChainUnitMachine, feed: Any) -> tuple[float, float]:
     return slack, math.inf if modes is None else float(modes.frequency[0])
 
 
+def has_empty_side(feed: Any) -> bool:
+    """Whether a side of a chain unit carries no material."""
+    return 0.0 in (feed.left.material_mass, feed.right.material_mass)
+
+
 def two_bar_limits(
     machine: ChainUnitMachine, feed: Any, *, empties: bool = False
 ) -> tuple[float, tuple[SpeedLimit, ...]]:
     """The lowest natural frequency of an organ as a chain [rad/s], infinite where there is none, and the limits of
     the crank speed for two bars. With `empties` a side is empty at times."""
     slack, mode = slack_and_mode(machine, feed)
-    empty = empties or 0.0 in (feed.left.material_mass, feed.right.material_mass)
-    return mode, speed_limits(slack, mode, empty)
+    return mode, speed_limits(slack, mode, empties or has_empty_side(feed))
 
 
 def limits_of_organs(

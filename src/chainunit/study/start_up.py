@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -12,7 +13,7 @@ from ..work.progress import Progress
 from .measures import STARTED
 from .readings import only_whole_turns, turns_made
 from .rig import Rig, join
-from .window import is_settled, whole_turns
+from .window import Phase, Window, is_settled, whole_turns
 
 _LONGEST_START = 30.0
 """Time after the ramp at which an empty machine is fed, unless it would reach its speed in `_LONGEST_RISE`
@@ -35,6 +36,16 @@ class StartUp:
     steady_from: float
     stop: float
     rig: Rig
+
+    @property
+    def windows(self) -> tuple[Window, Window]:
+        """The windows of steady running, in whole turns, and of the start before them."""
+        drive, operation = self.rig.drive, self.rig.operation
+        turns = whole_turns(drive, self.run.sel(time=slice(self.steady_from, None)), operation.run.turns)
+        sides = drive.machine.loaded_sides(operation.feed)
+        steady = Window(Phase.STEADY, turns, drive, sides, operation.crank_speed)
+        before = self.run.sel(time=slice(None, float(turns["time"][0])))
+        return steady, replace(steady, phase=Phase.START_UP, run=before, steady=steady)
 
 
 def _start_empty(
@@ -88,6 +99,21 @@ def start_up(rig: Rig, simulation: Simulation, progress: Progress, guards: Mappi
         stop = min(longest, stop + max(lack * rig.operation.turn, rig.step))
         run = join([run, simulation.run(stop, rig.step, progress, guards=guards)])
     return StartUp(run, steady_from, stop, rig)
+
+
+def until_settled(
+    rig: Rig, simulation: Simulation, stop: float, length: float, most: float = math.inf
+) -> list[xr.Dataset]:
+    """Runs of a turning drive, the first to the time `stop` [s], each further one of the `length` [turns], until the
+    whole turns of a run, at most `most`, close, it makes none, or `PATIENCE` has passed."""
+    turn, drive = rig.operation.turn, rig.drive
+    runs = [simulation.run(stop, rig.step)]
+    while simulation.time < stop + PATIENCE * turn:
+        turns = only_whole_turns(drive, runs[-1], most)
+        if turns is None or is_settled(drive, turns):
+            break
+        runs.append(simulation.run(simulation.time + length * turn, rig.step))
+    return runs
 
 
 def _missing(rig: Rig, run: xr.Dataset, steady_from: float) -> tuple[float | None, float]:

@@ -3,7 +3,7 @@ the comparison with the monolithic solution."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -89,6 +89,18 @@ def follow(
         if not isinstance(after := signals[full], Profile)
     }
     return Transient(event, begin, join(pieces), signals, jumps, pieces[0] if jumps else None)
+
+
+def follow_each(
+    rig: Rig, simulation: Simulation, events: Sequence[Event], angle: float, speed: float
+) -> Iterator[tuple[Event, xr.Dataset]]:
+    """Each of the `events` with its run from its begin on, without guards. The simulation is at its saved state; for
+    `angle` and `speed` see `lead_times`."""
+    saved = simulation.time
+    for event, lead in zip(events, lead_times(rig, simulation, events, angle, speed), strict=True):
+        begin = saved + lead
+        run = follow(rig, simulation, event, begin, begin + event.time_followed(rig.operation.turn)).run
+        yield event, run.sel(time=slice(begin, None))
 
 
 def coast(rig: Rig, transient: Transient, run: xr.Dataset, stop: float, file: Path) -> xr.Dataset:

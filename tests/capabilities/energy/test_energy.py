@@ -234,6 +234,12 @@ def test_what_the_regulation_asks(power, poles, asked):
     assert required(plate) == asked
 
 
+def test_the_regulation_covers_motors_for_50_and_60_hz():
+    plate = dataclasses.replace(catalogue()[0].nameplate, power=1e3)
+    asked = {f: required(dataclasses.replace(plate, frequency=f)) for f in (50.0, 60.0, 87.0, 100.0)}
+    assert asked == {50.0: "IE3", 60.0: "IE3", 87.0: "", 100.0: ""}
+
+
 def test_a_motor_of_75_kw_below_ie4_is_warned_of(tmp_path):
     """The row as the packaged catalogue had it before: of class IE3."""
     row = (

@@ -16,7 +16,7 @@ from scipy.interpolate import CubicSpline
 from chainunit import InputError
 from chainunit.capabilities.static_inertia import CAPABILITY
 from chainunit.capabilities.static_inertia.analysis import StaticInertiaFindings
-from chainunit.capabilities.static_inertia.runs import numbers_of, obstacle, run_twin, windows, with_machine
+from chainunit.capabilities.static_inertia.runs import numbers_of, obstacle, run_twin, with_machine
 from chainunit.capabilities.static_inertia.twin import SPEED, twin
 from chainunit.capabilities.static_inertia.words import trial_words
 from chainunit.core.errors import RunError
@@ -148,7 +148,7 @@ def compiled(text):
 def steady_numbers(rig):
     with rig.from_rest() as simulation:
         started = start_up(rig, simulation, lambda time: None, {})
-    return numbers_of(*windows(rig, started.run, started.steady_from))
+    return numbers_of(*started.windows)
 
 
 def values(numbers):

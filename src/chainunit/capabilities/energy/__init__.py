@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from ...core.errors import InputError
+from ...core.errors import InputError, refusal_prefix
 from ...report.capability import Capability, Contents
 from ...report.lines import Line
 from ...study.analysis import Analysis
@@ -30,7 +30,7 @@ class EnergyCapability(Capability):
             follows={
                 "load": "the feed of the study all the time",
                 "other": "the same motor in the next efficiency class",
-                "inverter_losses": "those of the reference drive",
+                "inverter_losses": "the losses of the reference drive",
             },
         )
     }
@@ -57,10 +57,12 @@ class EnergyCapability(Capability):
                 yield InputError(f"usage.load.factor = {load.factor:g} ({name}): {words}", "usage.load")
         if not plan.other:
             return
-        from .other_motor import check_other
+        from ...drives.catalogue import motor_of_catalogue
 
-        error = check_other(plan.other, config.file.catalogues)
-        if error is not None:
+        try:
+            with refusal_prefix("usage.other = ", "usage.other"):
+                motor_of_catalogue(plan.other, config.file.catalogues)
+        except InputError as error:
             yield error
 
     def analyses(self) -> Iterable[type[Analysis]]:

@@ -118,9 +118,9 @@ class EnergyFindings(Findings):
             )
         study.note(
             "losses in iron",
-            "The model of the motor has no iron and stray losses of their own: the windings of a motor of the "
-            "catalogue are fitted so that their losses include them at rated load. At light load a real motor loses "
-            "more.",
+            "The model of the motor has no separate losses in iron and no stray losses: the windings of a motor of "
+            "the catalogue are fitted so that their losses include them at rated load. At light load a real motor "
+            "loses more.",
         )
         if mean.gear and any(load.factor != 1.0 for load in self.loads.values()):
             study.note(
@@ -186,7 +186,8 @@ class _Task:
                 loads=", ".join(duty.unsteady),
             )
             return None
-        own = self._energy(duty, motor.designation if motor else "the motor of the study", self._price(motor))
+        price = _price(self.plan.table.motor_price, motor)
+        own = self._energy(duty, motor.designation if motor else "the motor of the study", price)
         other, no_other = self._other(drive, motor, duty)
         return EnergyFindings(
             own=own,
@@ -207,10 +208,9 @@ class _Task:
         usual = (
             drive.parameters.ambient.T if steady.winding_temperature is None else steady.winding_temperature
         )
-        runs = 2.0 * len(self.plan.loads)
 
         def progress(name: str) -> None:
-            self.work.progress(f"energy: {name}{words}", 0.0, runs)
+            self.work.progress(f"energy: {name}{words}", 0.0, 1.0)
 
         hottest = self.study.config.permitted_temperature[1]
         return duty_of(self.work.rig, drive, self.plan.loads, inverter, usual, hottest, progress)
@@ -231,11 +231,6 @@ class _Task:
             "they are typical values, and a drive of class IE2 loses at least a quarter less at full load. The data "
             "sheet of the inverter has its own (usage.inverter_losses)"
         )
-
-    def _price(self, motor: CatalogueMotor | None, *, is_other: bool = False) -> float | None:
-        table = self.plan.table
-        given = float(table.other_price if is_other else table.motor_price)
-        return given or (motor.nameplate.price if motor else 0.0) or None
 
     def _other(
         self, drive: Drive, motor: CatalogueMotor | None, own: LoadDuty
@@ -262,7 +257,7 @@ class _Task:
                 f"with {other.designation} behind the same gear the crank turns at {speeds:.3g} times the speed, "
                 "which is another duty; name a motor of the same number of poles in usage.other"
             )
-        return self._energy(duty, other.designation, self._price(other, is_other=True)), ""
+        return self._energy(duty, other.designation, _price(self.plan.table.other_price, other)), ""
 
     def _energy(self, duty: LoadDuty, name: str, price: float | None) -> MotorEnergy:
         losses = duty.losses
@@ -271,11 +266,16 @@ class _Task:
         return MotorEnergy(name, year, losses, duty.temperature, duty.is_too_hot, speed, price)
 
 
+def _price(given: float, motor: CatalogueMotor | None) -> float | None:
+    """The price that the file gives, or else the catalogue; None where neither does."""
+    return float(given) or (motor.nameplate.price if motor else 0.0) or None
+
+
 def year_of(plan: UsagePlan, power: float, price: float | None) -> Year:
     """Energy and cost of a year with that mean electric `power` [W], for a motor of that `price`, if it is known."""
     table: Usage = plan.table
-    energy, years, hours = power * plan.running, float(table.years), float(table.hours) * float(table.days)
-    tonnes = float(table.tonnes_per_hour) * hours
+    energy, years = power * plan.running, float(table.years)
+    tonnes = float(table.tonnes_per_hour) * plan.running / 3600.0
     kWh = energy / 3.6e6
     cost = kWh * float(table.price) if table.price else None
     return Year(
@@ -292,14 +292,16 @@ def compared(own: MotorEnergy, other: MotorEnergy) -> MotorComparison:
     """The comparison of two motors with the same duty."""
     better, worse = sorted((own, other), key=lambda each: float(each.year.energy))
     saving = worse.year.energy - better.year.energy
-    costs = worse.year.cost, better.year.cost
-    cost = None if None in costs else costs[0] - costs[1]
-    prices = better.price, worse.price
-    extra = None if prices[0] is None or prices[1] is None else prices[0] - prices[1]
+    cost = _difference(worse.year.cost, better.year.cost)
+    extra = _difference(better.price, worse.price)
     share = saving / worse.year.energy
     if share < _ALIKE:
         return MotorComparison("", 0.0, 0.0, cost, extra, None, None)
     pays = None if not cost or extra is None else max(0.0, extra / cost)
-    lives = worse.year.life_cost, better.year.life_cost
-    life = None if None in lives else lives[0] - lives[1]
+    life = _difference(worse.year.life_cost, better.year.life_cost)
     return MotorComparison(better.motor, saving, share, cost, extra, pays, life)
+
+
+def _difference(larger: float | None, smaller: float | None) -> float | None:
+    """`larger` less `smaller`; None where one of them is not known."""
+    return None if larger is None or smaller is None else larger - smaller

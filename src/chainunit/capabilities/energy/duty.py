@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-
-import numpy as np
 
 from ...core.quantities import Layout
 from ...study.drive import Drive
@@ -40,22 +38,21 @@ class LoadDuty:
     def losses(self) -> Losses:
         """Their mean over the time of running."""
         layout = Layout(Losses)
-        values = [[x or 0.0 for x in layout.values(run.losses)] for run in self.runs.values()]
-        whole = np.average(values, axis=0, weights=list(self.shares.values()))
-        known = layout.values(next(iter(self.runs.values())).losses)
-        means = (None if x is None else float(y) for x, y in zip(known, whole, strict=True))
-        return Losses(**dict(zip(layout.names, means, strict=True)))
+        places = zip(*(layout.values(run.losses) for run in self.runs.values()), strict=True)
+        return layout.instance([None if None in losses else self._mean(losses) for losses in places])
 
     @property
     def given_back(self) -> float:
         """Mean power that the motor gives back to its supply at moments [W]."""
-        return sum(self.shares[name] * run.given_back for name, run in self.runs.items())
+        return self._mean(run.given_back for run in self.runs.values())
 
     def mean(self, name: str) -> float:
         """Mean of a variable over the time of running."""
-        return sum(
-            self.shares[load] * mean(run.turns, run.turns[name].values) for load, run in self.runs.items()
-        )
+        return self._mean(mean(run.turns, run.turns[name].values) for run in self.runs.values())
+
+    def _mean(self, values: Iterable[float]) -> float:
+        """The mean of a value of each run, by the shares of the loads."""
+        return sum(share * x for share, x in zip(self.shares.values(), values, strict=True))
 
 
 def duty_of(

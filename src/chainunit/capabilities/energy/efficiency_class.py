@@ -88,9 +88,14 @@ def class_of(plate: Nameplate) -> str:
 
 def required(plate: Nameplate) -> str:
     """The class that EU 2019/1781 asks of a three-phase motor on the market since July 2023; empty outside of its
-    scope: 50 to 1000 V, 2 to 8 poles, 0.12 to 1000 kW."""
+    scope: 50 or 60 Hz, 50 to 1000 V, 2 to 8 poles, 0.12 to 1000 kW."""
     kW, poles = 1e-3 * plate.power, round(plate.poles)
-    in_scope = 50.0 < plate.voltage <= 1000.0 and poles in (2, 4, 6, 8) and 0.12 <= kW <= 1000.0
+    in_scope = (
+        round(plate.frequency) in (50, 60)
+        and 50.0 < plate.voltage <= 1000.0
+        and poles in (2, 4, 6, 8)
+        and 0.12 <= kW <= 1000.0
+    )
     if not in_scope:
         return ""
     if 75.0 <= kW <= 200.0 and poles in (2, 4, 6):

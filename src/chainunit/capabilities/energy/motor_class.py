@@ -27,8 +27,8 @@ class MotorClass(Findings):
             study.warn(
                 "efficiency class",
                 "the motor {motor} is {own} by its efficiency of {efficiency}, and EU 2019/1781 asks {asked} of a "
-                "motor of its size and number of poles that comes to the market since July 2023 ({exemptions}); take "
-                "one of class {asked}.",
+                "motor of its size and number of poles that has come to the market since July 2023 ({exemptions}); "
+                "take a motor of class {asked}.",
                 motor=self.designation,
                 own=self.efficiency_class,
                 efficiency=(self.efficiency, "1", "percent"),

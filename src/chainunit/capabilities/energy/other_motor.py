@@ -1,4 +1,4 @@
-"""The motor that is compared with that of the study over its life."""
+"""The motor that is compared with the motor of the study over its life."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from ...core.errors import InputError
 from ...drives.catalogue import CatalogueMotor, catalogue, motor_of_catalogue
 from ...study.catalogue_drive import with_inertia, with_starter
 from ...study.drive import Drive
@@ -18,8 +17,8 @@ _SAME = 1e-3
 
 
 def other_motor(motor: CatalogueMotor, designation: str, own_motors: Sequence[Path]) -> CatalogueMotor | None:
-    """The motor with that `designation` in the packaged catalogue or the files `own_motors`; without one that of the
-    catalogues of the same power and poles that reaches the next efficiency class, or else the same motor with the
+    """The motor with that `designation` in the packaged catalogue or the files `own_motors`; without one the motor of
+    the catalogues of the same power and poles that reaches the next efficiency class, or else the same motor with the
     efficiency and the slip of that class. None where no class is above that of the motor.
 
     Raises
@@ -75,12 +74,3 @@ def with_motor(drive: Drive, tables: DriveTables, motor: CatalogueMotor) -> Driv
         observer=None,
     )
     return with_inertia(tables, other, drive.added_inertia)
-
-
-def check_other(designation: str, own_motors: Sequence[Path]) -> InputError | None:
-    """The refusal of a `designation` that no catalogue has; None for one that is there."""
-    try:
-        motor_of_catalogue(designation, own_motors)
-    except InputError as error:
-        return InputError(f"usage.other = {error}", "usage.other")
-    return None

@@ -23,7 +23,7 @@ from ...study.drive import Drive
 from ...study.readings import crank_angle, crank_speed, shaft_power
 from ...study.rig import Rig
 from ...study.start_up import start_up
-from ...study.window import Phase, Window, whole_turns
+from ...study.window import Window
 from .inverter import loss
 
 _HELD = 1e6
@@ -81,7 +81,6 @@ class SteadyLoad:
     turns: xr.Dataset
     given_back: float
     lasts: bool
-    rig: Rig
 
 
 def scaled(feed: Any, factor: float) -> Any:
@@ -122,34 +121,32 @@ def run_steadily(rig: Rig, drive: Drive, feed: Any, inverter: InverterRating | N
     """
     rig = replace(rig, drive=drive, operation=replace(rig.operation, feed=feed), fed_from=None)
     with rig.from_rest() as simulation:
-        started = start_up(rig, simulation, lambda time: None, {})
-    run = started.run.sel(time=slice(started.steady_from, None))
-    return read_running(rig, whole_turns(drive, run, rig.operation.run.turns), inverter)
+        steady, _ = start_up(rig, simulation, lambda time: None, {}).windows
+    return _read(steady, feed, inverter)
 
 
-def read_running(rig: Rig, turns: xr.Dataset, inverter: InverterRating | None) -> SteadyLoad:
-    """The losses in whole `turns` of a drive."""
-    drive, operation = rig.drive, rig.operation
-    w = Window(Phase.STEADY, turns, drive, drive.machine.loaded_sides(operation.feed), operation.crank_speed)
-    squared, p = w.mean(lambda drive, run: run[drive.motor_speed].values ** 2), drive.parameters
+def _read(w: Window, feed: Any, inverter: InverterRating | None) -> SteadyLoad:
+    """The losses in steady running with that feed."""
+    drive, turns = w.drive, w.run
+    squared = w.rms(drive.motor_speed) ** 2
     motor = w.mean("motor.supply_power") - w.taken_up[1]
     shaft = w.mean(shaft_power) - w.taken_up[0]
     line = [f"{part.name}.dissipated_power" for part in drive.line]
     parts: dict[str, float | None] = dict.fromkeys(PLACES)
     parts["winding"] = w.mean("motor.heat")
-    parts["windage"] = float(p.rotor.d) * squared
+    parts["windage"] = float(drive.parameters.rotor.d) * squared
     parts["gear"] = drive.gear_friction * squared if drive.gear_friction else None
     parts["line"] = sum(w.mean(full) for full in line if full in turns) if drive.line else None
     if inverter is not None:
         parts["inverter"] = w.mean(lambda drive, run: inverter.loss(run))
     if "machine.dissipated_power" in turns:
-        parts |= _machine(w, operation.feed)
+        parts |= _machine(w, feed)
     else:
         parts["machine"] = shaft - (parts["line"] or 0.0)
     electric = motor + (parts["inverter"] or 0.0)
     missing = electric - sum(x for x in parts.values() if x is not None)
     back = w.mean(lambda drive, run: np.maximum(-run["motor.supply_power"].values, 0.0))
-    return SteadyLoad(Losses(electric=electric, missing=missing, **parts), turns, back, w.lasts, rig)
+    return SteadyLoad(Losses(electric=electric, missing=missing, **parts), turns, back, w.lasts)
 
 
 def _machine(w: Window, feed: Any) -> dict[str, float]:

@@ -37,11 +37,15 @@ class Usage:
     )
     years: Value = quantity("1", "life of the drive in years", default=15.0, above=0.0, max=100.0)
     motor_price: Value = quantity(
-        "1", "price of the motor; 0: that of the catalogue, if it has one", default=0.0, min=0.0, max=1e12
+        "1",
+        "price of the motor; 0: its price in the catalogue, if it has one",
+        default=0.0,
+        min=0.0,
+        max=1e12,
     )
     other_price: Value = quantity(
         "1",
-        "price of the other motor; 0: that of the catalogue, if it has one",
+        "price of the other motor; 0: its price in the catalogue, if it has one",
         default=0.0,
         min=0.0,
         max=1e12,
@@ -85,7 +89,7 @@ FIELDS: Mapping[str, Any] = {
             description="losses of the inverter by its maker over its rated apparent power, at the eight operating "
             "points of IEC 61800-9-2 (frequency %; current %): "
             + ", ".join(f"({100 * f:g}; {100 * i:g})" for f, i in POINTS)
-            + "; without them those of the reference drive",
+            + "; without them the losses of the reference drive",
         ),
     ),
     "load": LOADS.field,
@@ -99,7 +103,7 @@ _WHOLE = 5e-3
 @dataclass(frozen=True)
 class UsagePlan:
     """The values of the table, the loads by name, the designation of the `other` motor (empty for the next class),
-    and the losses of the inverter at `POINTS` over its apparent power, none for those of the reference drive."""
+    and the losses of the inverter at `POINTS` over its apparent power, none to take the reference drive."""
 
     table: Usage
     loads: Mapping[str, LoadShare]

@@ -27,7 +27,6 @@ from ...study.rig import Rig, worst_residual
 from ...study.start_up import start_up
 from ...study.turn import TurnFindings
 from ...study.verdict import CREEPS, RESIDUAL, STEADY
-from ...study.window import Phase, Window, whole_turns
 from .table import FlywheelTable
 from .wheel import FlywheelAnswers, Wheel
 
@@ -164,22 +163,17 @@ def _own(study: StudyRecord, findings: FlywheelFindings) -> Wheel:
 
 def _run(study: StudyRecord, rig: Rig, findings: FlywheelFindings, flywheel: float) -> Wheel:
     """The start-up and steady running of the study with another flywheel [kg m2], without its safety coupling."""
-    tables, operation = study.config.drive, rig.operation
+    tables = study.config.drive
     turned = with_inertia(tables, replace(study.drive, observer=None), flywheel)
     assert study.config.motor is not None
     drive, _ = study.config.motor.completed(turned, tables, study.statics.normal)
     findings.is_retuned = findings.is_retuned or drive.parameters != turned.parameters
-    sides = drive.machine.loaded_sides(operation.feed)
     rig = replace(rig, drive=drive, fed_from=None)
     with rig.from_rest() as simulation:
         started = start_up(rig, simulation, lambda time: None, {})
-    run = started.run
-    residual = worst_residual(rig.residuals(run))
-    turns = whole_turns(drive, run.sel(time=slice(started.steady_from, None)), operation.run.turns)
-    steady = Window(Phase.STEADY, turns, drive, sides, operation.crank_speed)
-    rows = run.sel(time=slice(None, turns["time"].values[0]))
-    start = Window(Phase.START_UP, rows, drive, sides, operation.crank_speed, steady=steady)
-    return _wheel(study, findings, flywheel, read_answers(steady), read_answers(start), turns, residual)
+    residual = worst_residual(rig.residuals(started.run))
+    steady, start = started.windows
+    return _wheel(study, findings, flywheel, read_answers(steady), read_answers(start), steady.run, residual)
 
 
 def _wheel(

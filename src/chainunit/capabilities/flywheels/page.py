@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
@@ -14,7 +12,7 @@ from ...report import blocks as b
 from ...report import figure as fig
 from ...report.lines import Line, capital, line
 from ...report.style import LINES
-from ...report.turn import angle_axis
+from ...report.turn import angle_axis, last_turn
 from ...study.readings import crank_motion
 from ...study.record import StudyRecord
 from .analysis import FlywheelFindings
@@ -97,7 +95,7 @@ def _figure(study: StudyRecord, findings: FlywheelFindings, running: list[Wheel]
             current: run[f"motor.{drive.motor.current}"].values,
         }
         for axis, y in series.items():
-            items[axis].append(fig.Curve(number(wheel.flywheel, "kg.m2"), *_last_turn(angle, y), look))
+            items[axis].append(fig.Curve(number(wheel.flywheel, "kg.m2"), *last_turn(angle, y), look))
     panels = [fig.Panel(angle_axis(study), axis, tuple(curves)) for axis, curves in items.items()]
     return fig.Figure(
         "flywheel",
@@ -108,15 +106,6 @@ def _figure(study: StudyRecord, findings: FlywheelFindings, running: list[Wheel]
         file=PICTURE,
         heights=(1.3, 1.3),
     )
-
-
-def _last_turn(angle: Any, y: Any) -> tuple[Any, Any]:
-    """The last turn of a run over the crank angle from 0 to 2 pi."""
-    turn = 2.0 * math.pi
-    last = angle > angle[-1] - turn
-    place = angle[last] % turn
-    order = np.argsort(place)
-    return place[order], y[last][order]
 
 
 def _ripple(findings: FlywheelFindings, running: list[Wheel]) -> fig.Panel:

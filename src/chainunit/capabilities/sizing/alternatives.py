@@ -30,7 +30,7 @@ from ...study.start_runs import StartNumbers, from_angle, hardest, longest_start
 from ...study.start_up import start_up
 from ...study.starts import StartAnalysis, StartFindings
 from ...study.torques import PeakOf, all_feed_on, duty_peak, on_coupling
-from ...study.transients import follow, lead_times
+from ...study.transients import follow, follow_each
 from ...study.verdict import STEADY
 from ...system import ModelComponent, monolithic
 from ...system.graph import in_line
@@ -261,21 +261,16 @@ def _runs(study: StudyRecord, rig: Rig, of: PeakOf) -> tuple[float, dict[str, xr
         steady = started.run.sel(time=slice(started.steady_from, None))
         begin = simulation.save()
         angle, speed = crank_motion(rig.drive, steady)
-        events = {
-            name: event
+        events = [
+            event
             for name, event in study.config.events.items()
             if name in study.answers and not event.from_rest
-        }
-        leads = lead_times(rig, simulation, [*events.values()], float(angle[-1]), float(np.mean(speed)))
-        for (name, event), lead in zip(events.items(), leads, strict=True):
-            at = begin + lead
-            run = follow(rig, simulation, event, at, at + event.time_followed(operation.turn)).run.sel(
-                time=slice(at, None)
-            )
+        ]
+        for event, run in follow_each(rig, simulation, events, float(angle[-1]), float(np.mean(speed))):
             if event.role is Role.DUTY:
-                duty.append((name, run))
+                duty.append((event.name, run))
             elif event.role is Role.SHOCK:
-                shocks[name] = run
+                shocks[event.name] = run
         for side in (each for each in SIDES if each in rig.drive.machine.model.sides):
             event = one_sided_event(study.config.events, side)
             run = follow(rig, simulation, event, begin, begin + event.p.shift + 2.0 * operation.turn).run

@@ -40,7 +40,7 @@ def answer(s: b.Source) -> Iterator[b.Block]:
     yield from _parts(s)
     checks = b.at(s.result, f"{path}.checks")
     rows = tuple(
-        b.TableRow((capital(check.get("title", spoken(name))), _check(s, f"{path}.checks.{name}")))
+        b.TableRow((capital(check.get("title", spoken(name))), s.check(f"{path}.checks.{name}")))
         for name, check in checks.items()
     )
     if rows:
@@ -320,7 +320,7 @@ def _candidates(s: b.Source, row_count: int) -> b.Table:
         path = f"sizing.candidates.{i}"
         verdict = candidate["verdict"]
         motor = line(s.words(f"{path}.motor"), Aside(_behind(s, path)))
-        cells = (_check(s, f"{path}.checks.{name}") if name in candidate["checks"] else "" for name in checks)
+        cells = (s.check(f"{path}.checks.{name}") if name in candidate["checks"] else "" for name in checks)
         parts = (_flywheel(s, path), _mass(s, path)) if "flywheel" in candidate else ()
         rows.append(
             b.TableRow(
@@ -357,7 +357,7 @@ def _gears(s: b.Source) -> Iterator[b.Table]:
             continue
         price = s.number(f"{path}.parts.{k}.price", as_given=True, none="-")
         checks = candidate["checks"]
-        cells = (_check(s, f"{path}.checks.{name}") if name in checks else "not known" for name in titles)
+        cells = (s.check(f"{path}.checks.{name}") if name in checks else "not known" for name in titles)
         gear = s.words(f"{path}.parts.{k}.designation")
         note = (
             line("ruled out by the runs with ", s.words(f"{path}.runs_with"))
@@ -428,15 +428,3 @@ def _mass(s: b.Source, candidate: str) -> Line:
 
 def _aside(lines: Iterator[Line]) -> Line:
     return tuple(Aside(each) for each in lines)
-
-
-def _check(s: b.Source, path: str) -> b.Share:
-    check = b.at(s.result, path)
-    size = check["utilisation"]["value"]
-    of = s.line(f"{{{path}.value}} of {{{path}.limit}}") if "value" in check and "limit" in check else ()
-    if "forbidden" in check:
-        return b.Share(
-            s.number(f"{path}.utilisation", none="none permitted", over=True), s.words(f"{path}.forbidden")
-        )
-    over = size is not None and size > 1.0
-    return b.Share(s.number(f"{path}.utilisation", none="no value", over=over), of)

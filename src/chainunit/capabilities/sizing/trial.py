@@ -23,7 +23,7 @@ from ...study.drive import Drive
 from ...study.events import one_sided_event
 from ...study.limits import Check, heating, keeping_speed, starting
 from ...study.measures import time_to_start
-from ...study.readings import crank_angle, load_inertia, only_whole_turns, turns_made
+from ...study.readings import crank_angle, load_inertia, turns_made
 from ...study.relay import start_class
 from ...study.rig import Rig
 from ...study.start_runs import (
@@ -35,12 +35,11 @@ from ...study.start_runs import (
     starts_from_all,
     time_above,
 )
-from ...study.start_up import PATIENCE
+from ...study.start_up import until_settled
 from ...study.torques import DutyPeak, all_feed_on, at_gear, duty_peak
 from ...study.transients import follow
 from ...study.verdict import CREEPS, SETTLING, STEADY
-from ...study.window import BURNT, is_settled
-from ...system import Simulation
+from ...study.window import BURNT
 from .candidate import TrialResult
 from .duty import Duty, rms
 from .gear_rows import gear_checks
@@ -341,7 +340,7 @@ def try_motor(
             simulation.signals = rig.signals(ramp=True)
             window += max(1.0, operation.run.settle_turns) * turn
             shifts.append((SETTLING, simulation.run(window, rig.step)))
-        *settling, steady = _until_settled(rig, simulation, window + 2.0 * turn)
+        *settling, steady = until_settled(rig, simulation, window + 2.0 * turn, 2.0)
         shifts += [(SETTLING, run) for run in settling]
         event = simulation.save()
         for side in duty.one_sided:
@@ -355,18 +354,6 @@ def try_motor(
     return dataclasses.replace(
         trial, starts=starts_from_all(rig, longest_start(operation.ramp_end, trial.start_time))
     )
-
-
-def _until_settled(rig: Rig, simulation: Simulation, stop: float) -> list[xr.Dataset]:
-    """Runs of two turns, the first to the time `stop` [s], until the turns of a run close."""
-    turn, drive = rig.operation.turn, rig.drive
-    runs = [simulation.run(stop, rig.step)]
-    while simulation.time < stop + PATIENCE * turn:
-        turns = only_whole_turns(drive, runs[-1])
-        if turns is None or is_settled(drive, turns):
-            break
-        runs.append(simulation.run(simulation.time + 2.0 * turn, rig.step))
-    return runs
 
 
 def permitted_starts(

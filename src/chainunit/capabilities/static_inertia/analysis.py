@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -26,7 +25,6 @@ from .runs import (
     numbers_of,
     obstacle,
     run_twin,
-    windows,
     with_machine,
 )
 from .twin import twin
@@ -66,14 +64,6 @@ class EventPeaks:
     static: EventNumbers = part("with one inertia")
 
 
-@dataclass(frozen=True)
-class TwinTurns:
-    """What a figure needs: the drive with the twin, and whole turns of its runs."""
-
-    drive: Drive
-    runs: TwinRuns
-
-
 @result
 class StaticInertiaFindings(Findings):
     """The duty with each model of the load, and the other choice."""
@@ -92,12 +82,15 @@ class StaticInertiaFindings(Findings):
         "relative deviation of each number from that of the machine, by model", unit="1", kind="percent"
     )
     events: Mapping[str, EventPeaks] = part("peaks of the events, by name")
-    residual: float = quantity("1", "energy residual of the runs with one inertia over the energy moved")
+    residual: float = quantity(
+        "1",
+        "energy residual of start-up and steady running with one inertia over the energy moved, the largest",
+    )
     choice: OtherChoice | None = part(
         "the drive that is chosen with one inertia; none where the file gives the motor"
     )
     no_choice: str = part("why there is no other choice, where the search or its trial failed; else empty")
-    turns: TwinTurns | None = None
+    runs: TwinRuns
 
     def remark(self, study: StudyRecord) -> None:
         """The warning where another drive would have been chosen."""
@@ -143,10 +136,7 @@ class StaticInertiaAnalysis(Analysis):
             study.note(KIND, "The duty could not be run with one inertia: {why}.", why=str(error))
             return None
         assert study.started is not None
-        steady, start = windows(
-            replace(work.rig, fed_from=None), study.runs["start_up"], study.started.steady_from
-        )
-        numbers = numbers_of(steady, start)
+        numbers = numbers_of(*study.started.windows)
         choice, no_choice = choose_other(study, mean, work)
         return StaticInertiaFindings(
             speed=operation.crank_speed,
@@ -170,7 +160,7 @@ class StaticInertiaAnalysis(Analysis):
             residual=runs.residual,
             choice=choice,
             no_choice=no_choice,
-            turns=TwinTurns(rig.drive, runs),
+            runs=runs,
         )
 
 

@@ -3,18 +3,15 @@ have been chosen, and a turn."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
-from typing import Any
 
-import numpy as np
 import xarray as xr
 
 from ...core.quantities import Layout
 from ...report import blocks as b
 from ...report import figure as fig
 from ...report.lines import Line
-from ...report.turn import angle_axis
+from ...report.turn import angle_axis, last_turn
 from ...study.drive import Drive
 from ...study.readings import crank_motion
 from ...study.record import StudyRecord
@@ -42,19 +39,14 @@ def answer(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     findings = StaticInertiaFindings.found_in(study)
     if findings is None or (findings.choice is not None and findings.choice.differs):
         return
-    text = (
-        "A sizing program with one inertia, {static_inertia.inertia.mean} at the {driver}, and no terms of inertia "
-        "in the torque"
+    same = "" if findings.choice is None else " would have chosen the same drive; it"
+    yield b.Text(
+        s.line(
+            "A sizing program with one inertia, {static_inertia.inertia.mean} at the {driver}, and no terms of "
+            f"inertia in the torque{same} takes {{static_inertia.static.gear_torque_rms}} RMS at the output of the "
+            "gear, where the machine takes {static_inertia.machine.gear_torque_rms}."
+        )
     )
-    if findings.choice is not None:
-        text += " would have chosen the same drive;"
-    text += (
-        " takes {static_inertia.static.gear_torque_rms} RMS at the output of the gear for "
-        "{static_inertia.machine.gear_torque_rms}."
-    )
-    if findings.choice is not None:
-        text = text.replace("; takes", "; it takes")
-    yield b.Text(s.line(text))
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
@@ -66,7 +58,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
             "load as one number. Here this drive runs with the same weights, processing and friction and the mean "
             "inertia {static_inertia.inertia.mean}; the inertia of the machine goes from "
             "{static_inertia.inertia.least} to {static_inertia.inertia.largest} at the {driver}. The torque of the "
-            "load is without terms of inertia, or has those of a constant speed of {static_inertia.speed:4}."
+            "load is without terms of inertia, or has the terms at a constant speed of {static_inertia.speed:4}."
         ),
         "lead",
         "long",
@@ -76,8 +68,8 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         s.line(
             "RMS torque at the {driver} over a turn at constant speed, without a motor: "
             "{static_inertia.constant_speed.static} without the terms of inertia, "
-            "{static_inertia.constant_speed.machine} with them. Energy residual of the runs with one inertia: at "
-            "most {static_inertia.residual} of the energy moved."
+            "{static_inertia.constant_speed.machine} with them. Energy residual of start-up and steady running "
+            "with one inertia: at most {static_inertia.residual} of the energy moved."
         ),
         "note",
         "long",
@@ -162,14 +154,18 @@ def _choice(s: b.Source, findings: StaticInertiaFindings) -> Iterator[b.Block]:
         yield b.Text("Both choose the same drive.", "note", "long")
         return
     yield b.Text(trial_words(choice), "note", "long")
-    columns = (("checks", choice.missed), ("own_checks", choice.own_missed))
-    names = dict.fromkeys((*choice.checks, *choice.own_checks))
+    columns = (
+        ("checks", choice.checks, choice.missed),
+        ("own_checks", choice.own_checks, choice.own_missed),
+    )
     checks = []
-    for name in names:
+    for name in {**choice.checks, **choice.own_checks}:
         of = "checks" if name in choice.checks else "own_checks"
-        check = s.words(f"{_ROOT}.choice.{of}.{name}.title")
-        cells = (_check(s, f"{_ROOT}.choice.{key}", name, name in missed) for key, missed in columns)
-        checks.append(b.TableRow((check, *cells)))
+        cells = (
+            s.check(f"{_ROOT}.choice.{key}.{name}", name in missed) if name in its else "-"
+            for key, its, missed in columns
+        )
+        checks.append(b.TableRow((s.words(f"{_ROOT}.choice.{of}.{name}.title"), *cells)))
     heads = b.heads(
         "share of each limit that is used",
         s.line("{static_inertia.choice.static.motor} in the machine"),
@@ -178,32 +174,19 @@ def _choice(s: b.Source, findings: StaticInertiaFindings) -> Iterator[b.Block]:
     yield b.Table(tuple(checks), heads, title="Each drive by the other inertia", form="long")
 
 
-def _check(s: b.Source, path: str, name: str, over: bool) -> b.Cell:
-    checks = b.at(s.result, path)
-    if name not in checks:
-        return "-"
-    path, check = f"{path}.{name}", checks[name]
-    none = "none permitted" if "forbidden" in check else "no value"
-    used = s.number(f"{path}.utilisation", none=none, over=over)
-    if "forbidden" in check:
-        return b.Share(used, s.words(f"{path}.forbidden"))
-    return b.Share(used, s.line(f"{{{path}.value}} of {{{path}.limit}}") if "value" in check else ())
-
-
 def _figure(study: StudyRecord, findings: StaticInertiaFindings) -> fig.Figure:
-    turns = findings.turns
-    assert turns is not None
+    runs = findings.runs
     models: list[tuple[str, Drive, xr.Dataset]] = [
         ("J over the angle", study.drive, study.steady),
-        ("one J, without terms of inertia", turns.drive, turns.runs.turns),
-        ("one J, with terms at constant speed", turns.drive, turns.runs.turns_with_terms),
+        ("one J, without terms of inertia", runs.drive, runs.turns),
+        ("one J, with terms at constant speed", runs.drive, runs.turns_with_terms),
     ]
     torque: list[fig.Item] = []
     speed: list[fig.Item] = []
     for look, (name, drive, run) in enumerate(models):
         angle, w = crank_motion(drive, run)
-        torque.append(fig.Curve(name, *_last_turn(angle, gear_torque(drive, run)), look))
-        speed.append(fig.Curve(name, *_last_turn(angle, w), look, in_legend=False))
+        torque.append(fig.Curve(name, *last_turn(angle, gear_torque(drive, run)), look))
+        speed.append(fig.Curve(name, *last_turn(angle, w), look, in_legend=False))
     x = angle_axis(study)
     return fig.Figure(
         "static-inertia",
@@ -216,12 +199,3 @@ def _figure(study: StudyRecord, findings: StaticInertiaFindings) -> fig.Figure:
         file=PICTURE,
         heights=(1.3, 0.9),
     )
-
-
-def _last_turn(angle: Any, y: Any) -> tuple[Any, Any]:
-    """The last turn of a run over the crank angle from 0 to 2 pi."""
-    turn = 2.0 * math.pi
-    last = angle > angle[-1] - turn
-    place = angle[last] % turn
-    order = np.argsort(place)
-    return place[order], y[last][order]

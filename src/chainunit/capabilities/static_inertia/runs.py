@@ -3,7 +3,7 @@ the events of a study."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,12 +16,12 @@ from ...mechanism.models import InverseMachine
 from ...study.drive import Drive
 from ...study.event import Event
 from ...study.measures import read_measure, same_measure
-from ...study.readings import crank_motion, only_whole_turns
+from ...study.readings import crank_angle
 from ...study.rig import Rig, worst_residual
-from ...study.start_up import PATIENCE, StartUp, start_up
+from ...study.start_up import StartUp, start_up, until_settled
 from ...study.torques import at_gear, gear_torque
-from ...study.transients import follow, lead_times
-from ...study.window import Phase, Window, is_settled, whole_turns
+from ...study.transients import follow_each
+from ...study.window import Window, whole_turns
 from ...system import Profile, Simulation
 from ...work.progress import Progress
 from .twin import SPEED
@@ -65,10 +65,11 @@ class EventNumbers:
 
 @dataclass(frozen=True)
 class TwinRuns:
-    """The runs of a drive whose machine has one inertia: whole `turns` of steady running without terms of inertia,
-    and `turns_with_terms`; the numbers of both, those of events by name, and the largest energy residual of its runs
-    over the energy moved."""
+    """The runs of a `drive` whose machine has one inertia: whole `turns` of steady running without terms of inertia,
+    and `turns_with_terms`; the numbers of both, the numbers of events by name, and the largest energy residual of
+    start-up and steady running, with either, over the energy moved."""
 
+    drive: Drive
     turns: xr.Dataset
     turns_with_terms: xr.Dataset
     numbers: DutyNumbers
@@ -110,16 +111,6 @@ def numbers_of(steady: Window, start: Window | None) -> DutyNumbers:
     )
 
 
-def windows(rig: Rig, run: xr.Dataset, steady_from: float) -> tuple[Window, Window]:
-    """The windows of steady running and of the start of a `run` from rest."""
-    drive, operation = rig.drive, rig.operation
-    sides = drive.machine.loaded_sides(operation.feed)
-    turns = whole_turns(drive, run.sel(time=slice(steady_from, None)), operation.run.turns)
-    steady = Window(Phase.STEADY, turns, drive, sides, operation.crank_speed)
-    before = run.sel(time=slice(None, float(turns["time"][0])))
-    return steady, Window(Phase.START_UP, before, drive, sides, operation.crank_speed, steady=steady)
-
-
 def event_numbers(rig: Rig, run: xr.Dataset) -> EventNumbers:
     """The peaks of a run from the begin of its event on."""
     current = np.abs(run[f"motor.{rig.drive.motor.current}"].values)
@@ -143,29 +134,25 @@ def run_twin(rig: Rig, events: Sequence[Event], progress: Progress) -> TwinRuns:
     with rig.from_rest() as simulation:
         started = start_up(rig, simulation, progress, {})
         rig, begin = started.rig, simulation.save()
-        shares = [worst_residual(rig.residuals(started.run))]
-        steady, start = windows(rig, started.run, started.steady_from)
-        angle = float(crank_motion(rig.drive, started.run)[0][-1])
-        own = dict(_events(rig, simulation, angle, steady.speed_mean, events))
-        turns = _with_terms(rig, simulation, begin)
-    with_terms = replace(steady, run=turns)
+        steady, start = started.windows
+        angle = float(crank_angle(rig.drive, started.run)[-1])
+        running = [event for event in events if not event.from_rest]
+        own = {
+            event.name: event_numbers(rig, run)
+            for event, run in follow_each(rig, simulation, running, angle, steady.speed_mean)
+        }
+        last = _with_terms(rig, simulation, begin)
+    with_terms = replace(steady, run=whole_turns(rig.drive, last, rig.operation.run.turns))
     own |= {event.name: _loaded_start(rig, event, started) for event in events if event.from_rest}
     return TwinRuns(
-        steady.turns, turns, numbers_of(steady, start), numbers_of(with_terms, None), own, max(shares)
+        rig.drive,
+        steady.run,
+        with_terms.run,
+        numbers_of(steady, start),
+        numbers_of(with_terms, None),
+        own,
+        max(worst_residual(rig.residuals(run)) for run in (started.run, last)),
     )
-
-
-def _events(
-    rig: Rig, simulation: Simulation, angle: float, speed: float, events: Sequence[Event]
-) -> Iterator[tuple[str, EventNumbers]]:
-    """The peaks of each event of a running drive from the saved state on, whose crank is then at the `angle` [rad]
-    and has the mean `speed` [rad/s]."""
-    running = [event for event in events if not event.from_rest]
-    begin = simulation.time
-    for event, lead in zip(running, lead_times(rig, simulation, running, angle, speed), strict=True):
-        at = begin + lead
-        run = follow(rig, simulation, event, at, at + event.time_followed(rig.operation.turn)).run
-        yield event.name, event_numbers(rig, run.sel(time=slice(at, None)))
 
 
 def _loaded_start(rig: Rig, event: Event, started: StartUp) -> EventNumbers:
@@ -175,17 +162,15 @@ def _loaded_start(rig: Rig, event: Event, started: StartUp) -> EventNumbers:
 
 
 def _with_terms(rig: Rig, simulation: Simulation, begin: float) -> xr.Dataset:
-    """Whole turns of steady running with the terms of inertia, from the saved state at the time `begin` [s] on."""
-    operation, drive = rig.operation, rig.drive
+    """Steady running with the terms of inertia, from the saved state at the time `begin` [s] on: the run whose turns
+    close."""
+    operation = rig.operation
     speed, turn = operation.crank_speed, operation.turn
     simulation.restore()
     comes = Profile(0.0, ((begin, _COMES * turn, speed),))
     simulation.signals = {**rig.signals(), f"machine.{SPEED}": comes}
     settles, wanted = _COMES + operation.run.settle_turns, operation.run.turns
     simulation.run(begin + settles * turn, rig.step)
-    stop = simulation.time
-    while True:
-        run = simulation.run(simulation.time + (wanted + 0.1) * turn, rig.step)
-        turns = only_whole_turns(drive, run, wanted)
-        if turns is None or is_settled(drive, turns) or simulation.time > stop + PATIENCE * turn:
-            return run if turns is None else turns
+    length = wanted + 0.1
+    *_, last = until_settled(rig, simulation, simulation.time + length * turn, length, wanted)
+    return last

@@ -29,9 +29,9 @@ from ...core.engines import slope
 from ...core.model import Making, Part, keep
 from ...core.ports import PortSlopes
 from ...core.quantities import Value, declaration, declared_class, quantity
-from ...groups.body import body_on
+from ...groups.body import reflected_inertia
 from ...machines.machine import Machine
-from ...mechanism.machine import LiftedMechanism, MachineState
+from ...mechanism.machine import LiftedMechanism, MachineState, bodies_on
 from ...mechanism.models import InverseMachine, slopes
 
 INERTIA, SPEED = "fixed_inertia", "inertia_speed"
@@ -126,10 +126,6 @@ def _squares(p: Any, u: Any) -> Any:
 def _second(s: MachineState) -> Any:
     """The second derivative of the inertia by the crank angle [kg m2/rad2]."""
     links, pins = s.m.third_derivatives()
-    lifted = LiftedMechanism(s.m, links, pins)
-    linkage, total = s.m.linkage, 0.0
-    for group in (linkage.driver, *linkage.groups):
-        for bar in group.bars:
-            if bar.mass is not None:
-                total = total + slope(body_on(lifted.links[bar.name], bar.mass).inertia()[1])
-    return total
+    bodies = bodies_on(LiftedMechanism(s.m, links, pins).links, s.m.linkage)
+    _, by_angle = reflected_inertia(bodies.values())
+    return slope(by_angle)

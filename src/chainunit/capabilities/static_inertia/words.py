@@ -38,7 +38,7 @@ def missed_words(checks: Mapping[str, Check], names: Sequence[str], margin: floa
 
 
 def trial_words(choice: OtherChoice) -> str:
-    """The trial of the other drive in the machine, and that of the drive of the study with one inertia, in
+    """The trial of the other drive in the machine, and the trial of the drive of the study with one inertia, in
     sentences."""
     said = []
     if choice.own_missed and not choice.own.insufficient:

@@ -12,7 +12,7 @@ from ...core.errors import InputError
 from ...fmu.description import Interface
 from ...machines.api import ChainUnitMachine
 from ...machines.chain_unit import SIDES, ChamberForces, Feed, SideLoads
-from ...study.organ_limits import slack_and_mode
+from ...study.organ_limits import has_empty_side, slack_and_mode
 from ...study.verdict import speed_limits
 from .experiments import StatePoint
 from .rerun import TimeTable, UnpackedFmu
@@ -112,7 +112,7 @@ def _limits(fmu: UnpackedFmu) -> Iterator[dict[str, Any]]:
             ("chain_resonance", mode, "crank speed at the lowest natural frequency of an organ as a chain")
         ]
         if f"{prefix}left.theta_1" not in fmu.variables:
-            own += _of_two_bars(slack, mode, empty=0.0 in (feed.left.material_mass, feed.right.material_mass))
+            own += _of_two_bars(slack, mode, empty=has_empty_side(feed))
         masses = {f"{prefix}{side}.material_mass": sides[side].material_mass for side in SIDES}
         for name, value, words in own:
             yield {"name": name, "unit": "rad/s", "value": _finite(value), "with": masses, "meaning": words}
