@@ -22,6 +22,7 @@ from chainunit.capabilities.vouching.domain import domain
 from chainunit.capabilities.vouching.integrity import integrity
 from chainunit.capabilities.vouching.verify import _difference, verify
 from chainunit.fmu.backends import export
+from chainunit.fmu.reference import RELATED
 from chainunit.machines.accelerator import Accelerator
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.models import MODELS
@@ -110,7 +111,7 @@ def test_a_certified_fmu_holds(made):
 def test_other_members_stay_to_the_bit_and_importers_take_it(made, data, members):
     plain = archive.contents((made / "plain.fmu").read_bytes()).members
     changed = {name for name, content in plain.items() if members[name] != content}
-    assert changed == {documents.RELATED}
+    assert changed == {RELATED}
     added = set(members) - set(plain)
     assert all(name.startswith(manifest.OWN) or name == documents.SRMD for name in added)
     assert list(validate_fmu(str(made / "it.fmu"))) == []
@@ -183,7 +184,7 @@ def test_evidence_holds_the_numbers_of_the_sentences(members):
 
 def test_the_forms_of_the_standards(made, data, members):
     """Roles and places by FMI-LS-REF; SRMD with the checksum of the file beside it; CycloneDX."""
-    root = ElementTree.fromstring(members[documents.RELATED])
+    root = ElementTree.fromstring(members[RELATED])
     roles = {node.get("source"): node.get("role") for node in root.findall("Related")}
     assert {roles[name] for name in roles if name.startswith("vouching/")} == {
         "report", "meta-data", "signature", "experiment/validation"
@@ -235,7 +236,7 @@ def test_the_manifest_of_fmi_ls_ref_is_valid_by_its_schema(members, tmp_path):
         text = re.sub(r'(schemaLocation=")https://[^"]*/', r"\1", file.read_text("utf-8"))
         (tmp_path / file.name).write_text(text, "utf-8")
     schema = xmlschema.XMLSchema10(tmp_path / "fmi3LayeredStandardReferenceManifest.xsd")
-    text = members[documents.RELATED].decode()
+    text = members[RELATED].decode()
     assert list(schema.iter_errors(text)) == []
     assert list(schema.iter_errors(text.replace('role="report"', 'role="reports"', 1)))
 

@@ -15,6 +15,7 @@ from ...core.model import Model
 from ...fmu.description import Interface, generation_time
 from ...fmu.pack import interface_of
 from ...fmu.recipe import recipes
+from ...fmu.reference import RELATED
 from ...models import MODELS
 from ...study.package import with_rods
 from . import documents as docs
@@ -76,10 +77,10 @@ def members_of(file: Path) -> dict[str, bytes]:
 def without_certification(members: Mapping[str, bytes]) -> dict[str, bytes]:
     """The members as they were before an earlier certification."""
     own = {n: x for n, x in members.items() if not n.startswith(f"{OWN}/") and n != docs.SRMD}
-    if len(own) < len(members) and docs.RELATED in own:
-        before = docs.related(own.pop(docs.RELATED), ())
+    if len(own) < len(members) and RELATED in own:
+        before = docs.related(own.pop(RELATED), ())
         if before is not None:
-            own[docs.RELATED] = before
+            own[RELATED] = before
     return own
 
 
@@ -211,7 +212,7 @@ def _signed(
     members[docs.REPORT] = ("\n".join(report) + "\n").encode()
     members[docs.SRMD] = docs.srmd(title, classifications(data, limits), __version__)
     there = [*members, docs.SBOM, MANIFEST, SIGNATURE]
-    members[docs.RELATED] = docs.related(members.get(docs.RELATED), there) or b""
+    members[RELATED] = docs.related(members.get(RELATED), there) or b""
     members[docs.SBOM] = json_bytes(docs.sbom(title, __version__, members))
     head = {"kind": kind, "name": title, "version": __version__, "time": generation_time()}
     return Certified(signed(members, key, **head), words)

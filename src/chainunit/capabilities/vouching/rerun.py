@@ -17,8 +17,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core.errors import InputError, RunError, printable
-from ...core.quantities import Type, written
+from ...core.quantities import Type
 from ...core.temporary_folders import scratch
+from ...fmu.reference import csv_bytes
 from .archive import unsafe
 
 _TYPES: Mapping[str, Type] = {
@@ -285,13 +286,7 @@ def table(content: bytes) -> TimeTable:
 
 def table_bytes(of: TimeTable, types: Mapping[str, Type]) -> bytes:
     """The table in CSV."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["time", *of.names])
-    kinds = [types[name] for name in of.names]
-    for t, row in zip(of.time, of.values, strict=True):
-        writer.writerow([repr(float(t)), *(written(float(x), k) for x, k in zip(row, kinds, strict=True))])
-    return text.getvalue().encode()
+    return csv_bytes(["time", *of.names], np.column_stack([of.time, of.values]), types)
 
 
 def stepped(
