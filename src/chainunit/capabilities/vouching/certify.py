@@ -35,10 +35,11 @@ Told = Callable[[str], Any]
 
 
 class Certified(NamedTuple):
-    """A certified file: its content, and sentences on what it carries."""
+    """A certified file: its content, sentences on what it carries, and the same as entries of its SRMD."""
 
     data: bytes
     words: list[str]
+    entries: dict[str, dict[str, str]]
 
 
 def sources_hash() -> str:
@@ -210,12 +211,13 @@ def _signed(
         *(f"- {line}" for line in words),
     ]
     members[docs.REPORT] = ("\n".join(report) + "\n").encode()
-    members[docs.SRMD] = docs.srmd(title, classifications(data, limits), __version__)
+    entries = classifications(data, limits)
+    members[docs.SRMD] = docs.srmd(title, entries, __version__)
     there = [*members, docs.SBOM, MANIFEST, SIGNATURE]
     members[RELATED] = docs.related(members.get(RELATED), there) or b""
     members[docs.SBOM] = json_bytes(docs.sbom(title, __version__, members))
     head = {"kind": kind, "name": title, "version": __version__, "time": generation_time()}
-    return Certified(signed(members, key, **head), words)
+    return Certified(signed(members, key, **head), words, entries)
 
 
 def _require_own(fmu: UnpackedFmu, name: str) -> None:
@@ -390,7 +392,7 @@ def classifications(data: Mapping[str, Any], limits: Mapping[str, Any] | None) -
     return found
 
 
-def write(made: Certified, file: Path, name: str) -> Path:
+def write(made: Certified, file: Path) -> Path:
     """Write a certified file, and its SRMD with checksum beside it; returns the place of the SRMD.
 
     Raises
@@ -401,10 +403,6 @@ def write(made: Certified, file: Path, name: str) -> Path:
     beside = place_beside(file)
     with atomic_file(file) as part:
         part.write_bytes(made.data)
-    inner = contents(made.data).members
-    data = json.loads(inner[docs.EVIDENCE])
-    limits = json.loads(inner[docs.DOMAIN]) if docs.DOMAIN in inner else None
-    entries = classifications(data, limits)
     with atomic_file(beside) as part:
-        part.write_bytes(docs.srmd(name, entries, __version__, (file.name, made.data)))
+        part.write_bytes(docs.srmd(file.name, made.entries, __version__, (file.name, made.data)))
     return beside

@@ -123,7 +123,7 @@ def _system(found: Integrity, stated: Mapping[str, Any], name: str, run: bool, t
         if how != "certified":
             found.add(None, printable(member), "is no FMU of this package; its hash alone is signed")
             continue
-        inner = integrity(found.members[member], found.public)
+        inner = integrity(found.members[member], found.public, "the key of the package")
         _judge(inner, f"{name}: {member}", None, run, told)
         for each in inner.findings:
             found.add(each.holds, f"{printable(member)}, {each.topic}", each.words)
