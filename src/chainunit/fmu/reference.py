@@ -24,8 +24,8 @@ from ..core.quantities import Quantity, Type, written
 from .description import Interface
 from .pack import xml_bytes
 
-_STANDARD = "org.fmi-standard.fmi-ls-ref"
-REFERENCE = f"extra/{_STANDARD}"
+STANDARD = "org.fmi-standard.fmi-ls-ref"
+REFERENCE = f"extra/{STANDARD}"
 RELATED = f"{REFERENCE}/fmi-ls-manifest.xml"
 """The manifest of the layered standard, which tells the role of each related file."""
 INPUTS, STEPPED, READ = "in", "co_simulation", "set_then_read"
@@ -78,7 +78,7 @@ def related_files(content: bytes | None = None) -> Element:
         return ElementTree.fromstring(content)
     # the text of 1.0.0-beta.1 fixes this version
     said = {
-        "name": _STANDARD,
+        "name": STANDARD,
         "version": "1.0.0-alpha.1",
         "description": "Layered Standard providing information on related files included in an FMU.",
     }

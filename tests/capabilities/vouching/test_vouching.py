@@ -22,7 +22,7 @@ from chainunit.capabilities.vouching.domain import domain
 from chainunit.capabilities.vouching.integrity import integrity
 from chainunit.capabilities.vouching.verify import _difference, verify
 from chainunit.fmu.backends import export
-from chainunit.fmu.reference import RELATED
+from chainunit.fmu.reference import REFERENCE, RELATED
 from chainunit.machines.accelerator import Accelerator
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.models import MODELS
@@ -190,7 +190,7 @@ def test_the_forms_of_the_standards(made, data, members):
         "report", "meta-data", "signature", "experiment/validation"
     }  # fmt: skip
     for source in roles:
-        inside = f"{manifest.LS_REF}/{source}" if not source.startswith("../") else f"extra/{source[3:]}"
+        inside = f"{REFERENCE}/{source}" if not source.startswith("../") else f"extra/{source[3:]}"
         assert inside in members
     beside = ElementTree.fromstring((made / "it.srmd").read_bytes())
     inner = ElementTree.fromstring(members[documents.SRMD])
@@ -651,6 +651,10 @@ def test_an_ssp_package_with_its_fmus(made, tmp_path):
     run = chainunit("verify", "a.ssp", "--key", made / "chainunit.key.pub", cwd=tmp_path)
     assert run.returncode == 0
     assert re.search(r"holds  resources/DcMotor\.fmu, reference experiment", run.stdout)
+    assert re.search(r"holds  signature +holds, by the expected key", run.stdout)
+    assert re.search(
+        r"holds  resources/DcMotor\.fmu, signature +holds, by the key of the package", run.stdout
+    )
     assert re.search(r"note   resources/foreign\.fmu +is no FMU of this package", run.stdout)
     after = archive.contents(first).members
     assert all(after[n] == x for n, x in read.items() if not n.endswith(".fmu"))
