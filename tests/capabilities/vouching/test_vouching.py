@@ -835,3 +835,23 @@ def test_the_sources_hash_changes_with_a_source(monkeypatch, tmp_path):
     second = certify.sources_hash()
     (copy / "a.py").rename(copy / "b.py")
     assert len({first, second, certify.sources_hash()}) == 3 and (root / "capabilities").is_dir()
+
+
+def test_a_certificate_made_without_the_model_holds_for_whoever_has_it(own, tmp_path):
+    """It has no conditions of the model, and none are looked for; the file of another model is refused."""
+    from chainunit.machines.linkages.file import read_linkage
+
+    model = read_linkage(LINKAGES / "slider_crank_press.toml")
+    export(model, tmp_path / "it.fmu")
+    members = certify.members_of(tmp_path / "it.fmu")
+    without = certify.certified(members, "it.fmu", own, None, silent)
+    assert any(line.startswith("left out: smooth experiment, energy, points") for line in without.words)
+    for given in (None, model):
+        found = checked(tmp_path, without.data, model=given)
+        assert found["domain"].holds and found["equations"].holds is None
+        assert all(each.holds is not False for each in found.values())
+    with pytest.raises(InputError, match=r"it\.fmu: is no FMU of ChamberForces, or .* --of"):
+        certify.certified(members, "it.fmu", own, ChamberForces, silent)
+    (tmp_path / "it.fmu").write_bytes(certify.certified(members, "it.fmu", own, model, silent).data)
+    found = {each.topic: each for each in verify(tmp_path / "it.fmu", None, ChamberForces, told=silent)}
+    assert found["equations"].words == "the model of the file that --of names is not that of the FMU"

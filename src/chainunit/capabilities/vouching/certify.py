@@ -154,6 +154,10 @@ def _certified_fmu(
     with unpacked(members, name) as fmu:
         _require_own(fmu, name)
         interface = interface_for(fmu, model)
+        if model and interface is None:
+            raise InputError(
+                f"{name}: is no FMU of {model.name}, or its start values make none; name another file by --of"
+            )
         found = evidence(fmu, interface, told)
         given = [t for t in (found.tables and found.tables[0], found.given) if t]
         limits = domain(fmu, interface, found.points, given)
@@ -277,7 +281,10 @@ def evidence(fmu: UnpackedFmu, interface: Interface | None, told: Told) -> Evide
     if tables:
         data["reference"] = _checked(ex.rerun_reference(fmu, tables), tolerance, "its reference results")
     if interface is None:
-        words = "the model is not one of this package by its name; certify its study file or linkage file"
+        words = (
+            "the model is not one of this package by its name; certify its study file or linkage file, or name "
+            "it by --of"
+        )
         data["left_out"] = f"smooth experiment, energy, points: {words}"
         return Evidence(data, tables, None, None, [], tolerance)
     told(f"{fmu.name}: smooth experiment")

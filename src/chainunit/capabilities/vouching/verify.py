@@ -150,6 +150,7 @@ class _Experiments:
     ) -> None:
         self._found, self._fmu, self._stated, self._told = found, fmu, stated, told
         self._tolerance = float(stated["tolerance"])
+        self._model = model
         self._interface = interface_for(fmu, model)
         self._points = [ex.StatePoint(**each) for each in stated.get("points", {}).get("at", ())]
 
@@ -225,7 +226,11 @@ class _Experiments:
             words = self._stated.get("left_out", "no points were certified")
             self._found.add(None, "equations", printable(words, 300))
         elif self._interface is None:
-            words = "the model is not one of the package here by its name; name its file by --of"
+            words = (
+                "the model of the file that --of names is not that of the FMU"
+                if self._model
+                else "the model is not one of the package here by its name; name its file by --of"
+            )
             self._found.add(None, "equations", words)
         else:
             gap = ex.recompute_points(self._fmu, self._interface.model, self._points)
@@ -234,7 +239,9 @@ class _Experiments:
     def _domain(self) -> None:
         content = self._fmu.file(docs.DOMAIN)
         stated = json.loads(content or b"null")
-        if self._interface is None:
+        # a certificate that was made without the model has no conditions of it
+        has_model = "left_out" not in self._stated
+        if has_model and self._interface is None:
             self._found.add(
                 None, "domain", f"{len(stated['variables'])} variables, as certified; not computed again"
             )
@@ -242,7 +249,7 @@ class _Experiments:
         tables = ex.reference_tables(self._fmu)
         smooth = self._fmu.file(SMOOTH_IN)
         given = [t for t in (tables and tables[0], table(smooth) if smooth else None) if t]
-        own = domain(self._fmu, self._interface, self._points, given)
+        own = domain(self._fmu, self._interface if has_model else None, self._points, given)
         different = _difference(stated, json.loads(json.dumps(own)), "")
         words = (
             f"{len(own['variables'])} variables and {len(own['limits'])} limits are computed again, the same"
