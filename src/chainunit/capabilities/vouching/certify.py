@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
 SMOOTH_IN, SMOOTH_OUT = f"{OWN}/smooth_in.csv", f"{OWN}/smooth_out.csv"
-EVERY = 40
-"""One of so many rows of the smooth experiment is kept as a result."""
 Told = Callable[[str], Any]
 
 
@@ -290,10 +288,9 @@ def evidence(fmu: UnpackedFmu, interface: Interface | None, told: Told) -> Evide
     told(f"{fmu.name}: smooth experiment")
     given = ex.smooth_inputs(interface)
     outputs = [s.name for s in interface.signals_of("output")]
-    columns = [*outputs, *(n for n in ("tau", "w") if n in fmu.variables and n not in outputs)]
-    found, run = ex.convergence(fmu, given, columns)
+    found, run = ex.convergence(fmu, given, ex.with_shaft(fmu, outputs))
     data["convergence"] = found._asdict()
-    balance = ex.balance_of(columns)
+    balance = ex.balance_of(run.names)
     if balance:
         missing, flow = ex.energy_residual(run, balance)
         data["energy"] = {"missing": missing, "flow": flow, **balance._asdict()}
@@ -315,9 +312,7 @@ def evidence(fmu: UnpackedFmu, interface: Interface | None, told: Told) -> Evide
         ex.POWER_GAP,
         "its powers do not balance: the gap is {:.2g} of their size, allowed is {:g}",
     )
-    own = [columns.index(name) for name in outputs]
-    results = TimeTable(tuple(outputs), run.time[::EVERY], run.values[::EVERY, own])
-    return Evidence(data, tables, given, results, points, tolerance)
+    return Evidence(data, tables, given, ex.kept(run, outputs), points, tolerance)
 
 
 def _checked(found: ex.Deviation, tolerance: float, what: str) -> dict[str, Any]:

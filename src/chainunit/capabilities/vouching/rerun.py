@@ -306,7 +306,11 @@ def stepped(
             behind.append(running.get(outputs))
             if k + 1 < len(times):
                 running.step(float(times[k]), float(times[k + 1] - times[k]))
-    return tuple(TimeTable(tuple(outputs), times, np.array(each, float)) for each in (before, behind))  # type: ignore[return-value]
+    names = tuple(outputs)
+    return (
+        TimeTable(names, times, np.array(before, float)),
+        TimeTable(names, times, np.array(behind, float)),
+    )
 
 
 def sizes(of: TimeTable, fmu: UnpackedFmu) -> Any:

@@ -16,11 +16,11 @@ from ...core.files import regular_bytes
 from ...core.model import Model
 from . import documents as docs
 from . import experiments as ex
-from .certify import EVERY, SMOOTH_IN, SMOOTH_OUT, interface_for, sources_hash, told_convergence
+from .certify import SMOOTH_IN, SMOOTH_OUT, interface_for, sources_hash, told_convergence
 from .domain import domain
 from .integrity import Finding, Integrity, integrity
 from .manifest import Manifest, sha3
-from .rerun import NoLibraryError, TimeTable, UnpackedFmu, deviation, table, unpacked
+from .rerun import NoLibraryError, UnpackedFmu, deviation, table, unpacked
 
 Told = Callable[[str], Any]
 _GROWTH = 4.0
@@ -196,11 +196,9 @@ class _Experiments:
             return
         self._told("smooth experiment")
         given, wanted = (table(self._fmu.file(name) or b"") for name in (SMOOTH_IN, SMOOTH_OUT))
-        columns = [*wanted.names]
-        columns += [n for n in ("tau", "w") if n in self._fmu.variables and n not in columns]
-        own, run = ex.convergence(self._fmu, given, columns)
-        kept = TimeTable(wanted.names, run.time[::EVERY], run.values[::EVERY, : len(wanted.names)])
-        self._add("smooth experiment", ex.Deviation(*deviation(kept, wanted, self._fmu)), "the FMU here")
+        own, run = ex.convergence(self._fmu, given, ex.with_shaft(self._fmu, wanted.names))
+        gap = deviation(ex.kept(run, wanted.names), wanted, self._fmu)
+        self._add("smooth experiment", ex.Deviation(*gap), "the FMU here")
         stated = self._stated["convergence"]
         holds = own.error <= _GROWTH * stated["error"] + 1e-10
         words = f"{told_convergence(own._asdict())}; certified with an error of {stated['error']:.2g}"
