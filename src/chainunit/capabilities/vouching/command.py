@@ -11,13 +11,12 @@ from ...core.errors import InputError
 from ...core.files import ResultKind
 from ...report.console import show_remark, study_file, terminal_console
 
+_KEY = Path("chainunit.key")
 _MODEL = "Study file or linkage file (TOML) of the FMU, where its model is no packaged one."
 
 
 def key(
-    output: Annotated[Path, typer.Option("-o", "--output", help="File of the private key.")] = Path(
-        "chainunit.key"
-    ),
+    output: Annotated[Path, typer.Option("-o", "--output", help="File of the private key.")] = _KEY,
 ) -> None:
     """Make a key for signatures: the private one, which stays with you, and the public one to hand on."""
     from .keys import make_key
@@ -35,7 +34,7 @@ def certify(
     ],
     key_file: Annotated[
         Path, typer.Option("--key", help="File of the private key, by chainunit key.")
-    ] = Path("chainunit.key"),
+    ] = _KEY,
     output: Annotated[
         Path | None,
         typer.Option(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +16,12 @@ from ...core.files import regular_bytes
 from ...core.model import Model
 from . import documents as docs
 from . import experiments as ex
-from .certify import SMOOTH_IN, SMOOTH_OUT, interface_for, sources_hash, told_convergence
+from .certify import SMOOTH_IN, SMOOTH_OUT, Told, interface_for, sources_hash, told_convergence
 from .domain import domain
 from .integrity import Finding, Integrity, integrity
 from .manifest import Manifest, sha3
 from .rerun import NoLibraryError, UnpackedFmu, deviation, table, unpacked
 
-Told = Callable[[str], Any]
 _GROWTH = 4.0
 """An error on this machine may be so many times the stated one: rounding is another with another library of C."""
 
