@@ -2,7 +2,7 @@
 
 They are the results of a Co-Simulation master that holds its inputs over a step, computed by the Python kernels.
 There are two files of them, as masters read outputs at different moments. The files lie in the folder of the layered
-standard FMI-LS-REF (1.0.0-alpha.1), whose manifest describes each file.
+standard FMI-LS-REF (1.0.0-beta.1), whose manifest describes each file.
 """
 
 from __future__ import annotations
@@ -11,8 +11,9 @@ import csv
 import io
 import logging
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
+from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement, register_namespace
 
 import numpy as np
@@ -25,10 +26,12 @@ from .pack import xml_bytes
 
 STANDARD = "org.fmi-standard.fmi-ls-ref"
 REFERENCE = f"extra/{STANDARD}"
+RELATED = f"{REFERENCE}/fmi-ls-manifest.xml"
+"""The manifest of the layered standard, which tells the role of each related file."""
 INPUTS, STEPPED, READ = "in", "co_simulation", "set_then_read"
 """Endings of the names of the files: inputs; outputs at the end of each step; outputs at its beginning."""
 STEP, ROWS = 0.04, 26  # s
-_MANIFEST = "http://fmi-standard.org/fmi-ls-manifest"
+_NAMESPACE = "http://fmi-standard.org/fmi-ls-manifest"
 _MOST_STEPS = 100_000
 """Largest number of steps of the integrator in one step of the file; at their start values the models take some
 hundred."""
@@ -57,21 +60,29 @@ def reference_results(interface: Interface) -> dict[str, bytes]:
         "Model Exchange, and of Co-Simulation masters that read there, which the FMI standard does not allow",
     }
     types = {s.name: s.variable.type for s in interface.signals}
-    files = {f"{REFERENCE}/{name}_{end}.csv": _csv(*table, types) for end, table in tables.items()}
-    register_namespace("fmi-ls", _MANIFEST)
-    root = Element("fmiReferences")
-    root.set(f"{{{_MANIFEST}}}fmi-ls-name", STANDARD)
-    root.set(f"{{{_MANIFEST}}}fmi-ls-version", "1.0.0-alpha.1")
-    root.set(
-        f"{{{_MANIFEST}}}fmi-ls-description",
-        "Layered Standard providing information on related files included in an FMU.",
-    )
+    files = {f"{REFERENCE}/{name}_{end}.csv": csv_bytes(*table, types) for end, table in tables.items()}
+    root = related_files()
     for end in tables:
         role = "testcase" if end == INPUTS else "result"
         SubElement(
             root, "Related", type="text/csv", source=f"{name}_{end}.csv", role=role, description=words[end]
         )
-    return files | {f"{REFERENCE}/fmi-ls-manifest.xml": xml_bytes(root)}
+    return files | {RELATED: xml_bytes(root)}
+
+
+def related_files(content: bytes | None = None) -> Element:
+    """The root of the manifest of FMI-LS-REF: of that in a file with this content, or of a new one, which names no
+    file yet."""
+    register_namespace("fmi-ls", _NAMESPACE)
+    if content is not None:
+        return ElementTree.fromstring(content)
+    # the text of 1.0.0-beta.1 fixes this version
+    said = {
+        "name": STANDARD,
+        "version": "1.0.0-alpha.1",
+        "description": "Layered Standard providing information on related files included in an FMU.",
+    }
+    return Element("fmiReferences", {f"{{{_NAMESPACE}}}fmi-ls-{key}": text for key, text in said.items()})
 
 
 def _tables(interface: Interface) -> dict[str, tuple[list[str], list[list[float]]]]:
@@ -83,9 +94,7 @@ def _tables(interface: Interface) -> dict[str, tuple[list[str], list[list[float]
         where a value is no finite number, or one step of the file takes more than `_MOST_STEPS` of the integrator.
     """
     model = interface.model
-    p = model.with_derived(
-        MATH, model.parameter_layout.instance([s.start for s in interface.signals_of("parameter")])
-    )
+    p = parameters_at_start(interface)
     inputs = excitation(interface)
     layout = model.state_layout
     tables: dict[str, list[list[float]]] = {INPUTS: [], STEPPED: [], READ: []}
@@ -169,7 +178,16 @@ def _march(interface: Interface, p: Any) -> Any:
     return march
 
 
-def _csv(head: Sequence[str], rows: Sequence[Sequence[float]], types: Mapping[str, Type]) -> bytes:
+def parameters_at_start(interface: Interface) -> Any:
+    """The parameters of the model at their start values, with the values that are derived from them."""
+    model = interface.model
+    return model.with_derived(
+        MATH, model.parameter_layout.instance([s.start for s in interface.signals_of("parameter")])
+    )
+
+
+def csv_bytes(head: Sequence[str], rows: Iterable[Sequence[float]], types: Mapping[str, Type]) -> bytes:
+    """A table in CSV with the exact numbers; a column without a type, as that of the time, has real ones."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(head)
@@ -266,9 +284,7 @@ def _inertia(interface: Interface, torque: str) -> float:
     symbols, derivatives = interface.trace.symbols, interface.trace.derivatives
     speeds = [d for d, v in zip(derivatives, interface.states, strict=True) if v.unit == "rad/s"]
     by = casadi.jacobian(casadi.vertcat(*speeds), symbols[1][model.input_layout.names.index(torque)])
-    p = model.with_derived(
-        MATH, model.parameter_layout.instance([s.start for s in interface.signals_of("parameter")])
-    )
+    p = parameters_at_start(interface)
     u = [s.start for s in interface.signals_of("input")]
     x = layout.values(model.begin(p, model.input_layout.instance(u)))
     at: list[Any] = [model.parameter_layout.values(p), u, x, getattr(p, "derived", [])]

@@ -9,7 +9,8 @@ import math
 import os
 import re
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -28,6 +29,30 @@ Kind = Literal["Co-Simulation", "Model Exchange"]
 """Interface of an FMU."""
 _working_directory = threading.Lock()
 """Locked while fmpy loads a library: all threads of the process share one working directory."""
+
+
+@contextmanager
+def loading() -> Iterator[None]:
+    """Keep the working directory of the process while fmpy loads a library: it changes to the folder of the library,
+    and stays there after an error."""
+    with _working_directory:
+        here = Path.cwd()
+        try:
+            yield
+        finally:
+            os.chdir(here)
+
+
+def fmi2_callbacks(logger: Callable[..., None]) -> Any:
+    """The callbacks of an instance of FMI 2.0, which the caller must keep alive as long as the instance; `logger`
+    takes environment, name, status, category and message."""
+    from fmpy import calloc, fmi2, free
+
+    callbacks = fmi2.fmi2CallbackFunctions()
+    callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(logger)
+    callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(calloc)
+    callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(free)
+    return callbacks
 
 
 class DiscardError(RunError):
@@ -170,7 +195,6 @@ class Instance:
     def __init__(self, fmu: Fmu, name: str, journal: list[str] | None = None) -> None:
         """The messages of the FMU are added to `journal`, which several instances may share: their messages then
         stand in the order of time."""
-        from fmpy import calloc, free
         from fmpy import fmi2 as api
 
         self.fmu = fmu
@@ -185,24 +209,18 @@ class Instance:
                     journal.append(f"{name}: {text}")
                 log.warning("%s: %s", name, text)
 
-        self._callbacks = api.fmi2CallbackFunctions()
-        self._callbacks.logger = api.fmi2CallbackLoggerTYPE(logger)
-        self._callbacks.allocateMemory = api.fmi2CallbackAllocateMemoryTYPE(calloc)
-        self._callbacks.freeMemory = api.fmi2CallbackFreeMemoryTYPE(free)
+        self._callbacks = fmi2_callbacks(logger)
         self._alive = False
-        with _working_directory:
-            here = Path.cwd()
-            try:
+        try:
+            with loading():
                 self._fmi = getattr(api, self._api)(
                     guid=fmu.description.guid,
                     unzipDirectory=fmu.folder,
                     modelIdentifier=fmu.identifier,
                     instanceName=name,
                 )
-            except Exception as error:  # fmpy has no error class of its own for this
-                raise InputError(f"{fmu.file}: {_unloadable(fmu, error)}") from error
-            finally:
-                os.chdir(here)  # fmpy changes to the folder of the library, and stays there after an error
+        except Exception as error:  # fmpy has no error class of its own for this
+            raise InputError(f"{fmu.file}: {_unloadable(fmu, error)}") from error
         try:
             self._fmi.instantiate(callbacks=self._callbacks, loggingOn=True)
         except Exception as error:

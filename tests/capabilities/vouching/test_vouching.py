@@ -22,6 +22,7 @@ from chainunit.capabilities.vouching.domain import domain
 from chainunit.capabilities.vouching.integrity import integrity
 from chainunit.capabilities.vouching.verify import _difference, verify
 from chainunit.fmu.backends import export
+from chainunit.fmu.reference import REFERENCE, RELATED
 from chainunit.machines.accelerator import Accelerator
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.models import MODELS
@@ -110,7 +111,7 @@ def test_a_certified_fmu_holds(made):
 def test_other_members_stay_to_the_bit_and_importers_take_it(made, data, members):
     plain = archive.contents((made / "plain.fmu").read_bytes()).members
     changed = {name for name, content in plain.items() if members[name] != content}
-    assert changed == {documents.RELATED}
+    assert changed == {RELATED}
     added = set(members) - set(plain)
     assert all(name.startswith(manifest.OWN) or name == documents.SRMD for name in added)
     assert list(validate_fmu(str(made / "it.fmu"))) == []
@@ -183,13 +184,13 @@ def test_evidence_holds_the_numbers_of_the_sentences(members):
 
 def test_the_forms_of_the_standards(made, data, members):
     """Roles and places by FMI-LS-REF; SRMD with the checksum of the file beside it; CycloneDX."""
-    root = ElementTree.fromstring(members[documents.RELATED])
+    root = ElementTree.fromstring(members[RELATED])
     roles = {node.get("source"): node.get("role") for node in root.findall("Related")}
     assert {roles[name] for name in roles if name.startswith("vouching/")} == {
         "report", "meta-data", "signature", "experiment/validation"
     }  # fmt: skip
     for source in roles:
-        inside = f"{manifest.LS_REF}/{source}" if not source.startswith("../") else f"extra/{source[3:]}"
+        inside = f"{REFERENCE}/{source}" if not source.startswith("../") else f"extra/{source[3:]}"
         assert inside in members
     beside = ElementTree.fromstring((made / "it.srmd").read_bytes())
     inner = ElementTree.fromstring(members[documents.SRMD])
@@ -235,7 +236,7 @@ def test_the_manifest_of_fmi_ls_ref_is_valid_by_its_schema(members, tmp_path):
         text = re.sub(r'(schemaLocation=")https://[^"]*/', r"\1", file.read_text("utf-8"))
         (tmp_path / file.name).write_text(text, "utf-8")
     schema = xmlschema.XMLSchema10(tmp_path / "fmi3LayeredStandardReferenceManifest.xsd")
-    text = members[documents.RELATED].decode()
+    text = members[RELATED].decode()
     assert list(schema.iter_errors(text)) == []
     assert list(schema.iter_errors(text.replace('role="report"', 'role="reports"', 1)))
 
@@ -650,6 +651,10 @@ def test_an_ssp_package_with_its_fmus(made, tmp_path):
     run = chainunit("verify", "a.ssp", "--key", made / "chainunit.key.pub", cwd=tmp_path)
     assert run.returncode == 0
     assert re.search(r"holds  resources/DcMotor\.fmu, reference experiment", run.stdout)
+    assert re.search(r"holds  signature +holds, by the expected key", run.stdout)
+    assert re.search(
+        r"holds  resources/DcMotor\.fmu, signature +holds, by the key of the package", run.stdout
+    )
     assert re.search(r"note   resources/foreign\.fmu +is no FMU of this package", run.stdout)
     after = archive.contents(first).members
     assert all(after[n] == x for n, x in read.items() if not n.endswith(".fmu"))
@@ -830,3 +835,23 @@ def test_the_sources_hash_changes_with_a_source(monkeypatch, tmp_path):
     second = certify.sources_hash()
     (copy / "a.py").rename(copy / "b.py")
     assert len({first, second, certify.sources_hash()}) == 3 and (root / "capabilities").is_dir()
+
+
+def test_a_certificate_made_without_the_model_holds_for_whoever_has_it(own, tmp_path):
+    """It has no conditions of the model, and none are looked for; the file of another model is refused."""
+    from chainunit.machines.linkages.file import read_linkage
+
+    model = read_linkage(LINKAGES / "slider_crank_press.toml")
+    export(model, tmp_path / "it.fmu")
+    members = certify.members_of(tmp_path / "it.fmu")
+    without = certify.certified(members, "it.fmu", own, None, silent)
+    assert any(line.startswith("left out: smooth experiment, energy, points") for line in without.words)
+    for given in (None, model):
+        found = checked(tmp_path, without.data, model=given)
+        assert found["domain"].holds and found["equations"].holds is None
+        assert all(each.holds is not False for each in found.values())
+    with pytest.raises(InputError, match=r"it\.fmu: is no FMU of ChamberForces, or .* --of"):
+        certify.certified(members, "it.fmu", own, ChamberForces, silent)
+    (tmp_path / "it.fmu").write_bytes(certify.certified(members, "it.fmu", own, model, silent).data)
+    found = {each.topic: each for each in verify(tmp_path / "it.fmu", None, ChamberForces, told=silent)}
+    assert found["equations"].words == "the model of the file that --of names is not that of the FMU"

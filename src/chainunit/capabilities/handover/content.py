@@ -42,11 +42,7 @@ def content_of(study: StudiedDrive) -> Content:
 
 def _known(**values: Any) -> dict[str, Any]:
     """The values that are known; empty lists are none."""
-    return {name: value for name, value in values.items() if value is not None and not _is_empty(value)}
-
-
-def _is_empty(value: Any) -> bool:
-    return isinstance(value, list) and not value
+    return {name: value for name, value in values.items() if value is not None and value != []}
 
 
 def _times(factor: float, value: float | None) -> float | None:
@@ -155,16 +151,10 @@ def _components(study: StudiedDrive) -> Iterator[Content]:
         share = _times(_PERCENT, study.check("gear", "utilisation"))
         names = {"MaxTorqueUtilizationPercentage": share, "MaxTorqueUtilization": peak}
         yield _component("gearbox", ", ".join(parts), **names)
-    current = _best_number(study, "inverter_current")
+    current = study.inverter_current
     if study.text("start") == "inverter":
         least = f", rated current at least {_shown(current, 'A')}" if current else ""
         yield _component("drive controller", f"inverter{least}", ContinuousCurrent=current)
-
-
-def _best_number(study: StudiedDrive, name: str) -> float | None:
-    numbers = study.best.get("numbers")
-    value = numbers.get(name, {}).get("value") if isinstance(numbers, dict) else None
-    return float(value) if isinstance(value, int | float) else None
 
 
 def _motor(study: StudiedDrive) -> Content:
@@ -191,7 +181,7 @@ def _motor(study: StudiedDrive) -> Content:
         MaxCurrentUtilization=steady("current_peak"),
         MaxThermalUtilizationPercentage=_times(_PERCENT, used),
         MaxThermalUtilization=None if hottest is None else hottest - _KELVIN,
-        RmsOfPower=_rms(study.steady.time, study.steady.torque * study.steady.speed),
+        RmsOfPower=float(np.sqrt(_mean(study.steady.time, (study.steady.torque * study.steady.speed) ** 2))),
         MaxTorqueUtilizationPercentage=_times(_PERCENT, study.check("peak_torque", "utilisation")),
         MaxTorqueUtilization=study.check("peak_torque", "value") or steady("motor_torque_peak"),
         MaxRotationSpeedUtilization=_RPM * fastest,
@@ -205,8 +195,8 @@ def _motor(study: StudiedDrive) -> Content:
     )
 
 
-def _rms(time: np.ndarray, values: np.ndarray) -> float:
-    return float(np.sqrt(np.trapezoid(values**2, time) / (time[-1] - time[0])))
+def _mean(time: np.ndarray, values: np.ndarray) -> float:
+    return float(np.trapezoid(values, time) / (time[-1] - time[0]))
 
 
 def _electric(study: StudiedDrive) -> tuple[float | None, float | None]:
@@ -215,9 +205,7 @@ def _electric(study: StudiedDrive) -> tuple[float | None, float | None]:
     if study.supply_power is None:
         return None, None
     time, power = study.steady.time, study.supply_power
-    parts = (np.maximum(power, 0.0), np.maximum(-power, 0.0))
-    taken, given_back = (float(np.trapezoid(part, time) / (time[-1] - time[0])) for part in parts)
-    return taken, given_back
+    return _mean(time, np.maximum(power, 0.0)), _mean(time, np.maximum(-power, 0.0))
 
 
 def _others(study: StudiedDrive) -> Iterator[Content]:

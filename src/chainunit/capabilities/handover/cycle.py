@@ -11,13 +11,14 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...core.errors import InputError, printable
+from ...reading.tables import decoded, file_text
 from .shell import environment_of
 from .template import ROOT, elements
 
@@ -80,7 +81,7 @@ def read_cycle(file: str | Path, section: str = "RotativeSection") -> ShaftCycle
     """
     path = Path(file)
     if path.suffix.lower() == ".csv":
-        return _of_csv(_text(_bytes(path), path), path)
+        return _of_csv(file_text(path), path)
     environment, supplement = environment_of(path)
     sections = _at(_submodel(environment, path), SECTION.split("/")[1:-1])
     own = next((each for each in sections if each.get("idShort") == section), None)
@@ -90,10 +91,10 @@ def read_cycle(file: str | Path, section: str = "RotativeSection") -> ShaftCycle
     name = next((each.get("value") for each in own["value"] if each["idShort"] == "MotionSectionFile"), None)
     if not name:
         raise InputError(f"{path}: the MotionSectionFile of {section} names no file")
-    cycle = _of_csv(_text(supplement(name), path), path)
+    cycle = _of_csv(decoded(path, supplement(name)), path)
     links = _at(_submodel(environment, path), ["SizingProjectInformation"])
     plain = [each["value"] for each in links if str(each.get("value", "")).endswith("load_cycle.csv")]
-    return _with_inertia(cycle, _text(supplement(plain[0]), path), f"{path}: {plain[0]}") if plain else cycle
+    return _with_inertia(cycle, supplement(plain[0]), f"{path}: {plain[0]}") if plain else cycle
 
 
 def _submodel(environment: Mapping[str, Any], path: Path) -> Mapping[str, Any]:
@@ -111,20 +112,6 @@ def _at(submodel: Mapping[str, Any], names: Sequence[str]) -> list[dict[str, Any
     return below
 
 
-def _bytes(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error
-
-
-def _text(content: bytes, path: Path) -> str:
-    try:
-        return content.decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: is no text in UTF-8 ({error.reason})") from error
-
-
 def _of_csv(text: str, path: Path) -> ShaftCycle:
     rows = list(csv.reader(text.splitlines(), delimiter=";"))
     if not rows or rows[0] != headings():
@@ -139,14 +126,28 @@ def _of_csv(text: str, path: Path) -> ShaftCycle:
     return ShaftCycle(time, angle, speed, acceleration, -torque)
 
 
-def _with_inertia(cycle: ShaftCycle, text: str, name: str) -> ShaftCycle:
+def load_cycle(content: bytes) -> np.ndarray:
+    """Time, speed, torque and inertia of the content of a load_cycle.csv, shape (4, time).
+
+    Raises
+    ------
+    ValueError
+        where it has other columns, or fewer than two rows.
+    """
+    values = np.array(list(csv.reader(content.decode("utf-8").splitlines()[1:])), float).T
+    if values.shape[0] != 4 or values.shape[1] < 2:
+        raise ValueError(f"columns: {values.shape[0]}, rows: {values.shape[-1]}")
+    return values
+
+
+def _with_inertia(cycle: ShaftCycle, content: bytes, name: str) -> ShaftCycle:
     """The cycle with the inertia of the load_cycle.csv of this `name`, where this has the same instants."""
     try:
-        time, _, _, inertia = np.array(list(csv.reader(text.splitlines()[1:])), float).T
+        time, _, _, inertia = load_cycle(content)
     except ValueError as error:
         raise InputError(
             f"{name}: must have four columns of numbers: time, speed, torque, inertia ({printable(str(error))})"
         ) from error
     if time.shape != cycle.time.shape or not np.allclose(time, cycle.time, rtol=1e-8, atol=1e-12):
         return cycle
-    return ShaftCycle(cycle.time, cycle.angle, cycle.speed, cycle.acceleration, cycle.torque, inertia)
+    return replace(cycle, inertia=inertia)

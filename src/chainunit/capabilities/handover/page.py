@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -20,7 +20,7 @@ from .candidates import CANDIDATES, candidates_csv
 from .checks import CHECKS, checks_csv
 from .content import CYCLE, MEDIA_TYPES, RUN, STUDY, content_of
 from .cycle import as_csv
-from .shell import Content, LinkedFile, TextRange, aasx_writer, environment
+from .shell import Content, LinkedFile, TextRange, aasx_modules, environment, write_aasx
 from .studied import StudiedDrive, read_study
 from .template import ROOT, elements, numbered
 
@@ -42,8 +42,8 @@ class Handover:
     content: Content
     files: Mapping[str, bytes]
     """the files beside the shell, by name"""
-    write_aasx: Callable[..., None] | None
-    """see `chainunit.capabilities.handover.shell.aasx_writer`; None where no package is asked for"""
+    aasx: bool
+    """whether the package is asked for"""
 
     @property
     def identity(self) -> str:
@@ -64,12 +64,13 @@ def hand_over(question: HandoverQuestion) -> Handover:
     InputError
         see `chainunit.capabilities.handover.studied.read_study`; without basyx-python-sdk where an AASX is asked for.
     """
-    writer = aasx_writer() if question.aasx else None
+    if question.aasx:
+        aasx_modules()  # where they are missing, before anything is written
     study = read_study(question.results)
     texts = {CYCLE: as_csv(study.steady), RUN: as_csv(study.run)}
     files = {STUDY: study.files[study.result.file.name], LOAD_CYCLE: study.files[LOAD_CYCLE]}
     files |= {name: text.encode("utf-8") for name, text in texts.items()}
-    return Handover(study, content_of(study), files, writer)
+    return Handover(study, content_of(study), files, question.aasx)
 
 
 def _leaves(content: Content, path: str, shown: str) -> Iterator[tuple[str, str, Any]]:
@@ -161,9 +162,8 @@ def _write(name: str, content: bytes, folder: Path) -> list[Path]:
 
 
 def _write_aasx(found: Handover, folder: Path) -> list[Path]:
-    assert found.write_aasx is not None
     with atomic_file(folder / AASX) as part:
-        found.write_aasx(found.content, found.identity, found.title, found.files, MEDIA_TYPES, part)
+        write_aasx(found.content, found.identity, found.title, found.files, MEDIA_TYPES, part)
     return [folder / AASX]
 
 
@@ -175,7 +175,7 @@ def _writers(found: Handover, report: b.Report, folder: Path, of_report: list[Wr
     if found.study.checks:
         files[CHECKS] = checks_csv(found.study.checks).encode("utf-8")
     own: list[Writer] = [partial(_write, name, content, folder) for name, content in files.items()]
-    if found.write_aasx is not None:
+    if found.aasx:
         own.insert(0, partial(_write_aasx, found, folder))
     return [*own, *of_report]
 

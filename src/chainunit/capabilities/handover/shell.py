@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ...core.errors import InputError, printable
+from ...reading.tables import file_bytes
 from .template import ROOT, TEMPLATE_ID, TemplateElement, elements, numbered
 
 EXACT = "ExactValue"
@@ -152,34 +153,35 @@ def _reference(template: TemplateElement) -> dict[str, Any]:
     return {"type": template.reference, "keys": [{"type": template.key, "value": template.semantic_id}]}
 
 
-def aasx_writer() -> Callable[[Content, str, str, Mapping[str, bytes], Mapping[str, str], Path], None]:
-    """The function that writes an AASX: of the content, identity and name of `environment`, the bytes and the media
-    types of its files by their names, and the path.
+def aasx_modules() -> Any:
+    """The modules that write an AASX, see `needs_basyx`."""
+    return needs_basyx("sizing.aasx: leave it out by --no-aasx, or write it, which")
+
+
+def write_aasx(
+    content: Content,
+    identity: str,
+    name: str,
+    files: Mapping[str, bytes],
+    media_types: Mapping[str, str],
+    path: Path,
+) -> None:
+    """Write an AASX: content, identity and name are those of `environment`; bytes and media types of its files by
+    their names.
 
     Raises
     ------
     InputError
-        without basyx-python-sdk.
+        see `aasx_modules`.
     """
-    aasx, json_adapter = needs_basyx("sizing.aasx: leave it out by --no-aasx, or write it, which")
-
-    def write(
-        content: Content,
-        identity: str,
-        name: str,
-        files: Mapping[str, bytes],
-        media_types: Mapping[str, str],
-        path: Path,
-    ) -> None:
-        text = json.dumps(environment(content, identity, name, _FOLDER))
-        store = json_adapter.read_aas_json_file(io.StringIO(text), failsafe=False)
-        supplements = aasx.DictSupplementaryFileContainer()
-        for each, data in files.items():
-            supplements.add_file(f"{_FOLDER}{each}", io.BytesIO(data), media_types[each])
-        with aasx.AASXWriter(path, failsafe=False) as writer:
-            writer.write_all_aas_objects("/aasx/data.json", store, supplements, write_json=True)
-
-    return write
+    aasx, json_adapter = aasx_modules()
+    text = json.dumps(environment(content, identity, name, _FOLDER))
+    store = json_adapter.read_aas_json_file(io.StringIO(text), failsafe=False)
+    supplements = aasx.DictSupplementaryFileContainer()
+    for each, data in files.items():
+        supplements.add_file(f"{_FOLDER}{each}", io.BytesIO(data), media_types[each])
+    with aasx.AASXWriter(path, failsafe=False) as writer:
+        writer.write_all_aas_objects("/aasx/data.json", store, supplements, write_json=True)
 
 
 def environment_of(path: Path) -> tuple[Mapping[str, Any], Callable[[str], bytes]]:
@@ -193,10 +195,9 @@ def environment_of(path: Path) -> tuple[Mapping[str, Any], Callable[[str], bytes
     """
     if path.suffix.lower() == ".aasx":
         return _of_aasx(path)
+    content = file_bytes(path)
     try:
-        data = json.loads(path.read_bytes())
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error
+        data = json.loads(content)
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path}: is no JSON ({printable(str(error))})") from error
     if not isinstance(data, dict):
@@ -206,11 +207,9 @@ def environment_of(path: Path) -> tuple[Mapping[str, Any], Callable[[str], bytes
         # a name that leads out of the folder is none of this shell
         file = path.parent / Path(name).name
         try:
-            return file.read_bytes()
-        except OSError as error:
-            raise InputError(
-                f"{file}: cannot be read ({error.strerror or error}); {path} names it"
-            ) from error
+            return file_bytes(file)
+        except InputError as error:
+            raise InputError(f"{error}; {path} names it") from error
 
     return data, supplement
 

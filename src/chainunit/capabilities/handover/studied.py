@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, date, datetime
@@ -14,10 +13,11 @@ import numpy as np
 import xarray as xr
 
 from ...core.errors import InputError, printable
+from ...reading.tables import file_bytes
 from ...report.series import SERIES, STEADY_BEGIN
 from ...study.record import LOAD_CYCLE
 from ...study.stored_result import StoredResult, as_mapping, read_result
-from .cycle import ShaftCycle
+from .cycle import ShaftCycle, load_cycle
 
 _CLOSE = 1e-6
 """Difference, relative to the largest value, up to which a series is that of load_cycle.csv, which has nine
@@ -40,18 +40,12 @@ class StudiedDrive:
 
     def number(self, *path: str) -> float | None:
         """The number of the result at a path, in its unit there; None where it has none."""
-        node: Any = self.result.data
-        for name in path:
-            node = as_mapping(node).get(name)
-        value = as_mapping(node).get("value")
-        return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
+        return _number(self.result.data, *path)
 
     def text(self, *path: str) -> str:
         """The text of the result at a path; empty where it has none."""
-        node: Any = self.result.data
-        for name in path:
-            node = as_mapping(node).get(name)
-        return printable(node, 2000) if isinstance(node, str) else ""
+        found = _at(self.result.data, *path)
+        return printable(found, 2000) if isinstance(found, str) else ""
 
     @cached_property
     def written(self) -> datetime:
@@ -70,13 +64,13 @@ class StudiedDrive:
     @property
     def candidates(self) -> list[Mapping[str, Any]]:
         """The candidates of sizing by their rank; none without sizing."""
-        found = as_mapping(self.result.data.get("sizing")).get("candidates")
+        found = _at(self.result.data, "sizing", "candidates")
         return [as_mapping(each) for each in found] if isinstance(found, list) else []
 
     @property
     def checks(self) -> list[Mapping[str, Any]]:
         """The checks by clause; none without."""
-        found = as_mapping(self.result.data.get("checks")).get("rows")
+        found = _at(self.result.data, "checks", "rows")
         return [as_mapping(each) for each in found] if isinstance(found, list) else []
 
     @property
@@ -88,9 +82,25 @@ class StudiedDrive:
 
     def check(self, name: str, part: str) -> float | None:
         """A number of a check of the drive of sizing: its ``value``, ``limit`` or ``utilisation``."""
-        entry = as_mapping(as_mapping(as_mapping(self.best.get("checks")).get(name)).get(part))
-        value = entry.get("value")
-        return float(value) if isinstance(value, int | float) else None
+        return _number(self.best, "checks", name, part)
+
+    @property
+    def inverter_current(self) -> float | None:
+        """The least rated current of the inverter that the drive of sizing needs [A]."""
+        return _number(self.best, "numbers", "inverter_current")
+
+
+def _at(node: Any, *path: str) -> Any:
+    """What stands at a path below a node; None where nothing does."""
+    for name in path:
+        node = as_mapping(node).get(name)
+    return node
+
+
+def _number(node: Any, *path: str) -> float | None:
+    """The number of the entry at a path below a node; None where there is none."""
+    value = _at(node, *path, "value")
+    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
 
 
 def read_study(folder: Path) -> StudiedDrive:
@@ -110,7 +120,14 @@ def read_study(folder: Path) -> StudiedDrive:
         raise InputError(
             f"{folder}: has no {LOAD_CYCLE}, as its machine makes no whole turn in steady running; a sizing needs one"
         )
-    plain = _plain_cycle(folder / LOAD_CYCLE)
+    files = {name: file_bytes(folder / name) for name in (result.file.name, LOAD_CYCLE)}
+    try:
+        plain = load_cycle(files[LOAD_CYCLE])
+    except ValueError as error:
+        raise InputError(
+            f"{folder / LOAD_CYCLE}: is no load cycle, which has four columns ({printable(str(error))}); run the "
+            "study again"
+        ) from error
     try:
         start = xr.load_dataset(folder / SERIES, group="start_up")
     except (OSError, ValueError) as error:
@@ -143,22 +160,8 @@ def read_study(folder: Path) -> StudiedDrive:
             torque,
         ),
         None if power is None else np.interp(at, time, power.values),
-        {name: (folder / name).read_bytes() for name in (result.file.name, LOAD_CYCLE)},
+        files,
     )
-
-
-def _plain_cycle(file: Path) -> np.ndarray:
-    """Time, speed, torque and inertia of a load_cycle.csv, shape (4, time)."""
-    try:
-        rows = list(csv.reader(file.read_text("utf-8").splitlines()))[1:]
-        values = np.array(rows, float).T
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"{file}: is no load cycle ({printable(str(error))}); run the study again"
-        ) from error
-    if values.shape[0] != 4 or values.shape[1] < 2:
-        raise InputError(f"{file}: is no load cycle, which has four columns; run the study again")
-    return values
 
 
 def _steady(start: xr.Dataset, at: np.ndarray, plain: np.ndarray) -> ShaftCycle:

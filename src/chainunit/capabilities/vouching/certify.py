@@ -15,6 +15,7 @@ from ...core.model import Model
 from ...fmu.description import Interface, generation_time
 from ...fmu.pack import interface_of
 from ...fmu.recipe import recipes
+from ...fmu.reference import RELATED
 from ...models import MODELS
 from ...study.package import with_rods
 from . import documents as docs
@@ -28,16 +29,15 @@ if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
 SMOOTH_IN, SMOOTH_OUT = f"{OWN}/smooth_in.csv", f"{OWN}/smooth_out.csv"
-EVERY = 40
-"""One of so many rows of the smooth experiment is kept as a result."""
 Told = Callable[[str], Any]
 
 
 class Certified(NamedTuple):
-    """A certified file: its content, and sentences on what it carries."""
+    """A certified file: its content, sentences on what it carries, and the same as entries of its SRMD."""
 
     data: bytes
     words: list[str]
+    entries: dict[str, dict[str, str]]
 
 
 def sources_hash() -> str:
@@ -76,10 +76,10 @@ def members_of(file: Path) -> dict[str, bytes]:
 def without_certification(members: Mapping[str, bytes]) -> dict[str, bytes]:
     """The members as they were before an earlier certification."""
     own = {n: x for n, x in members.items() if not n.startswith(f"{OWN}/") and n != docs.SRMD}
-    if len(own) < len(members) and docs.RELATED in own:
-        before = docs.related(own.pop(docs.RELATED), ())
+    if len(own) < len(members) and RELATED in own:
+        before = docs.related(own.pop(RELATED), ())
         if before is not None:
-            own[docs.RELATED] = before
+            own[RELATED] = before
     return own
 
 
@@ -152,6 +152,10 @@ def _certified_fmu(
     with unpacked(members, name) as fmu:
         _require_own(fmu, name)
         interface = interface_for(fmu, model)
+        if model and interface is None:
+            raise InputError(
+                f"{name}: is no FMU of {model.name}, or its start values make none; name another file by --of"
+            )
         found = evidence(fmu, interface, told)
         given = [t for t in (found.tables and found.tables[0], found.given) if t]
         limits = domain(fmu, interface, found.points, given)
@@ -209,12 +213,13 @@ def _signed(
         *(f"- {line}" for line in words),
     ]
     members[docs.REPORT] = ("\n".join(report) + "\n").encode()
-    members[docs.SRMD] = docs.srmd(title, classifications(data, limits), __version__)
+    entries = classifications(data, limits)
+    members[docs.SRMD] = docs.srmd(title, entries, __version__)
     there = [*members, docs.SBOM, MANIFEST, SIGNATURE]
-    members[docs.RELATED] = docs.related(members.get(docs.RELATED), there) or b""
+    members[RELATED] = docs.related(members.get(RELATED), there) or b""
     members[docs.SBOM] = json_bytes(docs.sbom(title, __version__, members))
     head = {"kind": kind, "name": title, "version": __version__, "time": generation_time()}
-    return Certified(signed(members, key, **head), words)
+    return Certified(signed(members, key, **head), words, entries)
 
 
 def _require_own(fmu: UnpackedFmu, name: str) -> None:
@@ -274,16 +279,18 @@ def evidence(fmu: UnpackedFmu, interface: Interface | None, told: Told) -> Evide
     if tables:
         data["reference"] = _checked(ex.rerun_reference(fmu, tables), tolerance, "its reference results")
     if interface is None:
-        words = "the model is not one of this package by its name; certify its study file or linkage file"
+        words = (
+            "the model is not one of this package by its name; certify its study file or linkage file, or name "
+            "it by --of"
+        )
         data["left_out"] = f"smooth experiment, energy, points: {words}"
         return Evidence(data, tables, None, None, [], tolerance)
     told(f"{fmu.name}: smooth experiment")
     given = ex.smooth_inputs(interface)
     outputs = [s.name for s in interface.signals_of("output")]
-    columns = [*outputs, *(n for n in ("tau", "w") if n in fmu.variables and n not in outputs)]
-    found, run = ex.convergence(fmu, given, columns)
+    found, run = ex.convergence(fmu, given, ex.with_shaft(fmu, outputs))
     data["convergence"] = found._asdict()
-    balance = ex.balance_of(columns)
+    balance = ex.balance_of(run.names)
     if balance:
         missing, flow = ex.energy_residual(run, balance)
         data["energy"] = {"missing": missing, "flow": flow, **balance._asdict()}
@@ -305,9 +312,7 @@ def evidence(fmu: UnpackedFmu, interface: Interface | None, told: Told) -> Evide
         ex.POWER_GAP,
         "its powers do not balance: the gap is {:.2g} of their size, allowed is {:g}",
     )
-    own = [columns.index(name) for name in outputs]
-    results = TimeTable(tuple(outputs), run.time[::EVERY], run.values[::EVERY, own])
-    return Evidence(data, tables, given, results, points, tolerance)
+    return Evidence(data, tables, given, ex.kept(run, outputs), points, tolerance)
 
 
 def _checked(found: ex.Deviation, tolerance: float, what: str) -> dict[str, Any]:
@@ -389,7 +394,7 @@ def classifications(data: Mapping[str, Any], limits: Mapping[str, Any] | None) -
     return found
 
 
-def write(made: Certified, file: Path, name: str) -> Path:
+def write(made: Certified, file: Path) -> Path:
     """Write a certified file, and its SRMD with checksum beside it; returns the place of the SRMD.
 
     Raises
@@ -400,10 +405,6 @@ def write(made: Certified, file: Path, name: str) -> Path:
     beside = place_beside(file)
     with atomic_file(file) as part:
         part.write_bytes(made.data)
-    inner = contents(made.data).members
-    data = json.loads(inner[docs.EVIDENCE])
-    limits = json.loads(inner[docs.DOMAIN]) if docs.DOMAIN in inner else None
-    entries = classifications(data, limits)
     with atomic_file(beside) as part:
-        part.write_bytes(docs.srmd(name, entries, __version__, (file.name, made.data)))
+        part.write_bytes(docs.srmd(file.name, made.entries, __version__, (file.name, made.data)))
     return beside

@@ -11,13 +11,12 @@ from ...core.errors import InputError
 from ...core.files import ResultKind
 from ...report.console import show_remark, study_file, terminal_console
 
+_KEY = Path("chainunit.key")
 _MODEL = "Study file or linkage file (TOML) of the FMU, where its model is no packaged one."
 
 
 def key(
-    output: Annotated[Path, typer.Option("-o", "--output", help="File of the private key.")] = Path(
-        "chainunit.key"
-    ),
+    output: Annotated[Path, typer.Option("-o", "--output", help="File of the private key.")] = _KEY,
 ) -> None:
     """Make a key for signatures: the private one, which stays with you, and the public one to hand on."""
     from .keys import make_key
@@ -35,7 +34,7 @@ def certify(
     ],
     key_file: Annotated[
         Path, typer.Option("--key", help="File of the private key, by chainunit key.")
-    ] = Path("chainunit.key"),
+    ] = _KEY,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -65,14 +64,14 @@ def certify(
                 raise InputError(f"--of {of}: is for FMUs; leave it out for {file}")
             model, source = _exported(file, folder, status.update)
         else:
-            model, source = (_model(of) if of else None), file
+            model, source = (_model_and_start(of, status.update)[0] if of else None), file
         members = members_of(source)
         target = place_of(
             output or (Path(source.name) if source != file else file), members, output is not None
         )
         place_beside(target)
         made = certified(members, target.name, secret, model, status.update)
-        beside = write(made, target, target.name)
+        beside = write(made, target)
     print(f"{target}: certified; {beside}: its meta-data with checksum")
     for line in made.words:
         print(f"  {line}")
@@ -99,8 +98,8 @@ def verify(
     from .verify import verify as check
 
     expected = public_key(key_file) if key_file else None
-    model = _model(of) if of else None
     with terminal_console(stderr=True).status("verifying") as status:
+        model = _model_and_start(of, status.update)[0] if of else None
         found = check(file, expected, model, run=not no_run, told=status.update)
     wide = max(len(each.topic) for each in found)
     for each in found:
@@ -112,20 +111,19 @@ def verify(
         raise typer.Exit(1)
 
 
-def _model(file: Path) -> Any:
-    """The model of a study file or linkage file."""
+def _model_and_start(file: Path, progress: Any) -> Any:
+    """The model of a study file or linkage file, with its start values."""
     from ...study.package import is_study_file, model_and_start
 
-    return model_and_start(str(file), study_file(file) if is_study_file(str(file)) else None)[0]
+    loaded = study_file(file) if is_study_file(str(file)) else None
+    return model_and_start(str(file), loaded, progress=progress)
 
 
 def _exported(file: Path, folder: Path, progress: Any) -> tuple[Any, Path]:
     """The model of a study file or linkage file, and its FMU in the folder."""
     from ...fmu.backends import export
-    from ...study.package import is_study_file, model_and_start
 
-    loaded = study_file(file) if is_study_file(str(file)) else None
-    model, start = model_and_start(str(file), loaded, progress=progress)
+    model, start = _model_and_start(file, progress)
     target = folder / f"{model.name}.fmu"
     export(model, target, start, progress=progress)
     return model, target

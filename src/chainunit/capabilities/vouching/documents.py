@@ -12,29 +12,28 @@ from collections.abc import Mapping, Sequence
 from importlib import metadata
 from typing import Any
 from xml.etree import ElementTree
-from xml.etree.ElementTree import Element, SubElement, register_namespace
+from xml.etree.ElementTree import Element, SubElement
 
 from ...fmu.description import generation_time
 from ...fmu.pack import xml_bytes
-from ...fmu.reference import STANDARD
-from .manifest import LS_REF, OWN, sha3
+from ...fmu.reference import REFERENCE, related_files
+from .manifest import OWN, sha3
 
-RELATED = f"{LS_REF}/fmi-ls-manifest.xml"
 SRMD = "extra/org.ssp-standard.ssp-traceability.srmd/resourceMetaData.srmd"
 SRMD_VERSION = "1.0.0"
 SBOM, EVIDENCE, DOMAIN, REPORT, EXPERIMENTS = (
     f"{OWN}/{name}"
     for name in ("sbom.cdx.json", "evidence.json", "domain.json", "report.md", "experiments.xml")
 )
-_LS = "http://fmi-standard.org/fmi-ls-manifest"
 _FOLDER = OWN.rpartition("/")[2]
+_SRMD_SOURCE = "../" + SRMD.removeprefix("extra/")
 _JSON = "application/json"
 _RELATED = (
     ("report", "text/markdown", f"{_FOLDER}/report.md", "What is known about this file, and what was found"),
     ("report", _JSON, f"{_FOLDER}/evidence.json", "The same as numbers: experiments, errors, energy, points"),
     ("meta-data", _JSON, f"{_FOLDER}/domain.json", "Domain of validity by variable"),
     ("meta-data", "application/vnd.cyclonedx+json", f"{_FOLDER}/sbom.cdx.json", "Bill of materials, CycloneDX"),
-    ("meta-data", "application/x-srmd-meta-data", "../" + SRMD.removeprefix("extra/"), "SRMD of SSP Traceability"),
+    ("meta-data", "application/x-srmd-meta-data", _SRMD_SOURCE, "SRMD of SSP Traceability"),
     ("experiment/validation", "application/xml", f"{_FOLDER}/experiments.xml", "Experiments with inputs and results"),
     ("signature", _JSON, f"{_FOLDER}/manifest.json", "SHA3-256 of every member of this file"),
     ("signature", _JSON, f"{_FOLDER}/signature.json", "Ed25519 signature of manifest.json"),
@@ -52,26 +51,15 @@ def related(content: bytes | None, there: Sequence[str]) -> bytes | None:
     content : the present manifest, or None
     there : names of the members of the certified file
     """
-    register_namespace("fmi-ls", _LS)
-    if content is None:
-        root = Element("fmiReferences")
-        root.set(f"{{{_LS}}}fmi-ls-name", STANDARD)
-        # the text of 1.0.0-beta.1 fixes this value
-        root.set(f"{{{_LS}}}fmi-ls-version", "1.0.0-alpha.1")
-        root.set(
-            f"{{{_LS}}}fmi-ls-description",
-            "Layered Standard providing information on related files included in an FMU.",
-        )
-    else:
-        root = ElementTree.fromstring(content)
+    root = related_files(content)
     for node in list(root.findall("Related")):
         source = node.get("source", "")
-        if source.startswith(f"{_FOLDER}/") or source == "../" + SRMD.removeprefix("extra/"):
+        if source.startswith(f"{_FOLDER}/") or source == _SRMD_SOURCE:
             root.remove(node)
     # what follows the related files, by the schema, is annotations
     at = len(root.findall("Related"))
     for role, kind, source, words in _RELATED:
-        place = f"{LS_REF}/{source}" if not source.startswith("../") else SRMD
+        place = SRMD if source == _SRMD_SOURCE else f"{REFERENCE}/{source}"
         if place in there:
             root.insert(at, Element("Related", type=kind, source=source, role=role, description=words))
             at += 1

@@ -10,6 +10,7 @@ from typing import Any
 from ...core.engines import MATH
 from ...core.errors import InputError
 from ...fmu.description import Interface
+from ...fmu.reference import parameters_at_start
 from ...machines.api import ChainUnitMachine
 from ...machines.chain_unit import SIDES, ChamberForces, Feed, SideLoads
 from ...study.organ_limits import has_empty_side, slack_and_mode
@@ -68,10 +69,7 @@ def ranges(points: Iterable[StatePoint], given: Iterable[TimeTable]) -> dict[str
 
 def _conditions(interface: Interface) -> Iterator[dict[str, Any]]:
     """The conditions of the model on its parameters beside their bounds, with their limits at the start values."""
-    model = interface.model
-    p = model.with_derived(
-        MATH, model.parameter_layout.instance([s.start for s in interface.signals_of("parameter")])
-    )
+    model, p = interface.model, parameters_at_start(interface)
     for each, (value, low, high) in zip(model.required, model.requirements(MATH, p), strict=True):
         yield {
             "subject": each.subject,

@@ -29,6 +29,8 @@ from .rerun import TimeTable, UnpackedFmu, deviation, sizes, slave, stepped, tab
 STEP, END = 0.004, 1.0
 """Largest step and end of the smooth experiment [s]."""
 HALVINGS = 2
+_EVERY = 40
+"""One of so many rows of the smooth experiment is kept as a result."""
 TOLERANCE = 1e-5
 """Allowed deviation from reference results of a model with states, over the size of the column."""
 TOLERANCE_WITHOUT_STATES = 1e-9
@@ -168,6 +170,16 @@ def convergence(fmu: UnpackedFmu, given: TimeTable, outputs: Sequence[str]) -> t
     error = max(first, second) if order is None else second / (2.0**order - 1.0)
     steps = tuple(STEP / 2**k for k in range(HALVINGS + 1))
     return Convergence(steps, (first, second), order, error), runs[-1]
+
+
+def with_shaft(fmu: UnpackedFmu, outputs: Sequence[str]) -> list[str]:
+    """The outputs, and behind them torque and speed of a shaft, by which energy is balanced."""
+    return [*outputs, *(n for n in ("tau", "w") if n in fmu.variables and n not in outputs)]
+
+
+def kept(run: TimeTable, outputs: Sequence[str]) -> TimeTable:
+    """What is kept of the smooth experiment as the results of these `outputs`, its first columns."""
+    return TimeTable(tuple(outputs), run.time[::_EVERY], run.values[::_EVERY, : len(outputs)])
 
 
 # -- the energy balance of a run
@@ -322,11 +334,9 @@ def rerun_points(fmu: UnpackedFmu, points: Sequence[StatePoint]) -> Deviation:
 
 def recompute_points(fmu: UnpackedFmu, model: type[Model], points: Sequence[StatePoint]) -> Deviation:
     """The equations in Python on this machine against the outputs of the points."""
-    parameters, worst = set(model.parameter_layout.names), Deviation(0.0, "")
+    worst = Deviation(0.0, "")
     for point in points:
-        given = [
-            {n: x for n, x in point.given.items() if (n in parameters) == side} for side in (True, False)
-        ]
+        given = (_of(point, layout.names) for layout in (model.parameter_layout, model.input_layout))
         found = outputs_at(model, *given)
         worst = max(worst, _largest(fmu, found or {}, point.outputs))
     return worst

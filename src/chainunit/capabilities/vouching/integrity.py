@@ -44,9 +44,9 @@ class Integrity:
         self.findings.append(Finding(holds, topic, words))
 
 
-def integrity(data: bytes, key: bytes | None = None) -> Integrity:
-    """Check the bytes of a file; never an error, whatever they are. `key` is the public key of whom the receiver
-    expects the signature."""
+def integrity(data: bytes, key: bytes | None = None, whose: str = "the expected key") -> Integrity:
+    """Check the bytes of a file; never an error, whatever they are. `key` is the public key that must have signed:
+    that of whom the receiver expects the signature, or as the words `whose` say."""
     read = archive.contents(data)
     found = Integrity(members=read.members, is_archive=read.is_archive)
     places = [archive.located(data, name) for name in (MANIFEST, SIGNATURE)]
@@ -67,20 +67,14 @@ def integrity(data: bytes, key: bytes | None = None) -> Integrity:
             found.add(False, "signature", f"{name}: is missing, or its place in the archive is damaged")
     if not found.holds:
         return found
-    _judge(found, data, read, contents, key, places[0][0] if places[0] else 0)
+    _judge_signature(found, contents, key, whose)
+    if found.public:
+        _judge_members(found, data, read, contents, places[0][0] if places[0] else 0)
     return found
 
 
-def _judge(
-    found: Integrity,
-    data: bytes,
-    read: archive.ArchiveContents,
-    contents: Mapping[str, bytes],
-    key: bytes | None,
-    behind: int,
-) -> None:
-    manifest, signature = contents[MANIFEST], contents[SIGNATURE]
-    public, fault = check_signature(manifest, signature)
+def _judge_signature(found: Integrity, contents: Mapping[str, bytes], key: bytes | None, whose: str) -> None:
+    public, fault = check_signature(contents[MANIFEST], contents[SIGNATURE])
     if fault:
         found.add(False, "signature", fault)
         return
@@ -89,11 +83,20 @@ def _judge(
         words = f"holds, by the key {of}; whose key it is, a file cannot tell: compare it, or give --key"
         found.add(True, "signature", words)
     elif key == public:
-        found.add(True, "signature", f"holds, by the expected key {of}")
+        found.add(True, "signature", f"holds, by {whose} {of}")
     else:
         words = f"holds, but by another key: expected {fingerprint(key)}, signed by {of}"
         found.add(False, "signature", words)
-    if (stated := parsed(manifest)) is None:
+
+
+def _judge_members(
+    found: Integrity,
+    data: bytes,
+    read: archive.ArchiveContents,
+    contents: Mapping[str, bytes],
+    behind: int,
+) -> None:
+    if (stated := parsed(contents[MANIFEST])) is None:
         found.add(False, "manifest", f"{MANIFEST}: is of a form that this version of chainunit does not know")
         return
     found.manifest = stated

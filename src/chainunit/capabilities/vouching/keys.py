@@ -13,8 +13,6 @@ from ...core.files import regular_bytes, writing
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
-PRIVATE = "chainunit.key"
-"""Usual name of the file of a private key."""
 _PUBLIC = ".pub"
 
 

@@ -14,14 +14,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from ...fmu.reference import REFERENCE
 from . import archive
 from .keys import fingerprint, is_signed
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
-LS_REF = "extra/org.fmi-standard.fmi-ls-ref"
-OWN = f"{LS_REF}/vouching"
+OWN = f"{REFERENCE}/vouching"
 """The folder of what is written about a file."""
 MANIFEST, SIGNATURE = f"{OWN}/manifest.json", f"{OWN}/signature.json"
 FORM = "chainunit vouching 1"

@@ -6,7 +6,6 @@ from __future__ import annotations
 import contextlib
 import csv
 import io
-import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -17,8 +16,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core.errors import InputError, RunError, printable
-from ...core.quantities import Type, written
+from ...core.quantities import Type
 from ...core.temporary_folders import scratch
+from ...fmu.reference import csv_bytes
+from ...system.instance import fmi2_callbacks, loading
 from .archive import unsafe
 
 _TYPES: Mapping[str, Type] = {
@@ -151,20 +152,18 @@ class Slave:
             "modelIdentifier": fmu.description.coSimulation.modelIdentifier,
             "instanceName": "verified",
         }
-        here = Path.cwd()
         try:
-            self._api: Any = (fmi2.FMU2Slave if self._is_2 else fmi3.FMU3Slave)(**arguments)
+            with loading():
+                self._api: Any = (fmi2.FMU2Slave if self._is_2 else fmi3.FMU3Slave)(**arguments)
         except Exception as error:  # fmpy has no class of its own
             raise NoLibraryError(_no_library(fmu, error)) from error
-        finally:
-            os.chdir(here)  # fmpy changes to the folder of the library, and stays there after an error
-        self._loggers = self._logging(fmi2, fmi3)
+        self._loggers = self._logging()
         with self._told("cannot be instantiated"):
             self._api.instantiate(loggingOn=False, **self._loggers)
 
-    def _logging(self, fmi2: Any, fmi3: Any) -> dict[str, Any]:
+    def _logging(self) -> dict[str, Any]:
         """The arguments of `instantiate` by which the messages are kept; the object keeps them alive."""
-        from fmpy import calloc, free
+        from fmpy import fmi3
 
         def keep(message: bytes | None) -> None:
             if message:
@@ -172,11 +171,7 @@ class Slave:
 
         if not self._is_2:
             return {"logMessage": fmi3.fmi3LogMessageCallback(lambda *args: keep(args[-1]))}
-        callbacks = fmi2.fmi2CallbackFunctions()
-        callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(lambda *args: keep(args[4]))
-        callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(calloc)
-        callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(free)
-        return {"callbacks": callbacks}
+        return {"callbacks": fmi2_callbacks(lambda *args: keep(args[-1]))}
 
     @contextmanager
     def _told(self, what: str) -> Iterator[None]:
@@ -285,13 +280,7 @@ def table(content: bytes) -> TimeTable:
 
 def table_bytes(of: TimeTable, types: Mapping[str, Type]) -> bytes:
     """The table in CSV."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["time", *of.names])
-    kinds = [types[name] for name in of.names]
-    for t, row in zip(of.time, of.values, strict=True):
-        writer.writerow([repr(float(t)), *(written(float(x), k) for x, k in zip(row, kinds, strict=True))])
-    return text.getvalue().encode()
+    return csv_bytes(["time", *of.names], np.column_stack([of.time, of.values]), types)
 
 
 def stepped(
@@ -317,7 +306,11 @@ def stepped(
             behind.append(running.get(outputs))
             if k + 1 < len(times):
                 running.step(float(times[k]), float(times[k + 1] - times[k]))
-    return tuple(TimeTable(tuple(outputs), times, np.array(each, float)) for each in (before, behind))  # type: ignore[return-value]
+    names = tuple(outputs)
+    return (
+        TimeTable(names, times, np.array(before, float)),
+        TimeTable(names, times, np.array(behind, float)),
+    )
 
 
 def sizes(of: TimeTable, fmu: UnpackedFmu) -> Any:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +16,12 @@ from ...core.files import regular_bytes
 from ...core.model import Model
 from . import documents as docs
 from . import experiments as ex
-from .certify import EVERY, SMOOTH_IN, SMOOTH_OUT, interface_for, sources_hash, told_convergence
+from .certify import SMOOTH_IN, SMOOTH_OUT, Told, interface_for, sources_hash, told_convergence
 from .domain import domain
 from .integrity import Finding, Integrity, integrity
 from .manifest import Manifest, sha3
-from .rerun import NoLibraryError, TimeTable, UnpackedFmu, deviation, table, unpacked
+from .rerun import NoLibraryError, UnpackedFmu, deviation, table, unpacked
 
-Told = Callable[[str], Any]
 _GROWTH = 4.0
 """An error on this machine may be so many times the stated one: rounding is another with another library of C."""
 
@@ -123,7 +122,7 @@ def _system(found: Integrity, stated: Mapping[str, Any], name: str, run: bool, t
         if how != "certified":
             found.add(None, printable(member), "is no FMU of this package; its hash alone is signed")
             continue
-        inner = integrity(found.members[member], found.public)
+        inner = integrity(found.members[member], found.public, "the key of the package")
         _judge(inner, f"{name}: {member}", None, run, told)
         for each in inner.findings:
             found.add(each.holds, f"{printable(member)}, {each.topic}", each.words)
@@ -150,6 +149,7 @@ class _Experiments:
     ) -> None:
         self._found, self._fmu, self._stated, self._told = found, fmu, stated, told
         self._tolerance = float(stated["tolerance"])
+        self._model = model
         self._interface = interface_for(fmu, model)
         self._points = [ex.StatePoint(**each) for each in stated.get("points", {}).get("at", ())]
 
@@ -195,11 +195,9 @@ class _Experiments:
             return
         self._told("smooth experiment")
         given, wanted = (table(self._fmu.file(name) or b"") for name in (SMOOTH_IN, SMOOTH_OUT))
-        columns = [*wanted.names]
-        columns += [n for n in ("tau", "w") if n in self._fmu.variables and n not in columns]
-        own, run = ex.convergence(self._fmu, given, columns)
-        kept = TimeTable(wanted.names, run.time[::EVERY], run.values[::EVERY, : len(wanted.names)])
-        self._add("smooth experiment", ex.Deviation(*deviation(kept, wanted, self._fmu)), "the FMU here")
+        own, run = ex.convergence(self._fmu, given, ex.with_shaft(self._fmu, wanted.names))
+        gap = deviation(ex.kept(run, wanted.names), wanted, self._fmu)
+        self._add("smooth experiment", ex.Deviation(*gap), "the FMU here")
         stated = self._stated["convergence"]
         holds = own.error <= _GROWTH * stated["error"] + 1e-10
         words = f"{told_convergence(own._asdict())}; certified with an error of {stated['error']:.2g}"
@@ -225,7 +223,11 @@ class _Experiments:
             words = self._stated.get("left_out", "no points were certified")
             self._found.add(None, "equations", printable(words, 300))
         elif self._interface is None:
-            words = "the model is not one of the package here by its name; name its file by --of"
+            words = (
+                "the model of the file that --of names is not that of the FMU"
+                if self._model
+                else "the model is not one of the package here by its name; name its file by --of"
+            )
             self._found.add(None, "equations", words)
         else:
             gap = ex.recompute_points(self._fmu, self._interface.model, self._points)
@@ -234,7 +236,9 @@ class _Experiments:
     def _domain(self) -> None:
         content = self._fmu.file(docs.DOMAIN)
         stated = json.loads(content or b"null")
-        if self._interface is None:
+        # a certificate that was made without the model has no conditions of it
+        has_model = "left_out" not in self._stated
+        if has_model and self._interface is None:
             self._found.add(
                 None, "domain", f"{len(stated['variables'])} variables, as certified; not computed again"
             )
@@ -242,7 +246,7 @@ class _Experiments:
         tables = ex.reference_tables(self._fmu)
         smooth = self._fmu.file(SMOOTH_IN)
         given = [t for t in (tables and tables[0], table(smooth) if smooth else None) if t]
-        own = domain(self._fmu, self._interface, self._points, given)
+        own = domain(self._fmu, self._interface if has_model else None, self._points, given)
         different = _difference(stated, json.loads(json.dumps(own)), "")
         words = (
             f"{len(own['variables'])} variables and {len(own['limits'])} limits are computed again, the same"
