@@ -16,15 +16,22 @@ from ...core.quantities import Value, declaration, quantity
 from ...reading.results import part, result
 from ...study.event_torques import from_event_on
 from ...study.record import StudyRecord
-from ...study.relay import CLASSES, LIGHT, MULTIPLE, TRIPS_AT, TripClass, relay_trip, start_seconds
-from ...study.window import Phase
+from ...study.relay import (
+    CLASSES,
+    LIGHT,
+    MULTIPLE,
+    TRIPS_AT,
+    TripClass,
+    lasting_current,
+    relay_trip,
+    start_seconds,
+)
+from ...study.verdict import STEADY
 from .plan import RelayPlan
 from .row import CheckRow, NotChecked
 
 _CLAUSE = "IEC 60947-4-1, trip classes"
 _WHAT = "thermal overload relay"
-_LASTING = 5
-"""One part in so many at the end of a run has the current that flows on."""
 
 
 @declaration
@@ -81,9 +88,9 @@ def stall_heat(
     of: TripClass, time: Any, current: Any, setting: float, before: float, stall_current: float
 ) -> StallHeat | None:
     """An event: the trip of the slowest relay of a class, and the heat of the motor until then. `time` [s] since the
-    event and `current` [A] are of shape (n,); the RMS current of the last fifth flows on. None where the relay never
+    event and `current` [A] are of shape (n,); its `lasting_current` flows on. None where the relay never
     trips."""
-    lasts = float(np.sqrt(np.mean(current[-max(1, len(current) // _LASTING) :] ** 2)))
+    lasts = lasting_current(current)
     trip = relay_trip(time, current, setting, before, lasts, of.longest, TRIPS_AT)
     if trip is None:
         return None
@@ -141,8 +148,7 @@ def find(study: StudyRecord, plan: RelayPlan) -> tuple[RelayFindings | None, lis
     if missing := [name for name, value in given.items() if not value]:
         return None, [NotChecked(_WHAT, f"the motor has no nameplate; add [relay] with {', '.join(missing)}")]
     assert study.start is not None
-    window = study.window(Phase.STEADY, study.steady)
-    name, before = window.current, window.rms(window.current)
+    name, before = f"motor.{study.drive.motor.current}", study.answers[STEADY].current_rms
     rise = study.runs["start_up"].sel(time=slice(None, study.start.start_time))
     seconds = start_seconds(rise["time"].values, np.abs(rise[name].values), given["setting"])
     runs: dict[str, tuple[Any, Any, float]] = {}
