@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,6 @@ from command import chainunit
 from chainunit.capabilities.checks.gear import (
     GearDuty,
     ShaftLoad,
-    driver_pin,
     equivalent_torque,
     gear_check,
     gear_rows,
@@ -27,7 +27,11 @@ from chainunit.capabilities.checks.row import CheckRow
 from chainunit.capabilities.checks.tables import GearRatingTable
 from chainunit.core.errors import InputError
 from chainunit.drives.gear_rating import GearRating
+from chainunit.machines.api import machine_of
+from chainunit.machines.linkages.file import read_linkage
+from chainunit.models import MACHINES
 from chainunit.report.blocks import at
+from chainunit.study.bearings import driver_bearing
 from chainunit.study.config import parse
 
 DOCS = (Path(__file__).parents[3] / "docs" / "checks.md").read_text("utf-8")
@@ -123,11 +127,24 @@ def test_what_nobody_gives_is_named():
     ]
 
 
-def test_the_bearing_of_the_crank_is_the_pin_that_turns_with_it():
-    angle = np.linspace(3.0, 15.0, 400)
-    turned = {"a": 0.1 * np.sin(angle), "b": 3.0 - angle, "c": angle - 0.2 * np.sin(angle)}
-    assert driver_pin({"A": "a", "C": "c", "O1": "b"}, turned, angle) == "O1"
-    assert driver_pin({"A": "a", "C": "c", "X": "x"}, turned, angle) == ""
+@pytest.mark.parametrize(
+    ("machine", "title"),
+    [
+        ("ChamberForces", "O1 crank bearing"),
+        ("KnifeDrive", "O1 crank bearing"),
+        ("scotch_yoke_pump.toml", "O1"),
+        ("whitworth_quick_return.toml", "O1"),
+        ("cylinder_lift.toml", ""),
+    ],
+)
+def test_the_bearing_of_the_crank_is_the_pin_that_turns_with_it(machine, title):
+    file = Path(__file__).parents[3] / "examples" / "linkages" / machine
+    of = machine_of(MACHINES[machine] if machine in MACHINES else read_linkage(file))
+    assert driver_bearing(SimpleNamespace(simulated_machine=of, foreign_machine=None)) == title
+    if title:
+        phi = np.linspace(0.0, 2.0 * np.pi * of.p.ratio, 400)
+        turned = of.pin_turns({"phi0": phi})[of.model.pins[title]]
+        assert np.abs(turned) == pytest.approx(phi / of.p.ratio, abs=1e-9)
 
 
 # -- a study

@@ -8,29 +8,27 @@ with the same teeth: they carry the largest torque of the turn in each turn, so 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from ...core.quantities import Value, declaration, quantity
 from ...drives.gear_rating import GearRating
 from ...reading.results import part, result
 from ...study.arrays import peak
-from ...study.bearings import hardest_run, mean_load
-from ...study.drive import Drive
-from ...study.readings import crank_angle, machine_series, shaft_power
+from ...study.bearings import driver_bearing, driver_force, largest_load, mean_load
+from ...study.readings import crank_angle, shaft_power
 from ...study.record import StudyRecord
 from ...study.starts import StartFindings
 from ...study.torques import gear_torque
-from ...study.window import mean, whole_turns
+from ...study.window import mean
 from .row import CheckRow, NotChecked
-from .runs import runs_from_events
+from .runs import largest
 from .tables import GearRatingTable, MotorShaftTable
 
 _MAKER = "Rating of the maker of the gear"
-_UNTURNED = 1e-6
-"""Angle [rad] up to which a pin turns with the crank."""
 
 
 @declaration
@@ -76,23 +74,6 @@ def equivalent_torque(torque: Any, angle: Any, exponent: float) -> float:
     """Torque of equal damage [N m] of a `torque` [N m] over the `angle` of its shaft [rad], both of shape (n,):
     (integral of |T|^p |d angle| / integral of |d angle|)^(1/p). With an exponent of 0, the largest torque."""
     return mean_load(np.abs(torque), angle, exponent) if exponent else peak(torque)
-
-
-def driver_pin(titles: Mapping[str, str], turned: Mapping[str, Any], angle: Any) -> str:
-    """The title of the first pin that turns with the crank, which is its bearing in the frame; empty where none does.
-
-    Parameters
-    ----------
-    titles : by title, the output of the pin
-    turned, angle : by output, the angle of the pin, and that of the crank [rad], each of shape (n,)
-    """
-    span = np.asarray(angle) - angle[0]
-    for title, output in titles.items():
-        if output in turned:
-            own = np.abs(turned[output] - turned[output][0])
-            if float(np.max(np.abs(own - np.abs(span)))) <= _UNTURNED * max(1.0, peak(span)):
-                return title
-    return ""
 
 
 def gear_check(
@@ -169,20 +150,13 @@ def _lacks(title: str, key: str) -> NotChecked:
     return NotChecked(f"gear, {title}", f"the file does not give it; add [gear_rating] with {key}")
 
 
-def bearing_force(study: StudyRecord, turns: Any) -> tuple[str, Any, float | None]:
-    """The bearing of the crank by its title, its force over whole `turns` [N], shape (n,), and the largest of all
-    runs [N]; an empty title, and None, where no pin turns with the crank."""
-    drive = study.drive
-    if drive.foreign_machine:
-        return "", None, None
-    machine = drive.simulated_machine
-    turned = machine.pin_turns(machine_series(turns))
-    title = driver_pin(machine.model.pins, turned, crank_angle(drive, turns))
+def bearing_force(study: StudyRecord, turns: xr.Dataset) -> tuple[str, float | None, float | None]:
+    """The bearing of the crank by its title, its largest force over whole `turns`, and that of all runs [N]; an empty
+    title, and None, where the machine has none."""
+    title = driver_bearing(study.drive)
     if not title:
         return "", None, None
-    output = machine.model.pins[title]
-    force = np.hypot(*(turns[f"machine.{output}.{axis}"].values for axis in ("fx", "fy")))
-    return title, force, study.pins[hardest_run(study.pins, title)][title]["peak"]
+    return title, peak(driver_force(study.drive, turns)), largest_load(study.pins, title)[0]
 
 
 def find(study: StudyRecord, table: GearRatingTable) -> tuple[GearCheck | None, list[CheckRow | NotChecked]]:
@@ -197,22 +171,23 @@ def find(study: StudyRecord, table: GearRatingTable) -> tuple[GearCheck | None, 
         return None, [NotChecked("gear", why, "gear_rating")]
     if drive.foreign is not None:
         return None, [NotChecked("gear", "the motor is an FMU, whose torque is not known")]
-    turns = whole_turns(drive, study.steady)
-    torque, largest, run = gear_torque(drive, turns), *_largest_torque(drive, runs_from_events(study))
+    turns = study.steady
+    torque = gear_torque(drive, turns)
+    most, run = largest(study, lambda run: gear_torque(drive, run))
     starts = StartFindings.found_in(study)
-    if starts is not None and starts.worst.gear_torque > largest:
-        largest, run = starts.worst.gear_torque, "start_up"
-    title, force, largest_radial = bearing_force(study, turns)
+    if starts is not None and starts.worst.gear_torque > most:
+        most, run = starts.worst.gear_torque, "start_up"
+    title, radial, largest_radial = bearing_force(study, turns)
     load = GearDuty(
         ratio=drive.ratio,
         exponent=table.exponent or None,
         equivalent=equivalent_torque(torque, crank_angle(drive, turns), table.exponent),
         mean=mean(turns, np.abs(torque)),
-        largest=largest,
+        largest=most,
         power=mean(turns, np.abs(shaft_power(drive, turns))),
-        radial=None if force is None else peak(force),
+        radial=radial,
         largest_radial=largest_radial,
-        speed=max(peak(each[drive.motor_speed].values) for _, each in runs_from_events(study)),
+        speed=largest(study, lambda run: run[drive.motor_speed].values)[0],
     )
     found = gear_check(load, rating, table.peak_factor or tables.gear.start_factor, run, title)
     return found, list(gear_rows(found, rating, table.peak_overhung_load, study.titles))
@@ -232,11 +207,6 @@ def rating_of(table: GearRatingTable, sold: GearRating | None, torque_limit: flo
     )
 
 
-def _largest_torque(drive: Drive, runs: Iterable[tuple[str, Any]]) -> tuple[float, str]:
-    """The largest torque at the output of the gear [N m], and the run in which it is."""
-    return max((peak(gear_torque(drive, run)), name) for name, run in runs)
-
-
 def motor_shaft(
     study: StudyRecord, table: MotorShaftTable
 ) -> tuple[ShaftLoad | None, list[CheckRow | NotChecked]]:
@@ -247,8 +217,7 @@ def motor_shaft(
         why = "the file gives no permitted load; add [motor_shaft] with overhung_load"
         belt = "" if direct else ", and for a belt on it with pulley_diameter and tension_factor"
         return None, [NotChecked(what, why + belt, "motor_shaft")]
-    turns = whole_turns(study.drive, study.steady)
-    torque = None
+    turns, torque = study.steady, None
     if table.pulley_diameter and table.tension_factor:
         torque = peak(turns[study.drive.motor_torque].values)
         radial = pulley_force(torque, table.pulley_diameter, table.tension_factor)
@@ -256,9 +225,9 @@ def motor_shaft(
         numbers = {"T": "checks.motor_shaft.torque"}
     elif direct:
         title, force, _ = bearing_force(study, turns)
-        if not title:
+        if force is None:
             return None, [NotChecked(what, "no pin of the machine turns with the shaft")]
-        radial, formula, numbers = peak(force), f"largest reaction of {title} in steady running", {}
+        radial, formula, numbers = force, f"largest reaction of {title} in steady running", {}
     else:
         return None, [
             NotChecked(what, "a belt or wheel on it is not known; add pulley_diameter and tension_factor")

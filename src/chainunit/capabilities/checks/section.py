@@ -15,13 +15,11 @@ import numpy as np
 from ...core.quantities import Value, declaration, quantity
 from ...reading.results import part, result
 from ...study.arrays import peak
-from ...study.bearings import hardest_run
-from ...study.readings import crank_angle, crank_torque, machine_series
+from ...study.bearings import driver_bearing, largest_load, pin_force
+from ...study.readings import crank_torque, machine_series
 from ...study.record import StudyRecord
-from ...study.window import whole_turns
-from .gear import driver_pin
 from .row import CheckRow, NotChecked
-from .runs import runs_from_events
+from .runs import largest
 from .section_plan import SectionPlan
 from .section_strength import (
     DIRECTIONS,
@@ -195,12 +193,12 @@ def find(
     if not plans:
         return {}, [NotChecked("shaft sections", "the file has none; add [section.NAME]", "section.NAME")]
     drive = study.drive
-    turns = whole_turns(drive, study.steady)
+    turns = study.steady
     machine = drive.simulated_machine
     turned = machine.pin_turns(machine_series(turns))
-    bearing = driver_pin(machine.model.pins, turned, crank_angle(drive, turns))
+    bearing = driver_bearing(drive)
     torque = crank_torque(drive, turns)
-    largest_torque = max(peak(crank_torque(drive, run)) for _, run in runs_from_events(study))
+    largest_torque, _ = largest(study, lambda run: crank_torque(drive, run))
     found: dict[str, ShaftSection] = {}
     checks: list[CheckRow | NotChecked] = []
     for name, plan in plans.items():
@@ -211,15 +209,14 @@ def find(
             checks.append(NotChecked(f"section {name}", why))
             continue
         fx, fy = (turns[f"machine.{output}.{axis}"].values for axis in ("fx", "fy"))
-        force = np.hypot(fx, fy)
+        force = peak(pin_force(turns, output))
         if plan.on == "link":
-            amplitude, mean = np.array([peak(force)]), np.zeros(1)
+            amplitude, mean = np.array([force]), np.zeros(1)
         else:
             angle = turned[machine.model.pins[bearing]] if plan.on == "crank" else 0.0
             amplitude, mean = fibres(fx, fy, angle)
-        run = hardest_run(study.pins, pin)
-        largest = study.pins[run][pin]["peak"] or 0.0
-        args = (amplitude, mean, peak(force), largest, torque, largest_torque, pin, run)
+        most, run = largest_load(study.pins, pin)
+        args = (amplitude, mean, force, most, torque, largest_torque, pin, run)
         found[name] = shaft_section(plan, *args)
         checks += section_rows(name, found[name], plan.table.safety, study.title_of(run))
     return found, checks
