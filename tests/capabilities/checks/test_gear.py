@@ -127,6 +127,19 @@ def test_what_nobody_gives_is_named():
     ]
 
 
+def test_a_crank_with_bearings_of_its_own_puts_no_load_on_the_gear():
+    plans = [parse(text).plans["checks"] for text in ("[sizing]\nseparate_bearing = true", "[sizing]", "")]
+    assert [plan.separate_bearing for plan in plans] == [True, False, False]
+
+
+def test_the_numbers_of_the_application_factor_are_those_of_its_formula():
+    for load, symbols in ((LOAD, ["Teq", "TN", "p"]), (replace(LOAD, exponent=None), ["Teq", "TN"])):
+        found = gear_check(load, RATING, 2.0)
+        row = next(gear_rows(found, RATING, 0.0, {}))
+        assert list(row.numbers) == symbols and all(each in row.formula for each in symbols)
+        assert found.application_factor == found.load.equivalent / found.rated_torque
+
+
 @pytest.mark.parametrize(
     ("machine", "title"),
     [

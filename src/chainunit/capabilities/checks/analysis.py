@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, TypeVar
 
@@ -48,16 +49,17 @@ class CheckFindings(Findings):
         """Warn of each check that does not hold."""
         for row in self.rows:
             if not row.holds:
+                share = number(row.utilisation, "1", "used")
                 study.warn(
                     "check",
-                    "{of}: {title} {value}, and {bound} {limit} {allowed}: {used} of the limit is used ({clause}).",
+                    "{of}: {title} {value}, and {bound} {limit} {allowed}{used} ({clause}).",
                     of=row.of,
                     title=row.title,
-                    value=(row.value, row.unit, row.kind),
+                    value="never" if row.value == math.inf else (row.value, row.unit, row.kind),
                     bound="at least" if row.at_least else "at most",
                     limit=(row.limit, row.unit, row.kind),
                     allowed="are needed" if row.at_least else "are permitted",
-                    used=number(row.utilisation, "1", "used"),
+                    used="" if row.utilisation == math.inf else f": {share} of the limit is used",
                     clause=row.clause,
                 )
 
@@ -118,7 +120,7 @@ def _of_cycle(study: StudyRecord, plan: CheckPlan, found: _Found) -> dict[str, A
     """The findings on parts that carry the cycle, by name; their checks are added."""
     starts = plan.starts_per_hour
     return {
-        "gear": found.of(*gear.find(study, plan.gear)),
+        "gear": found.of(*gear.find(study, plan.gear, plan.separate_bearing)),
         "motor_shaft": found.of(*gear.motor_shaft(study, plan.motor_shaft)),
         "flexible_coupling": found.of(*coupling.find(study, plan.coupling, plan.coupling_place, starts)),
         "section": found.of(*section.find(study, plan.sections)),

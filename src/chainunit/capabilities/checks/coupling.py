@@ -169,7 +169,12 @@ def coupling_rows(
             "alternating_torque",
             "alternating",
             "TKW >= half range of sum V(f) Sf(f) T(f), times St",
-            {"rigid": f"{at}.swinging.rigid", "elastic": f"{at}.swinging.elastic", **factors},
+            {
+                "rigid": f"{at}.swinging.rigid",
+                "elastic": f"{at}.swinging.elastic",
+                "fe": f"{at}.swinging.natural_frequency",
+                **factors,
+            },
         ),
         (
             "passage through resonance",

@@ -29,6 +29,8 @@ from .runs import largest
 from .tables import GearRatingTable, MotorShaftTable
 
 _MAKER = "Rating of the maker of the gear"
+_UNTURNED = "no pin of the machine turns with the output shaft"
+_SEPARATE = "the crank has bearings of its own (sizing.separate_bearing)"
 
 
 @declaration
@@ -51,10 +53,9 @@ class GearCheck:
     """The gear. Its application factors are the torque of equal damage over its rated torque, and over the mean."""
 
     run: str = part("the run with the largest torque")
-    bearing: str = part(
-        "pin whose reaction the output shaft carries; empty where none turns with the {driver}"
-    )
+    bearing: str = part("pin whose reaction the output shaft carries; empty where it carries none")
     load: GearDuty = part(inline=True)
+    rated_torque: float | None = quantity("N.m", "rated torque of the output TN")
     application_factor: float | None = quantity("1", "application factor of the cycle, Teq over rated torque")
     over_mean: float | None = quantity("1", "torque of equal damage over the mean one")
     torque_limit: float | None = quantity("N.m", "permitted torque of the output in peaks")
@@ -65,7 +66,7 @@ class ShaftLoad:
     """The radial force on the motor's shaft."""
 
     torque: float | None = quantity(
-        "N.m", "largest torque of the motor in steady running; none without a pulley"
+        "N.m", "largest torque at the motor's shaft in steady running; none without a pulley"
     )
     radial: float = quantity("N", "largest radial force on the shaft in steady running")
 
@@ -80,11 +81,12 @@ def gear_check(
     load: GearDuty, rating: GearRating, peak_factor: float, run: str = "", bearing: str = ""
 ) -> GearCheck:
     """The gear under its load."""
-    rated = rating.rated_torque
+    rated = rating.rated_torque or None
     return GearCheck(
         run=run,
         bearing=bearing,
         load=load,
+        rated_torque=rated,
         application_factor=load.equivalent / rated if rated else None,
         over_mean=load.equivalent / load.mean if load.mean else None,
         torque_limit=rated * peak_factor if rated else None,
@@ -92,32 +94,41 @@ def gear_check(
 
 
 def gear_rows(
-    of: GearCheck, rating: GearRating, permitted_peak: float, titles: Mapping[str, str]
+    of: GearCheck,
+    rating: GearRating,
+    permitted_peak: float,
+    titles: Mapping[str, str],
+    unloaded: str = _UNTURNED,
 ) -> Iterator[CheckRow | NotChecked]:
     """The rows of a gear; `permitted_peak` is the permitted radial force in events [N], 0 where it is unknown, and
-    `titles` are those of runs."""
+    `titles` are those of runs. `unloaded` says why the output shaft carries no reaction, where it carries none."""
     own, at = of.load, "checks.gear"
     if of.application_factor is not None and of.torque_limit is not None:
-        by = "p of the file" if own.exponent else "the largest torque"
+        rated = {"TN": f"{at}.rated_torque"}
+        teq = "Teq: largest |T| of steady running"
+        exponent = {}
+        if own.exponent:
+            teq = "Teq = (sum |T|^p |dphi| / sum |dphi|)^(1/p)"
+            exponent = {"p": f"{at}.exponent"}
         yield CheckRow(
             "gear",
             "application factor",
             "ISO 6336-6:2019, annex on KA from a load spectrum",
-            f"KA = Teq/T, Teq = (sum |T|^p |dphi| / sum |dphi|)^(1/p), {by}",
+            f"KA = Teq/TN, {teq}",
             of.application_factor,
             rating.application_factor,
             f"{at}.application_factor",
-            {"Teq": f"{at}.equivalent", "mean |T|": f"{at}.mean"},
+            {"Teq": f"{at}.equivalent", **rated, **exponent},
         )
         yield CheckRow(
             "gear",
             f"largest torque of the output ({titles.get(of.run, of.run)})",
             _MAKER,
-            "T <= peak factor x rated torque",
+            "T <= peak factor x TN",
             own.largest,
             of.torque_limit,
             f"{at}.largest",
-            {"permitted": f"{at}.torque_limit"},
+            {**rated, "permitted": f"{at}.torque_limit"},
             "N.m",
         )
     else:
@@ -130,7 +141,7 @@ def gear_rows(
     for title, key, formula, name, unit, kind in ratings:
         limit, value = getattr(rating, key), getattr(own, name)
         if value is None:
-            yield NotChecked(f"gear, {title}", "no pin of the machine turns with the output shaft")
+            yield NotChecked(f"gear, {title}", unloaded)
         elif not limit:
             yield _lacks(title, key)
         else:
@@ -147,7 +158,7 @@ def gear_rows(
 
 
 def _lacks(title: str, key: str) -> NotChecked:
-    return NotChecked(f"gear, {title}", f"the file does not give it; add [gear_rating] with {key}")
+    return NotChecked(f"gear, {title}", f"its limit is not given; add [gear_rating] with {key}")
 
 
 def bearing_force(study: StudyRecord, turns: xr.Dataset) -> tuple[str, float | None, float | None]:
@@ -159,8 +170,11 @@ def bearing_force(study: StudyRecord, turns: xr.Dataset) -> tuple[str, float | N
     return title, peak(driver_force(study.drive, turns)), largest_load(study.pins, title)[0]
 
 
-def find(study: StudyRecord, table: GearRatingTable) -> tuple[GearCheck | None, list[CheckRow | NotChecked]]:
-    """The gear of a study and its checks; none for a drive without a gear."""
+def find(
+    study: StudyRecord, table: GearRatingTable, separate: bool = False
+) -> tuple[GearCheck | None, list[CheckRow | NotChecked]]:
+    """The gear of a study and its checks; none for a drive without a gear. `separate` tells whether the crank has
+    bearings of its own."""
     drive, tables = study.drive, study.config.drive
     if drive.ratio == 1.0:
         return None, []
@@ -177,7 +191,7 @@ def find(study: StudyRecord, table: GearRatingTable) -> tuple[GearCheck | None, 
     starts = StartFindings.found_in(study)
     if starts is not None and starts.worst.gear_torque > most:
         most, run = starts.worst.gear_torque, "start_up"
-    title, radial, largest_radial = bearing_force(study, turns)
+    title, radial, largest_radial = ("", None, None) if separate else bearing_force(study, turns)
     load = GearDuty(
         ratio=drive.ratio,
         exponent=table.exponent or None,
@@ -190,7 +204,8 @@ def find(study: StudyRecord, table: GearRatingTable) -> tuple[GearCheck | None, 
         speed=largest(study, lambda run: run[drive.motor_speed].values)[0],
     )
     found = gear_check(load, rating, table.peak_factor or tables.gear.start_factor, run, title)
-    return found, list(gear_rows(found, rating, table.peak_overhung_load, study.titles))
+    why = _SEPARATE if separate else _UNTURNED
+    return found, list(gear_rows(found, rating, table.peak_overhung_load, study.titles, why))
 
 
 def rating_of(table: GearRatingTable, sold: GearRating | None, torque_limit: float) -> GearRating:
@@ -221,8 +236,12 @@ def motor_shaft(
     if table.pulley_diameter and table.tension_factor:
         torque = peak(turns[study.drive.motor_torque].values)
         radial = pulley_force(torque, table.pulley_diameter, table.tension_factor)
-        formula = "F = 2 T f/d, T: largest torque of the motor in steady running"
-        numbers = {"T": "checks.motor_shaft.torque"}
+        formula = "F = 2 T f/d, T: largest torque at the motor's shaft in steady running"
+        numbers = {
+            "T": "checks.motor_shaft.torque",
+            "f": "motor_shaft.tension_factor",
+            "d": "motor_shaft.pulley_diameter",
+        }
     elif direct:
         title, force, _ = bearing_force(study, turns)
         if force is None:

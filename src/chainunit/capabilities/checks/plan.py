@@ -59,6 +59,8 @@ class CheckPlan:
     coupling: FlexibleCouplingTable | None = None
     coupling_place: str = "motor"
     sections: Mapping[str, SectionPlan] = field(default_factory=dict)
+    separate_bearing: bool = False
+    """whether the file says that the crank has bearings of its own, so that the gear does not carry its reaction"""
 
 
 def read_plan(reading: FileReading) -> CheckPlan:
@@ -79,6 +81,7 @@ def read_plan(reading: FileReading) -> CheckPlan:
     starting = reading.values.get("starting") or StartingTable()
     # the table of another capability, if the program has it
     demands = reading.values.get("sizing") if "sizing" in reading.data else None
+    form = getattr(reading.form, "sizing", None)
     asked = starting.per_hour or getattr(demands, "starts_per_hour", 0.0)
     return CheckPlan(
         bearings,
@@ -89,6 +92,7 @@ def read_plan(reading: FileReading) -> CheckPlan:
         reading.values.get("motor_shaft") or MotorShaftTable(),
         *_coupling(reading),
         sections,
+        getattr(form, "separate_bearing", False),
     )
 
 

@@ -7,6 +7,7 @@ must not trip it, and as slow as the other, where it must still save the motor.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -190,19 +191,17 @@ def relay_rows(of: RelayFindings, titles: Mapping[str, str]) -> Iterator[CheckRo
         "s",
     )
     numbers = {"Ir": f"{at}.setting", "IA": f"{at}.stall_current", "I0": f"{at}.before"}
-    if own.stall_trip is not None:
-        yield CheckRow(
-            name,
-            "trip with the rotor locked",
-            f"{_CLAUSE}; locked-rotor time of the maker of the motor",
-            f"t = T ln(((IA/Ir)^2 - (I0/Ir)^2)/((IA/Ir)^2 - {TRIPS_AT:g}^2)), T from the largest trip time of the "
-            "class",
-            own.stall_trip,
-            of.numbers.stall_time,
-            f"{here}.stall_trip",
-            numbers | {"largest": f"{here}.longest"},
-            "s",
-        )
+    yield CheckRow(
+        name,
+        "trip with the rotor locked",
+        f"{_CLAUSE}; locked-rotor time of the maker of the motor",
+        f"t = T ln(((IA/Ir)^2 - (I0/Ir)^2)/((IA/Ir)^2 - {TRIPS_AT:g}^2)), T from the largest trip time of the class",
+        math.inf if own.stall_trip is None else own.stall_trip,
+        of.numbers.stall_time,
+        f"{here}.stall_trip",
+        numbers | {"largest": f"{here}.longest"},
+        "s",
+    )
     for event, heat in of.events.items():
         yield CheckRow(
             name,

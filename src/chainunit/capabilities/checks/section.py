@@ -40,7 +40,7 @@ _CLAUSE = {
 @declaration
 class SectionStress:
     """The stresses of a section: of the fibre with the least safety in steady running, and the largest ones of all
-    runs."""
+    runs. A load that does not swing has no permitted amplitude."""
 
     bending: Value = quantity("N/m2", "amplitude of bending", kind="stress")
     bending_mean: Value = quantity("N/m2", "mean of bending", kind="stress")
@@ -126,13 +126,19 @@ def shaft_section(
     fatigue = fibre_fatigue(strength, stress, plan.mean_stress)
     worst = fatigue.worst
     most = (lever * largest, pull * largest, twist * largest_torque)
+    amplitudes = {
+        "bending": float(stress.bending[worst]),
+        "tension": stress.tension,
+        "torsion": stress.torsion,
+    }
     numbers = SectionStress(
-        bending=float(stress.bending[worst]),
+        **amplitudes,
         bending_mean=float(stress.bending_mean[worst]),
-        tension=stress.tension,
-        torsion=stress.torsion,
         torsion_mean=stress.torsion_mean,
-        **{f"permitted_{load}": float(limit[worst]) for load, limit in fatigue.permitted.items()},
+        **{
+            f"permitted_{load}": float(limit[worst]) if amplitudes[load] > 0.0 else None
+            for load, limit in fatigue.permitted.items()
+        },
         largest_bending=most[0],
         largest_tension=most[1],
         largest_torsion=most[2],
@@ -145,7 +151,7 @@ def shaft_section(
 def section_rows(name: str, of: ShaftSection, safety: float, run: str) -> Iterator[CheckRow]:
     """The rows of a section; `run` is the title of the run with the largest force."""
     at = f"checks.section.{name}"
-    own = of.stress
+    own, loads = of.stress, {"sba": "bending", "szda": "tension", "tta": "torsion"}
     # a section without a swinging stress lasts
     fatigue = own.fatigue_safety if math.isfinite(own.fatigue_safety) else None
     yields = own.yield_safety if math.isfinite(own.yield_safety) else None
@@ -158,12 +164,12 @@ def section_rows(name: str, of: ShaftSection, safety: float, run: str) -> Iterat
         safety,
         f"{at}.fatigue_safety",
         {
-            "sba": f"{at}.bending",
-            "szda": f"{at}.tension",
-            "tta": f"{at}.torsion",
-            "sbADK": f"{at}.permitted_bending",
-            "szdADK": f"{at}.permitted_tension",
-            "ttADK": f"{at}.permitted_torsion",
+            **{symbol: f"{at}.{load}" for symbol, load in loads.items()},
+            **{
+                f"{symbol.removesuffix('a')}ADK": f"{at}.permitted_{load}"
+                for symbol, load in loads.items()
+                if getattr(own, f"permitted_{load}") is not None
+            },
         },
         at_least=True,
     )
@@ -180,6 +186,7 @@ def section_rows(name: str, of: ShaftSection, safety: float, run: str) -> Iterat
             "szd": f"{at}.largest_tension",
             "tt": f"{at}.largest_torsion",
             "sbFK": f"{at}.strength.yield_bending",
+            "szdFK": f"{at}.strength.yield_tension",
             "ttFK": f"{at}.strength.yield_torsion",
         },
         at_least=True,
