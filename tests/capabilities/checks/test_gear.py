@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,6 @@ from command import chainunit
 from chainunit.capabilities.checks.gear import (
     GearDuty,
     ShaftLoad,
-    driver_pin,
     equivalent_torque,
     gear_check,
     gear_rows,
@@ -28,9 +28,11 @@ from chainunit.capabilities.checks.tables import GearRatingTable
 from chainunit.core.errors import InputError
 from chainunit.drives.gear_rating import GearRating
 from chainunit.report.blocks import at
+from chainunit.study.bearings import driver_bearing
 from chainunit.study.config import parse
 
 DOCS = (Path(__file__).parents[3] / "docs" / "checks.md").read_text("utf-8")
+LINKAGES = Path(__file__).parents[3] / "examples" / "linkages"
 RATING = GearRating(
     rated_torque=1000.0,
     application_factor=1.25,
@@ -123,11 +125,20 @@ def test_what_nobody_gives_is_named():
     ]
 
 
-def test_the_bearing_of_the_crank_is_the_pin_that_turns_with_it():
-    angle = np.linspace(3.0, 15.0, 400)
-    turned = {"a": 0.1 * np.sin(angle), "b": 3.0 - angle, "c": angle - 0.2 * np.sin(angle)}
-    assert driver_pin({"A": "a", "C": "c", "O1": "b"}, turned, angle) == "O1"
-    assert driver_pin({"A": "a", "C": "c", "X": "x"}, turned, angle) == ""
+def test_the_bearing_of_the_crank_is_that_in_the_ground_wherever_it_stands_in_the_file(tmp_path):
+    """The block of a yoke that only slides turns on the crank's pin A as far as the crank in its bearing."""
+    yoke = (LINKAGES / "scotch_yoke_pump.toml").read_text("utf-8")
+    pin = '[joints.A]\non = "crank.A"\nby = "block.A"\n\n'
+    (tmp_path / "yoke.toml").write_text(yoke.replace("[joints.slot]", f"{pin}[joints.slot]"), "utf-8")
+    machines = (
+        ("yoke.toml", "A", "O1"),
+        ("KnifeDrive", "O1 crank bearing", "O1 crank bearing"),
+        ("Accelerator", "O rotor bearing", "O rotor bearing"),
+    )
+    for name, first, bearing in machines:
+        machine = parse(f'[system]\nmachine = "{name}"', str(tmp_path / "study.toml")).machine
+        assert next(iter(machine.model.pins)) == first
+        assert driver_bearing(SimpleNamespace(foreign_machine=None, simulated_machine=machine)) == bearing
 
 
 # -- a study

@@ -10,7 +10,7 @@ import numpy as np
 from ...reading.results import part, result
 from ...reading.text import number
 from ...study.analysis import Analysis, Findings, Work
-from ...study.bearings import hardest_run
+from ...study.bearings import hardest_run, pin_force
 from ...study.readings import crank_angle, has_turn, machine_series
 from ...study.record import StudyRecord
 from ...study.window import whole_turns
@@ -144,7 +144,7 @@ def _bearings(study: StudyRecord, plan: CheckPlan, found: _Found) -> None:
         if name is None or name not in angles:
             found.add([NotChecked(f"{pin}, bearing", "its angle is not known with organs that are chains")])
             continue
-        force = np.hypot(*(turns[f"machine.{name}.{axis}"].values for axis in ("fx", "fy")))
+        force = pin_force(drive, turns, pin)
         run = hardest_run(study.pins, pin)
         largest = study.pins[run][pin]["peak"] or 0.0
         if bearing.kind == PLAIN:

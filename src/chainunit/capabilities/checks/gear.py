@@ -17,9 +17,9 @@ from ...core.quantities import Value, declaration, quantity
 from ...drives.gear_rating import GearRating
 from ...reading.results import part, result
 from ...study.arrays import peak
-from ...study.bearings import hardest_run, mean_load
+from ...study.bearings import driver_bearing, hardest_run, mean_load, pin_force
 from ...study.drive import Drive
-from ...study.readings import crank_angle, machine_series, shaft_power
+from ...study.readings import crank_angle, shaft_power
 from ...study.record import StudyRecord
 from ...study.starts import StartFindings
 from ...study.torques import gear_torque
@@ -29,8 +29,6 @@ from .runs import runs_from_events
 from .tables import GearRatingTable, MotorShaftTable
 
 _MAKER = "Rating of the maker of the gear"
-_UNTURNED = 1e-6
-"""Angle [rad] up to which a pin turns with the crank."""
 
 
 @declaration
@@ -76,23 +74,6 @@ def equivalent_torque(torque: Any, angle: Any, exponent: float) -> float:
     """Torque of equal damage [N m] of a `torque` [N m] over the `angle` of its shaft [rad], both of shape (n,):
     (integral of |T|^p |d angle| / integral of |d angle|)^(1/p). With an exponent of 0, the largest torque."""
     return mean_load(np.abs(torque), angle, exponent) if exponent else peak(torque)
-
-
-def driver_pin(titles: Mapping[str, str], turned: Mapping[str, Any], angle: Any) -> str:
-    """The title of the first pin that turns with the crank, which is its bearing in the frame; empty where none does.
-
-    Parameters
-    ----------
-    titles : by title, the output of the pin
-    turned, angle : by output, the angle of the pin, and that of the crank [rad], each of shape (n,)
-    """
-    span = np.asarray(angle) - angle[0]
-    for title, output in titles.items():
-        if output in turned:
-            own = np.abs(turned[output] - turned[output][0])
-            if float(np.max(np.abs(own - np.abs(span)))) <= _UNTURNED * max(1.0, peak(span)):
-                return title
-    return ""
 
 
 def gear_check(
@@ -171,18 +152,12 @@ def _lacks(title: str, key: str) -> NotChecked:
 
 def bearing_force(study: StudyRecord, turns: Any) -> tuple[str, Any, float | None]:
     """The bearing of the crank by its title, its force over whole `turns` [N], shape (n,), and the largest of all
-    runs [N]; an empty title, and None, where no pin turns with the crank."""
-    drive = study.drive
-    if drive.foreign_machine:
-        return "", None, None
-    machine = drive.simulated_machine
-    turned = machine.pin_turns(machine_series(turns))
-    title = driver_pin(machine.model.pins, turned, crank_angle(drive, turns))
+    runs [N]; an empty title, and None, where there is none, see `driver_bearing`."""
+    title = driver_bearing(study.drive)
     if not title:
         return "", None, None
-    output = machine.model.pins[title]
-    force = np.hypot(*(turns[f"machine.{output}.{axis}"].values for axis in ("fx", "fy")))
-    return title, force, study.pins[hardest_run(study.pins, title)][title]["peak"]
+    largest = study.pins[hardest_run(study.pins, title)][title]["peak"]
+    return title, pin_force(study.drive, turns, title), largest
 
 
 def find(study: StudyRecord, table: GearRatingTable) -> tuple[GearCheck | None, list[CheckRow | NotChecked]]:

@@ -15,11 +15,10 @@ import numpy as np
 from ...core.quantities import Value, declaration, quantity
 from ...reading.results import part, result
 from ...study.arrays import peak
-from ...study.bearings import hardest_run
-from ...study.readings import crank_angle, crank_torque, machine_series
+from ...study.bearings import driver_bearing, hardest_run
+from ...study.readings import crank_torque, machine_series
 from ...study.record import StudyRecord
 from ...study.window import whole_turns
-from .gear import driver_pin
 from .row import CheckRow, NotChecked
 from .runs import runs_from_events
 from .section_plan import SectionPlan
@@ -198,7 +197,7 @@ def find(
     turns = whole_turns(drive, study.steady)
     machine = drive.simulated_machine
     turned = machine.pin_turns(machine_series(turns))
-    bearing = driver_pin(machine.model.pins, turned, crank_angle(drive, turns))
+    bearing = driver_bearing(drive)
     torque = crank_torque(drive, turns)
     largest_torque = max(peak(crank_torque(drive, run)) for _, run in runs_from_events(study))
     found: dict[str, ShaftSection] = {}

@@ -14,7 +14,7 @@ from ...core.errors import InputError
 from ...drives.catalogue_gears import CatalogueGear
 from ...drives.gear_ratios import GearUnit, nearest
 from ...study.arrays import peak
-from ...study.bearings import driver_force
+from ...study.bearings import driver_bearing, pin_force
 from ...study.drive import Drive
 from ...study.limits import SPEED_DEVIATION, Check
 from ...study.readings import shaft_power
@@ -124,9 +124,8 @@ def gear_checks(
     if of.thermal_power:
         passed = sum(share * float(np.mean(np.abs(shaft_power(drive, run)))) for share, run in cases)
         checks["gear_thermal"] = Check("power that the gear passes", passed, of.thermal_power, "W")
-    forces = [] if separate else [driver_force(drive, run) for run in running]
-    if of.overhung_load and forces and all(force is not None for force in forces):
-        largest = max(peak(force) for force in forces)
+    if of.overhung_load and not separate and (bearing := driver_bearing(drive)):
+        largest = max(peak(pin_force(drive, run, bearing)) for run in running)
         checks["gear_overhung"] = Check("overhung load of the gear", largest, of.overhung_load, "N")
     if of.largest_speed:
         fastest = max(peak(run["motor.w"].values) for run in running)
