@@ -19,6 +19,7 @@ from chainunit.capabilities.checks.gear import (
     equivalent_torque,
     gear_check,
     gear_rows,
+    peak_factor_of,
     pulley_force,
     rating_of,
     shaft_row,
@@ -27,6 +28,7 @@ from chainunit.capabilities.checks.row import CheckRow
 from chainunit.capabilities.checks.tables import GearRatingTable
 from chainunit.core.errors import InputError
 from chainunit.drives.gear_rating import GearRating
+from chainunit.drives.gearing import Transmission
 from chainunit.report.blocks import at
 from chainunit.study.bearings import driver_bearing
 from chainunit.study.config import parse
@@ -226,3 +228,14 @@ def test_ratings_of_the_file_come_before_those_of_the_catalogue():
     assert given == replace(sold, rated_torque=800.0, application_factor=1.0, overhung_load=7e3)
     limit = rating_of(GearRatingTable(application_factor=1.3, largest_speed=300.0), None, 700.0)
     assert limit == GearRating(rated_torque=700.0, application_factor=1.3, largest_speed=300.0)
+
+
+def test_a_gear_of_a_catalogue_permits_the_same_torque_in_peaks_as_in_the_choice():
+    """Its start factor is over the rated torque times the application factor; one of the file over the rated one."""
+    gear = Transmission(torque_limit=450.0, start_factor=2.0)
+    sold = GearRating(rated_torque=300.0, application_factor=1.5)
+    factor = peak_factor_of(GearRatingTable(), sold, gear)
+    assert gear_check(LOAD, sold, factor).torque_limit == gear.start_limit == 900.0
+    assert peak_factor_of(GearRatingTable(), None, gear) == 2.0
+    assert peak_factor_of(GearRatingTable(rated_torque=400.0), sold, gear) == 2.0
+    assert peak_factor_of(GearRatingTable(peak_factor=1.8), sold, gear) == 1.8

@@ -15,6 +15,7 @@ import numpy as np
 
 from ...core.quantities import Value, declaration, quantity
 from ...drives.gear_rating import GearRating
+from ...drives.gearing import Transmission
 from ...reading.results import part, result
 from ...study.arrays import peak
 from ...study.bearings import driver_bearing, hardest_run, mean_load, pin_force
@@ -147,7 +148,7 @@ def gear_rows(
 
 
 def _lacks(title: str, key: str) -> NotChecked:
-    return NotChecked(f"gear, {title}", f"the file does not give it; add [gear_rating] with {key}")
+    return NotChecked(f"gear, {title}", f"its limit is not known; add [gear_rating] with {key}")
 
 
 def bearing_force(study: StudyRecord, turns: Any) -> tuple[str, Any, float | None]:
@@ -189,7 +190,7 @@ def find(study: StudyRecord, table: GearRatingTable) -> tuple[GearCheck | None, 
         largest_radial=largest_radial,
         speed=max(peak(each[drive.motor_speed].values) for _, each in runs_from_events(study)),
     )
-    found = gear_check(load, rating, table.peak_factor or tables.gear.start_factor, run, title)
+    found = gear_check(load, rating, peak_factor_of(table, drive.gear_rating, tables.gear), run, title)
     return found, list(gear_rows(found, rating, table.peak_overhung_load, study.titles))
 
 
@@ -205,6 +206,13 @@ def rating_of(table: GearRatingTable, sold: GearRating | None, torque_limit: flo
         overhung_load=table.overhung_load or sold.overhung_load,
         largest_speed=table.largest_speed or sold.largest_speed,
     )
+
+
+def peak_factor_of(table: GearRatingTable, sold: GearRating | None, gear: Transmission) -> float:
+    """The permitted torque in peaks over the rated torque: that in the `table` of the file, else in a start of the
+    `gear`; one that is `sold` in a catalogue permits it over the rated torque times its application factor."""
+    over_rated = 1.0 if sold is None or table.rated_torque else sold.application_factor
+    return float(table.peak_factor or gear.start_factor * over_rated)
 
 
 def _largest_torque(drive: Drive, runs: Iterable[tuple[str, Any]]) -> tuple[float, str]:
