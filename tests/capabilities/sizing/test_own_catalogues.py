@@ -13,6 +13,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from command import chainunit
+from event_tables import HEAVY_TABLES
 from sizings import sized_by
 
 from chainunit.capabilities.handover.candidates import candidates_csv
@@ -45,20 +46,10 @@ large,G-3,50.8,900,0.96,0.0004,6000,9000,
 far,G-4,80,900,0.94,0.0004,6000,9000,50
 """
 
-MACHINE = """
+MACHINE = f"""
 event = []
 catalogue = ["gears.csv"]
-start = "soft"
-[machine]
-crank = { m = 160, s = 0.05, I = 4 }
-coupler = { m = 120, s = 0.7, I = 24 }
-rocker = { m = 480, s = 0.5, I = 60 }
-left = { wall_mass = 540, web_mass = 216 }
-right = { wall_mass = 540, web_mass = 216 }
-[feed]
-left = { material_mass = 300, processing_force = 120 }
-right = { material_mass = 300, processing_force = 120 }
-[sizing]
+start = "soft"{HEAVY_TABLES}[sizing]
 candidates = 1
 poles_least = 4
 poles_most = 4
