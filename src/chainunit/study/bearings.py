@@ -25,7 +25,7 @@ def pin_loads(drive: Drive, run: xr.Dataset) -> dict[str, dict[str, float | None
     machine = drive.simulated_machine
     angles = machine.pin_turns(machine_series(turns))
     for title, name in machine.model.pins.items():
-        forces, forces_of_turns = (pin_force(of, name) for of in (run, turns))
+        forces, forces_of_turns = (pin_force(drive, of, title) for of in (run, turns))
         table[title] = {
             "peak": float(np.max(forces)),
             "rms": math.sqrt(mean(turns, forces_of_turns**2)),
@@ -34,29 +34,21 @@ def pin_loads(drive: Drive, run: xr.Dataset) -> dict[str, dict[str, float | None
     return table
 
 
-def pin_force(run: xr.Dataset, output: str) -> Any:
-    """Size of the reaction of a pin [N], shape (time,), by its `output` of the machine."""
-    return np.hypot(run[f"machine.{output}.fx"].values, run[f"machine.{output}.fy"].values)
-
-
 def driver_bearing(drive: Drive) -> str:
-    """The title of the pin that is the bearing of the driver, such as O1 of a crank; empty for a machine of whose
-    driver none is known."""
+    """The title of the bearing in which the driver turns, such as that of O1 of a crank; empty for a machine
+    that does not show it, such as a foreign FMU."""
     if drive.foreign_machine:
         return ""
-    machine = drive.simulated_machine
-    model = machine.model
-    bar = getattr(model.linkage(MATH, machine.p, model.Inputs()).driver, "bar", None)
-    for title, output in model.pins.items():
-        if bar is not None and model.joints.get(output) == (bar.pin, bar.name):
-            return str(title)
-    return ""
+    model, p = drive.simulated_machine.model, drive.simulated_machine.p
+    (bearing,) = model.linkage(MATH, p, model.Inputs()).driver.joints
+    titles = {model.joints.get(output): title for title, output in model.pins.items()}
+    return titles.get(bearing, "")
 
 
-def driver_force(drive: Drive, run: xr.Dataset) -> Any:
-    """Reaction at the bearing of the driver [N], shape (time,), see `driver_bearing`; None where it has none."""
-    title = driver_bearing(drive)
-    return pin_force(run, drive.simulated_machine.model.pins[title]) if title else None
+def pin_force(drive: Drive, run: xr.Dataset, title: str) -> Any:
+    """Size of the reaction of a pin or guide of that `title` in a run [N], shape (time,)."""
+    output = drive.simulated_machine.model.pins[title]
+    return np.hypot(run[f"machine.{output}.fx"].values, run[f"machine.{output}.fy"].values)
 
 
 _ALIKE = 1e-3

@@ -19,6 +19,7 @@ from chainunit.capabilities.checks.gear import (
     equivalent_torque,
     gear_check,
     gear_rows,
+    peak_factor_of,
     pulley_force,
     rating_of,
     shaft_row,
@@ -27,14 +28,13 @@ from chainunit.capabilities.checks.row import CheckRow
 from chainunit.capabilities.checks.tables import GearRatingTable
 from chainunit.core.errors import InputError
 from chainunit.drives.gear_rating import GearRating
-from chainunit.machines.api import machine_of
-from chainunit.machines.linkages.file import read_linkage
-from chainunit.models import MACHINES
+from chainunit.drives.gearing import Transmission
 from chainunit.report.blocks import at
 from chainunit.study.bearings import driver_bearing
 from chainunit.study.config import parse
 
 DOCS = (Path(__file__).parents[3] / "docs" / "checks.md").read_text("utf-8")
+LINKAGES = Path(__file__).parents[3] / "examples" / "linkages"
 RATING = GearRating(
     rated_torque=1000.0,
     application_factor=1.25,
@@ -140,24 +140,20 @@ def test_the_numbers_of_the_application_factor_are_those_of_its_formula():
         assert found.application_factor == found.load.equivalent / found.rated_torque
 
 
-@pytest.mark.parametrize(
-    ("machine", "title"),
-    [
-        ("ChamberForces", "O1 crank bearing"),
-        ("KnifeDrive", "O1 crank bearing"),
-        ("scotch_yoke_pump.toml", "O1"),
-        ("whitworth_quick_return.toml", "O1"),
-        ("cylinder_lift.toml", ""),
-    ],
-)
-def test_the_bearing_of_the_crank_is_the_pin_that_turns_with_it(machine, title):
-    file = Path(__file__).parents[3] / "examples" / "linkages" / machine
-    of = machine_of(MACHINES[machine] if machine in MACHINES else read_linkage(file))
-    assert driver_bearing(SimpleNamespace(simulated_machine=of, foreign_machine=None)) == title
-    if title:
-        phi = np.linspace(0.0, 2.0 * np.pi * of.p.ratio, 400)
-        turned = of.pin_turns({"phi0": phi})[of.model.pins[title]]
-        assert np.abs(turned) == pytest.approx(phi / of.p.ratio, abs=1e-9)
+def test_the_bearing_of_the_crank_is_that_in_the_ground_wherever_it_stands_in_the_file(tmp_path):
+    """The block of a yoke that only slides turns on the crank's pin A as far as the crank in its bearing."""
+    yoke = (LINKAGES / "scotch_yoke_pump.toml").read_text("utf-8")
+    pin = '[joints.A]\non = "crank.A"\nby = "block.A"\n\n'
+    (tmp_path / "yoke.toml").write_text(yoke.replace("[joints.slot]", f"{pin}[joints.slot]"), "utf-8")
+    machines = (
+        ("yoke.toml", "A", "O1"),
+        ("KnifeDrive", "O1 crank bearing", "O1 crank bearing"),
+        ("Accelerator", "O rotor bearing", "O rotor bearing"),
+    )
+    for name, first, bearing in machines:
+        machine = parse(f'[system]\nmachine = "{name}"', str(tmp_path / "study.toml")).machine
+        assert next(iter(machine.model.pins)) == first
+        assert driver_bearing(SimpleNamespace(foreign_machine=None, simulated_machine=machine)) == bearing
 
 
 # -- a study
@@ -245,3 +241,14 @@ def test_ratings_of_the_file_come_before_those_of_the_catalogue():
     assert given == replace(sold, rated_torque=800.0, application_factor=1.0, overhung_load=7e3)
     limit = rating_of(GearRatingTable(application_factor=1.3, largest_speed=300.0), None, 700.0)
     assert limit == GearRating(rated_torque=700.0, application_factor=1.3, largest_speed=300.0)
+
+
+def test_a_gear_of_a_catalogue_permits_the_same_torque_in_peaks_as_in_the_choice():
+    """Its start factor is over the rated torque times the application factor; one of the file over the rated one."""
+    gear = Transmission(torque_limit=450.0, start_factor=2.0)
+    sold = GearRating(rated_torque=300.0, application_factor=1.5)
+    factor = peak_factor_of(GearRatingTable(), sold, gear)
+    assert gear_check(LOAD, sold, factor).torque_limit == gear.start_limit == 900.0
+    assert peak_factor_of(GearRatingTable(), None, gear) == 2.0
+    assert peak_factor_of(GearRatingTable(rated_torque=400.0), sold, gear) == 2.0
+    assert peak_factor_of(GearRatingTable(peak_factor=1.8), sold, gear) == 1.8

@@ -143,7 +143,7 @@ def _bearings(study: StudyRecord, plan: CheckPlan, found: _Found) -> None:
         if name is None or name not in angles:
             found.add([NotChecked(f"{pin}, bearing", "its angle is not known with organs that are chains")])
             continue
-        force = pin_force(turns, name)
+        force = pin_force(drive, turns, pin)
         largest, run = largest_load(study.pins, pin)
         if bearing.kind == PLAIN:
             of_plain = plain.plain_bearing(bearing.table, time, force, angles[name], largest, run)

@@ -16,9 +16,10 @@ import xarray as xr
 
 from ...core.quantities import Value, declaration, quantity
 from ...drives.gear_rating import GearRating
+from ...drives.gearing import Transmission
 from ...reading.results import part, result
 from ...study.arrays import peak
-from ...study.bearings import driver_bearing, driver_force, largest_load, mean_load
+from ...study.bearings import driver_bearing, largest_load, mean_load, pin_force
 from ...study.readings import crank_angle, shaft_power
 from ...study.record import StudyRecord
 from ...study.starts import StartFindings
@@ -158,7 +159,7 @@ def gear_rows(
 
 
 def _lacks(title: str, key: str) -> NotChecked:
-    return NotChecked(f"gear, {title}", f"its limit is not given; add [gear_rating] with {key}")
+    return NotChecked(f"gear, {title}", f"its limit is not known; add [gear_rating] with {key}")
 
 
 def bearing_force(study: StudyRecord, turns: xr.Dataset) -> tuple[str, float | None, float | None]:
@@ -167,7 +168,7 @@ def bearing_force(study: StudyRecord, turns: xr.Dataset) -> tuple[str, float | N
     title = driver_bearing(study.drive)
     if not title:
         return "", None, None
-    return title, peak(driver_force(study.drive, turns)), largest_load(study.pins, title)[0]
+    return title, peak(pin_force(study.drive, turns, title)), largest_load(study.pins, title)[0]
 
 
 def find(
@@ -203,7 +204,7 @@ def find(
         largest_radial=largest_radial,
         speed=largest(study, lambda run: run[drive.motor_speed].values)[0],
     )
-    found = gear_check(load, rating, table.peak_factor or tables.gear.start_factor, run, title)
+    found = gear_check(load, rating, peak_factor_of(table, drive.gear_rating, tables.gear), run, title)
     why = _SEPARATE if separate else _UNTURNED
     return found, list(gear_rows(found, rating, table.peak_overhung_load, study.titles, why))
 
@@ -220,6 +221,13 @@ def rating_of(table: GearRatingTable, sold: GearRating | None, torque_limit: flo
         overhung_load=table.overhung_load or sold.overhung_load,
         largest_speed=table.largest_speed or sold.largest_speed,
     )
+
+
+def peak_factor_of(table: GearRatingTable, sold: GearRating | None, gear: Transmission) -> float:
+    """The permitted torque in peaks over the rated torque: that in the `table` of the file, else in a start of the
+    `gear`; one that is `sold` in a catalogue permits it over the rated torque times its application factor."""
+    over_rated = 1.0 if sold is None or table.rated_torque else sold.application_factor
+    return float(table.peak_factor or gear.start_factor * over_rated)
 
 
 def motor_shaft(

@@ -216,7 +216,7 @@ def find(
             checks.append(NotChecked(f"section {name}", why))
             continue
         fx, fy = (turns[f"machine.{output}.{axis}"].values for axis in ("fx", "fy"))
-        force = peak(pin_force(turns, output))
+        force = peak(pin_force(drive, turns, pin))
         if plan.on == "link":
             amplitude, mean = np.array([force]), np.zeros(1)
         else:
