@@ -1,4 +1,4 @@
-"""The command that checks catalogues of one's own, and writes templates for them."""
+"""The command that checks catalogues of the user, and writes templates for them."""
 
 from __future__ import annotations
 

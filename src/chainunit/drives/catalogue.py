@@ -6,7 +6,7 @@ motors on the market: IE3, and IE4 from 75 kW on (since July 2023, up to 200 kW,
 are typical of such motors but belong to no maker: they vary smoothly with size, and take the place of a supplier's
 catalogue.
 
-Files of one's own have the same columns, see `chainunit.drives.catalogue_rows`; beside motors they may have gears and
+Files of the user have the same columns, see `chainunit.drives.catalogue_rows`; beside motors they may have gears and
 couplings (`chainunit.drives.catalogue_gears`, `chainunit.drives.catalogue_couplings`).
 """
 
@@ -119,7 +119,7 @@ class CatalogueMotor:
 
 @dataclass(frozen=True)
 class Offer:
-    """All that some catalogues of one's own offer."""
+    """All that some catalogues of the user offer."""
 
     motors: Sequence[CatalogueMotor] = ()
     gears: Sequence[CatalogueGear] = ()
@@ -177,19 +177,20 @@ def motor_of_catalogue(
     return motors[designation]
 
 
-def check_own(files: Sequence[Path]) -> None:
-    """Read the rows of one's own and fit a circuit to each motor.
+def check_own(files: Sequence[Path]) -> Offer:
+    """Read what the files of the user offer and fit a circuit to each motor.
 
     Raises
     ------
     InputError
         see `catalogue` and `CatalogueMotor.identify`.
     """
-    faults = Faults()
-    for motor in offer(*files).motors:
+    faults, found = Faults(), offer(*files)
+    for motor in found.motors:
         with faults.collected():
             motor.identify()
     faults.refuse()
+    return found
 
 
 @cache

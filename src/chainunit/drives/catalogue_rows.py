@@ -35,7 +35,8 @@ TEXTS: Mapping[str, str] = MappingProxyType(
     }
 )
 """Columns of texts of every kind, with their descriptions."""
-_NEEDED_TEXTS = ("designation",)
+LEFT_OUT: Mapping[str, str] = MappingProxyType({"order_number": "none", "source": "file and line"})
+"""What stands for a column of texts that a file leaves out, in words; each file has the others."""
 _LONGEST = 200
 _HEADING = re.compile(r"\s*(\w+)\s*(?:\[\s*(.*?)\s*\])?\s*")
 
@@ -91,7 +92,8 @@ class CatalogueKind:
     @property
     def required(self) -> tuple[str, ...]:
         """Columns that each file has."""
-        return (*_NEEDED_TEXTS, *(v.name for v in self.variables.values() if v.quantity.start is None))
+        texts = (name for name in TEXTS if name not in LEFT_OUT)
+        return (*texts, *(v.name for v in self.variables.values() if v.quantity.start is None))
 
     def heading(self, name: str) -> str:
         """The heading of a column, with the unit that engineers read."""

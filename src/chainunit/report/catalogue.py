@@ -1,17 +1,17 @@
-"""A checked catalogue of one's own: what it offers, and what it leaves open."""
+"""A checked catalogue of the user: what it offers, and what it leaves open."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 from ..core.quantities import Variable
-from ..drives.catalogue import KINDS, check_own, offer
-from ..drives.catalogue_rows import CatalogueKind
+from ..drives.catalogue import KINDS, check_own
+from ..drives.catalogue_rows import TEXTS, CatalogueKind
 from ..reading.text import number
 from ..study.keys import catalogue_columns
-from .blocks import Block, Report, Table, TableRow, Text, heads
+from .blocks import Report, Table, TableRow, Text, heads
 from .reference import key_rows
 
 
@@ -23,30 +23,28 @@ def checked(files: Sequence[Path]) -> Report:
     InputError
         with a line for each fault of all files; see `chainunit.drives.catalogue.check_own`.
     """
-    check_own(files)
-    found = offer(*files)
+    found = check_own(files)
     of_kinds = zip(KINDS, (found.motors, found.gears, found.couplings), strict=True)
-    blocks = [block for kind, items in of_kinds if items for block in _contents(kind, items)]
+    tables = [_contents(kind, items) for kind, items in of_kinds if items]
     names = ", ".join(str(file) for file in files)
     more = "Name the files in a study file: catalogue = [...]."
-    return Report("", "catalogue", {}, (Text(f"{names}: every row is right."), *blocks, Text(more)), ())
+    return Report("", "catalogue", {}, (Text(f"{names}: every row is right."), *tables, Text(more)), ())
 
 
-def _contents(kind: CatalogueKind, items: Sequence[Any]) -> Iterator[Block]:
+def _contents(kind: CatalogueKind, items: Sequence[Any]) -> Table:
     """The ranges of the columns of one kind, and the columns that some rows leave open."""
     data = [item.nameplate if kind.name == "motor" else item.data for item in items]
-    rows = []
+    name = "order_number"
+    unknown = sum(not item.order_number for item in items)
+    rows = [TableRow((name, "-", str(unknown or "-"), TEXTS[name]))]
     for name, variable in kind.variables.items():
         values = [float(getattr(each, name)) for each in data]
         # of a column that may be left out, the start value 0 stands for a value that is not known
         unknown = values.count(0.0) if variable.quantity.start == 0.0 else 0
         known = [x for x in values if x or variable.quantity.start != 0.0]
         rows.append(TableRow((name, _range(variable, known), str(unknown or "-"), variable.description)))
-    for name in ("order_number",):
-        unknown = sum(not getattr(item, name) for item in items)
-        rows.insert(0, TableRow((name, "-", str(unknown or "-"), "number or code by which it is ordered")))
-    title = f"{len(items)} {kind.plural if len(items) > 1 else kind.name}"
-    yield Table(tuple(rows), heads("column", "from, to", "rows without", "meaning"), title, numeric=False)
+    title = f"{len(items)} {kind.plural if len(items) > 1 else kind.plural.removesuffix('s')}"
+    return Table(tuple(rows), heads("column", "from, to", "rows without", "meaning"), title, numeric=False)
 
 
 def _range(variable: Variable, values: Iterable[float]) -> str:
@@ -60,5 +58,8 @@ def _range(variable: Variable, values: Iterable[float]) -> str:
 def columns() -> Report:
     """The columns of catalogues of every kind: unit, allowed range, meaning."""
     tables = (Table(*key_rows(table), table.title, numeric=False) for table in catalogue_columns())
-    hint = Text("chainunit catalogue --template writes a file of each kind to be filled, FILE checks one.")
+    hint = Text(
+        "A column without a default must be there. chainunit catalogue --template writes "
+        "a file of each kind to be filled, chainunit catalogue FILE checks one."
+    )
     return Report("Columns of a catalogue", "catalogue", {}, (*tables, hint), ())

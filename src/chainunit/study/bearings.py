@@ -25,9 +25,7 @@ def pin_loads(drive: Drive, run: xr.Dataset) -> dict[str, dict[str, float | None
     machine = drive.simulated_machine
     angles = machine.pin_turns(machine_series(turns))
     for title, name in machine.model.pins.items():
-        forces, forces_of_turns = (
-            np.hypot(of[f"machine.{name}.fx"].values, of[f"machine.{name}.fy"].values) for of in (run, turns)
-        )
+        forces, forces_of_turns = (pin_force(drive, of, title) for of in (run, turns))
         table[title] = {
             "peak": float(np.max(forces)),
             "rms": math.sqrt(mean(turns, forces_of_turns**2)),
@@ -36,17 +34,21 @@ def pin_loads(drive: Drive, run: xr.Dataset) -> dict[str, dict[str, float | None
     return table
 
 
-def driver_force(drive: Drive, run: xr.Dataset) -> Any:
-    """Reaction at the bearing of the driver, such as O1 of a crank [N], shape (time,); None for a machine of whose
-    driver none is known."""
-    machine = drive.simulated_machine
+def driver_bearing(drive: Drive) -> str:
+    """The title of the bearing in which the driver turns, such as that of O1 of a crank; empty for a machine
+    that does not show it, such as a foreign FMU."""
     if drive.foreign_machine:
-        return None
-    bar = getattr(machine.model.linkage(MATH, machine.p, machine.model.Inputs()).driver, "bar", None)
-    for output, joint in machine.model.joints.items():
-        if bar is not None and joint == (bar.pin, bar.name):
-            return np.hypot(run[f"machine.{output}.fx"].values, run[f"machine.{output}.fy"].values)
-    return None
+        return ""
+    model, p = drive.simulated_machine.model, drive.simulated_machine.p
+    (bearing,) = model.linkage(MATH, p, model.Inputs()).driver.joints
+    titles = {model.joints.get(output): title for title, output in model.pins.items()}
+    return titles.get(bearing, "")
+
+
+def pin_force(drive: Drive, run: xr.Dataset, title: str) -> Any:
+    """Size of the reaction of a pin or guide of that `title` in a run [N], shape (time,)."""
+    output = drive.simulated_machine.model.pins[title]
+    return np.hypot(run[f"machine.{output}.fx"].values, run[f"machine.{output}.fy"].values)
 
 
 _ALIKE = 1e-3
@@ -57,6 +59,12 @@ def hardest_run(pins: Mapping[str, Mapping[str, Mapping[str, float | None]]], pi
     """The run with the largest peak of a pin; of equal ones the first."""
     peaks = {run: table[pin]["peak"] or 0.0 for run, table in pins.items()}
     return next(run for run, peak in peaks.items() if peak >= (1.0 - _ALIKE) * max(peaks.values()))
+
+
+def largest_load(pins: Mapping[str, Mapping[str, Mapping[str, float | None]]], pin: str) -> tuple[float, str]:
+    """The largest force of a pin [N], and its `hardest_run`."""
+    run = hardest_run(pins, pin)
+    return pins[run][pin]["peak"] or 0.0, run
 
 
 def mean_load(force: Any, angle: Any, exponent: float = 3.0) -> float:

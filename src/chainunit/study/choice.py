@@ -65,7 +65,7 @@ def check_motor(
     motor: MotorSource | None, tables: DriveTables, plans: Mapping[str, Any], catalogues: Sequence[Path]
 ) -> None:
     """Refuse files of a study that it cannot use: that of its motor or, where a capability chooses the motor, the
-    catalogues of one's own.
+    catalogues of the user.
 
     Raises
     ------

@@ -63,7 +63,7 @@ class FileContents:
     choices: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     """by name, all values that are no quantities, such as "start" or "driveline.place", given or not"""
     catalogues: tuple[Path, ...] = ()
-    """the catalogues of one's own that it names"""
+    """the catalogues that it names"""
     unusual: tuple[UnusualValue, ...] = ()
     """values whose unit is likely mistaken"""
     tables: Mapping[str, Any] = dataclasses.field(default_factory=dict)

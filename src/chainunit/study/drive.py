@@ -74,7 +74,7 @@ class Drive:
     """designation of the gear, if it is one of a catalogue"""
 
     gear_rating: GearRating | None = None
-    """its ratings"""
+    """its ratings; none of the overhung load where its shaft carries no reaction of the driver"""
 
     observer: ModelComponent | None = None
     """a load observer, which takes signals of the motor"""

@@ -17,7 +17,7 @@ from pydantic.fields import FieldInfo
 from ..core.quantities import Layout, Variable, variables, written
 from ..core.units import shortest_text
 from ..drives.catalogue import KINDS as CATALOGUES
-from ..drives.catalogue_rows import TEXTS
+from ..drives.catalogue_rows import LEFT_OUT, TEXTS
 from ..drives.motors import MOTORS
 from ..models import MACHINES
 from ..reading.lists import TableList
@@ -166,7 +166,9 @@ def key_tables() -> tuple[KeyTable, ...]:
 
 def catalogue_columns() -> tuple[KeyTable, ...]:
     """The columns of catalogues, and keys of their tables [[motor]], [[gear]] and [[coupling]]."""
-    texts = tuple(Key(name, description, sort="text") for name, description in TEXTS.items())
+    texts = tuple(
+        Key(name, words, sort="text", follows=LEFT_OUT.get(name, "")) for name, words in TEXTS.items()
+    )
     return tuple(
         KeyTable(
             kind.name,

@@ -15,7 +15,7 @@ from .arrays import peak
 from .drive import AbsentError, Drive
 from .limits import reaches
 from .readings import crank_speed, crank_torque, largest_torque, shaft_power
-from .relay import relay_trip
+from .relay import lasting_current, relay_trip
 from .stored import energy_gap, energy_held, stored_shares
 from .verdict import CREEPS
 from .window import Phase, Window, drift, end_gap
@@ -91,9 +91,8 @@ def _relay(w: Window) -> float | None:
         return None
     assert w.steady is not None
     current = w.value(w.current)
-    # the current at the end is assumed to flow on
-    lasts = float(np.sqrt(np.mean(current[-max(1, len(current) // 5) :] ** 2)))
-    return relay_trip(w.since, current, setting, w.steady.rms(w.current), lasts, w.relay_class)
+    before, lasts = w.steady.rms(w.current), lasting_current(current)
+    return relay_trip(w.since, current, setting, before, lasts, w.relay_class)
 
 
 def _slack_time(w: Window) -> float | None:

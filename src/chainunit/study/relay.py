@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from .arrays import rms
+
 
 @dataclass(frozen=True)
 class TripClass:
@@ -32,9 +34,10 @@ LIGHT, HEAVIEST = 10, 30
 """The usual class, and the heaviest."""
 HEAVIER = 40
 """The class of a start during which a relay of class 30 may trip."""
-HOLDS_AT, TRIPS_AT = 1.05, 1.2
-"""A relay must not trip within two hours at the first multiple of its setting, and must within them at the second."""
+TRIPS_AT = 1.2
+"""Multiple of its setting at which a relay must trip within two hours; at 1.05 it must not."""
 _PICK_UP = 1.1  # between the two
+_LASTING = 5
 
 
 def start_class(time: Any, current: Any, rated: float) -> int:
@@ -55,6 +58,11 @@ def start_seconds(time: Any, current: Any, setting: float) -> float:
     class."""
     share = np.square(np.asarray(current) / (MULTIPLE * setting))
     return float(np.trapezoid(share, np.asarray(time)))
+
+
+def lasting_current(current: Any) -> float:
+    """The RMS of the last fifth of a record of the `current` [A], shape (n,), which is assumed to flow on."""
+    return rms(current[-max(1, len(current) // _LASTING) :])
 
 
 def class_words(trip_class: int) -> str:

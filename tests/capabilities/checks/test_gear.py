@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,10 +16,10 @@ from command import chainunit
 from chainunit.capabilities.checks.gear import (
     GearDuty,
     ShaftLoad,
-    driver_pin,
     equivalent_torque,
     gear_check,
     gear_rows,
+    peak_factor_of,
     pulley_force,
     rating_of,
     shaft_row,
@@ -27,10 +28,13 @@ from chainunit.capabilities.checks.row import CheckRow
 from chainunit.capabilities.checks.tables import GearRatingTable
 from chainunit.core.errors import InputError
 from chainunit.drives.gear_rating import GearRating
+from chainunit.drives.gearing import Transmission
 from chainunit.report.blocks import at
+from chainunit.study.bearings import driver_bearing
 from chainunit.study.config import parse
 
 DOCS = (Path(__file__).parents[3] / "docs" / "checks.md").read_text("utf-8")
+LINKAGES = Path(__file__).parents[3] / "examples" / "linkages"
 RATING = GearRating(
     rated_torque=1000.0,
     application_factor=1.25,
@@ -123,11 +127,33 @@ def test_what_nobody_gives_is_named():
     ]
 
 
-def test_the_bearing_of_the_crank_is_the_pin_that_turns_with_it():
-    angle = np.linspace(3.0, 15.0, 400)
-    turned = {"a": 0.1 * np.sin(angle), "b": 3.0 - angle, "c": angle - 0.2 * np.sin(angle)}
-    assert driver_pin({"A": "a", "C": "c", "O1": "b"}, turned, angle) == "O1"
-    assert driver_pin({"A": "a", "C": "c", "X": "x"}, turned, angle) == ""
+def test_a_crank_with_bearings_of_its_own_puts_no_load_on_the_gear():
+    plans = [parse(text).plans["checks"] for text in ("[sizing]\nseparate_bearing = true", "[sizing]", "")]
+    assert [plan.separate_bearing for plan in plans] == [True, False, False]
+
+
+def test_the_numbers_of_the_application_factor_are_those_of_its_formula():
+    for load, symbols in ((LOAD, ["Teq", "TN", "p"]), (replace(LOAD, exponent=None), ["Teq", "TN"])):
+        found = gear_check(load, RATING, 2.0)
+        row = next(gear_rows(found, RATING, 0.0, {}))
+        assert list(row.numbers) == symbols and all(each in row.formula for each in symbols)
+        assert found.application_factor == found.load.equivalent / found.rated_torque
+
+
+def test_the_bearing_of_the_crank_is_that_in_the_ground_wherever_it_stands_in_the_file(tmp_path):
+    """The block of a yoke that only slides turns on the crank's pin A as far as the crank in its bearing."""
+    yoke = (LINKAGES / "scotch_yoke_pump.toml").read_text("utf-8")
+    pin = '[joints.A]\non = "crank.A"\nby = "block.A"\n\n'
+    (tmp_path / "yoke.toml").write_text(yoke.replace("[joints.slot]", f"{pin}[joints.slot]"), "utf-8")
+    machines = (
+        ("yoke.toml", "A", "O1"),
+        ("KnifeDrive", "O1 crank bearing", "O1 crank bearing"),
+        ("Accelerator", "O rotor bearing", "O rotor bearing"),
+    )
+    for name, first, bearing in machines:
+        machine = parse(f'[system]\nmachine = "{name}"', str(tmp_path / "study.toml")).machine
+        assert next(iter(machine.model.pins)) == first
+        assert driver_bearing(SimpleNamespace(foreign_machine=None, simulated_machine=machine)) == bearing
 
 
 # -- a study
@@ -215,3 +241,14 @@ def test_ratings_of_the_file_come_before_those_of_the_catalogue():
     assert given == replace(sold, rated_torque=800.0, application_factor=1.0, overhung_load=7e3)
     limit = rating_of(GearRatingTable(application_factor=1.3, largest_speed=300.0), None, 700.0)
     assert limit == GearRating(rated_torque=700.0, application_factor=1.3, largest_speed=300.0)
+
+
+def test_a_gear_of_a_catalogue_permits_the_same_torque_in_peaks_as_in_the_choice():
+    """Its start factor is over the rated torque times the application factor; one of the file over the rated one."""
+    gear = Transmission(torque_limit=450.0, start_factor=2.0)
+    sold = GearRating(rated_torque=300.0, application_factor=1.5)
+    factor = peak_factor_of(GearRatingTable(), sold, gear)
+    assert gear_check(LOAD, sold, factor).torque_limit == gear.start_limit == 900.0
+    assert peak_factor_of(GearRatingTable(), None, gear) == 2.0
+    assert peak_factor_of(GearRatingTable(rated_torque=400.0), sold, gear) == 2.0
+    assert peak_factor_of(GearRatingTable(peak_factor=1.8), sold, gear) == 1.8

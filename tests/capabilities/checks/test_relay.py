@@ -104,6 +104,11 @@ def test_the_classes_that_let_the_start_through_and_protect():
     assert not next(relay_rows(heaviest, {})).holds
 
 
+def test_a_relay_that_never_trips_in_a_stall_does_not_protect():
+    row = used(stall_current=20.0)["trip with the rotor locked"]
+    assert math.isinf(row.utilisation) and not row.holds
+
+
 # -- a study
 
 STUDY = """

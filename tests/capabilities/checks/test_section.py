@@ -216,6 +216,16 @@ def test_a_section_without_load_lasts():
     )
 
 
+def test_a_load_that_does_not_swing_has_no_permitted_amplitude():
+    for share, names in ((0.0, ["sbADK", "ttADK"]), (0.4, ["sbADK", "szdADK", "ttADK"])):
+        of, rows = section(axial_share=share)
+        fatigue = rows["safety against fatigue"]
+        assert [name for name in fatigue.numbers if name.endswith("ADK")] == names
+        assert (of.stress.permitted_tension is None) == (share == 0.0)
+        yields = rows["safety against yield"]
+        assert all(symbol in yields.formula for symbol in yields.numbers) and "szdFK" in yields.numbers
+
+
 # -- a study
 
 STUDY = """

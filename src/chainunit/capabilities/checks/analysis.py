@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, TypeVar
-
-import numpy as np
 
 from ...reading.results import part, result
 from ...reading.text import number
 from ...study.analysis import Analysis, Findings, Work
-from ...study.bearings import hardest_run
-from ...study.readings import crank_angle, has_turn, machine_series
+from ...study.bearings import largest_load, pin_force
+from ...study.readings import has_turn, machine_series, turns_made
 from ...study.record import StudyRecord
-from ...study.window import whole_turns
 from . import coupling, gear, plain, relay, rigid, rolling, section, starting
 from .coupling import CouplingCheck
 from .gear import GearCheck, ShaftLoad
+from .pins import first_word, turning_pins
 from .plain import PlainBearing
-from .plan import CheckPlan, turning_pins
+from .plan import CheckPlan
 from .relay import RelayFindings
 from .rolling import RollingBearing
 from .row import CheckRow, NotChecked
@@ -50,16 +49,17 @@ class CheckFindings(Findings):
         """Warn of each check that does not hold."""
         for row in self.rows:
             if not row.holds:
+                share = number(row.utilisation, "1", "used")
                 study.warn(
                     "check",
-                    "{of}: {title} {value}, and {bound} {limit} {allowed}: {used} of the limit is used ({clause}).",
+                    "{of}: {title} {value}, and {bound} {limit} {allowed}{used} ({clause}).",
                     of=row.of,
                     title=row.title,
-                    value=(row.value, row.unit, row.kind),
+                    value="never" if row.value == math.inf else (row.value, row.unit, row.kind),
                     bound="at least" if row.at_least else "at most",
                     limit=(row.limit, row.unit, row.kind),
                     allowed="are needed" if row.at_least else "are permitted",
-                    used=number(row.utilisation, "1", "used"),
+                    used="" if row.utilisation == math.inf else f": {share} of the limit is used",
                     clause=row.clause,
                 )
 
@@ -120,7 +120,7 @@ def _of_cycle(study: StudyRecord, plan: CheckPlan, found: _Found) -> dict[str, A
     """The findings on parts that carry the cycle, by name; their checks are added."""
     starts = plan.starts_per_hour
     return {
-        "gear": found.of(*gear.find(study, plan.gear)),
+        "gear": found.of(*gear.find(study, plan.gear, plan.separate_bearing)),
         "motor_shaft": found.of(*gear.motor_shaft(study, plan.motor_shaft)),
         "flexible_coupling": found.of(*coupling.find(study, plan.coupling, plan.coupling_place, starts)),
         "section": found.of(*section.find(study, plan.sections)),
@@ -134,19 +134,17 @@ def _bearings(study: StudyRecord, plan: CheckPlan, found: _Found) -> None:
         found.add([NotChecked("bearings", "the machine is an FMU, whose pins are not known")])
         return
     if asked:
-        turns = whole_turns(drive, study.steady)
+        turns = study.steady
         machine = drive.simulated_machine
         angles = machine.pin_turns(machine_series(turns))
-        time = turns["time"].values
-        made = float(np.ptp(crank_angle(drive, turns))) / (2.0 * np.pi)
+        time, made = turns["time"].values, turns_made(drive, turns)
     for pin, bearing in asked.items():
         name = machine.model.pins.get(pin)
         if name is None or name not in angles:
             found.add([NotChecked(f"{pin}, bearing", "its angle is not known with organs that are chains")])
             continue
-        force = np.hypot(*(turns[f"machine.{name}.{axis}"].values for axis in ("fx", "fy")))
-        run = hardest_run(study.pins, pin)
-        largest = study.pins[run][pin]["peak"] or 0.0
+        force = pin_force(drive, turns, pin)
+        largest, run = largest_load(study.pins, pin)
         if bearing.kind == PLAIN:
             of_plain = plain.plain_bearing(bearing.table, time, force, angles[name], largest, run)
             found.plain[pin] = of_plain
@@ -164,10 +162,6 @@ def _bearings(study: StudyRecord, plan: CheckPlan, found: _Found) -> None:
 def _without(pins: Iterable[str], asked: Mapping[str, Any]) -> Iterator[NotChecked]:
     """The pins without data."""
     if missing := [pin for pin in pins if pin not in asked]:
-        why = f"the file has no table for {'them' if len(missing) > 1 else 'it'}; add [bearing.{_key(missing[0])}]"
-        yield NotChecked(f"bearings at {', '.join(missing)}", why, f"bearing.{_key(missing[0])}")
-
-
-def _key(pin: str) -> str:
-    """The first word of a pin's title, as a key of TOML."""
-    return pin.split(" ")[0]
+        table = f"bearing.{first_word(missing[0])}"
+        why = f"the file has no table for {'them' if len(missing) > 1 else 'it'}; add [{table}]"
+        yield NotChecked(f"bearings at {', '.join(missing)}", why, table)

@@ -12,16 +12,16 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from ...core.quantities import Value, declaration, quantity
 from ...reading.results import part, result
-from ...study.arrays import peak
 from ...study.readings import load_inertia
 from ...study.record import StudyRecord
 from ...study.torques import gear_torque
-from ...study.window import mean, whole_turns
+from ...study.window import mean
 from .row import CheckRow, NotChecked
-from .runs import runs_from_events
+from .runs import largest
 from .tables import FlexibleCouplingTable
 
 _CLAUSE = "DIN 740-2:1986"
@@ -169,7 +169,12 @@ def coupling_rows(
             "alternating_torque",
             "alternating",
             "TKW >= half range of sum V(f) Sf(f) T(f), times St",
-            {"rigid": f"{at}.swinging.rigid", "elastic": f"{at}.swinging.elastic", **factors},
+            {
+                "rigid": f"{at}.swinging.rigid",
+                "elastic": f"{at}.swinging.elastic",
+                "fe": f"{at}.swinging.natural_frequency",
+                **factors,
+            },
         ),
         (
             "passage through resonance",
@@ -209,14 +214,18 @@ def find(
         )
         return None, [NotChecked("flexible coupling", why)]
     drive = study.drive
-    turns = whole_turns(drive, study.steady)
-    largest, run = max((peak(_torque(study, run, place)), name) for name, run in runs_from_events(study))
+    turns = study.steady
+
+    def torque_of(run: xr.Dataset) -> Any:
+        return gear_torque(drive, run) if place == "crank" else run["motor.tau"].values
+
+    most, run = largest(study, torque_of)
     ratio = drive.ratio if place == "crank" else 1.0
-    torque, time = _torque(study, turns, place), turns["time"].values
+    torque, time = torque_of(turns), turns["time"].values
     duty = CouplingDuty(
         mean=mean(turns, torque),
         rms=math.sqrt(mean(turns, torque**2)),
-        largest=largest,
+        largest=most,
         drive_inertia=float(drive.fmu_parameters.rotor.J) * ratio**2,
         load_inertia=float(np.mean(load_inertia(drive, turns))) * ratio**2,
     )
@@ -232,8 +241,3 @@ def find(
     )
     found = coupling_check(duty, factors, swing, place, run)
     return found, list(coupling_rows(found, table, study.titles))
-
-
-def _torque(study: StudyRecord, run: Any, place: str) -> Any:
-    """The torque at the place of the coupling [N m], shape (n,)."""
-    return gear_torque(study.drive, run) if place == "crank" else run["motor.tau"].values

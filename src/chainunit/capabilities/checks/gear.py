@@ -8,29 +8,30 @@ with the same teeth: they carry the largest torque of the turn in each turn, so 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from ...core.quantities import Value, declaration, quantity
 from ...drives.gear_rating import GearRating
+from ...drives.gearing import Transmission
 from ...reading.results import part, result
 from ...study.arrays import peak
-from ...study.bearings import hardest_run, mean_load
-from ...study.drive import Drive
-from ...study.readings import crank_angle, machine_series, shaft_power
+from ...study.bearings import driver_bearing, largest_load, mean_load, pin_force
+from ...study.readings import crank_angle, shaft_power
 from ...study.record import StudyRecord
 from ...study.starts import StartFindings
 from ...study.torques import gear_torque
-from ...study.window import mean, whole_turns
+from ...study.window import mean
 from .row import CheckRow, NotChecked
-from .runs import runs_from_events
+from .runs import largest
 from .tables import GearRatingTable, MotorShaftTable
 
 _MAKER = "Rating of the maker of the gear"
-_UNTURNED = 1e-6
-"""Angle [rad] up to which a pin turns with the crank."""
+_UNTURNED = "no pin of the machine turns with the output shaft"
+_SEPARATE = "the crank has bearings of its own (sizing.separate_bearing)"
 
 
 @declaration
@@ -53,10 +54,9 @@ class GearCheck:
     """The gear. Its application factors are the torque of equal damage over its rated torque, and over the mean."""
 
     run: str = part("the run with the largest torque")
-    bearing: str = part(
-        "pin whose reaction the output shaft carries; empty where none turns with the {driver}"
-    )
+    bearing: str = part("pin whose reaction the output shaft carries; empty where it carries none")
     load: GearDuty = part(inline=True)
+    rated_torque: float | None = quantity("N.m", "rated torque of the output TN")
     application_factor: float | None = quantity("1", "application factor of the cycle, Teq over rated torque")
     over_mean: float | None = quantity("1", "torque of equal damage over the mean one")
     torque_limit: float | None = quantity("N.m", "permitted torque of the output in peaks")
@@ -67,7 +67,7 @@ class ShaftLoad:
     """The radial force on the motor's shaft."""
 
     torque: float | None = quantity(
-        "N.m", "largest torque of the motor in steady running; none without a pulley"
+        "N.m", "largest torque at the motor's shaft in steady running; none without a pulley"
     )
     radial: float = quantity("N", "largest radial force on the shaft in steady running")
 
@@ -78,32 +78,16 @@ def equivalent_torque(torque: Any, angle: Any, exponent: float) -> float:
     return mean_load(np.abs(torque), angle, exponent) if exponent else peak(torque)
 
 
-def driver_pin(titles: Mapping[str, str], turned: Mapping[str, Any], angle: Any) -> str:
-    """The title of the first pin that turns with the crank, which is its bearing in the frame; empty where none does.
-
-    Parameters
-    ----------
-    titles : by title, the output of the pin
-    turned, angle : by output, the angle of the pin, and that of the crank [rad], each of shape (n,)
-    """
-    span = np.asarray(angle) - angle[0]
-    for title, output in titles.items():
-        if output in turned:
-            own = np.abs(turned[output] - turned[output][0])
-            if float(np.max(np.abs(own - np.abs(span)))) <= _UNTURNED * max(1.0, peak(span)):
-                return title
-    return ""
-
-
 def gear_check(
     load: GearDuty, rating: GearRating, peak_factor: float, run: str = "", bearing: str = ""
 ) -> GearCheck:
     """The gear under its load."""
-    rated = rating.rated_torque
+    rated = rating.rated_torque or None
     return GearCheck(
         run=run,
         bearing=bearing,
         load=load,
+        rated_torque=rated,
         application_factor=load.equivalent / rated if rated else None,
         over_mean=load.equivalent / load.mean if load.mean else None,
         torque_limit=rated * peak_factor if rated else None,
@@ -111,32 +95,41 @@ def gear_check(
 
 
 def gear_rows(
-    of: GearCheck, rating: GearRating, permitted_peak: float, titles: Mapping[str, str]
+    of: GearCheck,
+    rating: GearRating,
+    permitted_peak: float,
+    titles: Mapping[str, str],
+    unloaded: str = _UNTURNED,
 ) -> Iterator[CheckRow | NotChecked]:
     """The rows of a gear; `permitted_peak` is the permitted radial force in events [N], 0 where it is unknown, and
-    `titles` are those of runs."""
+    `titles` are those of runs. `unloaded` says why the output shaft carries no reaction, where it carries none."""
     own, at = of.load, "checks.gear"
     if of.application_factor is not None and of.torque_limit is not None:
-        by = "p of the file" if own.exponent else "the largest torque"
+        rated = {"TN": f"{at}.rated_torque"}
+        teq = "Teq: largest |T| of steady running"
+        exponent = {}
+        if own.exponent:
+            teq = "Teq = (sum |T|^p |dphi| / sum |dphi|)^(1/p)"
+            exponent = {"p": f"{at}.exponent"}
         yield CheckRow(
             "gear",
             "application factor",
             "ISO 6336-6:2019, annex on KA from a load spectrum",
-            f"KA = Teq/T, Teq = (sum |T|^p |dphi| / sum |dphi|)^(1/p), {by}",
+            f"KA = Teq/TN, {teq}",
             of.application_factor,
             rating.application_factor,
             f"{at}.application_factor",
-            {"Teq": f"{at}.equivalent", "mean |T|": f"{at}.mean"},
+            {"Teq": f"{at}.equivalent", **rated, **exponent},
         )
         yield CheckRow(
             "gear",
             f"largest torque of the output ({titles.get(of.run, of.run)})",
             _MAKER,
-            "T <= peak factor x rated torque",
+            "T <= peak factor x TN",
             own.largest,
             of.torque_limit,
             f"{at}.largest",
-            {"permitted": f"{at}.torque_limit"},
+            {**rated, "permitted": f"{at}.torque_limit"},
             "N.m",
         )
     else:
@@ -149,7 +142,7 @@ def gear_rows(
     for title, key, formula, name, unit, kind in ratings:
         limit, value = getattr(rating, key), getattr(own, name)
         if value is None:
-            yield NotChecked(f"gear, {title}", "no pin of the machine turns with the output shaft")
+            yield NotChecked(f"gear, {title}", unloaded)
         elif not limit:
             yield _lacks(title, key)
         else:
@@ -166,27 +159,23 @@ def gear_rows(
 
 
 def _lacks(title: str, key: str) -> NotChecked:
-    return NotChecked(f"gear, {title}", f"the file does not give it; add [gear_rating] with {key}")
+    return NotChecked(f"gear, {title}", f"its limit is not known; add [gear_rating] with {key}")
 
 
-def bearing_force(study: StudyRecord, turns: Any) -> tuple[str, Any, float | None]:
-    """The bearing of the crank by its title, its force over whole `turns` [N], shape (n,), and the largest of all
-    runs [N]; an empty title, and None, where no pin turns with the crank."""
-    drive = study.drive
-    if drive.foreign_machine:
-        return "", None, None
-    machine = drive.simulated_machine
-    turned = machine.pin_turns(machine_series(turns))
-    title = driver_pin(machine.model.pins, turned, crank_angle(drive, turns))
+def bearing_force(study: StudyRecord, turns: xr.Dataset) -> tuple[str, float | None, float | None]:
+    """The bearing of the crank by its title, its largest force over whole `turns`, and that of all runs [N]; an empty
+    title, and None, where the machine has none."""
+    title = driver_bearing(study.drive)
     if not title:
         return "", None, None
-    output = machine.model.pins[title]
-    force = np.hypot(*(turns[f"machine.{output}.{axis}"].values for axis in ("fx", "fy")))
-    return title, force, study.pins[hardest_run(study.pins, title)][title]["peak"]
+    return title, peak(pin_force(study.drive, turns, title)), largest_load(study.pins, title)[0]
 
 
-def find(study: StudyRecord, table: GearRatingTable) -> tuple[GearCheck | None, list[CheckRow | NotChecked]]:
-    """The gear of a study and its checks; none for a drive without a gear."""
+def find(
+    study: StudyRecord, table: GearRatingTable, separate: bool = False
+) -> tuple[GearCheck | None, list[CheckRow | NotChecked]]:
+    """The gear of a study and its checks; none for a drive without a gear. `separate` tells whether the crank has
+    bearings of its own."""
     drive, tables = study.drive, study.config.drive
     if drive.ratio == 1.0:
         return None, []
@@ -197,25 +186,27 @@ def find(study: StudyRecord, table: GearRatingTable) -> tuple[GearCheck | None, 
         return None, [NotChecked("gear", why, "gear_rating")]
     if drive.foreign is not None:
         return None, [NotChecked("gear", "the motor is an FMU, whose torque is not known")]
-    turns = whole_turns(drive, study.steady)
-    torque, largest, run = gear_torque(drive, turns), *_largest_torque(drive, runs_from_events(study))
+    turns = study.steady
+    torque = gear_torque(drive, turns)
+    most, run = largest(study, lambda run: gear_torque(drive, run))
     starts = StartFindings.found_in(study)
-    if starts is not None and starts.worst.gear_torque > largest:
-        largest, run = starts.worst.gear_torque, "start_up"
-    title, force, largest_radial = bearing_force(study, turns)
+    if starts is not None and starts.worst.gear_torque > most:
+        most, run = starts.worst.gear_torque, "start_up"
+    title, radial, largest_radial = ("", None, None) if separate else bearing_force(study, turns)
     load = GearDuty(
         ratio=drive.ratio,
         exponent=table.exponent or None,
         equivalent=equivalent_torque(torque, crank_angle(drive, turns), table.exponent),
         mean=mean(turns, np.abs(torque)),
-        largest=largest,
+        largest=most,
         power=mean(turns, np.abs(shaft_power(drive, turns))),
-        radial=None if force is None else peak(force),
+        radial=radial,
         largest_radial=largest_radial,
-        speed=max(peak(each[drive.motor_speed].values) for _, each in runs_from_events(study)),
+        speed=largest(study, lambda run: run[drive.motor_speed].values)[0],
     )
-    found = gear_check(load, rating, table.peak_factor or tables.gear.start_factor, run, title)
-    return found, list(gear_rows(found, rating, table.peak_overhung_load, study.titles))
+    found = gear_check(load, rating, peak_factor_of(table, drive.gear_rating, tables.gear), run, title)
+    why = _SEPARATE if separate else _UNTURNED
+    return found, list(gear_rows(found, rating, table.peak_overhung_load, study.titles, why))
 
 
 def rating_of(table: GearRatingTable, sold: GearRating | None, torque_limit: float) -> GearRating:
@@ -232,9 +223,11 @@ def rating_of(table: GearRatingTable, sold: GearRating | None, torque_limit: flo
     )
 
 
-def _largest_torque(drive: Drive, runs: Iterable[tuple[str, Any]]) -> tuple[float, str]:
-    """The largest torque at the output of the gear [N m], and the run in which it is."""
-    return max((peak(gear_torque(drive, run)), name) for name, run in runs)
+def peak_factor_of(table: GearRatingTable, sold: GearRating | None, gear: Transmission) -> float:
+    """The permitted torque in peaks over the rated torque: that in the `table` of the file, else in a start of the
+    `gear`; one that is `sold` in a catalogue permits it over the rated torque times its application factor."""
+    over_rated = 1.0 if sold is None or table.rated_torque else sold.application_factor
+    return float(table.peak_factor or gear.start_factor * over_rated)
 
 
 def motor_shaft(
@@ -247,18 +240,21 @@ def motor_shaft(
         why = "the file gives no permitted load; add [motor_shaft] with overhung_load"
         belt = "" if direct else ", and for a belt on it with pulley_diameter and tension_factor"
         return None, [NotChecked(what, why + belt, "motor_shaft")]
-    turns = whole_turns(study.drive, study.steady)
-    torque = None
+    turns, torque = study.steady, None
     if table.pulley_diameter and table.tension_factor:
         torque = peak(turns[study.drive.motor_torque].values)
         radial = pulley_force(torque, table.pulley_diameter, table.tension_factor)
-        formula = "F = 2 T f/d, T: largest torque of the motor in steady running"
-        numbers = {"T": "checks.motor_shaft.torque"}
+        formula = "F = 2 T f/d, T: largest torque at the motor's shaft in steady running"
+        numbers = {
+            "T": "checks.motor_shaft.torque",
+            "f": "motor_shaft.tension_factor",
+            "d": "motor_shaft.pulley_diameter",
+        }
     elif direct:
         title, force, _ = bearing_force(study, turns)
-        if not title:
+        if force is None:
             return None, [NotChecked(what, "no pin of the machine turns with the shaft")]
-        radial, formula, numbers = peak(force), f"largest reaction of {title} in steady running", {}
+        radial, formula, numbers = force, f"largest reaction of {title} in steady running", {}
     else:
         return None, [
             NotChecked(what, "a belt or wheel on it is not known; add pulley_diameter and tension_factor")

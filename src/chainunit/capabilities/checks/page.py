@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
+from ...reading.text import number
 from ...report import blocks as b
 from ...report.lines import Line, join, line
 from ...study.record import StudyRecord
@@ -73,9 +75,10 @@ def relay(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
             )
         )
     lead = s.line(
-        "The start heats a relay as {checks.relay.start_seconds} at 7.2 times its setting of "
-        "{checks.relay.setting}; the rotor may be locked for {checks.relay.stall_time}. A cold relay surely holds "
-        "up to the least trip time of its class, and the slowest relay of the class has to trip before that time."
+        "The start heats a relay as much as 7.2 times its setting of {checks.relay.setting} does in "
+        "{checks.relay.start_seconds}; the rotor may be locked for {checks.relay.stall_time}. A cold relay surely "
+        "holds up to the least trip time of its class, and the slowest relay of the class has to trip before that "
+        "time."
     )
     yield b.Text(lead, "lead", "long")
     heads = b.heads(
@@ -88,8 +91,10 @@ def _row(s: b.Source, found: CheckFindings, k: int, *, short: bool = False) -> b
     row, path = found.rows[k], f"checks.rows.{k}"
     title = line(s.words(f"{path}.of"), ": ", s.words(f"{path}.title"))
     limit = line("at least " if row.at_least else "at most ", s.number(f"{path}.limit"))
-    used = s.number(f"{path}.utilisation", over=not row.holds)
-    cells = (title, s.number(row.number), limit, b.Share(used))
+    # of a check that fails, a number that the result does not have is not finite
+    value, used = ("-", "-") if row.holds else ("never", number(math.inf, "1", "used"))
+    share = b.Share(s.number(f"{path}.utilisation", over=not row.holds, none=used))
+    cells = (title, s.number(row.number, none=value), limit, share)
     note = (
         () if short else line(s.words(f"{path}.clause"), ". ", s.words(f"{path}.formula"), *_numbers(s, row))
     )

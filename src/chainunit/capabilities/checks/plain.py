@@ -77,7 +77,15 @@ def checks(pin: str, of: PlainBearing, table: Any, path: str, run: str) -> Itera
             "stress",
             {"F": at["largest_force"], **sizes},
         ),
-        ("speed", "sliding speed", _MAKER, "v = d/2 |dphi/dt|, largest of steady running", "m/s", "", sizes),
+        (
+            "speed",
+            "sliding speed",
+            _MAKER,
+            "v = d/2 |dphi/dt|, largest of steady running",
+            "m/s",
+            "",
+            {"d": at["diameter"]},
+        ),
         (
             "pv",
             "pressure times speed",

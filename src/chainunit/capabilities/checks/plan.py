@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from ...core.errors import Faults, meant
+from ...core.errors import Faults
 from ...reading.lists import Entry
 from ...reading.tables import instance
 from ...study.file_reading import FileReading
+from .pins import no_pin, pins_named, turning_pins
 from .section_plan import SectionPlan, read_sections
 from .tables import (
     BEARINGS,
@@ -58,6 +59,8 @@ class CheckPlan:
     coupling: FlexibleCouplingTable | None = None
     coupling_place: str = "motor"
     sections: Mapping[str, SectionPlan] = field(default_factory=dict)
+    separate_bearing: bool = False
+    """whether the file says that the crank has bearings of its own, so that the gear does not carry its reaction"""
 
 
 def read_plan(reading: FileReading) -> CheckPlan:
@@ -71,13 +74,14 @@ def read_plan(reading: FileReading) -> CheckPlan:
     faults = Faults()
     bearings, sections = {}, dict[str, SectionPlan]()
     if reading.machine is not None:
-        bearings = _bearings(reading, faults)
         titles = turning_pins(reading.machine.model)
+        bearings = _bearings(reading.data.get("bearing", {}), titles, faults)
         sections = read_sections(reading.data.get("section", {}), titles, faults)
     faults.refuse()
     starting = reading.values.get("starting") or StartingTable()
     # the table of another capability, if the program has it
     demands = reading.values.get("sizing") if "sizing" in reading.data else None
+    form = getattr(reading.form, "sizing", None)
     asked = starting.per_hour or getattr(demands, "starts_per_hour", 0.0)
     return CheckPlan(
         bearings,
@@ -88,6 +92,7 @@ def read_plan(reading: FileReading) -> CheckPlan:
         reading.values.get("motor_shaft") or MotorShaftTable(),
         *_coupling(reading),
         sections,
+        getattr(form, "separate_bearing", False),
     )
 
 
@@ -107,27 +112,13 @@ def _coupling(reading: FileReading) -> tuple[FlexibleCouplingTable | None, str]:
     )
 
 
-def turning_pins(model: Any) -> list[str]:
-    """The titles of the pins of a machine that turn."""
-    return [title for title, output in model.pins.items() if output in model.joints]
-
-
-def pins_named(name: str, titles: list[str]) -> list[str]:
-    """The pins of these `titles` with a name: a whole title, or its first words. A name that several pins begin with
-    stands for each of them."""
-    return [title for title in titles if title == name or title.startswith(f"{name} ")]
-
-
-def _bearings(reading: FileReading, faults: Faults) -> dict[str, BearingPlan]:
-    assert reading.machine is not None
-    titles = turning_pins(reading.machine.model)
-    names = [*dict.fromkeys(each for title in titles for each in (title.split(" ")[0], title))]
+def _bearings(tables: Mapping[str, Any], titles: list[str], faults: Faults) -> dict[str, BearingPlan]:
     taken: dict[str, str] = {}
 
     def read(entry: Entry, name: str) -> tuple[list[str], BearingPlan]:
         pins = pins_named(name, titles)
         if not pins:
-            entry.fault("", f"is no turning pin{meant(name, names)} there are {', '.join(titles) or 'none'}")
+            entry.fault("", no_pin(name, titles))
         kind = entry.raw.pop("kind", None)
         if kind is None:
             entry.fault("kind", f"must be given, one of {', '.join(KINDS)}")
@@ -150,6 +141,6 @@ def _bearings(reading: FileReading, faults: Faults) -> dict[str, BearingPlan]:
             table = replace(table, static_safety=STATIC_SAFETY[kind])
         return pins, BearingPlan(kind, table)
 
-    found = BEARINGS.read_named(reading.data.get("bearing", {}), faults, read)
+    found = BEARINGS.read_named(tables, faults, read)
     plans = {pin: plan for pins, plan in found.values() for pin in pins}
     return {title: plans[title] for title in titles if title in plans}

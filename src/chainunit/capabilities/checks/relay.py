@@ -7,6 +7,7 @@ must not trip it, and as slow as the other, where it must still save the motor.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -16,15 +17,22 @@ from ...core.quantities import Value, declaration, quantity
 from ...reading.results import part, result
 from ...study.event_torques import from_event_on
 from ...study.record import StudyRecord
-from ...study.relay import CLASSES, LIGHT, MULTIPLE, TRIPS_AT, TripClass, relay_trip, start_seconds
-from ...study.window import Phase
+from ...study.relay import (
+    CLASSES,
+    LIGHT,
+    MULTIPLE,
+    TRIPS_AT,
+    TripClass,
+    lasting_current,
+    relay_trip,
+    start_seconds,
+)
+from ...study.verdict import STEADY
 from .plan import RelayPlan
 from .row import CheckRow, NotChecked
 
 _CLAUSE = "IEC 60947-4-1, trip classes"
 _WHAT = "thermal overload relay"
-_LASTING = 5
-"""One part in so many at the end of a run has the current that flows on."""
 
 
 @declaration
@@ -81,9 +89,9 @@ def stall_heat(
     of: TripClass, time: Any, current: Any, setting: float, before: float, stall_current: float
 ) -> StallHeat | None:
     """An event: the trip of the slowest relay of a class, and the heat of the motor until then. `time` [s] since the
-    event and `current` [A] are of shape (n,); the RMS current of the last fifth flows on. None where the relay never
+    event and `current` [A] are of shape (n,); its `lasting_current` flows on. None where the relay never
     trips."""
-    lasts = float(np.sqrt(np.mean(current[-max(1, len(current) // _LASTING) :] ** 2)))
+    lasts = lasting_current(current)
     trip = relay_trip(time, current, setting, before, lasts, of.longest, TRIPS_AT)
     if trip is None:
         return None
@@ -141,8 +149,7 @@ def find(study: StudyRecord, plan: RelayPlan) -> tuple[RelayFindings | None, lis
     if missing := [name for name, value in given.items() if not value]:
         return None, [NotChecked(_WHAT, f"the motor has no nameplate; add [relay] with {', '.join(missing)}")]
     assert study.start is not None
-    window = study.window(Phase.STEADY, study.steady)
-    name, before = window.current, window.rms(window.current)
+    name, before = f"motor.{study.drive.motor.current}", study.answers[STEADY].current_rms
     rise = study.runs["start_up"].sel(time=slice(None, study.start.start_time))
     seconds = start_seconds(rise["time"].values, np.abs(rise[name].values), given["setting"])
     runs: dict[str, tuple[Any, Any, float]] = {}
@@ -184,19 +191,17 @@ def relay_rows(of: RelayFindings, titles: Mapping[str, str]) -> Iterator[CheckRo
         "s",
     )
     numbers = {"Ir": f"{at}.setting", "IA": f"{at}.stall_current", "I0": f"{at}.before"}
-    if own.stall_trip is not None:
-        yield CheckRow(
-            name,
-            "trip with the rotor locked",
-            f"{_CLAUSE}; locked-rotor time of the maker of the motor",
-            f"t = T ln(((IA/Ir)^2 - (I0/Ir)^2)/((IA/Ir)^2 - {TRIPS_AT:g}^2)), T from the largest trip time of the "
-            "class",
-            own.stall_trip,
-            of.numbers.stall_time,
-            f"{here}.stall_trip",
-            numbers | {"largest": f"{here}.longest"},
-            "s",
-        )
+    yield CheckRow(
+        name,
+        "trip with the rotor locked",
+        f"{_CLAUSE}; locked-rotor time of the maker of the motor",
+        f"t = T ln(((IA/Ir)^2 - (I0/Ir)^2)/((IA/Ir)^2 - {TRIPS_AT:g}^2)), T from the largest trip time of the class",
+        math.inf if own.stall_trip is None else own.stall_trip,
+        of.numbers.stall_time,
+        f"{here}.stall_trip",
+        numbers | {"largest": f"{here}.longest"},
+        "s",
+    )
     for event, heat in of.events.items():
         yield CheckRow(
             name,

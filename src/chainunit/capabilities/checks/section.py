@@ -15,13 +15,11 @@ import numpy as np
 from ...core.quantities import Value, declaration, quantity
 from ...reading.results import part, result
 from ...study.arrays import peak
-from ...study.bearings import hardest_run
-from ...study.readings import crank_angle, crank_torque, machine_series
+from ...study.bearings import driver_bearing, largest_load, pin_force
+from ...study.readings import crank_torque, machine_series
 from ...study.record import StudyRecord
-from ...study.window import whole_turns
-from .gear import driver_pin
 from .row import CheckRow, NotChecked
-from .runs import runs_from_events
+from .runs import largest
 from .section_plan import SectionPlan
 from .section_strength import (
     DIRECTIONS,
@@ -42,7 +40,7 @@ _CLAUSE = {
 @declaration
 class SectionStress:
     """The stresses of a section: of the fibre with the least safety in steady running, and the largest ones of all
-    runs."""
+    runs. A load that does not swing has no permitted amplitude."""
 
     bending: Value = quantity("N/m2", "amplitude of bending", kind="stress")
     bending_mean: Value = quantity("N/m2", "mean of bending", kind="stress")
@@ -128,13 +126,19 @@ def shaft_section(
     fatigue = fibre_fatigue(strength, stress, plan.mean_stress)
     worst = fatigue.worst
     most = (lever * largest, pull * largest, twist * largest_torque)
+    amplitudes = {
+        "bending": float(stress.bending[worst]),
+        "tension": stress.tension,
+        "torsion": stress.torsion,
+    }
     numbers = SectionStress(
-        bending=float(stress.bending[worst]),
+        **amplitudes,
         bending_mean=float(stress.bending_mean[worst]),
-        tension=stress.tension,
-        torsion=stress.torsion,
         torsion_mean=stress.torsion_mean,
-        **{f"permitted_{load}": float(limit[worst]) for load, limit in fatigue.permitted.items()},
+        **{
+            f"permitted_{load}": float(limit[worst]) if amplitudes[load] > 0.0 else None
+            for load, limit in fatigue.permitted.items()
+        },
         largest_bending=most[0],
         largest_tension=most[1],
         largest_torsion=most[2],
@@ -147,7 +151,7 @@ def shaft_section(
 def section_rows(name: str, of: ShaftSection, safety: float, run: str) -> Iterator[CheckRow]:
     """The rows of a section; `run` is the title of the run with the largest force."""
     at = f"checks.section.{name}"
-    own = of.stress
+    own, loads = of.stress, {"sba": "bending", "szda": "tension", "tta": "torsion"}
     # a section without a swinging stress lasts
     fatigue = own.fatigue_safety if math.isfinite(own.fatigue_safety) else None
     yields = own.yield_safety if math.isfinite(own.yield_safety) else None
@@ -160,12 +164,12 @@ def section_rows(name: str, of: ShaftSection, safety: float, run: str) -> Iterat
         safety,
         f"{at}.fatigue_safety",
         {
-            "sba": f"{at}.bending",
-            "szda": f"{at}.tension",
-            "tta": f"{at}.torsion",
-            "sbADK": f"{at}.permitted_bending",
-            "szdADK": f"{at}.permitted_tension",
-            "ttADK": f"{at}.permitted_torsion",
+            **{symbol: f"{at}.{load}" for symbol, load in loads.items()},
+            **{
+                f"{symbol.removesuffix('a')}ADK": f"{at}.permitted_{load}"
+                for symbol, load in loads.items()
+                if getattr(own, f"permitted_{load}") is not None
+            },
         },
         at_least=True,
     )
@@ -182,6 +186,7 @@ def section_rows(name: str, of: ShaftSection, safety: float, run: str) -> Iterat
             "szd": f"{at}.largest_tension",
             "tt": f"{at}.largest_torsion",
             "sbFK": f"{at}.strength.yield_bending",
+            "szdFK": f"{at}.strength.yield_tension",
             "ttFK": f"{at}.strength.yield_torsion",
         },
         at_least=True,
@@ -195,12 +200,12 @@ def find(
     if not plans:
         return {}, [NotChecked("shaft sections", "the file has none; add [section.NAME]", "section.NAME")]
     drive = study.drive
-    turns = whole_turns(drive, study.steady)
+    turns = study.steady
     machine = drive.simulated_machine
     turned = machine.pin_turns(machine_series(turns))
-    bearing = driver_pin(machine.model.pins, turned, crank_angle(drive, turns))
+    bearing = driver_bearing(drive)
     torque = crank_torque(drive, turns)
-    largest_torque = max(peak(crank_torque(drive, run)) for _, run in runs_from_events(study))
+    largest_torque, _ = largest(study, lambda run: crank_torque(drive, run))
     found: dict[str, ShaftSection] = {}
     checks: list[CheckRow | NotChecked] = []
     for name, plan in plans.items():
@@ -211,15 +216,14 @@ def find(
             checks.append(NotChecked(f"section {name}", why))
             continue
         fx, fy = (turns[f"machine.{output}.{axis}"].values for axis in ("fx", "fy"))
-        force = np.hypot(fx, fy)
+        force = peak(pin_force(drive, turns, pin))
         if plan.on == "link":
-            amplitude, mean = np.array([peak(force)]), np.zeros(1)
+            amplitude, mean = np.array([force]), np.zeros(1)
         else:
             angle = turned[machine.model.pins[bearing]] if plan.on == "crank" else 0.0
             amplitude, mean = fibres(fx, fy, angle)
-        run = hardest_run(study.pins, pin)
-        largest = study.pins[run][pin]["peak"] or 0.0
-        args = (amplitude, mean, peak(force), largest, torque, largest_torque, pin, run)
+        most, run = largest_load(study.pins, pin)
+        args = (amplitude, mean, force, most, torque, largest_torque, pin, run)
         found[name] = shaft_section(plan, *args)
         checks += section_rows(name, found[name], plan.table.safety, study.title_of(run))
     return found, checks

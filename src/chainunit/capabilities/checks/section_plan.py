@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ...core.errors import Faults, meant
+from ...core.errors import Faults
 from ...reading.lists import Entry
 from ...reading.tables import instance
+from .pins import no_pin, pins_named
 from .tables import (
     GIVEN_NOTCH,
     NOTCH_KEYS,
@@ -48,17 +49,13 @@ def read_sections(tables: Mapping[str, Any], titles: list[str], faults: Faults) 
         words = {key: entry.raw.pop(key) for key in _TEXTS if key in entry.raw}
         pin = words.get("pin", "")
         if pin:
-            pins = [title for title in titles if title == pin or title.startswith(f"{pin} ")]
-            if len(pins) != 1:
-                known = [*dict.fromkeys(each for title in titles for each in (title.split(" ")[0], title))]
-                why = (
-                    f"is no turning pin{meant(pin, known)} there are {', '.join(titles) or 'none'}"
-                    if not pins
-                    else f"stands for {', '.join(pins)}; give the whole title of one"
-                )
-                entry.fault("pin", why)
-            else:
+            pins = pins_named(pin, titles)
+            if len(pins) == 1:
                 pin = pins[0]
+            elif pins:
+                entry.fault("pin", f"stands for {', '.join(pins)}; give the whole title of one")
+            else:
+                entry.fault("pin", no_pin(pin, titles))
         for key in missing:
             choice = f", one of {', '.join(NOTCHES)}" if key == "notch" else ""
             entry.fault(key, f"must be given{choice}")

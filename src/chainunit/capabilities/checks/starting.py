@@ -17,7 +17,7 @@ from ...core.quantities import Value, declaration, quantity
 from ...reading.results import result
 from ...study.readings import load_inertia
 from ...study.record import StudyRecord
-from ...study.window import Phase
+from ...study.verdict import STEADY
 from .row import CheckRow, NotChecked
 from .tables import StartingTable
 
@@ -85,7 +85,6 @@ def find(
     plate, drive = study.plate.nameplate, study.drive
     rise = study.runs["start_up"].sel(time=slice(None, study.start.start_time))
     inertia = float(drive.fmu_parameters.rotor.J + np.mean(load_inertia(drive, study.steady)))
-    window = study.window(Phase.STEADY, study.steady)
     time, torque, speed = (rise[name].values for name in ("time", "motor.air_gap_tau", drive.motor_speed))
     motor, counter = start_torques(time, torque, speed, inertia)
     found = starting(
@@ -96,7 +95,7 @@ def find(
             inertia=inertia,
             motor_torque=motor,
             counter_torque=counter,
-            current=window.rms(window.current),
+            current=study.answers[STEADY].current_rms,
             rated_current=plate.rated_current,
         )
     )

@@ -143,7 +143,8 @@ class GearRatingTable(GearRating):
     )
     peak_factor: Value = quantity(
         "1",
-        "permitted torque in peaks and starts over the rated torque; 0: gear.start_factor",
+        "permitted torque in peaks and starts over the rated torque; 0: gear.start_factor, of a gear of a catalogue "
+        "times its application_factor",
         default=0.0,
         min=0.0,
         max=20.0,

@@ -11,7 +11,6 @@ from ...fmu.backends import Backend
 from ...machines.machine import Machine
 from ...report.blocks import Block, Source
 from ...report.capability import Capability, Contents
-from ...report.lines import Line
 from ...study.analysis import Analysis
 from ...study.conditions import given, has_entries, is_one_of
 from ...study.config import Config
@@ -118,16 +117,6 @@ class SizingCapability(Capability):
         from . import page
 
         return page.answer(s)
-
-    def unchecked(self, study: StudyRecord) -> Iterator[Line]:
-        """The limits of the gear that its catalogue does not give."""
-        from .findings import SizingFindings
-        from .gear_rows import unknown_limits
-
-        found = SizingFindings.found_in(study)
-        if found is not None and found.best.sold is not None:
-            for words in unknown_limits(found.best.sold):
-                yield f"{words} of the gear: the catalogue does not give it"
 
     def judgements(self, s: Source, study: StudyRecord) -> Iterator[Block]:
         """The alarm where no motor fits."""

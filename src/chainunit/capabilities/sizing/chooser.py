@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ...drives.catalogue import CatalogueMotor, offer
+from ...drives.catalogue import CatalogueMotor, Offer, offer
 from ...fmu.backends import Backend
 from ...machines.machine import Machine
 from ...study.config import Config
@@ -32,8 +32,8 @@ class SizingChooser:
     duty: Duty | None = None
     """the duty of the machine for which it has chosen"""
 
-    def _task(self, machine: Machine) -> SizingTask:
-        config, own = self.config, offer(*self.config.file.catalogues)
+    def _task(self, machine: Machine, own: Offer) -> SizingTask:
+        config = self.config
         gears = strong_enough(own.gears, float(self.plan.demands.gear_torque))
         return SizingTask(
             self.plan, config.drive, machine, config.operation, config.events, gears, own.couplings
@@ -41,8 +41,9 @@ class SizingChooser:
 
     def choose(self, machine: Machine) -> DriveProposal:
         """See `chainunit.study.proposal.Chooser`."""
-        task = self._task(machine)
-        motors = motors_on_offer(task, self.config.file.catalogues)
+        own = offer(*self.config.file.catalogues)
+        task = self._task(machine, own)
+        motors = motors_on_offer(task, own.motors)
         self.progress("the machine at constant speed", 0.0, 1.0)
         duty = duty_of(task, self.config.values, self.folder, self.backend)
         # another machine is no model that an FMU can be made of
@@ -53,4 +54,5 @@ class SizingChooser:
     def judge(self, drive: Drive, motor: CatalogueMotor) -> Judged:
         """See `chainunit.study.proposal.Chooser`; on the compiled system."""
         assert self.duty is not None
-        return MotorTrials(self._task(self.config.machine), self.duty).judged_drive(drive, motor)
+        task = self._task(self.config.machine, offer(*self.config.file.catalogues))
+        return MotorTrials(task, self.duty).judged_drive(drive, motor)

@@ -173,9 +173,7 @@ class SizingFindings(Findings):
         listed = parts_list(items, unknown, flywheel, wanted)
         if (needed := self._gear_needed(study, setting)) is not None:
             order, remedy = needed
-            words = (
-                f"{order.decides.words} takes one with a rated output torque of {number(order.rated, 'N.m')}"
-            )
+            words = f"{order.decides.words} takes one that permits {number(order.rated, 'N.m')} in running"
             listed = replace(listed, open=[f"The gear is too weak: {words}; {remedy}.", *listed.open])
         if best.motor.is_packaged:
             words = "The motor is one of the packaged table, which is typical data: nobody sells it."
@@ -234,7 +232,7 @@ class SizingFindings(Findings):
         study.warn(
             "gear too weak",
             "The gear {gear} permits {limit} in running and {start} in a start or an overload; {case} puts {torque} "
-            "on it. A gear with a rated output torque of {rated} carries it: {remedy}.",
+            "on it. A gear that permits {rated} in running carries it: {remedy}.",
             gear=sold.designation,
             limit=(sold.transmission.torque_limit, "N.m"),
             start=(sold.transmission.start_limit, "N.m"),

@@ -12,9 +12,10 @@ import xarray as xr
 
 from ...core.errors import InputError
 from ...drives.catalogue_gears import CatalogueGear
+from ...drives.gear_rating import GearRating
 from ...drives.gear_ratios import GearUnit, nearest
 from ...study.arrays import peak
-from ...study.bearings import driver_force
+from ...study.bearings import driver_bearing, pin_force
 from ...study.drive import Drive
 from ...study.limits import SPEED_DEVIATION, Check
 from ...study.readings import shaft_power
@@ -102,13 +103,9 @@ def rows_for(
 
 
 def gear_checks(
-    gear: CatalogueGear,
-    drive: Drive,
-    running: Sequence[xr.Dataset],
-    cases: Sequence[tuple[float, xr.Dataset]],
-    separate: bool,
+    of: GearRating, drive: Drive, running: Sequence[xr.Dataset], cases: Sequence[tuple[float, xr.Dataset]]
 ) -> dict[str, Check]:
-    """The checks of a gear beside those of its torque, as far as its catalogue has their limits.
+    """The checks of a gear beside those of its torque, as far as its ratings have their limits.
 
     The thermal rating is compared with the mean of |power| at the gear, as its loss by load is a share of the power
     in either direction. The overhung load is the largest reaction at the bearing of the driver in running, where the
@@ -118,19 +115,19 @@ def gear_checks(
     ----------
     running : all runs of running
     cases : the runs of the duty, each with its share of the time
-    separate : whether the crank has bearings of its own
     """
-    of, checks = gear.data, dict[str, Check]()
+    checks = dict[str, Check]()
     if of.thermal_power:
         passed = sum(share * float(np.mean(np.abs(shaft_power(drive, run)))) for share, run in cases)
-        checks["gear_thermal"] = Check("power that the gear passes", passed, of.thermal_power, "W")
-    forces = [] if separate else [driver_force(drive, run) for run in running]
-    if of.overhung_load and forces and all(force is not None for force in forces):
-        largest = max(peak(force) for force in forces)
+        checks["gear_thermal"] = Check("mean power of the gear", passed, of.thermal_power, "W")
+    if of.overhung_load and (bearing := driver_bearing(drive)):
+        largest = max(peak(pin_force(drive, run, bearing)) for run in running)
         checks["gear_overhung"] = Check("overhung load of the gear", largest, of.overhung_load, "N")
     if of.largest_speed:
         fastest = max(peak(run["motor.w"].values) for run in running)
-        checks["gear_speed"] = Check("speed of the gear", fastest, of.largest_speed, "rad/s", "speed")
+        checks["gear_speed"] = Check(
+            "speed of the gear's input shaft", fastest, of.largest_speed, "rad/s", "speed"
+        )
     return checks
 
 

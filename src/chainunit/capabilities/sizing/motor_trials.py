@@ -84,7 +84,10 @@ class MotorTrials:
         )
         drive = with_ratio(gear_ratio=chosen)
         if gear is not None:
-            drive = dataclasses.replace(drive, gear_name=gear.designation, gear_rating=gear.rating)
+            rating = gear.rating
+            if plan.separate_bearing:
+                rating = dataclasses.replace(rating, overhung_load=0.0)
+            drive = dataclasses.replace(drive, gear_name=gear.designation, gear_rating=rating)
             return Candidate(
                 motor, drive, margin=plan.demands.margin, unit=unit_of(gear), series="catalogue", sold=gear
             )

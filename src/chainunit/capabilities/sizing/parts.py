@@ -72,7 +72,9 @@ def parts_list(
     }
     sentences = [f"Without {what}: {', '.join(kinds)}." for what, kinds in lacking.items() if kinds]
     if unknown:
-        sentences.append(f"Not checked, as the catalogue of gears does not give it: {', '.join(unknown)}.")
+        sentences.append(
+            f"Left out of the choice, as the catalogue of gears does not give it: {', '.join(unknown)}."
+        )
     sentences += [f"In no catalogue: {words}." for words in (flywheel, coupling) if words]
     return PartsList(items, sentences)
 

@@ -38,25 +38,24 @@ _WORSE_WITH_POWER = ("gear_start",)
 """Checks that a larger motor makes worse."""
 
 
-def motors_on_offer(task: SizingTask, own: Sequence[Path]) -> list[CatalogueMotor]:
-    """The motors of the catalogue with the requested numbers of poles, the smallest first, with the motors of the
-    files of `own` ones.
+def motors_on_offer(task: SizingTask, own: Sequence[CatalogueMotor]) -> list[CatalogueMotor]:
+    """The motors of the catalogue with the requested numbers of poles, the smallest first, with the user's
+    `own` ones.
 
     Raises
     ------
     InputError
-        for a catalogue that cannot be read or has no such motor, and as `check_ratios`.
+        for a catalogue that has no such motor, and as `check_ratios`.
     """
     limits, tables = task.plan.demands, task.tables
-    motors = [m for m in catalogue(*own) if limits.poles_least <= m.nameplate.poles <= limits.poles_most]
-    if task.plan.own_only:
-        motors = [m for m in motors if not m.is_packaged]
-        if not motors:
-            raise InputError(
-                "sizing.own_only: the catalogues have no motor of their own with so many poles; name one by "
-                "catalogue, or leave it out",
-                "sizing.own_only",
-            )
+    offered = own if task.plan.own_only else [*catalogue(), *own]
+    motors = [m for m in offered if limits.poles_least <= m.nameplate.poles <= limits.poles_most]
+    if not motors and task.plan.own_only:
+        raise InputError(
+            "sizing.own_only: the catalogues have no motor of their own with so many poles; name one by "
+            "catalogue, or leave it out",
+            "sizing.own_only",
+        )
     motors.sort(key=lambda m: (m.nameplate.power, poles_rank(m.nameplate.poles)))
     if not motors:
         raise InputError(

@@ -29,9 +29,7 @@ class SizingTask:
     """the gears of catalogues, of which one is chosen; without them any gear of the plan's kind"""
     couplings: Sequence[CatalogueCoupling] = ()
     """the safety couplings of catalogues"""
-    gear: CatalogueGear | None = None
-    """the gear of the drive on trial, if it is one of a catalogue"""
 
     def of_gear(self, gear: CatalogueGear | None) -> SizingTask:
         """The task with a drive that has this gear, whose values stand in the `tables`."""
-        return self if gear is None else replace(self, gear=gear, tables=with_gear(self.tables, gear))
+        return self if gear is None else replace(self, tables=with_gear(self.tables, gear))

@@ -298,9 +298,8 @@ class Trial:
             hardest = max([at_gear(self.drive, self.start), *(s.gear_torque for s in self.starts)])
             title = "torque of the gear in a start"
             checks["gear_start"] = Check(title, hardest, gear.start_limit, "N.m")
-        if self.task.gear is not None:
-            separate = self.task.plan.separate_bearing
-            checks |= gear_checks(self.task.gear, self.drive, self._running, self._cases, separate)
+        if (rating := self.drive.gear_rating) is not None:
+            checks |= gear_checks(rating, self.drive, self._running, self._cases)
         return checks
 
 
