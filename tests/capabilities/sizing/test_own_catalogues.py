@@ -17,7 +17,9 @@ from event_tables import HEAVY_TABLES
 from sizings import sized_by
 
 from chainunit.capabilities.handover.candidates import candidates_csv
+from chainunit.capabilities.sizing import findings
 from chainunit.capabilities.sizing.candidate import Candidate, Criterion, Standing, TrialResult
+from chainunit.capabilities.sizing.gear_order import GearLoad, GearOrder
 from chainunit.capabilities.sizing.gear_rows import (
     gear_checks,
     helps,
@@ -30,6 +32,7 @@ from chainunit.capabilities.sizing.parts import coupling_for
 from chainunit.capabilities.sizing.preference import order_words, rank
 from chainunit.core.errors import InputError
 from chainunit.drives.catalogue import catalogue, offer
+from chainunit.drives.gearing import ordered_torque
 from chainunit.reading.results import as_data
 from chainunit.study.catalogue_drive import catalogue_drive
 from chainunit.study.config import load, parse
@@ -176,6 +179,20 @@ def test_inertia_and_loss_of_the_row_take_part_in_the_computation(sized):
     tables = found.proposal(config.drive).tables
     assert tables.gear.torque_limit == 500.0 and "gear.torque_limit" in tables.given
     assert tables.gear.efficiency == pytest.approx(0.94) and tables.gear.J == 0.0002
+
+
+@pytest.mark.parametrize(("rated", "is_weak"), [(500.4, False), (500.1, True)])
+def test_a_gear_that_just_carries_an_overload_is_not_too_weak(sized, monkeypatch, rated, is_weak):
+    """The torque to order is rounded up, to 501 N m here; the gear is judged by the one that it has to carry."""
+    _, found = sized
+    load = GearLoad(1000.4, "an overload", 2.0)
+    order = GearOrder(ordered_torque(load.rated, 0.0), {"overload": load}, ())
+    monkeypatch.setattr(findings, "gear_order", lambda *of: order)
+    data = dataclasses.replace(found.best.sold.data, rated_torque=rated)
+    best = dataclasses.replace(found.best, sold=dataclasses.replace(found.best.sold, data=data))
+    study = SimpleNamespace(insufficient="")
+    listed = dataclasses.replace(found, candidates=[best]).parts(study, None)
+    assert any("an overload takes one that permits 501 N m" in words for words in listed.open) == is_weak
 
 
 def test_checks_of_thermal_rating_overhung_load_and_speed(sized):

@@ -201,11 +201,11 @@ class SizingFindings(Findings):
             study.note("sizing", "{text}", text=text)
         if study.insufficient:
             study.warn("insufficient motor", "{answer}. All runs are with it.", answer=self.answer)
-        self._remark_on_gear(study)
+        setting = self.coupling(study)
+        self._remark_on_gear(study, setting)
         if study.statics.modes is not None:
             rigid = "Sizing took the shafts as rigid and the driveline as massless; the runs include it."
             study.note("sized without line", rigid)
-        setting = self.coupling(study)
         if setting is not None and setting.obstacle in (None, Obstacle.RELEASE):
             # this is the setting that the answer names, recommended or not
             remark_on_rams(study, setting.least)
@@ -217,15 +217,18 @@ class SizingFindings(Findings):
         else None."""
         sold = self.best.sold
         order = None if sold is None else gear_order(study, setting, 0.0)
-        if sold is None or order is None or order.rated <= sold.transmission.torque_limit * (1.0 + ROUNDING):
+        if sold is None or order is None:
+            return None
+        # the torque to order is rounded up
+        if order.decides.rated <= sold.transmission.torque_limit * (1.0 + ROUNDING):
             return None
         if other := stronger(self.gears, sold, order.rated):
             return order, f"{other.designation} of the catalogue does so; give sizing.gear_torque"
         return order, "the catalogue has none of this ratio"
 
-    def _remark_on_gear(self, study: StudyRecord) -> None:
+    def _remark_on_gear(self, study: StudyRecord, setting: Setting | None) -> None:
         """Warn where the runs ask more of the gear than its catalogue permits."""
-        sold, needed = self.best.sold, self._gear_needed(study, self.coupling(study))
+        sold, needed = self.best.sold, self._gear_needed(study, setting)
         if sold is None or needed is None:
             return
         order, remedy = needed
