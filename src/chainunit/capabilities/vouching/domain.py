@@ -13,8 +13,8 @@ from ...fmu.description import Interface
 from ...fmu.reference import parameters_at_start
 from ...machines.api import ChainUnitMachine
 from ...machines.chain_unit import SIDES, ChamberForces, Feed, SideLoads
-from ...study.organ_limits import has_empty_side, slack_and_mode
-from ...study.verdict import speed_limits
+from ...study.organ_limits import two_bar_limits
+from ...study.verdict import SpeedLimit
 from .experiments import StatePoint
 from .rerun import TimeTable, UnpackedFmu
 
@@ -105,23 +105,23 @@ def _limits(fmu: UnpackedFmu) -> Iterator[dict[str, Any]]:
             for side in SIDES
         }
         feed = Feed(**sides)
-        slack, mode = slack_and_mode(machine, feed)
+        mode, limits = two_bar_limits(machine, feed)
         own = [
             ("chain_resonance", mode, "crank speed at the lowest natural frequency of an organ as a chain")
         ]
         if f"{prefix}left.theta_1" not in fmu.variables:
-            own += _of_two_bars(slack, mode, empty=has_empty_side(feed))
+            own += _of_two_bars(limits)
         masses = {f"{prefix}{side}.material_mass": sides[side].material_mass for side in SIDES}
         for name, value, words in own:
             yield {"name": name, "unit": "rad/s", "value": _finite(value), "with": masses, "meaning": words}
 
 
-def _of_two_bars(slack: float, mode: float, *, empty: bool) -> Iterator[tuple[str, float, str]]:
+def _of_two_bars(limits: Iterable[SpeedLimit]) -> Iterator[tuple[str, float, str]]:
     """Name, crank speed [rad/s] and meaning of each limit of two bars in place of chains."""
-    good = {each.topic: each.speed for each in speed_limits(slack, mode, empty)}
+    good = {each.topic: each.speed for each in limits}
     yield (
         "slack_free_speed",
-        slack,
+        good["slack speed"],
         "crank speed at which a web first goes slack; above, two bars are no chain",
     )
     for link in ("crank", "rocker"):
