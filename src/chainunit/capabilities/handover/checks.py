@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from ...study.stored_result import as_mapping
+from .rows import as_rows, number_of, text_of
 
 CHECKS = "checks.csv"
 _TEXTS = ("of", "title", "clause", "formula")
@@ -16,31 +15,16 @@ _TEXTS = ("of", "title", "clause", "formula")
 def checks_csv(rows: Sequence[Mapping[str, Any]]) -> str:
     """The checks in their order. A value that is not known is empty; ``number`` is the place of the value in
     study.json."""
-    text = io.StringIO()
-    writer = csv.writer(text, delimiter=";", lineterminator="\n")
-    writer.writerow((*_TEXTS, "value", "bound", "limit", "unit", "utilisation", "holds", "number"))
-    for row in rows:
-        value, limit, used = (as_mapping(row.get(name)) for name in ("value", "limit", "utilisation"))
-        writer.writerow(
-            (
-                *(_text(row.get(name)) for name in _TEXTS),
-                _number(value),
-                "at least" if row.get("at_least") else "at most",
-                _number(limit),
-                _text(limit.get("unit")),
-                _number(used),
-                "yes" if row.get("holds") else "no",
-                _text(row.get("number")),
-            )
-        )
-    return text.getvalue()
+    heads = (*_TEXTS, "value", "bound", "limit", "unit", "utilisation", "holds", "number")
+    return as_rows(heads, map(_cells, rows))
 
 
-def _text(value: Any) -> str:
-    return value if isinstance(value, str) else ""
-
-
-def _number(entry: Mapping[str, Any]) -> str:
-    """Every digit: the number is the one of result.json."""
-    value = entry.get("value")
-    return "" if value is None else repr(value)
+def _cells(row: Mapping[str, Any]) -> Iterator[str]:
+    yield from (text_of(row, name) for name in _TEXTS)
+    yield number_of(row.get("value"))
+    yield "at least" if row.get("at_least") else "at most"
+    yield number_of(row.get("limit"))
+    yield text_of(as_mapping(row.get("limit")), "unit")
+    yield number_of(row.get("utilisation"))
+    yield "yes" if row.get("holds") else "no"
+    yield text_of(row, "number")

@@ -9,7 +9,6 @@ inertia over the turn is a column of load_cycle.csv."""
 from __future__ import annotations
 
 import csv
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,6 +18,7 @@ import numpy as np
 
 from ...core.errors import InputError, printable
 from ...reading.tables import decoded, file_text
+from .rows import as_rows
 from .shell import environment_of
 from .template import ROOT, elements
 
@@ -54,11 +54,7 @@ def headings() -> list[str]:
 def as_csv(cycle: ShaftCycle) -> str:
     """The CSV of the template: headings, then a row for each instant; separated by ``;``, with decimal points."""
     columns = cycle.time, cycle.angle, cycle.speed, cycle.acceleration, -cycle.torque
-    text = io.StringIO()
-    writer = csv.writer(text, delimiter=";", lineterminator="\n")
-    writer.writerow(headings())
-    writer.writerows([f"{x + 0.0:.9g}" for x in row] for row in zip(*columns, strict=True))
-    return text.getvalue()
+    return as_rows(headings(), ([f"{x + 0.0:.9g}" for x in row] for row in zip(*columns, strict=True)))
 
 
 def read_cycle(file: str | Path, section: str = "RotativeSection") -> ShaftCycle:
