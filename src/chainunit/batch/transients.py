@@ -23,7 +23,6 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from scipy.integrate import RK45
 
 from ..core import integrators
 from ..core.engines import MATH, casadi_
@@ -292,6 +291,8 @@ def _compiled(
     compiler: Compiler,
 ) -> _NativeLoop:
     """The compiled loop."""
+    from scipy.integrate import RK45
+
     operations = _operations(model, outputs, by)
     assert model.state_layout is not None
     sides = 2 if by else 1
