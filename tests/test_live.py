@@ -446,5 +446,12 @@ def test_a_date_in_the_study_file_is_a_text_in_the_page(tmp_path):
     assert json.loads(json.dumps(live.data["file"]))["report"] == {"date": "2026-03-01"}
 
 
+@pytest.mark.parametrize("name", ["chain-unit", "knife"])
+def test_a_live_page_alone_is_small(name, tmp_path):
+    file = tmp_path / "study.toml"
+    file.write_text(example(name), "utf-8")
+    assert len(html.render(live_page(file, None, tmp_path)).encode()) < 150_000
+
+
 def test_the_page_says_that_no_run_was_made(tmp_path):
     assert "status: no run was made<" in html.render(live_page(None, None, tmp_path))

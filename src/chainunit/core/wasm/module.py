@@ -33,6 +33,7 @@ from ..model import Model, Requirement
 from ..native.division import Division
 from ..native.kernels import ModelFunction, groups_without_slopes, kernels, output_groups
 from ..native.operations import ARGUMENT, NUMBER, Operations
+from ..native.repeats import outlined
 from ..quantities import Variable
 from ..symbolic_trace import chosen_columns, outputs_of, trace
 from .encoding import Function, Module
@@ -96,6 +97,10 @@ def _kernel(
     """Write a kernel: a function for each part of its operations, and one that calls the needed parts."""
     operations = Operations(kernel.arguments, kernel.groups)
     items, results = operations.items, operations.results
+    if kernel.frequency == "ONCE":
+        short = outlined(items, results, kernel.name)
+        items, results = short.items, short.results
+        own.add(short.called)
     division = Division(items, results, _LONGEST)
     addresses = _addresses(kernel, groups, results, memory)
     # a result is computed to its place; one that stands twice, or is an argument or a number, is copied there
