@@ -14,7 +14,8 @@ memory, at addresses that the description names.
 ``forward(groups)``
     the change of these outputs, and by one bit more of the derivatives, along changes of inputs and states
 ``run(begin, step, longest, rows, signals, chosen, into, groups)``
-    a run in the time, see `chainunit.core.wasm.runs`
+    a run in the time, see `chainunit.core.wasm.runs`; and ``dense(...)``, in fewer substeps, where the states have no
+    constraints
 
 The bytes follow from the equations alone. Each engine computes the same bits: the module calls no function of its
 host.
@@ -86,7 +87,7 @@ def wasm_module(
             written[kernel.name] = _kernel(kernel, groups, memory, module, own)
     if model.state_layout:
         _start(model, memory, module, written)
-        write_run(model, memory, module, own, written)
+        write_run(t, memory, module, own, written)
     _fill(model, memory, module)
     return WasmModule(module.bytes_of(memory.size), _description(model, outputs, groups, memory, module))
 

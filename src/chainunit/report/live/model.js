@@ -312,7 +312,9 @@ const liveModel = async (data, bytes) => {
       whole[numbers / 4] = count;
       this.columns.forEach((name, n) => (whole[numbers / 4 + 2 + n] = 8 * k.index[name]));
       const into = numbers + chosen;
-      const made = k.functions.run(begin, step, this.of.longest, rows, at, numbers, into, 1);
+      // between the steps of the integrator where the module interpolates
+      const go = k.functions.dense ?? k.functions.run;
+      const made = go(begin, step, this.of.longest, rows, at, numbers, into, 1);
       const found = { time: new Float64Array(made), made, wanted: rows };
       for (const name of this.columns) found[name] = new Float64Array(made);
       for (let r = 0; r < made; r++) {
