@@ -251,7 +251,7 @@ class Transients:
         lanes = self._loop.lanes
         pieces = [(r, r + lanes) for r in range(0, room, lanes)]
         if workers == 1:
-            piece((0, room))
+            piece((0, runs))
         else:
             list(threads(min(workers, os.cpu_count() or 1)).map(piece, pieces))
         times = np.minimum(begin[:, None] + step * np.arange(rows), stop[:, None])
