@@ -1,13 +1,16 @@
 """Instructions of WebAssembly for lists of operations.
 
 A value that one operation takes stays on the stack; others are kept in locals, which are used again as soon as
-nothing needs their value. Functions beyond the basic operations are those of `chainunit.core.native.elementary`.
+nothing needs their value, the first ones first: their numbers are short, and operations that stand again and again
+have bytes that a packer finds again. Functions beyond the basic operations are those of
+`chainunit.core.native.elementary`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import partial
+from heapq import heappop, heappush
 
 from ..errors import InputError
 from ..native.elementary import OWN, ROOT_OF_HALF, recording
@@ -127,7 +130,7 @@ class Writer:
             if store is not None and root in kept and root in self._local:
                 store(root, partial(self.push, root))
                 if alone:
-                    self._free.append(self._local.pop(root))
+                    heappush(self._free, self._local.pop(root))
 
     def push(self, place: int) -> None:
         """Push the value of an operation."""
@@ -172,7 +175,7 @@ class Writer:
                 yield operand
 
     def _keep(self, place: int) -> None:
-        self._local[place] = self._free.pop() if self._free else self._function.local()
+        self._local[place] = heappop(self._free) if self._free else self._function.local()
         self._function.set(self._local[place])
 
     def _keep_results(self, place: int) -> None:
@@ -190,7 +193,7 @@ class Writer:
     def _release(self, root: int, leaves: dict[int, list[int]], last: dict[int, int]) -> None:
         for leaf in leaves[root]:
             if last.get(leaf) == root and leaf in self._local:
-                self._free.append(self._local.pop(leaf))
+                heappush(self._free, self._local.pop(leaf))
 
     def _push_value(self, place: int) -> None:
         """Push the value of an operation that is in no local, with the instructions that compute it."""
