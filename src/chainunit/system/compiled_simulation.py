@@ -121,7 +121,9 @@ class CompiledSimulation(Simulation):
         return _advance([self], [options.stop], options)[0]
 
     def _dataset(self, times: Any, outputs: Mapping[str, Any], kept: Sequence[str], every: int) -> xr.Dataset:
-        chosen = np.unique([*range(0, len(times), every), len(times) - 1])
+        chosen = np.arange(0, len(times), every)
+        if chosen[-1] != len(times) - 1:
+            chosen = np.append(chosen, len(times) - 1)
         signals = {full: np.broadcast_to(at_time(x, times), times.shape) for full, x in self.signals.items()}
         rows = {**outputs, **signals}
         known = {v.name: v for v in self._system.model.input_layout.variables} | self._system.outputs
