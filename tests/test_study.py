@@ -729,6 +729,7 @@ def test_the_overloads_of_both_sides_are_readable(columns, tables):
     assert "jam right" in heads[-1] and all(len(line) <= columns for line in heads)
 
 
+@pytest.mark.second
 def test_feed_forward_of_chains_is_told_by_chains(tmp_path, monkeypatch):
     """The control asks a machine of the same kind: the ripple that is left is a fraction of that with two bars."""
     from chainunit.study import config
