@@ -291,8 +291,6 @@ def _compiled(
     compiler: Compiler,
 ) -> _NativeLoop:
     """The compiled loop."""
-    from scipy.integrate import RK45
-
     operations = _operations(model, outputs, by)
     assert model.state_layout is not None
     sides = 2 if by else 1
