@@ -41,6 +41,17 @@ class Trace:
         pairs = [*zip(outputs_of(self.model), self.outputs, strict=True), *self.further_quantities]
         return {variable.name: (variable, value) for variable, value in pairs}
 
+    @cached_property
+    def is_free(self) -> bool:
+        """Whether the states have no constraints, see `Model.constrained_states`."""
+        import casadi
+
+        met = self.model.constrained_states(casadi_(), self.p, self.u, self.x)
+        return all(
+            casadi.is_equal(casadi.SX(x), own)
+            for x, own in zip(met, casadi.vertsplit(self.symbols[2]), strict=True)
+        )
+
     def outputs_at(self, x: Any) -> list[Any]:
         """The outputs with the states `x` in place of the symbols."""
         parts = self.model.evaluate(casadi_(), self.p, self.u, x)

@@ -97,6 +97,12 @@ class Rig:
         machine = self.graph.components["machine"].connectors
         return set(event.inputs(event.side)) <= set(self.inputs) and set(event.reads) <= set(machine)
 
+    def gives(self, full: str) -> bool:
+        """Whether the drive has an output of that full name."""
+        name, _, variable = full.partition(".")
+        connector = self.graph.components[name].connectors.get(variable)
+        return connector is not None and connector.causality == "output"
+
     def event_signals(self, event: Event, begin: float, state: Values) -> Signals:
         """The signals of the event, by full name, if it begins at `begin` [s] with the outputs `state`."""
         normal = {name: value for name, (_, value) in self.inputs.items()}

@@ -31,6 +31,18 @@ Guarded = tuple[Instance, Any, list[float]]
 """An instance, the handle of its guarded outputs, and their limits."""
 
 
+def check_forward(begin: float, stop: float, step: float) -> None:
+    """Refuse a run from `begin` to `stop` [s] in steps of `step` [s] that does not go forward.
+
+    Raises
+    ------
+    InputError
+        where it does not.
+    """
+    if not (0.0 < step < math.inf) or not begin < stop < math.inf:
+        raise InputError(f"a run from t = {begin:g} to {stop:g} s in steps of {step:g} s: must go forward")
+
+
 @dataclass(frozen=True)
 class RunOptions:
     """The arguments of `Simulation.run`."""
@@ -105,10 +117,7 @@ class Simulation(ABC):
         WriteError
             where the `file` cannot be written.
         """
-        if not (0.0 < step < math.inf) or not self.time < stop < math.inf:
-            raise InputError(
-                f"a run from t = {self.time:g} to {stop:g} s in steps of {step:g} s: must go forward"
-            )
+        check_forward(self.time, stop, step)
         if not every >= 1 or every % 1:
             raise InputError(f"every = {every:g}: must be a whole number >= 1")
         run, failure = self._run(RunOptions(stop, step, progress, guards or {}, every, names, file))
