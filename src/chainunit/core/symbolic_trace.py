@@ -33,7 +33,9 @@ class Trace:
     @cached_property
     def further_quantities(self) -> list[tuple[Variable, Any]]:
         """The quantities beside the outputs, see `Model.further_quantities`."""
-        return self.model.further_quantities(casadi_(), self.p, self.u, self.x)
+        names = (v.name for v in outputs_of(self.model))
+        outputs = dict(zip(names, self.outputs, strict=True))
+        return self.model.further_quantities(casadi_(), self.p, self.u, self.x, outputs)
 
     @cached_property
     def columns(self) -> dict[str, tuple[Variable, Any]]:

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
     from .drive import Drive
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 
 @dataclass(frozen=True)
 class LeastPull:

@@ -7,9 +7,9 @@ import math
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from ..core.quantities import Value, declaration, quantity
 from ..system import CompiledSimulation, Simulation, run_together
@@ -21,6 +21,9 @@ from .measures import STARTED, time_to_start
 from .relay import start_class
 from .rig import Rig, join
 from .torques import PeakOf, at_gear, on_coupling
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 START_ANGLES = 8
 """Number of crank angles, evenly over the turn, from which the machine is started."""

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from ..batch.transients import Transients, signal_table
 from ..core.engines import MATH
@@ -17,6 +16,9 @@ from .graph import System
 from .rows import selected
 from .signals import at_time
 from .simulation import RunOptions, Simulation, check_forward
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 TOLERANCE = 1e-9
 """Relative tolerance of the integrator: a run agrees with the monolithic solution to some 1e-7 of the peaks, where a
@@ -121,6 +123,8 @@ class CompiledSimulation(Simulation):
         return _advance([self], [options.stop], options)[0]
 
     def _dataset(self, times: Any, outputs: Mapping[str, Any], kept: Sequence[str], every: int) -> xr.Dataset:
+        import xarray as xr
+
         chosen = np.arange(0, len(times), every)
         if chosen[-1] != len(times) - 1:
             chosen = np.append(chosen, len(times) - 1)

@@ -13,10 +13,9 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
-import xarray as xr
 
 from ..core.errors import InputError, InterruptedRunError, RunError
 from ..core.files import atomic_file
@@ -26,6 +25,9 @@ from . import rows
 from .graph import FmuComponent, System, direct_inputs, order
 from .instance import Fmu, Instance, Kind
 from .signals import Profile, at_time
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Guarded = tuple[Instance, Any, list[float]]
 """An instance, the handle of its guarded outputs, and their limits."""
@@ -312,6 +314,8 @@ class FmuSimulation(Simulation):
         """Go from the first of the `times` to each of the others in turn, with all values consistent there."""
 
     def _run(self, options: RunOptions) -> tuple[xr.Dataset, RunError | None]:
+        import xarray as xr
+
         start, file = self.time, options.file
         n = max(1, math.ceil((options.stop - start) / options.step - 1e-9))
         recorders, guarded = self._recorders(options.names), self._guarded(options.guards)

@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from ...core.quantities import Value, declaration, quantity
 from ...reading.results import part, result
@@ -23,6 +22,9 @@ from ...study.window import mean
 from .row import CheckRow, NotChecked
 from .runs import largest
 from .tables import FlexibleCouplingTable
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _CLAUSE = "DIN 740-2:1986"
 _TURN = 2.0 * math.pi
