@@ -51,6 +51,23 @@ def test_imports_no_more_than_is_needed(code, needed, tmp_path, monkeypatch):
     assert loaded & DEPENDENCIES == needed
 
 
+@pytest.mark.parametrize(
+    ("module", "package"), [("casadi.tools", "casadi"), ("netCDF4", "netcdf4"), ("PIL.Image", "pillow")]
+)
+def test_a_package_that_is_not_installed_has_a_sentence(module, package):
+    """Some are not to be had for every machine, and a check of a certified file needs few. A module that is missing
+    by a fault of ours is no bad input."""
+
+    def run(missing):
+        fails = f"def fail(*given, **options): raise ModuleNotFoundError('no', name={missing!r})"
+        code = f"from chainunit.app import cli\n{fails}\ncli.app = fail\ncli.main()"
+        return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+
+    words = f"this needs the package {package}, which is not installed: pip install {package}"
+    assert (run(module).returncode, run(module).stderr) == (2, f"chainunit: {words}\n")
+    assert "Traceback" in run("chainunit.nothing").stderr
+
+
 RESULTS = ("BestResult", "IdentificationResult", "SweepResult", "WatchResult")
 
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import sys
 from collections.abc import Sequence
 from enum import StrEnum
+from importlib import metadata
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -297,11 +299,24 @@ def _outcome() -> tuple[int, str]:
     except OSError as error:
         where = error.filename or ("the output or the folder for temporary files" if full(error) else "")
         return 1 if full(error) else 2, f"{where}: {error.strerror or error}"
+    except ModuleNotFoundError as error:
+        if not (package := _declared(error.name or "")):
+            raise
+        return 2, f"this needs the package {package}, which is not installed: pip install {package}"
     except Exception as error:
         # wrong usage: an unknown command or option, a missing argument
         if not hasattr(error, "format_message"):
             raise
         return 2, _usage(error)
+
+
+def _declared(module: str) -> str:
+    """The package of a missing module, where it is one that this package requires; it may be installed without them,
+    as to check a certified file. Empty for any other module, which is missing by a fault of ours."""
+    package = module.partition(".")[0].lower()
+    package = {"pil": "pillow"}.get(package, package)
+    required = (re.match(r"[\w-]+", line) for line in metadata.requires("chainunit") or ())
+    return package if any(found and found[0].lower() == package for found in required) else ""
 
 
 def _usage(error: Any) -> str:

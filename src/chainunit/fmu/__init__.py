@@ -1,1 +1,1 @@
-"""FMUs from declared models. No module here names a machine."""
+"""FMUs from declared models, and the loading of the libraries of FMUs. No module here names a machine."""

@@ -28,8 +28,9 @@ from ..core.quantities import Layout, declared_class, group
 from ..mechanism.chains import ChainedState
 from ..mechanism.linkage import Linkage
 from ..mechanism.models import DirectMachine, InverseMachine, LinkageModel, acceleration
-from .chain_organs import MOST, Organs, Parameters, both
+from .chain_organs import LEAST, MOST, Organs, Parameters, both
 from .chain_unit import SIDES, ChamberForces, Inputs, Outputs, drive
+from .hanging import split
 
 CLOSING = 20.0
 """Rate at which the gap between a chain and A2 is closed [1/s]."""
@@ -179,6 +180,21 @@ def flexible(walls: int, webs: int) -> type[InverseMachine]:
             f"and at most {MOST} in all; more need an implicit integrator"
         )
     return _flexible(walls, webs)
+
+
+def with_rods(number: int, start: Mapping[str, float]) -> type[InverseMachine]:
+    """ChainUnitFlexible with `number` rods an organ. They are divided between wall and web so that the rods
+    are nearest to equal length, by the lengths among the `start` values.
+
+    Raises
+    ------
+    InputError
+        for a number of rods that the model cannot have.
+    """
+    if not LEAST <= number <= MOST:
+        raise InputError(f"rods = {number}: must be >= {LEAST} and <= {MOST}")
+    lengths = ChamberForces.Parameters()
+    return flexible(*split((start.get("l1", lengths.l1), start.get("l2", lengths.l2)), number))
 
 
 @functools.cache

@@ -13,10 +13,8 @@ from ..core.temporary_folders import scratch
 from ..drives.motor import Motor
 from ..fmu.backends import Backend
 from ..machines.api import ChainedUnit
-from ..machines.chain_organs import LEAST, MOST, USUAL
-from ..machines.chain_unit import ChamberForces
-from ..machines.flexible import ChainedModel, flexible
-from ..machines.hanging import split
+from ..machines.chain_organs import USUAL
+from ..machines.flexible import ChainedModel, with_rods
 from ..machines.machine import Machine
 from ..mechanism.models import DirectMachine
 from ..models import model_named
@@ -161,21 +159,6 @@ def left_out(operation: OperatingConditions, events: Iterable[str]) -> str:
     if not names:
         return ""
     return f"Not in it: {'; '.join(names)}. Its loads are those of normal running."
-
-
-def with_rods(number: int, start: Mapping[str, float]) -> type[Model]:
-    """ChainUnitFlexible with `number` rods an organ. They are divided between wall and web so that the rods
-    are nearest to equal length, by the lengths among the `start` values.
-
-    Raises
-    ------
-    InputError
-        for a number of rods that the model cannot have.
-    """
-    if not LEAST <= number <= MOST:
-        raise InputError(f"rods = {number}: must be >= {LEAST} and <= {MOST}")
-    lengths = ChamberForces.Parameters()
-    return flexible(*split((start.get("l1", lengths.l1), start.get("l2", lengths.l2)), number))
 
 
 def _is_of(model: type[Model], drive: Drive) -> bool:

@@ -10,7 +10,11 @@ import numpy as np
 from ..core.quantities import Layout
 from ..machines.api import ChainUnitMachine
 from ..machines.chain_unit import RODS, SIDES, RodName, SideLoads
-from .drive import Drive
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from .drive import Drive
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -6,16 +6,14 @@ import contextlib
 import ctypes
 import logging
 import math
-import os
 import re
-import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 from ..core.errors import InputError, RunError, printable, shown
 from ..core.temporary_folders import remove_folder, temporary_folder
+from ..fmu.loading import fmi2_callbacks, loading
 
 log = logging.getLogger("chainunit.fmu")
 _WARNING, _DISCARD, _FATAL = 1, 2, 4  # of fmi2Status
@@ -27,32 +25,6 @@ _WHOLE = {
 }
 Kind = Literal["Co-Simulation", "Model Exchange"]
 """Interface of an FMU."""
-_working_directory = threading.Lock()
-"""Locked while fmpy loads a library: all threads of the process share one working directory."""
-
-
-@contextmanager
-def loading() -> Iterator[None]:
-    """Keep the working directory of the process while fmpy loads a library: it changes to the folder of the library,
-    and stays there after an error."""
-    with _working_directory:
-        here = Path.cwd()
-        try:
-            yield
-        finally:
-            os.chdir(here)
-
-
-def fmi2_callbacks(logger: Callable[..., None]) -> Any:
-    """The callbacks of an instance of FMI 2.0, which the caller must keep alive as long as the instance; `logger`
-    takes environment, name, status, category and message."""
-    from fmpy import calloc, fmi2, free
-
-    callbacks = fmi2.fmi2CallbackFunctions()
-    callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(logger)
-    callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(calloc)
-    callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(free)
-    return callbacks
 
 
 class DiscardError(RunError):

@@ -6,7 +6,10 @@ import io
 import json
 import random
 import re
+import subprocess
+import sys
 import zipfile
+from importlib import metadata
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -17,11 +20,22 @@ from command import chainunit
 from fmpy.validation import validate_fmu
 
 from chainunit import ChainUnitMachine, InputError, __version__
-from chainunit.capabilities.vouching import archive, certify, documents, experiments, keys, manifest, rerun
+from chainunit.capabilities.vouching import (
+    archive,
+    certify,
+    documents,
+    experiments,
+    keys,
+    libraries,
+    manifest,
+    rerun,
+)
 from chainunit.capabilities.vouching.domain import domain
 from chainunit.capabilities.vouching.integrity import integrity
 from chainunit.capabilities.vouching.verify import _difference, verify
 from chainunit.fmu.backends import export
+from chainunit.fmu.native.export import export as native
+from chainunit.fmu.native.platforms import compiles
 from chainunit.fmu.reference import REFERENCE, RELATED
 from chainunit.machines.accelerator import Accelerator
 from chainunit.machines.chain_unit import ChamberForces
@@ -106,6 +120,25 @@ def test_a_certified_fmu_holds(made):
     ]  # fmt: skip
     assert lines[-1] == "it.fmu: holds"
     assert "by the expected key" in lines[0] and "29 members" in lines[1]
+
+
+NEEDED = {"cryptography", "fmpy", "numpy", "pydantic", "pythonfmu", "rich", "scipy", "typer"}
+"""The packages that a receiver installs beside this one; docs/how-to/vouching.md names them."""
+PAGE = Path(__file__).parents[3] / "docs" / "how-to" / "vouching.md"
+
+
+def test_a_receiver_needs_few_packages(made):
+    """The others, as casadi, are not to be had for every machine."""
+    code = "import sys; from chainunit.app.cli import app; app(['verify', 'it.fmu'], standalone_mode=False)"
+    after = "print('loaded', *{m.split('.')[0].lower() for m in sys.modules})"
+    command = [sys.executable, "-c", f"{code}; {after}"]
+    run = subprocess.run(command, cwd=made, capture_output=True, text=True, check=True)
+    *said, loaded = run.stdout.splitlines()
+    declared = {re.match(r"[\w-]+", line)[0].lower() for line in metadata.requires("chainunit")}
+    assert said[-1] == "it.fmu: holds" and {"casadi", "pandas", "xarray"} < declared
+    assert (declared | {"cryptography"}) & set(loaded.split()) == NEEDED
+    (line,) = re.findall("^pip install (?!--no-deps|')(.*)$", PAGE.read_text("utf-8"), re.MULTILINE)
+    assert set(line.split()) == NEEDED - {"rich"}, "typer brings rich"
 
 
 def test_other_members_stay_to_the_bit_and_importers_take_it(made, data, members):
@@ -456,12 +489,114 @@ def test_wrong_results_inside_are_found(tmp_path, members, other):
     assert found["reference experiment"].holds is False and found["smooth experiment"].holds
 
 
-def test_without_a_library_for_this_machine_the_equations_are_compared(tmp_path, members, other):
-    bare = {n: x for n, x in members.items() if not n.startswith("binaries/")}
-    found = checked(tmp_path, signed(bare, other))
-    assert found["experiments"].holds is None
-    assert "the FMU has no library that this machine can load; it has none" in found["experiments"].words
-    assert found["equations"].holds and all(each.holds is not False for each in found.values())
+def without(members, *folders):
+    return {name: content for name, content in members.items() if not name.startswith(folders)}
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_without_a_library_for_this_machine_it_is_built_from_the_sources(tmp_path, own, fmi):
+    """The same sources give the same numbers."""
+    if not compiles(fmi):
+        pytest.skip("no C compiler")
+    native(Accelerator, tmp_path / "plain.fmu", fmi=fmi)
+    plain = certify.members_of(tmp_path / "plain.fmu")
+    whole = certify.certified(plain, "it.fmu", own, None, silent).data
+    bare = without(archive.contents(whole).members, "binaries/")
+    before = checked(tmp_path, whole)
+    found = checked(tmp_path, signed(bare, own))
+    words = (
+        "the FMU has no library that this machine can load; it has none (Cannot find shared library binaries"
+    )
+    assert found["library"].holds is None and found["library"].words.startswith(words)
+    assert re.search(r"one that \S+ made here from the sources in the FMU$", found.pop("library").words)
+    assert found.keys() == before.keys() and all(each.holds for each in found.values())
+    for topic in ("reference experiment", "smooth experiment", "step", "energy", "points"):
+        assert found[topic].words == before[topic].words
+
+
+def test_other_sources_that_are_signed_again_are_found(tmp_path, members, other):
+    """Those of a machine with another crank, whose results are not the ones inside."""
+    if "sources/model.c" not in members:
+        pytest.skip("no C compiler")
+    export(ChamberForces, tmp_path / "longer.fmu", {"left.material_mass": 45.0, "r": 0.2})
+    theirs = archive.contents((tmp_path / "longer.fmu").read_bytes()).members
+    guid, new = (re.search(rb'guid="([^"]+)"', x["modelDescription.xml"])[1] for x in (members, theirs))
+    model = theirs["sources/model.c"].replace(new, guid)
+    assert guid in model
+    found = checked(tmp_path, signed({**without(members, "binaries/"), "sources/model.c": model}, other))
+    assert found["library"].holds is None and found["equations"].holds
+    assert found["reference experiment"].holds is False and found["smooth experiment"].holds is False
+
+
+def test_without_library_and_sources_or_compiler_the_equations_are_compared(
+    tmp_path, members, other, monkeypatch
+):
+    if "sources/model.c" not in members:
+        pytest.skip("no C compiler")
+    bare = without(members, "binaries/")
+    broken = {**bare, "sources/model.c": b"int"}
+
+    def said(contents):
+        found = checked(tmp_path, signed(contents, other))
+        assert found["experiments"].holds is None and "reference experiment" not in found
+        assert found["equations"].holds and all(each.holds is not False for each in found.values())
+        return found["experiments"].words
+
+    words = "are not run: the FMU has no library that this machine can load; it has none (Cannot find"
+    assert said(without(bare, "sources/")).startswith(words)
+    assert said(without(bare, "sources/")).endswith(", and no sources of one")
+    assert "its sources cannot be compiled here: the C compiler " in said(broken)
+    assert "cannot be compiled here" in said(without(bare, "sources/runtime.c"))
+    with monkeypatch.context() as patch:
+        patch.setattr(libraries, "compiler", lambda: None)
+        assert "a C compiler makes one from the sources in the FMU: install cc" in said(bare)
+
+
+def test_the_end_says_that_experiments_were_not_run(made):
+    run = chainunit("verify", "it.fmu", "--no-run", cwd=made)
+    assert run.returncode == 0 and "note   experiments  are not run, as --no-run asks" in run.stdout
+    assert run.stdout.splitlines()[-1] == "it.fmu: holds, but experiments were not run"
+
+
+@pytest.mark.second
+def test_a_python_fmu_runs_without_its_library(fmus, own, tmp_path):
+    """By its own Python code, and not by that of another FMU of the same name in the same process."""
+    made = certify.certified(certify.members_of(fmus["DcMotor"]), "DcMotor.fmu", own, None, silent)
+    bare = without(archive.contents(made.data).members, "binaries/")
+    (equations,) = (name for name in bare if name.endswith("/drives/dc_motor.py"))
+    (script,) = (name for name in bare if re.fullmatch(r"resources/DcMotor_\w+\.py", name))
+    modules = set(sys.modules)
+
+    def found_in(**changed):
+        contents = {**bare, **{name: text.encode() for name, text in changed.items()}}
+        return checked(tmp_path, signed(contents, own))
+
+    found = found_in()
+    assert found["library"].holds is None
+    assert found.pop("library").words.endswith(
+        "the Python code in the FMU, in this Python and without its library"
+    )
+    assert {"reference experiment", "smooth experiment", "points"} <= found.keys()
+    assert all(each.holds for each in found.values()), found
+    text = bare[equations].decode()
+    assert text.count("u.w_ref") > 0
+    slower = found_in(**{equations: text.replace("u.w_ref", "(0.9 * u.w_ref)")})
+    assert slower["reference experiment"].holds is False and slower["equations"].holds
+    assert all(each.holds for each in found_in().values() if each.topic != "library")
+    refuses = found_in(
+        **{script: bare[script].decode() + "    def do_step(self, *at):\n        return False\n"}
+    )
+    assert refuses["experiments"].holds is False
+    assert refuses["experiments"].words == "DcMotor stops at t = 0 s: the step is discarded"
+    fails = found_in(**{script: "import nothing_here"})
+    assert (
+        fails["experiments"].holds is None
+        and "; its Python code does not run here: No module named" in fails["experiments"].words
+    )
+    assert {
+        name for name in set(sys.modules) - modules if "DcMotor" in name or name.startswith("chainunit_")
+    } == set()
+    assert str(tmp_path) not in sys.path
 
 
 def test_evidence_of_another_form_is_a_sentence(tmp_path, members, other):

@@ -16,8 +16,8 @@ from ...fmu.description import Interface, generation_time
 from ...fmu.pack import interface_of
 from ...fmu.recipe import recipes
 from ...fmu.reference import RELATED
+from ...machines.flexible import with_rods
 from ...models import MODELS
-from ...study.package import with_rods
 from . import documents as docs
 from . import experiments as ex
 from .archive import contents, unsafe

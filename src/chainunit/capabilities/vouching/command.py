@@ -84,9 +84,7 @@ def verify(
     ] = None,
     no_run: Annotated[
         bool,
-        typer.Option(
-            "--no-run", help="Check bytes and equations alone; the library of the FMU is not loaded."
-        ),
+        typer.Option("--no-run", help="Check bytes and equations alone; no code of the FMU is run."),
     ] = False,
     of: Annotated[Path | None, typer.Option("--of", help=_MODEL)] = None,
 ) -> None:
@@ -95,6 +93,7 @@ def verify(
     The exit status is 0 where all lines hold, 1 where one does not, 2 for bad input.
     """
     from .keys import public_key
+    from .verify import NOT_RUN
     from .verify import verify as check
 
     expected = public_key(key_file) if key_file else None
@@ -106,7 +105,9 @@ def verify(
         sign = {True: "holds", False: "FAILS", None: "note"}[each.holds]
         print(f"{sign:5}  {each.topic:{wide}}  {each.words}")
     failed = sum(each.holds is False for each in found)
-    print(f"{file}: {'holds' if not failed else f'does not hold: {failed} of {len(found)} lines fail'}")
+    unrun = any(each.holds is None and each.topic.endswith(NOT_RUN) for each in found)
+    whole = "holds, but experiments were not run" if unrun else "holds"
+    print(f"{file}: {whole if not failed else f'does not hold: {failed} of {len(found)} lines fail'}")
     if failed:
         raise typer.Exit(1)
 

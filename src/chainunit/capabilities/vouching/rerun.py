@@ -6,8 +6,9 @@ from __future__ import annotations
 import contextlib
 import csv
 import io
+import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,8 +19,8 @@ import numpy as np
 from ...core.errors import InputError, RunError, printable
 from ...core.quantities import Type
 from ...core.temporary_folders import scratch
+from ...fmu.loading import fmi2_callbacks, loading
 from ...fmu.reference import csv_bytes
-from ...system.instance import fmi2_callbacks, loading
 from .archive import unsafe
 
 _TYPES: Mapping[str, Type] = {
@@ -55,6 +56,18 @@ class UnpackedFmu:
     folder: Path
     description: Any
     variables: Mapping[str, FmuVariable]
+    instead: Callable[..., Any] | None = None
+    """what is called in place of fmpy's class, with the same arguments, where the FMU's own library is not used"""
+
+    @property
+    def fmi(self) -> int:
+        """The version of FMI, 2 or 3."""
+        return 2 if self.description.fmiVersion.startswith("2") else 3
+
+    @property
+    def identifier(self) -> str:
+        """The name of its library in C, without its ending."""
+        return str(self.description.coSimulation.modelIdentifier)
 
     @property
     def name(self) -> str:
@@ -130,6 +143,29 @@ class NoLibraryError(RunError):
     """An FMU has no library that this machine can load."""
 
 
+def opened(fmu: UnpackedFmu) -> Any:
+    """The library of the FMU in fmpy's class for it, or what stands in its place.
+
+    Raises
+    ------
+    NoLibraryError
+        where this machine cannot load the library.
+    """
+    from fmpy import fmi2, fmi3
+
+    of_class = fmu.instead or (fmi2.FMU2Slave if fmu.fmi == 2 else fmi3.FMU3Slave)
+    try:
+        with loading():
+            return of_class(
+                guid=fmu.description.guid if fmu.fmi == 2 else fmu.description.instantiationToken,
+                unzipDirectory=str(fmu.folder),
+                modelIdentifier=fmu.identifier,
+                instanceName="verified",
+            )
+    except Exception as error:  # fmpy has no class of its own
+        raise NoLibraryError(_no_library(fmu, error)) from error
+
+
 class Slave:
     """An instance for Co-Simulation of either version of FMI.
 
@@ -142,21 +178,9 @@ class Slave:
     """
 
     def __init__(self, fmu: UnpackedFmu) -> None:
-        from fmpy import fmi2, fmi3
-
-        self._fmu, self._is_2 = fmu, fmu.description.fmiVersion.startswith("2")
+        self._fmu, self._is_2 = fmu, fmu.fmi == 2
         self._said: list[str] = []
-        arguments = {
-            "guid": fmu.description.guid if self._is_2 else fmu.description.instantiationToken,
-            "unzipDirectory": str(fmu.folder),
-            "modelIdentifier": fmu.description.coSimulation.modelIdentifier,
-            "instanceName": "verified",
-        }
-        try:
-            with loading():
-                self._api: Any = (fmi2.FMU2Slave if self._is_2 else fmi3.FMU3Slave)(**arguments)
-        except Exception as error:  # fmpy has no class of its own
-            raise NoLibraryError(_no_library(fmu, error)) from error
+        self._api: Any = opened(fmu)
         self._loggers = self._logging()
         with self._told("cannot be instantiated"):
             self._api.instantiate(loggingOn=False, **self._loggers)
@@ -233,7 +257,8 @@ class Slave:
 def _no_library(fmu: UnpackedFmu, error: Exception) -> str:
     there = sorted(path.name for path in (fmu.folder / "binaries").glob("*") if path.is_dir())
     has = f"it has those for {printable(', '.join(there))}" if there else "it has none"
-    return f"the FMU has no library that this machine can load; {has} ({printable(str(error), 200)})"
+    cause = str(error).replace(f"{fmu.folder}{os.sep}", "").rstrip(".")
+    return f"the FMU has no library that this machine can load; {has} ({printable(cause, 300)})"
 
 
 @contextmanager

@@ -19,9 +19,12 @@ from . import experiments as ex
 from .certify import SMOOTH_IN, SMOOTH_OUT, Told, interface_for, sources_hash, told_convergence
 from .domain import domain
 from .integrity import Finding, Integrity, integrity
+from .libraries import usable
 from .manifest import Manifest, sha3
 from .rerun import NoLibraryError, UnpackedFmu, deviation, table, unpacked
 
+NOT_RUN = "experiments"
+"""Topic of the line on experiments that are not run."""
 _GROWTH = 4.0
 """An error on this machine may be so many times the stated one: rounding is another with another library of C."""
 
@@ -60,7 +63,7 @@ def _judge(found: Integrity, name: str, model: type[Model] | None, run: bool, to
         return
     _version(found, found.manifest)
     if not found.holds and any(each.topic != "version" for each in found.findings if each.holds is False):
-        found.add(None, "experiments", "are not run: a file that is not as signed is not loaded")
+        found.add(None, NOT_RUN, "are not run: a file that is not as signed is not loaded")
         return
     try:
         stated = json.loads(found.members[docs.EVIDENCE])
@@ -159,16 +162,19 @@ class _Experiments:
         self._domain()
         self._equations()
         if not run:
-            self._found.add(None, "experiments", "are not run, as --no-run asks")
+            self._found.add(None, NOT_RUN, "are not run, as --no-run asks")
             return
         try:
+            self._fmu, words = usable(self._fmu)
+            if words:
+                self._found.add(None, "library", words)
             self._reference()
             self._smooth()
             self._at_points()
         except NoLibraryError as error:
-            self._found.add(None, "experiments", f"are not run: {error}")
+            self._found.add(None, NOT_RUN, f"are not run: {error}")
         except RunError as error:
-            self._found.add(False, "experiments", str(error))
+            self._found.add(False, NOT_RUN, str(error))
 
     def _add(self, topic: str, gap: ex.Deviation, what: str) -> None:
         holds = gap.value <= self._tolerance

@@ -21,7 +21,7 @@ from ..description import model_description, model_description_3
 from ..pack import interface_of, pack, xml_bytes
 from ..recipe import recipes
 from .generate import kernels, rules, tables
-from .platforms import build, choose
+from .platforms import build, choose, units_of
 from .wasm import COMPONENT, wasm_compiler, wasm_files
 
 _LAYER = ("model.h", "runtime.c", "fmi.h")
@@ -31,7 +31,6 @@ _LAYER = ("model.h", "runtime.c", "fmi.h")
 class _Version:
     """The files and attributes of one FMI version."""
 
-    layer: str
     guid: str
     headers: tuple[str, ...]
     kinds: Mapping[str, Mapping[str, str]]
@@ -53,13 +52,11 @@ _COMMON_3 = {
 _STEP = {"canHandleVariableCommunicationStepSize": "true", "maxOutputDerivativeOrder": "1"}
 _VERSIONS = {
     2: _Version(
-        "fmi2.c",
         "guid",
         ("fmi2FunctionTypes.h", "fmi2Functions.h", "fmi2TypesPlatform.h"),
         {"ModelExchange": _COMMON_2, "CoSimulation": _COMMON_2 | _STEP | {"canInterpolateInputs": "true"}},
     ),
     3: _Version(
-        "fmi3.c",
         "instantiationToken",
         ("fmi3FunctionTypes.h", "fmi3Functions.h", "fmi3PlatformTypes.h"),
         {"ModelExchange": _COMMON_3, "CoSimulation": _COMMON_3 | _STEP},
@@ -101,8 +98,8 @@ def export(
     folder(file.parent)
     of_version = _VERSIONS[fmi]
     version = metadata.version("chainunit")
-    layer = (*_LAYER, of_version.layer)
-    units = ("kernels.c", "model.c", of_version.layer)
+    units = units_of(fmi)
+    layer = (*_LAYER, units[-1])
 
     kinds = dict(of_version.kinds)
     if fmi == 3 and (model.state_layout or interface.discrete):

@@ -18,6 +18,11 @@ _SHARED = ("-shared", "-s")
 KERNELS, KERNELS_OBJECT, HEADERS = "kernels.c", "kernels.o", ("model.h", HEADER)
 
 
+def units_of(fmi: int) -> tuple[str, ...]:
+    """The names of the sources that are compiled, for that version of FMI; they include the others."""
+    return KERNELS, "model.c", f"fmi{fmi}.c"
+
+
 @dataclass(frozen=True)
 class Platform:
     """One platform: the suffix of its libraries, and for each FMI version the folders of `binaries` with the zig
@@ -117,6 +122,22 @@ def build(
         library = slices[0] if len(slices) == 1 else fat(slices)
         libraries[f"binaries/{folder}/{identifier}{target_platform.suffix}"] = library
     return libraries
+
+
+def build_here(compiler: Compiler, fmi: int, identifier: str, sources: Mapping[str, bytes]) -> bytes:
+    """The library for this machine from the sources of an FMU. `compiler` is that for this machine, the other
+    arguments are as for `build`.
+
+    Raises
+    ------
+    RunError
+        where the compiler fails, with its messages.
+    """
+    here = host() or "linux64"
+    # a library is the same in each folder; of macOS that of FMI 2.0 has all processors
+    version = 2 if 2 in PLATFORMS[here].folders else 3
+    (library,) = build(compiler, here, version, identifier, sources, units_of(fmi)).values()
+    return library
 
 
 def _compile(
