@@ -115,7 +115,11 @@ class CheckCapability(Capability):
         if absent:
             parts = (f"{each.what} ([{each.table}])" for each in absent)
             yield f"parts without data in the file: {'; '.join(parts)}"
-        yield from (f"{each.what}: {each.why}" for each in found.not_checked if not each.table)
+        reasons: dict[str, list[str]] = {}
+        for each in found.not_checked:
+            if not each.table:
+                reasons.setdefault(each.why, []).append(each.what)
+        yield from (f"{'; '.join(parts)}: {why}" for why, parts in reasons.items())
 
 
 CAPABILITY = CheckCapability()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 from ...reading.text import number
 from ...report import blocks as b
@@ -18,7 +19,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     found = CheckFindings.of_study(study)
     if found.rows:
         lead = (
-            "Each row is a check by the clause or source under it: the value of the run, the limit, and the share "
+            "Each row is a check by the clause or source {place}: the value of the run, the limit, and the share "
             "of the limit that is used. A check holds up to 100 %. docs/checks.md has each formula with its "
             "simplifications and an example."
         )
@@ -27,7 +28,8 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
                 " The values are of the runs of this study; the shares of limits under the answer are of the duty "
                 f"of {study.proposal.name}, so that both may differ."
             )
-        yield b.Text(lead, "lead", "long")
+        yield b.Text(lead.format(place="under it"), "lead", "long")
+        yield b.Text(lead.format(place="whose number stands behind it"), "lead", "sheet")
         yield b.Table(
             tuple(_row(s, found, k) for k in range(len(found.rows))),
             b.heads("check", "value", "limit", "used"),
@@ -35,12 +37,27 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
             note_title="clause, formula, numbers",
             form="long",
         )
+        yield from _on_sheet(s, found)
         yield b.Table(
             tuple(_row(s, found, k, short=True) for k in range(len(found.rows))),
             b.heads("check", "value", "limit", "used"),
             title="Checks by clause",
             form="short",
         )
+
+
+def _on_sheet(s: b.Source, found: CheckFindings) -> Iterator[b.Block]:
+    """The checks with a line each, and behind them each clause and formula once, by its number in the table."""
+    laws = dict.fromkeys((row.clause, row.formula) for row in found.rows)
+    places = {law: place for place, law in enumerate(laws, 1)}
+    rows = []
+    for k, row in enumerate(found.rows):
+        short = _row(s, found, k, short=True)
+        rows.append(replace(short, cells=(*short.cells, f"[{places[row.clause, row.formula]}]")))
+    heads = (*b.heads("check", "value", "limit"), b.Column("used", of_text=True), *b.heads("by"))
+    yield b.Table(tuple(rows), heads, title="Checks by clause", form="sheet")
+    for (clause, formula), place in places.items():
+        yield b.Text(f"[{place}] {clause}. {formula}", "note", "sheet")
 
 
 def missing(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
