@@ -11,6 +11,7 @@ from ...report import blocks as b
 from ...report.lines import Line, join, line
 from ...study.record import StudyRecord
 from .analysis import CheckFindings
+from .coupling_choice import CHOSEN
 from .row import CheckRow
 
 
@@ -38,6 +39,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
             form="long",
         )
         yield from _on_sheet(s, found)
+        yield from _coupling_to_order(s, found)
         yield b.Table(
             tuple(_row(s, found, k, short=True) for k in range(len(found.rows))),
             b.heads("check", "value", "limit", "used"),
@@ -58,6 +60,37 @@ def _on_sheet(s: b.Source, found: CheckFindings) -> Iterator[b.Block]:
     yield b.Table(tuple(rows), heads, title="Checks by clause", form="sheet")
     for (clause, formula), place in places.items():
         yield b.Text(f"[{place}] {clause}. {formula}", "note", "sheet")
+
+
+def _coupling_to_order(s: b.Source, found: CheckFindings) -> Iterator[b.Block]:
+    """The flexible coupling of the catalogues that is checked, and the others; nothing without such catalogues."""
+    candidates = () if found.flexible_coupling is None else found.flexible_coupling.candidates
+    if not candidates:
+        return
+    at, best = "checks.flexible_coupling.candidates", candidates[0]
+    words: list[Line] = [s.words(f"{at}.0.designation")]
+    if best.order_number:
+        words.append(s.line(f"order number {{{at}.0.order_number}}"))
+    if best.price is not None:
+        words.append(s.line(f"price {{={at}.0.price:10}}"))
+    values = (s.number(f"{at}.0.{name}", as_given=True) for name in ("rated_torque", "stiffness", "damping"))
+    words += [line(name, value) for name, value in zip(("TKN ", "CTdyn ", "psi "), values, strict=True)]
+    count = f"{sum(each.fits for each in candidates)} of the {len(candidates)} of the catalogues fit"
+    reason = s.words(f"{at}.0.reason")
+    begin = (
+        "Flexible coupling to order: " if best.verdict == CHOSEN else "Flexible coupling that does not fit: "
+    )
+    yield b.Text(line(begin, *join(words), ": ", reason, f" ({count})."))
+    rows = []
+    for k, each in enumerate(candidates):
+        texts = (s.words(f"{at}.{k}.{name}") for name in ("order_number", "verdict", "reason"))
+        order, verdict, why = texts
+        price = s.number(f"{at}.{k}.price", as_given=True, none="-")
+        share = s.number(f"{at}.{k}.checks.{each.checks.index(each.hardest)}.utilisation", over=not each.fits)
+        rows.append(b.TableRow((s.words(f"{at}.{k}.designation"), verdict, share, price, order, why)))
+    heads = b.heads("flexible coupling", "verdict", "largest share", "price", "order number", "reason")
+    title = "Flexible couplings of the catalogues"
+    yield b.Table(tuple(rows), heads, numeric=False, title=title, form="long")
 
 
 def missing(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:

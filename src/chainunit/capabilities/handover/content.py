@@ -5,7 +5,7 @@ the template has none with a crank or a linkage. The load of such a machine is t
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -130,9 +130,9 @@ def _system(study: StudiedDrive) -> Content:
     )
 
 
-def _order_code(study: StudiedDrive, kind: str) -> str | None:
-    """The order number of a part, where a catalogue gives one."""
-    return printable(text_of(study.ordered(kind), "order_number")) or None
+def _order_code(part: Mapping[str, Any]) -> str | None:
+    """The order number of a part of a catalogue, if it has one."""
+    return printable(text_of(part, "order_number")) or None
 
 
 def _component(kind: str, designation: str, order_code: str | None, **numbers: float | None) -> Content:
@@ -158,7 +158,7 @@ def _components(study: StudiedDrive) -> Iterator[Content]:
             parts.append(f"rated output torque at least {_shown(rated, 'Nm')}")
         share = _times(_PERCENT, study.check("gear", "utilisation"))
         names = {"MaxTorqueUtilizationPercentage": share, "MaxTorqueUtilization": peak}
-        yield _component("gearbox", ", ".join(parts), _order_code(study, "gear"), **names)
+        yield _component("gearbox", ", ".join(parts), _order_code(study.ordered("gear")), **names)
     current = study.inverter_current
     if study.text("start") == "inverter":
         least = f", rated current at least {_shown(current, 'A')}" if current else ""
@@ -185,7 +185,7 @@ def _motor(study: StudiedDrive) -> Content:
     return _component(
         "motor",
         study.text("motor", "title"),
-        _order_code(study, "motor"),
+        _order_code(study.ordered("motor")),
         MaxCurrentUtilizationPercentage=share(steady("current_peak"), rated("current")),
         MaxCurrentUtilization=steady("current_peak"),
         MaxThermalUtilizationPercentage=_times(_PERCENT, used),
@@ -225,7 +225,9 @@ def _others(study: StudiedDrive) -> Iterator[Content]:
     if trip:
         name = " ".join(filter(None, (_SAFETY, printable(text_of(study.ordered(_SAFETY), "designation")))))
         words = f"{name}, trip torque {_shown(trip, 'Nm')} at the motor's shaft"
-        yield _part(words, _order_code(study, _SAFETY))
+        yield _part(words, _order_code(study.ordered(_SAFETY)))
+    if flexible := study.flexible_coupling:
+        yield _part(f"flexible coupling {printable(text_of(flexible, 'designation'))}", _order_code(flexible))
     relay = study.number("sizing", "protection", "relay_current")
     if relay:
         device = study.text("sizing", "protection", "device")

@@ -87,6 +87,13 @@ class StudiedDrive:
         found = map(as_mapping, parts if isinstance(parts, list) else ())
         return next((each for each in found if each.get("part") == kind), {})
 
+    @property
+    def flexible_coupling(self) -> Mapping[str, Any]:
+        """The row of a catalogue that is the flexible coupling; empty where no row carries the torque."""
+        found = _at(self.result.data, "checks", "flexible_coupling", "candidates")
+        first = as_mapping(found[0]) if isinstance(found, list) and found else {}
+        return first if first.get("verdict") == "chosen" else {}
+
     def check(self, name: str, part: str) -> float | None:
         """A number of a check of the drive of sizing: its ``value``, ``limit`` or ``utilisation``."""
         return _number(self.best, "checks", name, part)
