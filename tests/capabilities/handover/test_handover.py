@@ -258,8 +258,8 @@ def test_a_sized_drive_has_one_number_for_each_utilisation(folder):
 
 
 def test_order_numbers_of_catalogues_are_handed_over(tmp_path):
-    """Motor, gear and safety coupling are rows of catalogues, and have the order numbers of these rows; without a
-    number there, nothing is written."""
+    """Motor, gear and both couplings are rows of catalogues, and have the order numbers of these rows; without a number
+    there, nothing is written."""
     example = LINKAGES.parent / "own_catalogue.toml"
     text = example.read_text("utf-8").replace('"catalogue/', f'"{example.parent.as_posix()}/catalogue/')
     (tmp_path / "own.toml").write_text(f'static_inertia_runs = "never"\n{text}', "utf-8")
@@ -268,12 +268,14 @@ def test_order_numbers_of_catalogues_are_handed_over(tmp_path):
     save(tmp_path / "results", tmp_path / "out", aasx=False)
     said = json.loads((tmp_path / "out" / "handover.json").read_text("utf-8"))
     rows = {}
-    for file in ("motors", "gears", "safety_couplings"):
+    for file in ("motors", "gears", "safety_couplings", "flexible_couplings"):
         with (example.parent / "catalogue" / f"{file}.csv").open(newline="", encoding="utf-8") as table:
             rows |= {row["designation"]: row["order_number"] for row in csv.DictReader(table)}
     parts = {"motor": "MainComponent", "gear": "MainComponent02", "safety coupling": "OtherComponent"}
     chosen = {each["part"]: each["designation"] for each in numbers(tmp_path)["sizing"]["parts"]["parts"]}
     assert chosen.keys() == parts.keys()
+    flexible = numbers(tmp_path)["checks"]["flexible_coupling"]["candidates"][0]["designation"]
+    parts["flexible coupling"], chosen["flexible coupling"] = "OtherComponent02", flexible
     for kind, element in parts.items():
         at = f"SizingResult/{element}"
         assert said["said"][f"{at}/ManufacturerOrderCode"]["value"] == rows[chosen[kind]] != ""
@@ -282,7 +284,7 @@ def test_order_numbers_of_catalogues_are_handed_over(tmp_path):
     own, _ = read_by_basyx(tmp_path / "out" / "sizing.json")
     path = f"{ROOT}/SizingResult/OtherComponent/ManufacturerOrderCode"
     codes = [each.value for name, each in walked(own.submodel_element) if name == path]
-    assert codes == [rows[chosen["safety coupling"]]]
+    assert codes == [rows[chosen["safety coupling"]], rows[flexible]]
     spoilt = numbers(tmp_path)
     spoilt["sizing"]["parts"]["parts"][1]["order_number"] = ""
     (tmp_path / "results" / "result.json").write_text(json.dumps(spoilt), "utf-8")

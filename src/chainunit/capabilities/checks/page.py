@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from ...reading.text import number
@@ -11,14 +11,19 @@ from ...report import blocks as b
 from ...report.lines import Line, join, line
 from ...study.record import StudyRecord
 from .analysis import CheckFindings
-from .coupling_choice import CHOSEN
+from .coupling_choice import CHOSEN, CouplingCandidate
 from .row import CheckRow
+
+_COUPLINGS = "checks.flexible_coupling.candidates"
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The table of the checks."""
     found = CheckFindings.of_study(study)
     if found.rows:
+        couplings = () if found.flexible_coupling is None else found.flexible_coupling.candidates
+        if couplings:
+            yield _coupling_to_order(s, couplings)
         lead = (
             "Each row is a check by the clause or source {place}: the value of the run, the limit, and the share "
             "of the limit that is used. A check holds up to 100 %. docs/checks.md has each formula with its "
@@ -39,7 +44,8 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
             form="long",
         )
         yield from _on_sheet(s, found)
-        yield from _coupling_to_order(s, found)
+        if couplings:
+            yield _tried_couplings(s, couplings)
         yield b.Table(
             tuple(_row(s, found, k, short=True) for k in range(len(found.rows))),
             b.heads("check", "value", "limit", "used"),
@@ -62,12 +68,9 @@ def _on_sheet(s: b.Source, found: CheckFindings) -> Iterator[b.Block]:
         yield b.Text(f"[{place}] {clause}. {formula}", "note", "sheet")
 
 
-def _coupling_to_order(s: b.Source, found: CheckFindings) -> Iterator[b.Block]:
-    """The flexible coupling of the catalogues that is checked, and the others; nothing without such catalogues."""
-    candidates = () if found.flexible_coupling is None else found.flexible_coupling.candidates
-    if not candidates:
-        return
-    at, best = "checks.flexible_coupling.candidates", candidates[0]
+def _coupling_to_order(s: b.Source, candidates: Sequence[CouplingCandidate]) -> b.Text:
+    """The flexible coupling of the catalogues that is checked."""
+    at, best = _COUPLINGS, candidates[0]
     words: list[Line] = [s.words(f"{at}.0.designation")]
     if best.order_number:
         words.append(s.line(f"order number {{{at}.0.order_number}}"))
@@ -80,17 +83,23 @@ def _coupling_to_order(s: b.Source, found: CheckFindings) -> Iterator[b.Block]:
     begin = (
         "Flexible coupling to order: " if best.verdict == CHOSEN else "Flexible coupling that does not fit: "
     )
-    yield b.Text(line(begin, *join(words), ": ", reason, f" ({count})."))
+    return b.Text(line(begin, *join(words), ": ", reason, f" ({count})."))
+
+
+def _tried_couplings(s: b.Source, candidates: Sequence[CouplingCandidate]) -> b.Table:
+    """The flexible couplings of the catalogues."""
     rows = []
     for k, each in enumerate(candidates):
-        texts = (s.words(f"{at}.{k}.{name}") for name in ("order_number", "verdict", "reason"))
-        order, verdict, why = texts
-        price = s.number(f"{at}.{k}.price", as_given=True, none="-")
-        share = s.number(f"{at}.{k}.checks.{each.checks.index(each.hardest)}.utilisation", over=not each.fits)
-        rows.append(b.TableRow((s.words(f"{at}.{k}.designation"), verdict, share, price, order, why)))
+        at = f"{_COUPLINGS}.{k}"
+        name, verdict, order, why = (
+            s.words(f"{at}.{x}") for x in ("designation", "verdict", "order_number", "reason")
+        )
+        price = s.number(f"{at}.price", as_given=True, none="-")
+        share = s.number(f"{at}.checks.{each.checks.index(each.hardest)}.utilisation", over=not each.fits)
+        rows.append(b.TableRow((name, verdict, share, price, order, why)))
     heads = b.heads("flexible coupling", "verdict", "largest share", "price", "order number", "reason")
     title = "Flexible couplings of the catalogues"
-    yield b.Table(tuple(rows), heads, numeric=False, title=title, form="long")
+    return b.Table(tuple(rows), heads, numeric=False, title=title, form="long")
 
 
 def missing(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
