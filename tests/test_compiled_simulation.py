@@ -10,7 +10,7 @@ from systems import pair
 
 from chainunit import InputError, RunError
 from chainunit.core.native.compilers import compiler
-from chainunit.system import CompiledSimulation, CoSimulation, Jump, Profile, export, monolithic
+from chainunit.system import CompiledSimulation, CoSimulation, Jump, Profile, export, monolithic, run_together
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 SPEED = "motor.w_ref"
@@ -77,6 +77,47 @@ def test_a_guard_and_every_keep_the_right_rows(system):
         assert simulation.time == float(run["time"][beyond])
     wanted = sorted({*range(0, beyond, 7), beyond})
     np.testing.assert_array_equal(ended["time"], run["time"][wanted])
+
+
+def test_runs_side_by_side_are_those_of_each_by_itself():
+    """They differ in parameters, states at the start, signals, and end; a guard ends one of them alone."""
+
+    def simulations():
+        for angle, force in ((0.0, 1000.0), (30.0, 0.0), (75.0, 400.0)):
+            own = {"motor.phi_start": angle, "machine.ratio": 50.0 + angle}
+            yield CompiledSimulation(pair("ChamberForces", "DcMotor", values=own), signals(force))
+
+    stops = [0.7, 0.55, 0.62]
+    free = [each.run(stop, 1e-3) for each, stop in zip(simulations(), stops, strict=True)]
+    peaks = sorted(float(np.max(np.abs(run["motor.tau"]))) for run in free)
+    limit = {"motor.tau": 0.5 * (peaks[1] + peaks[2])}
+    alone = [each.run(stop, 1e-3, guards=limit) for each, stop in zip(simulations(), stops, strict=True)]
+    together = list(simulations())
+    runs = run_together(together, stops, 1e-3, guards=limit)
+    ends = [float(run["time"][-1]) for run in runs]
+    assert (
+        ends == [each.time for each in together]
+        and sum(e == s for e, s in zip(ends, stops, strict=True)) == 2
+    )
+    for run, reference in zip(runs, alone, strict=True):
+        np.testing.assert_array_equal(run["time"], reference["time"])
+        for name, row in reference.items():
+            # compiled code that takes more arguments may round in another order
+            np.testing.assert_allclose(run[name], row, rtol=1e-7, atol=1e-7 * float(np.max(np.abs(row))))
+            assert run[name].attrs == row.attrs
+    # each goes on from its own end
+    further = run_together(together, [end + 0.1 for end in ends], 1e-3, names=["motor.tau"])
+    assert [float(run["time"][0]) for run in further] == ends
+    assert run_together([], [], 1e-3) == []
+
+
+def test_runs_side_by_side_that_do_not_belong_together_are_refused(system):
+    other = pair("ChamberForces", "InductionMotor", values={"machine.ratio": 50.0})
+    strangers = [CompiledSimulation(system, signals()), CompiledSimulation(other, {})]
+    with pytest.raises(InputError, match="must have one model"):
+        run_together(strangers, [0.1, 0.1], 1e-3)
+    with pytest.raises(InputError, match="must go forward"):
+        run_together([CompiledSimulation(system, signals())], [0.0], 1e-3)
 
 
 def test_the_names_to_keep_are_those_of_a_co_simulation(system, exported):

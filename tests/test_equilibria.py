@@ -190,7 +190,7 @@ def test_equilibria_of_a_few_random_linkages():
     assert swings >= 3 and len({driver for driver, _ in kinds}) == 3
 
 
-@pytest.mark.second
+@pytest.mark.slow
 def test_equilibria_of_random_linkages():
     """Four-bars, six-bars, slider-cranks and others, whose drivers turn, swing and slide."""
     kinds, swings = check_random(100)

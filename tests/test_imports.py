@@ -22,16 +22,29 @@ DEPENDENCIES = {
 }
 
 
+TIPPER = str(Path(__file__).parents[1] / "examples" / "linkages" / "tipper.toml")
+OF_FILES = {"typer", "rich", "numpy", "pydantic", "pythonfmu"}
+"""What a command needs that reads a study file or a linkage file."""
+
+
+def _command(*words):
+    return f"from chainunit.app.cli import app; app({list(words)!r}, standalone_mode=False)"
+
+
 @pytest.mark.parametrize(
     ("code", "needed"),
     [
         ("import chainunit", set()),
-        ("from chainunit.app.cli import app; app(['--help'], standalone_mode=False)", {"typer", "rich"}),
+        (_command("--help"), {"typer", "rich"}),
         ("import chainunit; chainunit.ChainUnitMachine", {"numpy"}),
+        (_command("keys"), OF_FILES),
+        (_command("live"), OF_FILES | {"casadi"}),
+        (_command("live", TIPPER), OF_FILES | {"casadi"}),
     ],
 )
-def test_imports_no_more_than_is_needed(code, needed):
+def test_imports_no_more_than_is_needed(code, needed, tmp_path, monkeypatch):
     assert {"numpy", "scipy", "xarray", "casadi", "fmpy", "matplotlib", "typer", "rich"} <= DEPENDENCIES
+    monkeypatch.chdir(tmp_path)
     after = f"import sys\n{code}\nprint('loaded', *{{m.split('.')[0].lower() for m in sys.modules}})"
     process = subprocess.run([sys.executable, "-c", after], capture_output=True, text=True, check=True)
     loaded = set(process.stdout.splitlines()[-1].split())
@@ -61,9 +74,7 @@ def test_completion_shows_the_public_names_alone_before_they_are_used():
 
 def test_a_linkage_is_shown_without_the_capabilities_of_a_study(tmp_path):
     """A folder is claimed by the kinds of results of all commands, which need no more than the commands."""
-    file = Path(__file__).parents[1] / "examples" / "linkages" / "tipper.toml"
-    call = f"app(['linkage', {str(file)!r}, '-o', {str(tmp_path / 'out')!r}], standalone_mode=False)"
-    code = f"import sys; from chainunit.app.cli import app; {call}"
+    code = f"import sys; {_command('linkage', TIPPER, '-o', str(tmp_path / 'out'))}"
     after = "print('loaded', *(m for m in sys.modules if m.startswith('chainunit.capabilities.')))"
     run = subprocess.run(
         [sys.executable, "-c", f"{code}; {after}"], capture_output=True, text=True, check=True

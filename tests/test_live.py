@@ -175,6 +175,37 @@ def test_runs_that_last_too_long_are_refused(packaged):
     assert refused and words == "these runs last too long for a page: 10004\u00a0s and more"
 
 
+@pytest.mark.parametrize("ratio", [30.0, 80.0], ids=["fast enough", "never fast enough"])
+def test_an_empty_start_is_made_once(ratio, tmp_path):
+    """From rest, without the feed until the crank is fast enough: a turn is made twice. Where the crank is never fast
+    enough, the time in which it should settle is. The rows are those of one run with that feed."""
+    config = study_of("knife")
+    live, _ = live_of(config, tmp_path)
+    assert live.data["runs"]["empty_start"]
+    script = f"""
+      const runs = model.runsOf(values({{"gear.ratio": {ratio}, "feed.cut_force": 3000}}));
+      const run = runs.start(), goal = runs.of.started * runs.speed, spent = runs.spent;
+      const names = [runs.of.names.speed, runs.of.names.torque], crank = runs.crank(run);
+      const row = crank.speed.findIndex((w) => w >= goal);
+      const from = row < 0 ? runs.rampEnd + runs.of.settle_turns * runs.turnTime : run.time[row];
+      const states = Array.from(runs.states);
+      runs.spent = 0;
+      const signals = runs.signals({{}}, true, from);
+      runs.setInputs(signals);
+      runs.k.functions.start();
+      const whole = runs.run(0, run.made, signals);
+      const off = (a, b) => Math.max(...a.map((x, k) => Math.abs(x - b[k]))) / Math.max(...b.map(Math.abs));
+      const even = run.time.every((t, k) => Math.abs(t - k * runs.of.step) < 1e-9);
+      return {{ row, spent, last: run.time[run.made - 1], made: run.made, wanted: run.wanted, even,
+        turn: runs.turnTime, off: names.map((name) => off(run[name], whole[name])),
+        ends: off(states, Array.from(runs.states)) }};"""
+    found = in_node(live, script)
+    assert (found["row"] < 0) == (ratio == 80.0) and found["made"] == found["wanted"] and found["even"]
+    twice = 2.0 if ratio == 30.0 else 2.0 + float(config.run.settle_turns)
+    assert found["spent"] < found["last"] + twice * found["turn"]
+    assert max(*found["off"], found["ends"]) < 1e-5
+
+
 def test_pulls_below_zero_are_judged_as_in_a_study(packaged):
     _, live, choice = packaged
     pulls = in_node(live, 'return model.pulls(model.turn(values({"run.crank_speed": 9})));')
@@ -444,6 +475,13 @@ def test_a_date_in_the_study_file_is_a_text_in_the_page(tmp_path):
     """TOML has dates, and JSON none."""
     live, _ = live_of(study_files.parse("event = []\n[report]\ndate = 2026-03-01\n"), tmp_path)
     assert json.loads(json.dumps(live.data["file"]))["report"] == {"date": "2026-03-01"}
+
+
+@pytest.mark.parametrize("name", ["chain-unit", "knife"])
+def test_a_live_page_alone_is_small(name, tmp_path):
+    file = tmp_path / "study.toml"
+    file.write_text(example(name), "utf-8")
+    assert len(html.render(live_page(file, None, tmp_path)).encode()) < 150_000
 
 
 def test_the_page_says_that_no_run_was_made(tmp_path):

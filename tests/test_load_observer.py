@@ -12,11 +12,12 @@ import numpy as np
 import observing
 import pytest
 from scipy.linalg import expm
+from scipy.special import lambertw
 from scipy.stats import norm
 
 from chainunit import InputError
 from chainunit.capabilities.watch.false_loads import ANGLES, false_loads
-from chainunit.core.engines import MATH, numpy_
+from chainunit.core.engines import MATH, Dual, dual, numpy_, slope
 from chainunit.core.native.compilers import compiler
 from chainunit.fmu.native.export import export
 from chainunit.machines import load_filter
@@ -151,10 +152,25 @@ def test_probability_and_level():
         assert load_filter.normal_probability(MATH, z) == pytest.approx(norm.cdf(z), abs=1e-7)
     z = load_filter.level(MATH, 0.5, 1e-6)
     assert 2.0 * z * math.exp(-0.5 * z * z) / (math.sqrt(2.0 * math.pi) * 0.5) == pytest.approx(
-        1e-6, rel=1e-3
+        1e-6, rel=1e-6
     )
     # an error that does not change has no rate, but a share of the machines
-    assert load_filter.level(MATH, 1e9, 1e-6) >= load_filter.LEAST_LEVEL
+    assert load_filter.level(MATH, 1e9, 1e-6) == pytest.approx(load_filter.LEAST_LEVEL, rel=1.2e-8)
+
+
+def test_the_level_is_that_of_lambert():
+    """From the least level to that of the least share, and the slope by the logarithm of the share."""
+    z = np.linspace(load_filter.LEAST_LEVEL, 37.26, 2001)
+    memory = 2.0 * z * np.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
+    levels = load_filter.level(numpy_(), memory, 1.0)
+    np.testing.assert_allclose(levels, z, rtol=1.2e-8)
+    share = z * np.exp(-0.5 * z * z)
+    seen = share > 1e-150  # whose square is a number
+    np.testing.assert_allclose(levels[seen], np.sqrt(-lambertw(-(share[seen] ** 2), -1).real), rtol=1.2e-8)
+    slopes = [slope(load_filter.level(dual(MATH), Dual(x, x), 1.0)) for x in memory[1:]]
+    np.testing.assert_allclose(slopes, -1.0 / (z - 1.0 / z)[1:], rtol=2e-6)
+    # the level of a rate that no machine shows stays finite
+    assert load_filter.level(MATH, 1e-200, 1e-200) == pytest.approx(37.27, abs=0.01)
 
 
 # -- at the machine

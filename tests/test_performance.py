@@ -39,6 +39,11 @@ def test_the_page_is_made_from_the_figures(bench, figures):
     assert set(figures) == {*page.BENCHES, *page.LONG}
 
 
+def test_the_own_functions_take_a_tenth_more_at_most(figures):
+    rows = [costs for model in figures["step_cost"]["own"].values() for costs in model.values()]
+    assert len(rows) > 15 and all(own <= 1.1 * library for own, library in rows)
+
+
 def test_the_limit_of_chains_is_the_measured_one(bench, figures):
     """The speed up to which a study takes the observer's word beside chains."""
     assert f"{bench('observer').share_below(figures['observer'], 0.2):.2f}" == str(CHAINS_GOOD)

@@ -22,12 +22,13 @@ from chainunit.capabilities.sides.analysis import factors_for, sides_over_speed
 from chainunit.core.ledger import NAME, Ledger
 from chainunit.machines.chain_unit import Feed
 from chainunit.reading.results import as_data
+from chainunit.report import series
 from chainunit.report import study as study_report
 from chainunit.study.cycle import cycle
 from chainunit.study.load_cases import alone, overload_factors
 from chainunit.study.readings import only_whole_turns, turns_made
 
-SHORT = """
+RUN = """
 [run]
 ramp = 0.3
 settle_turns = 1
@@ -37,7 +38,8 @@ crank_speed = 6
 [machine]
 ratio = 25
 """
-SHORT = event_line(*STANDARD, turns=1) + SHORT
+SHORT = event_line(*STANDARD, turns=1) + RUN
+ONE_JAM = event_line("jam_left", turns=1) + RUN
 
 
 @pytest.fixture(scope="module")
@@ -308,16 +310,13 @@ def test_an_old_result_does_not_survive_a_new_run(tmp_path, done):
     assert (out / "reactions.png").read_bytes()[:4] == b"\x89PNG"
 
 
-def study_of(text, tmp_path, status=0):
-    (tmp_path / "mine.toml").write_text(SHORT + text)
-    result = chainunit("study", "mine.toml", "-o", "out", cwd=tmp_path)
-    assert result.returncode == status, result.stderr
-    return result.stdout, json.loads((tmp_path / "out" / "result.json").read_text())
-
-
 def test_a_motor_that_cannot_reach_the_speed_is_told(tmp_path):
-    text, numbers = study_of("[motor]\nlimit = { v = 60 }", tmp_path, status=1)
-    assert "in place of 6 rad/s" in text and "does not return" not in text
+    weak = ONE_JAM + "[motor]\nlimit = { v = 60 }"
+    (tmp_path / "mine.toml").write_text(weak)
+    result = chainunit("study", "mine.toml", "-o", "out", cwd=tmp_path)
+    assert result.returncode == 1, result.stderr
+    assert "in place of 6 rad/s" in result.stdout and "does not return" not in result.stdout
+    numbers = json.loads((tmp_path / "out" / "result.json").read_text())
     assert numbers["answers"]["jam_left"]["recovery_time"]["value"] is None
 
 
@@ -541,13 +540,13 @@ step = 0.002
 
 
 def ran(text, folder):
-    """A study that was run in this process, with its files in `folder`."""
+    """A study that was run in this process, with its series in `folder`."""
     from chainunit.study import config
     from chainunit.study.result import as_dict
     from chainunit.study.run import run_study
 
     study = run_study(config.parse(text), folder)
-    write(study, folder)
+    series.write(study, folder)
     return study, as_dict(study)
 
 
@@ -730,6 +729,7 @@ def test_the_overloads_of_both_sides_are_readable(columns, tables):
     assert "jam right" in heads[-1] and all(len(line) <= columns for line in heads)
 
 
+@pytest.mark.second
 def test_feed_forward_of_chains_is_told_by_chains(tmp_path, monkeypatch):
     """The control asks a machine of the same kind: the ripple that is left is a fraction of that with two bars."""
     from chainunit.study import config

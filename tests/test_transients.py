@@ -5,10 +5,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import RK45
 
 from chainunit import InputError
 from chainunit.batch import transients
 from chainunit.batch.transients import Transients, profile_rows
+from chainunit.core import integrators
 from chainunit.core.engines import MATH
 from chainunit.core.native.compilers import compiler
 from chainunit.drives.dc_motor import DcMotor
@@ -267,3 +269,16 @@ def test_a_direction_gives_the_derivative_of_the_run(engine, rig):
     for row in range(len(KEPT)):
         peak = np.max(np.abs(alone.rows[row]))
         assert np.max(np.abs(result.rows[row, 1] - alone.rows[row, 0])) < 1e-9 * peak
+
+
+def test_the_dense_output_is_of_fourth_order():
+    """At the end of a step it is the solution, within it meets the conditions of fourth order, and the coefficients
+    are those of scipy."""
+    weights = np.array(integrators.DENSE)
+    np.testing.assert_array_equal(weights, RK45.P)
+    np.testing.assert_allclose(weights.sum(axis=1), [*integrators.STAGES[-1], 0.0], atol=1e-14)
+    nodes = np.array(integrators.NODES)
+    for z in (0.2, 0.5, 0.9):
+        share = weights @ np.array([z, z**2, z**3, z**4])
+        for k in range(4):
+            assert share @ nodes**k == pytest.approx(z ** (k + 1) / (k + 1), abs=1e-13)

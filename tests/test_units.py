@@ -2,12 +2,14 @@
 
 import math
 
+import pint
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chainunit.core.errors import InputError
-from chainunit.core.quantities import Quantity, Variable
+from chainunit.core.quantities import SI, Quantity, Variable
+from chainunit.core.unit_table import UNITS, ZEROS
 from chainunit.core.units import FITTING, fitting, split
 from chainunit.reading.tables import to_number
 from chainunit.reading.text import forms, number
@@ -135,6 +137,30 @@ def _variable(unit, kind=""):
 )
 def test_what_an_engineer_writes(unit, kind, text, value):
     assert to_number(_variable(unit, kind), text) == pytest.approx(value, rel=1e-12)
+
+
+_PINT = {
+    **dict.fromkeys(("rev", "revs", "U", "r"), "revolution"),
+    **dict.fromkeys(("kp", "kgf"), "kilogram_force"),
+    "PS": "metric_horsepower",
+    "lbf": "pound_force",
+    "sec": "second",
+    "%": "percent",
+    "‰": "permille",
+    "degC": "delta_degC",
+    "degF": "delta_degF",
+}
+"""Names of units for which pint has another name, or another meaning."""
+
+
+def test_factors_are_those_of_pint():
+    registry = pint.UnitRegistry()
+    for name, unit in UNITS.items():
+        own = registry.Quantity(unit.factor, "*".join(f"{each}**{unit.base.get(each, 0)}" for each in SI))
+        theirs = registry.Quantity(1.0, _PINT.get(name, name))
+        assert theirs.to(own.units).magnitude == pytest.approx(unit.factor, rel=4e-16), name
+    for name, zero in ZEROS.items():
+        assert registry.Quantity(0.0, name).to("K").magnitude == pytest.approx(zero, rel=4e-16)
 
 
 def test_the_list_is_long_enough():

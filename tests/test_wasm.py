@@ -302,17 +302,18 @@ def test_own_functions_have_the_bits_of_the_definition(engine):
             np.testing.assert_array_equal(np.signbit(got)[known], np.signbit(want)[known], kind)
 
 
-def test_the_bytes_are_the_same_in_every_process():
+@pytest.mark.parametrize("name, most", [("InductionMotor", 12_000), ("KnifeDrive", 100_000)])
+def test_the_bytes_are_the_same_in_every_process(name, most):
     """The equations alone make them: a new process, with other hashes of texts, has the same."""
     script = (
         "import hashlib, json; from chainunit.models import MODELS;"
-        "from chainunit.core.wasm.module import wasm_module; m = wasm_module(MODELS['InductionMotor']);"
+        f"from chainunit.core.wasm.module import wasm_module; m = wasm_module(MODELS['{name}']);"
         "print(hashlib.sha256(m.content + json.dumps(m.description).encode()).hexdigest())"
     )
     there = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True).stdout
-    here = wasm_module(MODELS["InductionMotor"])
+    here = wasm_module(MODELS[name])
     assert there.strip() == hashlib.sha256(here.content + json.dumps(here.description).encode()).hexdigest()
-    assert len(here.content) < 12_000
+    assert len(here.content) < most
 
 
 @declaration
@@ -353,7 +354,7 @@ class Run:
         self.inputs = {v.name: v.quantity.start for v in self.model.input_layout.variables} | (inputs or {})
         self.names = list(self.model.state_layout.names)
 
-    def in_engine(self, engine):
+    def in_engine(self, engine, function="run"):
         """The rows of the states, shape (rows, states), and the number of rows."""
         content, d = wasm_module(self.model).content, wasm_module(self.model).description
         steps = [
@@ -362,7 +363,14 @@ class Run:
             *([("call", "derive", [])] if "derive" in d["functions"] else []),
             ("call", "start", []),
             *run_steps(
-                d, self.signals, self.names, begin=0.5, step=self.step, rows=self.rows, longest=self.longest
+                d,
+                self.signals,
+                self.names,
+                begin=0.5,
+                step=self.step,
+                rows=self.rows,
+                longest=self.longest,
+                function=function,
             ),
         ]
         *_, count, rows, states = ENGINES[engine](content, steps)
@@ -440,6 +448,47 @@ def test_a_run_is_that_of_the_integrators(name, engine):
     assert np.max(np.abs(want - want[0])) > 0.0
     units = [v.unit for v in run.model.state_layout.variables]
     compare(rows.T, want.T, run.names, units, most=1e-10)
+
+
+BENT = Run(
+    "ChainUnit", 401, 2e-3,
+    {
+        "left.processing_force": Profile(0.0, ((0.55, 0.04, 800.0), (0.9, 1e-4, 0.0))),
+        "tau": [(0.5, 300.0), (1.1, 20.0)],
+    },
+    longest=0.1,
+)  # fmt: skip
+
+
+@engines
+def test_rows_between_the_substeps_are_those_of_a_run(engine):
+    """The same rows to the tolerance of the integrator, also where a profile bends between two of them."""
+    (rows, count), (want, _) = BENT.in_engine(engine, "dense"), BENT.in_engine(engine)
+    assert count == BENT.rows and np.max(np.abs(np.diff(want, axis=0))) > 0.01
+    units = [v.unit for v in BENT.model.state_layout.variables]
+    compare(rows.T, want.T, BENT.names, units, most=1e-6)
+    assert np.any(rows != want)
+
+
+@engines
+def test_rows_between_the_substeps_need_fewer_of_them(engine):
+    """A row every 0.2 ms would take 201 substeps."""
+    run = Run("ChainUnit", 202, 2e-4, {"tau": [(0.5, 300.0)]}, {"solver.max_steps": 20}, longest=0.1)
+    rows, count = run.in_engine(engine, "dense")
+    assert count == run.rows
+    stepwise, _ = run.in_engine(engine)
+    compare(rows.T, stepwise.T, run.names, [v.unit for v in run.model.state_layout.variables], most=1e-6)
+    # a substep that takes all of a run, and one whose error is above the permitted one
+    few = Run("ChainUnit", 3, 0.1, {"tau": [(0.5, 3e4)]}, {"solver.max_steps": 1}, longest=0.1)
+    rows, count = few.in_engine(engine, "dense")
+    assert count < few.rows and np.isfinite(rows[0]).all()
+
+
+def test_a_model_with_constraints_has_no_rows_between_its_substeps():
+    models = [MODELS["ChainUnit"], MODELS["DcMotor"], flexible(1, 1).direct()]
+    assert [m.controlled for m in models] == [True, False, True]
+    found = ["dense" in wasm_module(m, False).description["functions"] for m in models]
+    assert found == [True, False, False]
 
 
 @engines
@@ -520,6 +569,14 @@ def test_start_and_requirements_are_those_of_python(engine):
 @pytest.mark.parametrize("name", RUNS)
 def test_a_run_has_the_same_bits_in_every_engine(name):
     (there, _), (here, _) = (RUNS[name].in_engine(engine) for engine in ("node", "wasmtime"))
+    np.testing.assert_array_equal(there, here)
+
+
+@node
+@wasmtime
+@pytest.mark.second
+def test_rows_between_the_substeps_have_the_same_bits_in_every_engine():
+    (there, _), (here, _) = (BENT.in_engine(engine, "dense") for engine in ("node", "wasmtime"))
     np.testing.assert_array_equal(there, here)
 
 

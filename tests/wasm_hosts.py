@@ -132,7 +132,7 @@ def addresses(description, names):
     return struct.pack(f"<2i{len(names)}i", len(names), 0, *(known[name] for name in names))
 
 
-def run_steps(description, signals, names, *, begin, step, rows, longest=0.0):
+def run_steps(description, signals, names, *, begin, step, rows, longest=0.0, function="run"):
     """The steps of a run, whose last results are the number of its rows, the rows and the states at the end."""
     at = -(-description["memory"]["free"] // 16) * 16
     signal_table = table(description, signals, at)
@@ -145,7 +145,7 @@ def run_steps(description, signals, names, *, begin, step, rows, longest=0.0):
         ("write", at, signal_table),
         ("write", chosen, chosen_table),
         ("write", into, bytes(8 * rows * len(names))),
-        ("call", "run", [begin, step, longest, rows, at, chosen, into, every]),
+        ("call", function, [begin, step, longest, rows, at, chosen, into, every]),
         ("read", into, rows * len(names)),
         ("read", states["address"], len(states["names"])),
     ]

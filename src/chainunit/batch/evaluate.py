@@ -8,10 +8,9 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from ..core.errors import InputError, RemarkWarning, RunError
 from ..core.model import Model
@@ -23,6 +22,9 @@ from . import arrays
 from .equations import Equations, Result, equations, find, names_of
 from .native import Reductions, aligned, native_kernel
 from .reductions import REDUCTIONS
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 ENGINES = ("native", "numpy", "jax")
 _LEAST_INNER = 64
@@ -336,6 +338,8 @@ class Grid:
 
     def dataset(self, memory: Memory, reductions: Reductions) -> xr.Dataset:
         """The results with names, units and coordinates."""
+        import xarray as xr
+
         dims = self._dims(reductions)
         shape = [self.sizes[d] for d in dims]
         variables = {
@@ -355,6 +359,8 @@ class Grid:
 
 def _array(variable: Variable, x: Any) -> xr.DataArray:
     """The values of an argument as a DataArray in the declared unit."""
+    import xarray as xr
+
     if isinstance(x, xr.DataArray):
         unit = x.attrs.get("units")
         if unit is None or unit == variable.unit:

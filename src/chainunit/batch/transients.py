@@ -3,8 +3,7 @@ Without a C compiler its WebAssembly module makes them, where ``wasmtime`` is in
 
 Runs differ in parameters, states at the start, signals, and end. Each is integrated by the method of the model's FMU,
 with equal steps or with error control of its own (`chainunit.core.integrators`), and its signals are evaluated at
-every stage. Without constraints a step need not end at a row: the rows are interpolated (the dense output of Dormand
-and Prince, of fourth order, with scipy's coefficients).
+every stage. Without constraints a step need not end at a row: the rows are interpolated (`integrators.DENSE`).
 
 A run may carry a direction in the space of parameters, inputs and states at the start. Then the exact derivative of
 the run in this direction is integrated beside it, under the same control of the error: as many runs with the same
@@ -23,7 +22,6 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from scipy.integrate import RK45
 
 from ..core import integrators
 from ..core.engines import MATH, casadi_
@@ -31,7 +29,7 @@ from ..core.errors import InputError, RunError
 from ..core.model import Model
 from ..core.native.c_forms import constant
 from ..core.native.compilers import Compiler, compiler
-from ..core.native.operations import ARGUMENT, Operations
+from ..core.native.operations import Operations
 from ..core.symbolic_trace import outputs_of, trace
 from .equations import arguments_of, find, names_of
 from .native import load, threads
@@ -39,7 +37,8 @@ from .vector_code import VectorCode, c_file
 from .wasm_loop import WasmLoop, has_wasmtime
 
 _NUMBERS = (
-    "RK4_NODES RK4_WEIGHTS NODES STAGES ERRORS SHORTEST FIRST SAFETY ERROR_POWER LEAST_GROWTH MOST_GROWTH NO_ERROR"
+    "RK4_NODES RK4_WEIGHTS NODES STAGES ERRORS SHORTEST FIRST SAFETY ERROR_POWER LEAST_GROWTH MOST_GROWTH NO_ERROR "
+    "DENSE"
 ).split()
 """The numbers of `chainunit.core.integrators` that the loops need."""
 _LANES = 8
@@ -252,7 +251,7 @@ class Transients:
         lanes = self._loop.lanes
         pieces = [(r, r + lanes) for r in range(0, room, lanes)]
         if workers == 1:
-            piece((0, room))
+            piece((0, runs))
         else:
             list(threads(min(workers, os.cpu_count() or 1)).map(piece, pieces))
         times = np.minimum(begin[:, None] + step * np.arange(rows), stop[:, None])
@@ -329,12 +328,11 @@ def _compiled(
         "ROOM": code.room,
         "CHANGES": changes,
         "SIGNALS": len(driven),
-        "METHOD": _method(model, operations),
+        "METHOD": _method(model),
         "PUT": " ".join(put),
         "GUARDED": " ".join(guards),
     }
     constants = {name: value for name, value in vars(integrators).items() if name in _NUMBERS}
-    constants["DENSE"] = tuple(map(tuple, RK45.P))
     constants["NOMINAL"] = tuple(v.quantity.nominal or 1.0 for v in states)
     source = "\n".join(
         [
@@ -354,13 +352,11 @@ def _compiled(
     return _NativeLoop(digest, load(source, compiler), [names[starts[kind] + k] for kind, k in code.inputs])
 
 
-def _method(model: type[Model], operations: Operations) -> str:
+def _method(model: type[Model]) -> str:
     """How the model is integrated, see transients.h."""
     if not model.controlled:
         return "EVEN"
-    met = [operations.items[place] for place in operations.results[2]]
-    free = all(each.kind == ARGUMENT and each.entry == (2, k) for k, each in enumerate(met))
-    return "INTERPOLATED" if free else "TO_ROWS"
+    return "INTERPOLATED" if trace(model).is_free else "TO_ROWS"
 
 
 @lru_cache(maxsize=4)

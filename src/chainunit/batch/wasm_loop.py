@@ -1,7 +1,7 @@
 """Transients of a model where there is no C compiler: run by run in its WebAssembly module, by ``wasmtime``.
 
-The steps of the integrator end at each row, where those of the native loop need not: both agree to the tolerance of
-the integrator. Derivatives of runs there are none.
+As those of the native loop, the steps of the integrator need not end at a row where the states have no constraints.
+Both loops agree to the tolerance of the integrator. Derivatives of runs there are none.
 """
 
 from __future__ import annotations
@@ -88,6 +88,7 @@ class WasmLoop:
         wanted = {places[name] for name in outputs if name in places}
         self.groups = sum(1 << k for k, group in enumerate(d["groups"]) if wanted & set(group))
         self.numbers = 1 + 3 * changes
+        self.function = "dense" if "dense" in d["functions"] else "run"
 
     def __call__(
         self,
@@ -222,5 +223,5 @@ class _Instance:
 
     def _call(self, begin: float, step: float, longest: float, rows: int) -> int:
         places = self._table, self._list, self._into
-        count = self._exports["run"](self._store, begin, step, longest, rows, *places, self._loop.groups)
-        return int(count)
+        run = self._exports[self._loop.function]
+        return int(run(self._store, begin, step, longest, rows, *places, self._loop.groups))

@@ -109,6 +109,17 @@ LEAST_GROWTH, MOST_GROWTH = 0.2, 5.0
 """Limits of the ratio of a substep to the one before."""
 NO_ERROR = 1e-4
 """Error over the permitted error below which the next substep grows by `MOST_GROWTH`."""
+DENSE = (
+    (1.0, -8048581381 / 2820520608, 8663915743 / 2820520608, -12715105075 / 11282082432),
+    (0.0, 0.0, 0.0, 0.0),
+    (0.0, 131558114200 / 32700410799, -68118460800 / 10900136933, 87487479700 / 32700410799),
+    (0.0, -1754552775 / 470086768, 14199869525 / 1410260304, -10690763975 / 1880347072),
+    (0.0, 127303824393 / 49829197408, -318862633887 / 49829197408, 701980252875 / 199316789632),
+    (0.0, -282668133 / 205662961, 2019193451 / 616988883, -1453857185 / 822651844),
+    (0.0, 40617522 / 29380423, -110615467 / 29380423, 69997945 / 29380423),
+)
+"""Dense output of fourth order, L. F. Shampine, Math. Comp. 46 (1986) 135: behind the share z of a substep h the
+state has changed by the sum of the stages with the weights h*(D1*z + D2*z^2 + D3*z^3 + D4*z^4), a row for each."""
 
 
 def controlled(

@@ -403,7 +403,9 @@ class Model(metaclass=ModelType):
         return None
 
     @classmethod
-    def further_quantities(cls, xp: Any, p: Any, u: Any, x: Any = None) -> list[tuple[Variable, Any]]:
-        """Quantities beside the outputs, each declared and with its value at one point. Batches and cycle quantities
-        know them; FMUs do not have them."""
+    def further_quantities(
+        cls, xp: Any, p: Any, u: Any, x: Any, outputs: Mapping[str, Any]
+    ) -> list[tuple[Variable, Any]]:
+        """Quantities beside the `outputs`, which are given by name, each declared and with its value at one point.
+        Batches and cycle quantities know them; FMUs do not have them."""
         return []

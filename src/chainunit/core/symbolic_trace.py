@@ -33,13 +33,26 @@ class Trace:
     @cached_property
     def further_quantities(self) -> list[tuple[Variable, Any]]:
         """The quantities beside the outputs, see `Model.further_quantities`."""
-        return self.model.further_quantities(casadi_(), self.p, self.u, self.x)
+        names = (v.name for v in outputs_of(self.model))
+        outputs = dict(zip(names, self.outputs, strict=True))
+        return self.model.further_quantities(casadi_(), self.p, self.u, self.x, outputs)
 
     @cached_property
     def columns(self) -> dict[str, tuple[Variable, Any]]:
         """By name, all outputs and further quantities, each with its declaration and its value."""
         pairs = [*zip(outputs_of(self.model), self.outputs, strict=True), *self.further_quantities]
         return {variable.name: (variable, value) for variable, value in pairs}
+
+    @cached_property
+    def is_free(self) -> bool:
+        """Whether the states have no constraints, see `Model.constrained_states`."""
+        import casadi
+
+        met = self.model.constrained_states(casadi_(), self.p, self.u, self.x)
+        return all(
+            casadi.is_equal(casadi.SX(x), own)
+            for x, own in zip(met, casadi.vertsplit(self.symbols[2]), strict=True)
+        )
 
     def outputs_at(self, x: Any) -> list[Any]:
         """The outputs with the states `x` in place of the symbols."""

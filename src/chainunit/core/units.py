@@ -10,10 +10,11 @@ from __future__ import annotations
 import math
 import re
 import unicodedata
+from collections.abc import Mapping, Sequence
 from functools import cache
-from typing import Any
 
-from .quantities import base_units
+from .quantities import SI, base_units
+from .unit_table import NAMED, PREFIXED, UNITS, ZEROS
 
 _NUMBER = re.compile(
     r"([+-]?(?:\d{1,3}(?:[ ']\d{3})+(?:\.\d*)?|\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3}| ?[x*] ?10\^[+-]?\d{1,3})?)"
@@ -36,36 +37,9 @@ _SIGNS = {
     "×": "x",
     "μ": "µ",  # the Greek letter, which normal forms have
 }
-_PINT = {
-    "rev": "revolution",
-    "revs": "revolution",
-    "U": "revolution",
-    "r": "revolution",
-    "PS": "metric_horsepower",
-    "kp": "kilogram_force",
-    "kgf": "kilogram_force",
-    "lbf": "pound_force",
-    "sec": "second",
-    "%": "percent",
-    "‰": "permille",
-    "degF": "delta_degF",
-}
-"""Names of units for which pint has another name, or another meaning."""
-_ANGLES = frozenset(
-    "rad mrad radian radians deg degree degrees arcmin arcsec revolution revolutions turn turns rpm".split()
-)
-_OTHERS = """
-    m metre metres meter meters in inch inches ft g gram grams kilogram kilograms t tonne tonnes lb
-    s second seconds min minute minutes h hour hours d day days N newton J joule W watt hp bar Pa Wh kWh VA kVA
-    V volt A amp ampere Hz hertz K kelvin C degC H henry Wb ohm T F percent permille
-"""
-_NAMES = _ANGLES | frozenset(_OTHERS.split()) | _PINT.keys()
-"""Names of units that are read. Pint knows more, which nobody means (its k is Boltzmann's constant, its ton
-the American one)."""
+_ANGLES = frozenset(name for name, unit in UNITS.items() if "rad" in unit.base)
 _TORQUE_CONSTANT = base_units("N.m/A")
 """As a voltage constant it is in V s/rad."""
-_PREFIXES = "k M G T m µ u n p d c da"
-_PREFIXED = re.compile(r"(?:[kMGTmµunpdc]|da)(?:m|g|s|N|J|W|V|A|K|Hz|Pa|ohm|H|Wb|T|F)")
 
 FITTING: dict[str, tuple[str, ...]] = {
     "m": ("mm", "cm", "m"),
@@ -159,25 +133,32 @@ def _ascii(text: str) -> str:
 @cache
 def single_names() -> tuple[str, ...]:
     """All units that are read and have one name, without a power."""
-    prefixed = [
-        f"{prefix}{name}"
-        for prefix in _PREFIXES.split()
-        for name in "m g s N J W V A K Hz Pa ohm H Wb T F".split()
-    ]
     glued = [
         f"{first}{length}{time}"
         for first in "N daN kN MN mN µN kp g kg A V W kA kV kW MA MV MW".split()
         for length in ("", "mm", "cm", "m")
         for time in ("", "s")
     ]
-    names = dict.fromkeys([*sorted(_NAMES), *prefixed, *glued])
+    names = dict.fromkeys([*sorted(NAMED), *PREFIXED, *glued])
     return tuple(name for name in names if _is_name(name))
 
 
 @cache
-def dimension(unit_text: str) -> Any:
-    """The dimension of a unit, as pint has it: angles have none, and "C" is a charge."""
-    return _registry().parse_units(_pint_text(_factors(_ascii(unit_text)))).dimensionality
+def dimension(unit_text: str) -> dict[str, int]:
+    """The dimension of a unit, as exponents of the SI base units: angles have none, and "C" is a charge."""
+    return _dimension(_factors(_ascii(unit_text)))
+
+
+def _dimension(factors: Sequence[tuple[str, int]]) -> dict[str, int]:
+    exponents = dict.fromkeys(SI, 0)
+    for name, power in factors:
+        for base, exponent in UNITS[name].base.items():
+            exponents[base] += power * exponent
+    return _without_angle(exponents)
+
+
+def _without_angle(exponents: Mapping[str, int]) -> dict[str, int]:
+    return {base: exponent for base, exponent in exponents.items() if exponent and base != "rad"}
 
 
 def _is_name(name: str) -> bool:
@@ -188,19 +169,6 @@ def _is_name(name: str) -> bool:
     return True
 
 
-@cache
-def _registry() -> Any:
-    import pint
-
-    return pint.UnitRegistry()
-
-
-@cache
-def _unit(pint_text: str) -> Any:
-    """A unit of pint, which takes longer to read than to convert a number."""
-    return _registry().Unit(pint_text)
-
-
 def convert(number: float, unit_text: str, unit: str, kind: str = "") -> float:
     """The `number` in the unit that is `unit_text` behind it, in the declared `unit`.
 
@@ -209,15 +177,8 @@ def convert(number: float, unit_text: str, unit: str, kind: str = "") -> float:
     ValueError
         for a unit of another kind, or an unknown unit.
     """
-    import pint
-
-    base = base_units(unit)
-    factors = _of_temperature(_of_angle(_factors(_ascii(unit_text)), base), base, kind)
-    try:
-        there = _unit(_pint_text(_factors(_ascii(unit))))
-        return float(_registry().Quantity(number, _unit(_pint_text(factors))).to(there).magnitude)
-    except (pint.PintError, TypeError, AttributeError, AssertionError) as error:
-        raise ValueError(f"{unit_text}: is no unit of {unit}") from error
+    factor, zero = scale(unit_text, unit, kind)
+    return number * factor + zero
 
 
 def converts(unit_text: str, unit: str) -> bool:
@@ -229,10 +190,22 @@ def converts(unit_text: str, unit: str) -> bool:
     return True
 
 
+@cache
 def scale(unit_text: str, unit: str, kind: str = "") -> tuple[float, float]:
-    """Factor and offset from the unit `unit_text` to the declared `unit`; the errors are those of `convert`."""
-    offset = convert(0.0, unit_text, unit, kind)
-    return convert(1.0, unit_text, unit, kind) - offset, offset
+    """Factor and offset from the unit `unit_text` to the declared `unit`; the errors are those of `convert`.
+
+    A temperature alone counts from the zero of its scale; a temperature in a product, or a difference, is a number of
+    degrees.
+    """
+    base = base_units(unit)
+    factors = _of_angle(_factors(_ascii(unit_text)), base)
+    if "K" in base:
+        factors = [("degC" if name == "C" else name, power) for name, power in factors]
+    if _dimension(factors) != _without_angle(base):
+        raise ValueError(f"{unit_text}: is no unit of {unit}")
+    factor = math.prod(UNITS[name].factor ** power for name, power in factors)
+    zero = next((zero for name, zero in ZEROS.items() if factors == [(name, 1)]), 0.0)
+    return factor, 0.0 if kind == "difference" else zero
 
 
 def of_other_kind(unit_text: str, unit: str) -> str:
@@ -302,14 +275,8 @@ def _reads(text: str, unit: str, kind: str) -> bool:
         return False
 
 
-def _pint_text(factors: list[tuple[str, int]]) -> str:
-    """The factors as a text that pint reads."""
-    return "*".join(f"{name}**({power})" for name, power in factors) or "dimensionless"
-
-
 def _of_angle(factors: list[tuple[str, int]], base: dict[str, int]) -> list[tuple[str, int]]:
-    """The factors with the angle of the quantity added: 15 1/min or 0.25 Hz of a machine are turns. Pint
-    takes an angle for a pure number, so that it would accept "1/s" as an angular speed.
+    """The factors with the angle of the quantity added: 15 1/min or 0.25 Hz of a machine are turns.
 
     Raises
     ------
@@ -330,20 +297,8 @@ def _of_angle(factors: list[tuple[str, int]], base: dict[str, int]) -> list[tupl
     raise ValueError("no angle is named, and the quantity has one")
 
 
-def _of_temperature(factors: list[tuple[str, int]], base: dict[str, int], kind: str) -> list[tuple[str, int]]:
-    """The factors, in which a temperature alone counts from 0 degC, and a temperature in a product, or a
-    difference, is a number of kelvins."""
-    if "K" not in base:
-        return factors
-    if kind != "difference" and factors == [("C", 1)]:
-        return [("degC", 1)]
-    if kind != "difference" and len(factors) == 1:
-        return [(name.removeprefix("delta_"), power) for name, power in factors]
-    return [("kelvin" if name in ("degC", "C") else name, power) for name, power in factors]
-
-
 def _factors(unit_text: str) -> list[tuple[str, int]]:
-    """Pint's names and their powers in a unit without special signs.
+    """The names of `UNITS` and their powers in a unit without special signs.
 
     Raises
     ------
@@ -380,12 +335,11 @@ def _of_name(token: str, sign: int) -> list[tuple[str, int]]:
     assert match is not None  # a token of a name is a factor
     name, power = match[1], sign * int(match[2] or 1)
     product = _GLUED.fullmatch(name)
-    if name in _NAMES or _PREFIXED.fullmatch(name):
-        return [(_PINT.get(name, name), power)]
+    if name in UNITS:
+        return [(name, power)]
     if product is None or (product[2] is None and product[3] is None) or name == "gs":
         raise ValueError(f"{name}: is no unit")
     parts = [part for part in product.groups() if part]
-    parts = [_PINT.get(part, part) for part in parts]
     return [*((part, sign) for part in parts[:-1]), (parts[-1], power)]
 
 

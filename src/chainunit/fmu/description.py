@@ -103,7 +103,7 @@ class Interface:
         """The true dependencies of each output, then of each state's derivative: value references in a run (inputs
         and states) and at the start (parameters and inputs). They come from the sparsity of the traced equations. In
         a run a state depends only on itself."""
-        return _shared(self.model)._dependencies
+        return shared_interface(self.model)._dependencies
 
     @cached_property
     def _dependencies(self) -> list[tuple[list[int], list[int]]]:
@@ -148,7 +148,7 @@ class Interface:
     @property
     def reinitialized(self) -> frozenset[str]:
         """The states that an event may change: `Model.constrained_states` gives others than the states themselves."""
-        return _shared(self.model)._reinitialized
+        return shared_interface(self.model)._reinitialized
 
     @cached_property
     def _reinitialized(self) -> frozenset[str]:
@@ -187,7 +187,7 @@ class Interface:
 
 
 @lru_cache(maxsize=8)
-def _shared(model: type[Model]) -> Interface:
+def shared_interface(model: type[Model]) -> Interface:
     """The interface that keeps the equations of a model: its start values, and the version of FMI, do not change
     them."""
     return Interface(model, {}, Script)

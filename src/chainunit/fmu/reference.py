@@ -11,18 +11,21 @@ import csv
 import io
 import logging
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from functools import lru_cache
+from typing import Any, cast
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement, register_namespace
 
 import numpy as np
 
 from ..core.engines import MATH
+from ..core.model import Model
 from ..core.ports import FLANGE, LOAD
 from ..core.quantities import Quantity, Type, written
 from .description import Interface
 from .pack import xml_bytes
+from .script import Script
 
 STANDARD = "org.fmi-standard.fmi-ls-ref"
 REFERENCE = f"extra/{STANDARD}"
@@ -43,8 +46,9 @@ def reference_results(interface: Interface) -> dict[str, bytes]:
     """The files of reference results. Where, with the start values, the states run away or are too fast for the
     integrator, there are no files, and a warning is logged."""
     name = interface.model.name
+    starts = tuple((s.name, s.start) for s in interface.signals if s.start is not None)
     try:
-        tables = _tables(interface)
+        tables = _tables(interface.model, cast(Hashable, interface.script), starts)
     except (ArithmeticError, ValueError) as reason:  # ValueError: of `math`, where a linkage does not close
         log.warning(
             "The FMU %s: no reference results inside: %s; no run of this package needs them, an importer is checked "
@@ -85,15 +89,18 @@ def related_files(content: bytes | None = None) -> Element:
     return Element("fmiReferences", {f"{{{_NAMESPACE}}}fmi-ls-{key}": text for key, text in said.items()})
 
 
-def _tables(interface: Interface) -> dict[str, tuple[list[str], list[list[float]]]]:
-    """Head and rows of each file.
+@lru_cache(maxsize=32)
+def _tables(
+    model: type[Model], script: type[Script], starts: tuple[tuple[str, float], ...]
+) -> dict[str, tuple[list[str], list[list[float]]]]:
+    """Head and rows of each file, which are the same for each version of FMI.
 
     Raises
     ------
     ArithmeticError
         where a value is no finite number, or one step of the file takes more than `_MOST_STEPS` of the integrator.
     """
-    model = interface.model
+    interface = Interface(model, dict(starts), script)
     p = parameters_at_start(interface)
     inputs = excitation(interface)
     layout = model.state_layout

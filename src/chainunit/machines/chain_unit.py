@@ -497,14 +497,15 @@ class ChamberForces(InverseMachine):
         return drive(p, u, tuple(organ(p, u, side) for side in SIDES), resistances(p, u))
 
     @classmethod
-    def further_quantities(cls, xp: Any, p: Any, u: Any, x: Any = None) -> list[tuple[Variable, Any]]:
+    def further_quantities(
+        cls, xp: Any, p: Any, u: Any, x: Any, outputs: Mapping[str, Any]
+    ) -> list[tuple[Variable, Any]]:
         """Those of every machine, and the mean pull in each rod of two bars, ``mean_pull(left.web)``: below zero a
         chain is slack."""
-        columns = super().further_quantities(xp, p, u, x)
+        columns = super().further_quantities(xp, p, u, x, outputs)
         if cls.States is not None:
             return columns
-        rocker = cls.evaluate(xp, p, u, x)[0].rocker
-        pulls = organ_pulls(xp, p, u, rocker.psi, rocker.w, rocker.a)
+        pulls = organ_pulls(xp, p, u, *(outputs[f"rocker.{each}"] for each in ("psi", "w", "a")))
         for side in SIDES:
             for rod in RODS:
                 words = f"mean pull of the {rod} of the {side} organ"

@@ -282,13 +282,13 @@ def _outputs(xp: Any, p: Any, u: Any, x: Any, b: Balance) -> Outputs:
             xp.sqrt(xp.maximum(v, _LEAST)) * spread
             for v, spread in zip(variances, (p.feed.spread, p.force.spread), strict=True)
         ]
-        by_feed = normal_probability(xp, (hand * feed.value - limits.overload) / feed.deviation)
-        by_force = normal_probability(xp, (hand * force.value - limits.force_overload) / force.deviation)
+        by_feed = (hand * feed.value - limits.overload) / feed.deviation
+        by_force = (hand * force.value - limits.force_overload) / force.deviation
         return SideJudgement(
             material_mass_deviation=deviations[0],
             processing_force_deviation=deviations[1],
             web_pull=of_machine[name].web_pull,
-            overload=xp.maximum(by_feed, by_force),
+            overload=normal_probability(xp, xp.maximum(by_feed, by_force)),
         )
 
     return Outputs(

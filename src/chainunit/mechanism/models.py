@@ -203,11 +203,12 @@ class InverseMachine(LinkageModel, MachineModel):
         return sketch_of(cls.state(MATH, p, cls.Inputs(), low + (high - low) / (2.0 * math.pi), 0.0).m)
 
     @classmethod
-    def further_quantities(cls, xp: Any, p: Any, u: Any, x: Any = None) -> list[tuple[Variable, Any]]:
+    def further_quantities(
+        cls, xp: Any, p: Any, u: Any, x: Any, outputs: Mapping[str, Any]
+    ) -> list[tuple[Variable, Any]]:
         """The effort at the driver, ``crank_torque``; the size of each force, ``force(pivot)``; the places of all
         pins, ``x(A)`` and ``y(A)``; and the angle of the line of each sliding block, ``line(ram)``. A machine whose
         outputs depend on states has no places here."""
-        outputs = cls.parts[0].layout.by_name(cls.evaluate(xp, p, u, x)[0])
         unit = cls.driver_port.unit("N.m")
         columns = [
             (Variable("crank_torque", "effort at the driver", Quantity(unit, "")), outputs["tau"] * p.ratio)

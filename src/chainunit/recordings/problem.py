@@ -6,17 +6,18 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline
-from scipy.ndimage import uniform_filter1d
 
 from ..study.arrays import rms
 from .measurands import COUNTS, MEASURANDS
 from .plant import ANGLE, CRANK, AnyPlant, Nuisance, Overview, Response, Scenario
 from .recording import Recording
 from .unknown import Unknown
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 JITTER = 2e-5
 """Scatter of the instants at which rows are sampled [s]."""
@@ -111,11 +112,13 @@ class SimulatedRun:
 
     def __init__(self, run: RecordedRun, response: Response, names: Sequence[str], sizes: Any) -> None:
         self.run, self.response, self.names, self._sizes = run, response, tuple(names), sizes
-        self._courses = dict[tuple[str, int], CubicSpline]()
+        self._courses: dict[tuple[str, int], CubicSpline] = {}
 
     def interpolate(self, name: str, at: Any, with_slopes: bool = True) -> Interpolated:
         """A simulated quantity at the times `at` [s], shape (n,). Before the first and behind the last simulated time
         it stands."""
+        from scipy.interpolate import CubicSpline
+
         response = self.response
         at = np.clip(at, response.time[0], response.time[-1])
         x, rate = np.empty(len(at)), np.empty(len(at))
@@ -449,6 +452,8 @@ def measured_speed(recording: Recording, ratio: float) -> Any:
 def until_rest(run: RecordedRun, ratio: float) -> RecordedRun:
     """A run whose motor is switched off, until the machine has come to rest: friction that is smoothed lets it creep,
     where a real one sticks. A run without a column of the speed or an encoder stays as it is."""
+    from scipy.ndimage import uniform_filter1d
+
     recording, columns = run.recording, run.recording.columns
     if run.off is None or not {"crank.w", "motor.w", "motor.count"} & columns.keys():
         return run

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import f
 
 from ..core.messages import unit_behind
 from ..core.quantities import quantity
@@ -145,6 +144,8 @@ def residual_test(comparison: Comparison, level: float) -> ResidualTest:
     Over a part of a turn, such as a machine that swings after its motor was switched off, the orders are nearly one
     another's sums. Their orthogonal combinations are looked at, as far as the angles resolve them.
     """
+    from scipy.stats import f
+
     rows = len(comparison.residuals)
     orders = min(ORDERS, rows // ROWS)
     # the constant part is that of an offset
@@ -182,6 +183,8 @@ def residual_test(comparison: Comparison, level: float) -> ResidualTest:
 def _slow(residuals: Any, angle: Any, level: float) -> tuple[float, float, float]:
     """The sum of the squares of the means of parts of the run, in standard deviations of the noise within the parts,
     its limit, and the standard deviation of the means."""
+    from scipy.stats import f
+
     rows, count = len(residuals), min(len(residuals) // ROWS, round(float(np.ptp(angle)) / PART))
     if count < 2:
         return 0.0, math.inf, 0.0

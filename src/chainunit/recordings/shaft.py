@@ -17,10 +17,9 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from ..batch.evaluate import evaluate
 from ..core.errors import InputError, RunError
@@ -29,6 +28,9 @@ from ..machines.machine import Machine
 from ..study.drive import Drive
 from .measurands import COUNTS
 from .plant import ANGLE, CRANK, GUARD, AnyPlant, Nuisance, Overview, Response, Scenario, SourcedLoop
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 MEASURED = ("crank.tau", "crank.w", "motor.w", "motor.count")
 """Quantities of a machine whose torque is measured behind its motor, of which nothing need be known."""
@@ -146,6 +148,8 @@ class MeasuredShaft(AnyPlant):
         """The torque at the crank along a motion of the crank (angle, speed, acceleration), shape (3, rows), and its
         derivatives by all sought quantities and by the motion: with derivatives that a run does not need, all runs
         share compiled code."""
+        import xarray as xr
+
         model, ratio = self.machine.model, self.ratio
         own = {name.removeprefix("machine."): x for name, x in values.items() if name.startswith("machine.")}
         p = self.machine.replace({k: x for k, x in own.items() if k in model.parameter_layout.names}).p

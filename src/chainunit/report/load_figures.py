@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from ..study.drive import Drive
 from ..study.readings import crank_motion, crank_torque, shaft_power
 from ..study.window import mean
 from . import figure as fig
 from .turn import last_turn
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _CLASSES = 40
 """Classes of a histogram."""

@@ -8,9 +8,7 @@ from pathlib import Path
 from textwrap import fill
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.ticker import FuncFormatter
 
 from ..reading.text import Units
 from .figure import (
@@ -31,7 +29,7 @@ from .figure import (
 )
 from .lines import capital
 from .page_figures import classes
-from .style import BARS, FILLS, HATCHES, INK, class_colours, draw, look_of
+from .style import BARS, FILLS, HATCHES, INK, class_colours, draw, look_of, pyplot
 
 _ROW, _COLUMN = 2.5, 4.3  # of a panel [in]
 _LETTERS = 11.5  # of a title, to an inch
@@ -52,6 +50,7 @@ def write(figures: Iterable[Figure], folder: Path, units: Units) -> list[Path]:
 def contours(x: Any, y: Any, z: Any, level: float) -> list[Any]:
     """The lines along which `z`, shape (len(y), len(x)), equals `level`, each as its points, shape (n, 2). The
     longest comes first. No line runs through NaN."""
+    plt = pyplot()
     figure, axis = plt.subplots()
     lines = axis.contour(x, y, np.ma.masked_invalid(z), levels=[level]).allsegs[0]
     plt.close(figure)
@@ -65,7 +64,7 @@ def _figure(spec: Figure, units: Units) -> Any:
     has_titles = any(panel.title for _, _, panel in figure.all_panels())
     width = 8.2 if columns == 1 else 1.0 + _COLUMN * columns
     tall = 1.2 + (_ROW if rows > 1 else 3.2) * sum(heights) + (0.3 * rows if has_titles else 0.0)
-    drawing, axes = plt.subplots(
+    drawing, axes = pyplot().subplots(
         rows, columns, figsize=(width, tall), squeeze=False, height_ratios=heights, width_ratios=widths
     )
     places = {(r, c) for r, c, _ in figure.all_panels()}
@@ -130,8 +129,8 @@ def _scale(axis: Any, spec: Axis, side: str) -> None:
         return
     if spec.log:
         getattr(axis, f"set_{side}scale")("log")
-        which.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
-        which.set_minor_formatter(FuncFormatter(lambda v, _: f"{v:g}" if f"{v:e}"[0] in "25" else ""))
+        which.set_major_formatter(lambda v, _: f"{v:g}")
+        which.set_minor_formatter(lambda v, _: f"{v:g}" if f"{v:e}"[0] in "25" else "")
     else:
         axis.ticklabel_format(axis=side, useOffset=False)
     if spec.low is not None or spec.high is not None:

@@ -13,8 +13,7 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
-
-import xarray as xr
+from typing import TYPE_CHECKING
 
 from .. import __version__
 from ..core.files import atomic_file, netcdf
@@ -22,6 +21,9 @@ from ..study.readings import has_turn, load_inertia, motor_shaft
 from ..study.record import LOAD_CYCLE, StudyRecord
 from ..work.interrupts import stoppable
 from .run_names import title
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 SERIES = "result.nc"
 STEADY_BEGIN = "steady_begin"
@@ -48,6 +50,8 @@ def _has_cycle(study: StudyRecord) -> bool:
 
 def tree(study: StudyRecord) -> xr.DataTree:
     """The time series of all runs, a node for each run; each variable has its unit and description."""
+    import xarray as xr
+
     runs = {f"/{name}": run.assign_attrs(title=title(study, name)) for name, run in study.runs.items()}
     if _has_cycle(study):
         start_up = runs["/start_up"]

@@ -6,11 +6,6 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
-
 from ..core.files import atomic_file
 
 STYLE: dict[str, Any] = {
@@ -86,10 +81,20 @@ def look_of(look: int | str) -> dict[str, Any]:
     return LOOKS[look] if isinstance(look, str) else LINES[look % len(LINES)]
 
 
+def pyplot() -> Any:
+    """The plots of matplotlib, which draws into files alone."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot
+
+    return matplotlib.pyplot
+
+
 def draw(plots: Mapping[str, Callable[[], Any]], folder: Path) -> list[Path]:
     """Draw each figure into its file in `folder`, a PNG; returns the files."""
     folder.mkdir(parents=True, exist_ok=True)
-    files = []
+    files, plt = [], pyplot()
     with plt.rc_context(STYLE):
         for name, make in plots.items():
             figure = make()

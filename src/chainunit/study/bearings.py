@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from ..core.engines import MATH
 from .drive import Drive
 from .readings import machine_series
 from .window import mean, whole_turns
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def pin_loads(drive: Drive, run: xr.Dataset) -> dict[str, dict[str, float | None]]:

@@ -13,10 +13,9 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
 from operator import itemgetter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from ..batch.transients import Runs, Transients, signal_table
 from ..core.errors import InterruptedRunError, RunError
@@ -29,6 +28,9 @@ from .rig import Rig
 from .start_up import PATIENCE
 from .transients import follow, longest_lead
 from .window import is_settled, mean, time_at, whole_turns
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 BLOCK = 64
 """Number of runs that are side by side in memory."""
@@ -296,6 +298,8 @@ class BlockRuns:
 
     def _series(self, runs: Runs, k: int, before: Runs | None = None) -> xr.Dataset:
         """A run over its time, with the rows of the one `before`."""
+        import xarray as xr
+
         table = np.concatenate([*([_rows(before, k)[:, :-1]] if before else []), _rows(runs, k)], axis=1)
         # without an index, which would take as long as a tenth of the run
         time = xr.Coordinates({"time": ("time", table[0])}, indexes={})

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-import xarray as xr
+from typing import TYPE_CHECKING
 
 from .event import Role
 from .record import StudyRecord
 from .torques import DutyPeak, PeakOf, duty_peak, on_coupling
 from .verdict import STEADY
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def from_event_on(study: StudyRecord, name: str) -> xr.Dataset:

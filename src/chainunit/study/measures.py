@@ -5,10 +5,9 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from ..core.quantities import Layout, Value, Variable, declaration, quantity
 from .arrays import peak
@@ -19,6 +18,9 @@ from .relay import lasting_current, relay_trip
 from .stored import energy_gap, energy_held, stored_shares
 from .verdict import CREEPS
 from .window import Phase, Window, drift, end_gap
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 STARTED = 0.95
 """Share of the speed at which a start ends, see `time_to_start`."""

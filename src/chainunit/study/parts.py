@@ -91,12 +91,17 @@ class Parts:
         return _form(self.machine, self.motor if self.gives_motor else MOTORS["DcMotor"])
 
     @property
+    def keys(self) -> frozenset[str]:
+        """The keys of the `form`, which takes long to make."""
+        return frozenset({"title", "report", "system", "event", *self.sections, *all_choices()})
+
+    @property
     def example(self) -> dict[str, Any]:
         """The tables of the example, empty where there is none."""
         name = _examples_of_machines().get(self.machine.name)
         tables = toml(example(name)) if name else {}
         # the examples have tables of capabilities, too
-        return {name: table for name, table in tables.items() if name in self.form.model_fields}
+        return {name: table for name, table in tables.items() if name in self.keys}
 
 
 @lru_cache(maxsize=32)

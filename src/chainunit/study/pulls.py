@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from ..core.quantities import Layout
 from ..machines.api import ChainUnitMachine
 from ..machines.chain_unit import RODS, SIDES, RodName, SideLoads
 from .drive import Drive
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @dataclass(frozen=True)

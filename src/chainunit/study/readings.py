@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from ..system import shaft_torque, through
 from .arrays import peak
 from .drive import AbsentError, Drive
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def series(run: xr.Dataset, name: str) -> Any:
@@ -93,6 +95,8 @@ def only_whole_turns(drive: Drive, run: xr.Dataset, most: float = math.inf) -> x
 
     The last row is interpolated linearly; in periodic running it equals the first.
     """
+    import xarray as xr
+
     angle = crank_angle(drive, run)
     turned = (angle - angle[0]) / (2.0 * math.pi)
     # a run that ends on a whole turn may miss it by rounding

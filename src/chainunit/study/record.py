@@ -6,9 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, Literal, Self, TypeAlias
-
-import xarray as xr
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, TypeAlias
 
 from ..core.descriptions import of_driver
 from ..core.errors import RunError
@@ -29,6 +27,9 @@ from .start_up import StartUp
 from .statics import DriveStatics
 from .verdict import STEADY, Verdict
 from .window import Phase, Trip, Window, whole_turns
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 LOAD_CYCLE = "load_cycle.csv"
 """Name of the file with torque and speed of the motor's shaft in the steady turns."""

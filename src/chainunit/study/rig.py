@@ -6,9 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
-
-import xarray as xr
+from typing import TYPE_CHECKING, Any
 
 from ..core.errors import refusal_prefix
 from ..system import (
@@ -27,6 +25,9 @@ from .event import Event, OverTime, Signals, Values
 from .load_cases import no_feed
 from .operation import OperatingConditions
 from .readings import machine_series
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 FEED_RISE = 0.1
 """Share of a turn in which the feed comes to a machine that starts empty."""
@@ -96,6 +97,12 @@ class Rig:
             return False
         machine = self.graph.components["machine"].connectors
         return set(event.inputs(event.side)) <= set(self.inputs) and set(event.reads) <= set(machine)
+
+    def gives(self, full: str) -> bool:
+        """Whether the drive has an output of that full name."""
+        name, _, variable = full.partition(".")
+        connector = self.graph.components[name].connectors.get(variable)
+        return connector is not None and connector.causality == "output"
 
     def event_signals(self, event: Event, begin: float, state: Values) -> Signals:
         """The signals of the event, by full name, if it begins at `begin` [s] with the outputs `state`."""
@@ -181,5 +188,7 @@ def worst_residual(shares: Mapping[str, float]) -> float:
 def join(pieces: list[xr.Dataset]) -> xr.Dataset:
     """One run from pieces that follow each other; at an instant that two pieces share, the later piece
     counts."""
+    import xarray as xr
+
     parts = [piece.isel(time=slice(None, -1)) for piece in pieces[:-1]]
     return xr.concat([*parts, pieces[-1]], "time", data_vars="all") if parts else pieces[-1]

@@ -10,8 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-
-import xarray as xr
+from typing import TYPE_CHECKING
 
 from ..core.errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
@@ -42,6 +41,9 @@ from .statics import statics
 from .torques import on_coupling
 from .transients import Transient, coast, compare, follow, lead_times, release
 from .window import Phase, Trip
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _AFTER_TRIP = 1.0
 """Time for which a start in which the coupling opens is followed without it [s]: the first swings are the largest."""

@@ -4,18 +4,26 @@ time of a start."""
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..core.quantities import Value, declaration, quantity
+from ..system import CompiledSimulation, Simulation, run_together
+from ..system.certificate import torque_names
 from .arrays import peak
+from .drive import Drive
 from .event import Event
 from .measures import STARTED, time_to_start
 from .relay import start_class
 from .rig import Rig, join
 from .torques import PeakOf, at_gear, on_coupling
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 START_ANGLES = 8
 """Number of crank angles, evenly over the turn, from which the machine is started."""
@@ -61,31 +69,76 @@ def start_from(
     """A start from the crank angle [rad], with the `event` of a start, if one is given.
 
     It is followed until the crank has its speed and a little longer, at most to the time `longest` [s]; `start_time`
-    is None where the crank comes to no lasting speed by then, by the rule of `time_to_start`."""
-    rig = from_angle(rig, angle)
-    name, ratio = rig.drive.crank_output("w")
-    goal = STARTED * rig.operation.crank_speed * ratio
-    step = min(rig.step, _STEP)
-    with rig.from_rest(event) as simulation:
-        run = simulation.run(longest, step, guards={name: goal})
-        reached = float(simulation.time) if float(run[name][-1]) >= (1.0 - 1e-9) * goal else None
-        if reached is not None:
-            # the change from star to delta is a part of the start
-            run = join([run, simulation.run(max(reached, rig.drive.switched_until) + _AFTER, step)])
-        else:
+    is None where the crank comes to no lasting speed by then, by the rule of `time_to_start`. `of` gives the torque
+    on the coupling."""
+    return _starts_from([from_angle(rig, angle)], [angle], longest, event, of)[0]
+
+
+def _starts_from(
+    rigs: Sequence[Rig], angles: Sequence[float], longest: float, event: Event | None, of: PeakOf
+) -> list[StartNumbers]:
+    """The starts of rigs that differ in the angle [rad] alone; see `start_from`."""
+    drive, operation, step = rigs[0].drive, rigs[0].operation, min(rigs[0].step, _STEP)
+    name, ratio = drive.crank_output("w")
+    goal = STARTED * operation.crank_speed * ratio
+    with ExitStack() as stack:
+        simulations = [stack.enter_context(rig.from_rest(event)) for rig in rigs]
+        names = _read(rigs[0])
+        runs = _run_all(simulations, [longest] * len(rigs), step, names, {name: goal})
+        reached = [
+            float(simulation.time) if float(run[name][-1]) >= (1.0 - 1e-9) * goal else None
+            for simulation, run in zip(simulations, runs, strict=True)
+        ]
+        # the change from star to delta is a part of the start
+        ends = {k: max(t, drive.switched_until) + _AFTER for k, t in enumerate(reached) if t is not None}
+        later = _run_all([simulations[k] for k in ends], list(ends.values()), step, names)
+    for k, run in zip(ends, later, strict=True):
+        runs[k] = join([runs[k], run])
+    for k, run in enumerate(runs):
+        if k not in ends:
             # it may have settled at another speed: then it has started, as in the start-up of a study
             time, speed = run["time"].values, run[name].values / ratio
-            final = float(np.mean(speed[time >= time[-1] - rig.operation.turn]))
-            reached = time_to_start(time, speed, final, rig.operation.crank_speed)
-    time, current = run["time"].values, np.abs(run[f"motor.{rig.drive.motor.current}"].values)
-    relay, rated = None, rig.drive.rated_current
-    if reached is not None and rated is not None and not rig.drive.follows:
-        starting = time <= max(reached, rig.drive.switched_until)
+            final = float(np.mean(speed[time >= time[-1] - operation.turn]))
+            reached[k] = time_to_start(time, speed, final, operation.crank_speed)
+    return [_numbers(rigs[k].drive, angles[k], runs[k], reached[k], of) for k in range(len(rigs))]
+
+
+def _read(rig: Rig) -> list[str]:
+    """The outputs that the numbers of a start and the peak of any torque of `PeakOf` follow from."""
+    drive = rig.drive
+    motor = [f"motor.{name}" for name in ("tau", "w", "a", "heat", drive.motor.current)]
+    names = dict.fromkeys([drive.crank_output("w")[0], *motor, *torque_names(drive.machine_bond)])
+    return [full for full in names if rig.gives(full)]
+
+
+def _run_all(
+    simulations: Sequence[Simulation],
+    stops: Sequence[float],
+    step: float,
+    names: Sequence[str],
+    guards: Mapping[str, float] | None = None,
+) -> list[xr.Dataset]:
+    """The runs of simulations to their ends [s]: side by side where they are compiled."""
+    together = [each for each in simulations if isinstance(each, CompiledSimulation)]
+    if len(together) == len(simulations):
+        return run_together(together, stops, step, guards=guards, names=names)
+    return [
+        each.run(stop, step, guards=guards, names=names)
+        for each, stop in zip(simulations, stops, strict=True)
+    ]
+
+
+def _numbers(drive: Drive, angle: float, run: xr.Dataset, reached: float | None, of: PeakOf) -> StartNumbers:
+    """The numbers of a start that has `reached` its speed at that time [s]."""
+    time, current = run["time"].values, np.abs(run[f"motor.{drive.motor.current}"].values)
+    relay, rated = None, drive.rated_current
+    if reached is not None and rated is not None and not drive.follows:
+        starting = time <= max(reached, drive.switched_until)
         relay = start_class(time[starting], current[starting], rated)
     return StartNumbers(
         angle=angle,
-        gear_torque=at_gear(rig.drive, run),
-        coupling_torque=of(rig.drive, run),
+        gear_torque=at_gear(drive, run),
+        coupling_torque=of(drive, run),
         start_time=reached,
         start_class=relay,
         current=peak(current),
@@ -127,7 +180,7 @@ def starts_from_all(
     """Starts from `START_ANGLES` angles over the turn; each of the `events`, which are starts, from the angle 0. `of`
     gives the torque on the coupling."""
     angles = [2.0 * math.pi * k / START_ANGLES for k in range(START_ANGLES)]
-    starts = [start_from(rig, angle, longest, of=of) for angle in angles]
+    starts = _starts_from([from_angle(rig, angle) for angle in angles], angles, longest, None, of)
     return starts + [start_from(rig, 0.0, longest, event, of) for event in events]
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-
-import xarray as xr
+from typing import TYPE_CHECKING
 
 from ..system import Simulation
 from ..work.progress import Progress
@@ -14,6 +13,9 @@ from .measures import STARTED
 from .readings import only_whole_turns, turns_made
 from .rig import Rig, join
 from .window import Phase, Window, is_settled, whole_turns
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _LONGEST_START = 30.0
 """Time after the ramp at which an empty machine is fed, unless it would reach its speed in `_LONGEST_RISE`
@@ -79,7 +81,8 @@ def _start_empty(
 def start_up(rig: Rig, simulation: Simulation, progress: Progress, guards: Mapping[str, float]) -> StartUp:
     """Start-up and steady running to the time at which it should end, or longer, see `_missing`; a machine that
     starts empty runs so long after it is fed."""
-    pieces, steady_from, stop = list[xr.Dataset](), rig.operation.steady_begin, rig.operation.stop
+    pieces: list[xr.Dataset] = []
+    steady_from, stop = rig.operation.steady_begin, rig.operation.stop
     if rig.operation.empty_start:
         run, rig = _start_empty(rig, simulation, progress, guards)
         pieces = [run]

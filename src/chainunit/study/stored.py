@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from .arrays import stretches
 from .drive import AbsentError, Drive
 from .readings import shaft_power
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def energy_behind(drive: Drive, run: xr.Dataset) -> Any:

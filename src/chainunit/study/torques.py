@@ -5,15 +5,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any
-
-import xarray as xr
+from typing import TYPE_CHECKING, Any
 
 from .arrays import peak
 from .drive import Drive
 from .readings import crank_torque
 
-PeakOf = Callable[[Drive, xr.Dataset], float]
+if TYPE_CHECKING:
+    import xarray as xr
+
+PeakOf = Callable[[Drive, "xr.Dataset"], float]
 """The peak of a torque in a run, at the crank [N m]."""
 
 

@@ -6,10 +6,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from ..system import Jump, ModelComponent, Profile, Simulation, System, monolithic
 from ..work.progress import Progress
@@ -18,6 +17,9 @@ from .event import Event, Signals, angle_of_begin
 from .readings import machine_series
 from .rig import Rig, join
 from .window import time_at
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 DIFFERENCE = "_difference_to_monolithic"
 """Suffix of the name of a variable for its largest difference to the monolithic solution, over its peak."""

@@ -7,11 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum, auto
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
-from scipy.interpolate import CubicHermiteSpline
 
 from .arrays import peak
 from .drive import Drive
@@ -19,6 +17,9 @@ from .readings import crank_motion, crank_speed, crank_torque, has_turn, only_wh
 from .relay import LIGHT
 from .stored import energy_behind, energy_gap, energy_held
 from .verdict import CREEPS
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 BURNT = 2000.0
 """Temperature that stands for a winding without a thermal steady state [K]."""
@@ -35,7 +36,7 @@ LASTING = 0.05
 _EVEN = 1e-4
 """Relative change of the speed over the steady turns that counts as none."""
 
-Reading = Callable[[Drive, xr.Dataset], Any]
+Reading = Callable[[Drive, "xr.Dataset"], Any]
 """A value that is read from a run of a drive, shape (time,)."""
 
 
@@ -204,6 +205,8 @@ def whole_turns(drive: Drive, run: xr.Dataset, most: float = math.inf) -> xr.Dat
 def time_at(drive: Drive, run: xr.Dataset, angle: float) -> float | None:
     """Time [s] at which the crank passes the `angle` [rad] in a run, by a cubic between two rows; None where it does
     not get there."""
+    from scipy.interpolate import CubicHermiteSpline
+
     angles, speeds = crank_motion(drive, run)
     row = int(np.argmax(angles >= angle))
     if row == 0:

@@ -8,7 +8,7 @@ component, too: `foreign_component`."""
 
 from .certificate import certify, energy_residual, shaft_torque, through
 from .compiled import compiled, export_compiled
-from .compiled_simulation import CompiledSimulation
+from .compiled_simulation import CompiledSimulation, run_together
 from .fmus import export
 from .foreign import NAMES, fmu_component, foreign_component
 from .graph import (
@@ -55,6 +55,7 @@ __all__ = [
     "in_line",
     "monolithic",
     "rigid",
+    "run_together",
     "shaft_joints",
     "shaft_torque",
     "through",

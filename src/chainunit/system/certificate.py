@@ -8,16 +8,17 @@ loses."""
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
-from scipy.integrate import cumulative_simpson
 
 from ..core.errors import InputError
 from .graph import Bond, System
 
-Feed = Mapping[str, Callable[[xr.Dataset], Any]]
+if TYPE_CHECKING:
+    import xarray as xr
+
+Feed = Mapping[str, Callable[["xr.Dataset"], Any]]
 """By the full name of each mass input that changes in a run: a function of the run's Dataset that gives dE/dm [J/kg],
 the energy of one kilogram at its place in the machine."""
 
@@ -34,6 +35,9 @@ def energy_residual(
     to the jump with the values before it, while `run` has the values after the jump at that instant: each side is
     integrated separately.
     """
+    import xarray as xr
+    from scipy.integrate import cumulative_simpson
+
     parts = [run] if lead is None else [lead, run.sel(time=slice(float(lead["time"][-1]), None))]
     balance, throughput = np.zeros(1), 0.0
     for part in parts:
@@ -107,6 +111,8 @@ def _shaft_power(run: xr.Dataset, name: str, terminal: Any, tau: Any, w: Any) ->
 
 def _supply(run: xr.Dataset, bond: Bond, tau: Any, w: Any) -> Any:
     """The energy that the driver has given to the load [J], shape (time,)."""
+    from scipy.integrate import cumulative_simpson
+
     full = f"{bond.driver}.load_energy"
     if full in run:
         return run[full].values

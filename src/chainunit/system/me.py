@@ -15,7 +15,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import scipy.integrate
 
 from ..core.errors import InputError, RunError
 from .graph import System
@@ -56,6 +55,8 @@ class ModelExchange(FmuSimulation):
         rtol: float = 1e-8,
         method: str = "DOP853",
     ) -> None:
+        import scipy.integrate
+
         if method not in METHODS:
             raise InputError(f"method = {method}: must be one of {', '.join(METHODS)}")
         self._rtol, self._method = rtol, getattr(scipy.integrate, method)

@@ -7,9 +7,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy.linalg import eig
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import connected_components
 
 from ..reading.results import derived, part, result
 
@@ -53,6 +50,10 @@ def poles_of(A: Any, names: Sequence[str]) -> tuple[Pole, ...]:
     the eigenvalues of the blocks. So an integral on which nothing depends, such as an angle or an energy, has a
     pole at 0 without rounding; in a block a pole that rounding moves from 0 is set to 0.
     """
+    from scipy.linalg import eig
+    from scipy.sparse import csr_matrix
+    from scipy.sparse.csgraph import connected_components
+
     A = np.asarray(A, float)
     count, group = connected_components(csr_matrix(A != 0.0), connection="strong") if len(A) else (0, [])
     found = []

@@ -9,17 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
-from scipy.integrate import DOP853
 
 from ..core.engines import MATH, casadi_
 from ..core.errors import RunError
 from .compiled import compiled
 from .graph import System
 from .signals import at_time, corners
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def monolithic(
@@ -56,6 +57,8 @@ def monolithic(
     RunError
         where the solver gives up.
     """
+    from scipy.integrate import DOP853
+
     equations = _Equations(system, signals)
     times = np.asarray(times, float)
     x = equations.start(float(times[0])) if start is None else [start[full] for full in equations.states]
@@ -142,6 +145,8 @@ class _Equations:
 
     def dataset(self, times: Any, states: Any) -> xr.Dataset:
         """All states and outputs; `states` have the shape (states, times)."""
+        import xarray as xr
+
         outside = [np.broadcast_to(u, times.shape) for u in self._inputs(times)]
         outputs = np.asarray(self._all(np.array(outside).reshape(-1, len(times)), states))
         rows = zip((*self._states, *self._outputs), (*states, *outputs), strict=True)

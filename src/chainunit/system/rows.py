@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from ..core.errors import InputError
 from ..core.files import netcdf
 from .instance import Instance
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Recorder = tuple[Instance, Any, list[str]]
 """An instance, the handle of its recorded variables, and their full names."""
@@ -103,6 +105,8 @@ class Rows:
 
     def dataset(self) -> xr.Dataset:
         """The rows in memory; the variables share the memory of this table."""
+        import xarray as xr
+
         rows = {
             name: ("time", values[: self._filled], attributes)
             for values, (name, attributes) in zip(self._values, self._attributes().items(), strict=True)

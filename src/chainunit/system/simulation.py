@@ -13,10 +13,9 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
-import xarray as xr
 
 from ..core.errors import InputError, InterruptedRunError, RunError
 from ..core.files import atomic_file
@@ -27,8 +26,23 @@ from .graph import FmuComponent, System, direct_inputs, order
 from .instance import Fmu, Instance, Kind
 from .signals import Profile, at_time
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 Guarded = tuple[Instance, Any, list[float]]
 """An instance, the handle of its guarded outputs, and their limits."""
+
+
+def check_forward(begin: float, stop: float, step: float) -> None:
+    """Refuse a run from `begin` to `stop` [s] in steps of `step` [s] that does not go forward.
+
+    Raises
+    ------
+    InputError
+        where it does not.
+    """
+    if not (0.0 < step < math.inf) or not begin < stop < math.inf:
+        raise InputError(f"a run from t = {begin:g} to {stop:g} s in steps of {step:g} s: must go forward")
 
 
 @dataclass(frozen=True)
@@ -105,10 +119,7 @@ class Simulation(ABC):
         WriteError
             where the `file` cannot be written.
         """
-        if not (0.0 < step < math.inf) or not self.time < stop < math.inf:
-            raise InputError(
-                f"a run from t = {self.time:g} to {stop:g} s in steps of {step:g} s: must go forward"
-            )
+        check_forward(self.time, stop, step)
         if not every >= 1 or every % 1:
             raise InputError(f"every = {every:g}: must be a whole number >= 1")
         run, failure = self._run(RunOptions(stop, step, progress, guards or {}, every, names, file))
@@ -303,6 +314,8 @@ class FmuSimulation(Simulation):
         """Go from the first of the `times` to each of the others in turn, with all values consistent there."""
 
     def _run(self, options: RunOptions) -> tuple[xr.Dataset, RunError | None]:
+        import xarray as xr
+
         start, file = self.time, options.file
         n = max(1, math.ceil((options.stop - start) / options.step - 1e-9))
         recorders, guarded = self._recorders(options.names), self._guarded(options.guards)

@@ -258,7 +258,7 @@ def test_a_sized_drive_has_one_number_for_each_utilisation(folder):
 
 
 def test_order_numbers_of_catalogues_are_handed_over(tmp_path):
-    """Motor, gear and both couplings are rows of catalogues, and have the order numbers of these rows; without a number
+    """Motor, gear and both couplings are rows of catalogues, and have the order numbers of these rows; without one
     there, nothing is written."""
     example = LINKAGES.parent / "own_catalogue.toml"
     text = example.read_text("utf-8").replace('"catalogue/', f'"{example.parent.as_posix()}/catalogue/')

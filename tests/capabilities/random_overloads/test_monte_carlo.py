@@ -195,6 +195,7 @@ def branches(task, simulation, *drawn):
     return list(system.runs([point(task, each) for each in drawn]))
 
 
+@pytest.mark.second
 def test_a_run_is_what_its_number_says(killed):
     """Run again here, in this process, in another order."""
     task, results = task_of(killed[0]), opened(killed[0]).dataset
@@ -212,6 +213,7 @@ def test_a_run_is_what_its_number_says(killed):
             assert {name: float(run[name]) for name in got} == got
 
 
+@pytest.mark.second
 def test_the_store_says_what_its_numbers_are(killed):
     results = opened(killed[0]).dataset
     assert results["side"].attrs["flag_meanings"] == "none left right"
@@ -221,6 +223,7 @@ def test_the_store_says_what_its_numbers_are(killed):
         assert results[v.name].attrs == {"units": v.unit, "long_name": v.description}
 
 
+@pytest.mark.second
 def test_answers_hang_together(killed):
     result = opened(killed[0])
     runs = result.dataset
@@ -235,6 +238,7 @@ def test_answers_hang_together(killed):
     assert share["unit"] == "1" and share["low"]["value"] < share["value"] < share["high"]["value"]
 
 
+@pytest.mark.second
 def test_quantiles_have_intervals_or_are_left_out(killed):
     """Of the few runs the median is told, of 100 like them the 5 % and 95 % quantiles, too, of 400 all."""
     few = opened(killed[0]).dataset
@@ -306,6 +310,7 @@ def test_lumps_come_on_both_sides_alike_often_and_by_the_seed():
     assert [d.event.side for d in drawn[:50]] != sides
 
 
+@pytest.mark.second
 def test_lumps_come_anywhere_in_a_turn(killed):
     angles = sorted(opened(killed[0]).values("crank_angle"))
     gaps = [b - a for a, b in zip(angles, [*angles[1:], angles[0] + 2.0 * math.pi], strict=True)]
@@ -314,6 +319,7 @@ def test_lumps_come_anywhere_in_a_turn(killed):
     assert max(gaps) < 2.0 * math.pi * (math.log(n) + 3.0) / n
 
 
+@pytest.mark.second
 def test_what_the_numbers_depend_on_is_in_the_name(killed):
     folder, _, _ = killed
     task = task_of(folder)
@@ -328,6 +334,7 @@ def test_what_the_numbers_depend_on_is_in_the_name(killed):
     assert task_of(folder, runs=20).digest() == digest
 
 
+@pytest.mark.second
 def test_a_run_that_fails_is_a_result(killed, tmp_path, monkeypatch):
     """Its numbers are missing, its event and the reason are kept, and the runs after it are the same."""
     task, good = task_of(killed[0], runs=5), block_runs.follow
@@ -351,6 +358,7 @@ def test_a_run_that_fails_is_a_result(killed, tmp_path, monkeypatch):
     assert result.quantiles["crank_torque_peak"] == {}
 
 
+@pytest.mark.second
 def test_a_damaged_batch_is_computed_anew_and_told(killed, tmp_path):
     (store,) = killed[0].glob("*.zarr")
     copy = shutil.copytree(store, tmp_path / store.name)
@@ -362,6 +370,7 @@ def test_a_damaged_batch_is_computed_anew_and_told(killed, tmp_path):
     assert reports == [(0, 50), (48, 50), (50, 50)] and content(copy) == content(store)
 
 
+@pytest.mark.second
 def test_a_machine_without_the_files_of_the_fmus_makes_the_same_runs(killed, tmp_path):
     """A parcel that has come over a wire holds all that a run needs."""
     parcel = monte_carlo.Parcel.of(task_of(killed[0]))

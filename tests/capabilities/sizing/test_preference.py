@@ -426,6 +426,7 @@ def check_order(config, first, name, tmp_path, monkeypatch, *motors):
     assert used > 0.95
 
 
+@pytest.mark.second
 def test_the_heavy_mill_gets_the_motor_without_a_flywheel(tmp_path, monkeypatch):
     """It got 0.55 kW with 2 poles, a ratio of 199, a flywheel of 200 rotors, and a start of 7.3 s; with the gear that
     was ordered for 0.75 kW it got that again."""
@@ -450,6 +451,7 @@ def test_the_heavy_mill_gets_the_motor_without_a_flywheel(tmp_path, monkeypatch)
     check_order(config, result, "heavy_mill", tmp_path, monkeypatch, *motors)
 
 
+@pytest.mark.second
 def test_the_beam_pump_gets_four_poles_and_one_gear(tmp_path, monkeypatch):
     """It got 2 poles and a ratio of 369, and again with the gear that was ordered."""
     motors = "IE3 2-pole 11 kW, 160M", "IE3 4-pole 11 kW, 160M", "IE3 6-pole 11 kW, 160L"
@@ -582,6 +584,7 @@ def test_a_motor_that_fails_from_the_worst_angle_makes_room_for_the_next(monkeyp
     assert all("time to start 5 s" in c.reason for c in others)
 
 
+@pytest.mark.second
 def test_the_next_motor_without_a_flywheel_is_sought_beyond_the_candidates(tmp_path, monkeypatch):
     """With `larger` = 1 the smallest motor is chosen, with its flywheel; beside it stands the one that needs none."""
     four = [m.designation for m in catalogue() if m.nameplate.poles == 4.0][:6]

@@ -395,6 +395,7 @@ def test_a_starter_that_is_recommended_holds_in_a_study_of_its_own(on_line, way,
     assert not [warning for warning in trial.warnings if warning.kind == "coupling opens in start"]
 
 
+@pytest.mark.second
 def test_an_inverter_as_a_way_is_tried_with_more_boost(on_line, monkeypatch):
     """The mill with 0.75 kW started with 15 % only, and was said to start with none."""
     tried = []
@@ -420,6 +421,7 @@ def test_an_inverter_as_a_way_is_tried_with_more_boost(on_line, monkeypatch):
     assert tried == [({0.05}, 5)] and none.numbers.start is None
 
 
+@pytest.mark.second
 def test_a_recommendation_rests_on_right_runs_alone(on_line):
     """With a residual of the energy that counts as wrong an overload is left out; with one of normal running there is
     no recommendation."""
@@ -445,6 +447,7 @@ def test_a_recommendation_rests_on_right_runs_alone(on_line):
         assert "the energy balance is not kept in" in sentence(study)
 
 
+@pytest.mark.second
 def test_the_sentence_on_a_coupling_names_both_shafts_and_its_effect(on_line):
     """It is withdrawn where it saves nothing; where it leaves more than the gear may carry, it says how much more."""
     shocks, ratio = sizing_of(on_line).setting.overloads, on_line.drive.ratio
@@ -486,6 +489,7 @@ def test_the_sentence_on_a_coupling_names_both_shafts_and_its_effect(on_line):
     assert effects(study, over.least, release=effect.release + 0.004)["blocked"].with_coupling > 900.0
 
 
+@pytest.mark.second
 def test_a_coupling_before_the_flywheel_carries_each_start_and_one_sided_feed(on_line):
     """Its torque in starts from eight angles and with all feed on either side, against single runs by hand."""
     drive = dataclasses.replace(on_line.drive, added_inertia=2.0 * on_line.drive.parameters.rotor.J)
@@ -510,6 +514,7 @@ def test_a_coupling_before_the_flywheel_carries_each_start_and_one_sided_feed(on
     assert way.numbers.running > 1.1 * steady
 
 
+@pytest.mark.second
 def test_a_coupling_that_starts_open_ends_the_study(on_line, tmp_path, monkeypatch):
     """The message names the torque of the start, and no coupling is held shut."""
     coupling = f"[coupling]\ntrip_torque = {sizing_of(on_line).setting.least_in_running}\n"
@@ -521,6 +526,7 @@ def test_a_coupling_that_starts_open_ends_the_study(on_line, tmp_path, monkeypat
         config.parse(heavy() + coupling + "held_in_start = true\n")
 
 
+@pytest.mark.second
 def test_a_higher_setting_and_a_dip_that_opens_it(on_line, tmp_path, monkeypatch):
     """A given coupling is judged and no other recommended: it opens where its setting is passed; a dip of the voltage
     that opens it is a nuisance. The stiffer stops of the assumption run without it."""
@@ -546,6 +552,7 @@ def test_a_higher_setting_and_a_dip_that_opens_it(on_line, tmp_path, monkeypatch
     assert "These peaks are without the safety coupling" in note
 
 
+@pytest.mark.second
 def test_the_torque_through_a_coupling_by_hand(on_line):
     """It is the torque of the motor less the one that accelerates the inertia on the motor's side, and less friction;
     between motor and flywheel less the rotor's own alone."""
@@ -560,6 +567,7 @@ def test_the_torque_through_a_coupling_by_hand(on_line):
     assert on_motor_side(heavier, behind) == pytest.approx(by_hand, rel=1e-9)
 
 
+@pytest.mark.second
 def test_a_slip_clutch_slips_for_as_long_as_two_shafts_apart(on_line):
     """While it slips it passes its setting on: motor and machine run as if each had this torque alone."""
     (clutch,) = [each for each in sizing_of(on_line).alternatives if each.way is Way.SLIP_CLUTCH]
@@ -583,6 +591,7 @@ def test_a_slip_clutch_slips_for_as_long_as_two_shafts_apart(on_line):
     assert clutch.numbers.slip_power == clutch.numbers.setting * on_line.config.run.crank_speed
 
 
+@pytest.mark.second
 def test_the_energy_of_a_start_with_a_slip_clutch(on_line):
     """The motor's energy is the heat of the slip, and the energy that the machine stores and loses."""
     setting = sizing_of(on_line).setting.least_in_running
@@ -624,6 +633,7 @@ def test_a_slip_clutch_by_hand():
     assert heat == pytest.approx(0.5 * J * w * w, rel=1e-3)
 
 
+@pytest.mark.second
 def test_without_a_shock_no_coupling_is_recommended(tmp_path, monkeypatch):
     study = ran(heavy("feed_left", "feed_right"), tmp_path, monkeypatch)
     assert sizing_of(study).setting.obstacle is Obstacle.OVERLOADS
@@ -631,6 +641,7 @@ def test_without_a_shock_no_coupling_is_recommended(tmp_path, monkeypatch):
     assert numbers["trip_torque"]["value"] is None and numbers["coupling"].startswith("No safety coupling")
 
 
+@pytest.mark.second
 def test_one_sided_feed_and_a_loaded_soft_start_are_normal_duty(tmp_path, monkeypatch):
     """Sizing has the torque of all feed on the right as the study has it, whatever side is the heavier. A start under
     load is no shock; what passes the gear is told."""
@@ -730,6 +741,7 @@ def test_the_order_names_the_starter():
     assert said("direct") == ""
 
 
+@pytest.mark.second
 def test_an_insufficient_motor_gets_no_advice(tmp_path, monkeypatch):
     study = ran(heavy("jam_left") + "[gear]\ntorque_limit = 250\n", tmp_path, monkeypatch)
     assert study.insufficient and sizing_of(study).setting is None
@@ -738,6 +750,7 @@ def test_an_insufficient_motor_gets_no_advice(tmp_path, monkeypatch):
     assert "Insufficient motor:" in text and "relay at" not in text
 
 
+@pytest.mark.second
 def test_a_coupling_that_never_opens_gets_a_remark(tmp_path):
 
     def light(force):
@@ -834,6 +847,7 @@ def largest(study, run, begin=0.0, end=None):
     return float(abs(study.runs[run]["motor.tau"].sel(time=slice(begin, end))).max()) * study.drive.ratio
 
 
+@pytest.mark.second
 def test_a_start_under_load_opens_a_given_coupling(tmp_path):
     """The start-up stays below its setting; the harder start does not, and a warning names it."""
     starts = event_line("start_loaded_left", "start_loaded_right")

@@ -407,6 +407,7 @@ def test_ratios_with_which_no_motor_keeps_the_speed_are_refused_before_any_run(t
             sized_by(parse(more), tmp_path, report)
 
 
+@pytest.mark.second
 def test_without_a_fit_the_study_goes_on_with_the_nearest(tmp_path, monkeypatch):
     """All that was asked is run, marked as insufficient, and the command ends with 1."""
     from chainunit.app import cli
@@ -477,6 +478,7 @@ def test_a_motor_at_its_rated_load_is_as_warm_as_its_nameplate_says():
     assert warm(p, 1e6, T_RATED, plate.speed) == math.inf
 
 
+@pytest.mark.second
 def test_above_the_corner_an_inverter_has_less_torque(tmp_path, monkeypatch):
     """Twice the rated frequency: the breakdown torque of the check is a quarter, roughly, of that at 50 Hz."""
     monkeypatch.setattr(sizing, "catalogue", lambda *files: small(1))

@@ -10,10 +10,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from ...core.quantities import Value, declaration, quantity
 from ...drives.catalogue_flexible import CatalogueFlexible
@@ -26,6 +25,9 @@ from .coupling_choice import CHOSEN, CouplingCandidate, tried, with_row
 from .row import CheckRow, NotChecked
 from .runs import largest
 from .tables import FlexibleCouplingTable
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _CLAUSE = "DIN 740-2:1986"
 _TURN = 2.0 * math.pi

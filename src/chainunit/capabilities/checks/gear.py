@@ -9,10 +9,9 @@ with the same teeth: they carry the largest torque of the turn in each turn, so 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from ...core.quantities import Value, declaration, quantity
 from ...drives.gear_rating import GearRating
@@ -28,6 +27,9 @@ from ...study.window import mean
 from .row import CheckRow, NotChecked
 from .runs import largest
 from .tables import GearRatingTable, MotorShaftTable
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _MAKER = "Rating of the maker of the gear"
 _UNTURNED = "no pin of the machine turns with the output shaft"

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Any
-
-import xarray as xr
+from typing import TYPE_CHECKING, Any
 
 from ...study.arrays import peak
 from ...study.event_torques import from_event_on
 from ...study.record import StudyRecord
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def _runs_from_events(study: StudyRecord) -> Iterator[tuple[str, xr.Dataset]]:

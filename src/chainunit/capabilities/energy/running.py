@@ -11,10 +11,9 @@ closes because each loss is read from another output than the electric power; wh
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from ...core.messages import unit_behind
 from ...core.quantities import Layout, Value, declaration, quantity
@@ -25,6 +24,9 @@ from ...study.rig import Rig
 from ...study.start_up import start_up
 from ...study.window import Window
 from .inverter import loss
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _HELD = 1e6
 """Factor on the heat capacity of a winding that keeps its temperature."""

@@ -7,10 +7,9 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from ...core.quantities import Layout, variable_of
 from ...reading.results import derived, part, result
@@ -29,6 +28,9 @@ from ...study.turn import TurnFindings
 from ...study.verdict import CREEPS, RESIDUAL, STEADY
 from .table import FlywheelTable
 from .wheel import FlywheelAnswers, Wheel
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 CLOSE = 0.03
 """The fluctuation with the least flywheel lies below the permitted one by at most this share of it."""

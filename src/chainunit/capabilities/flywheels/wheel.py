@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-
-import xarray as xr
+from typing import TYPE_CHECKING
 
 from ...core.quantities import Value, declaration, quantity
 from ...reading.results import derived, part, result
 from ...study.limits import Check
 from ...study.measures import same_measure
 from ...study.window import closes
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @declaration

@@ -7,10 +7,9 @@ from dataclasses import dataclass, field
 from datetime import UTC, date, datetime
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from ...core.errors import InputError, printable
 from ...reading.tables import file_bytes
@@ -18,6 +17,9 @@ from ...report.series import SERIES, STEADY_BEGIN
 from ...study.record import LOAD_CYCLE
 from ...study.stored_result import StoredResult, as_mapping, read_result
 from .cycle import ShaftCycle, load_cycle
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _CLOSE = 1e-6
 """Difference, relative to the largest value, up to which a series is that of load_cycle.csv, which has nine
@@ -125,6 +127,8 @@ def read_study(folder: Path) -> StudiedDrive:
     InputError
         where the folder has no complete result, or no steady turn of the motor's shaft.
     """
+    import xarray as xr
+
     result = read_result(folder)
     if not folder.is_dir():
         folder = result.file.parent

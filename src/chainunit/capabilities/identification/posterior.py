@@ -16,7 +16,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2
 
 from ...recordings.fit import NormalEquations, inverse
 from ...recordings.problem import OUTLIER, Problem
@@ -93,6 +92,8 @@ def _score(problem: Problem, best: NormalEquations) -> Any:
 
 def _active_bounds(problem: Problem, best: NormalEquations) -> dict[int, float]:
     """The places of the sought numbers whose bound is active, with the gradient towards it."""
+    from scipy.stats import chi2
+
     count, (low, high), pull = len(problem.sought), problem.bounds, _score(problem, best)
     near = 1e-6 * problem.prior_deviations
     at = np.where(best.z <= low + near, pull < 0.0, (best.z >= high - near) & (pull > 0.0))

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from ...core.quantities import quantity
 from ...fmu.backends import Backend, export
@@ -54,6 +53,8 @@ def neighbours(
     search: Search, x: Any, objective: CycleQuantity, limits: Sequence[TurnLimit], value: float
 ) -> Neighbours:
     """The quantities of the machines `around` x, and whether these meet the limits."""
+    import xarray as xr
+
     points = around(search, x)
     quantities = list({q.name: q for q in (objective, *(limit.quantity for limit in limits))}.values())
     machine = search.wishes.machine.replace(dict(zip(search.wishes.names, map(float, x), strict=True)))

@@ -6,9 +6,9 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from ...core.errors import InterruptedRunError, RunError
 from ...drives.induction_motor import SoftStart
@@ -38,6 +38,9 @@ from ...work.progress import TaskProgress
 from .coupling import effects
 from .inverter import boosts
 from .protection import MARGIN, Alternative, Setting, Way, WayNumbers
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 SOFT_STARTERS = ((0.5, 1.0), (0.5, 3.0), (0.4, 2.0), (0.4, 5.0), (0.3, 5.0), (0.3, 10.0))
 """Share of the voltage and ramp [s] of the soft starters that are tried, in this order."""
@@ -299,7 +302,8 @@ def slip_run(rig: Rig, start: StartNumbers, setting: float) -> xr.Dataset | None
     system = in_line({**behind, "clutch": ModelComponent(SlipClutch, p), "motor": parts["motor"]})
     signals = rig.signals(ramp=True)
     assert start.start_time is not None
-    piece, pieces, state = 0.25 * start.start_time + _SWING, list[xr.Dataset](), None
+    pieces: list[xr.Dataset] = []
+    piece, state = 0.25 * start.start_time + _SWING, None
     full, slip_time = STARTED * rig.operation.crank_speed * drive.driven_machine.ratio, 0.0
     for k in range(12):
         times = np.linspace(k * piece, (k + 1) * piece, int(piece / _ROWS) + 2)

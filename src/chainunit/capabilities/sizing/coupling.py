@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from ...drives.catalogue_couplings import CatalogueCoupling
 from ...study.arrays import peak
@@ -20,6 +20,9 @@ from ...study.torques import at_gear, gear_torque
 from ...study.verdict import STEADY
 from .parts import coupling_for
 from .protection import CouplingEffect, Setting, goal
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def recommended_setting(study: StudyRecord, couplings: Sequence[CatalogueCoupling] = ()) -> Setting | None:

@@ -6,9 +6,9 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from ...core.errors import InputError
 from ...drives.catalogue_gears import CatalogueGear
@@ -21,6 +21,9 @@ from ...study.limits import SPEED_DEVIATION, Check
 from ...study.readings import shaft_power
 from .candidate import Candidate
 from .table import PRICE
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 OWN_KEYS = (
     "sizing.gear_kind",

@@ -8,10 +8,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from ...core.engines import MATH
 from ...drives.catalogue import CatalogueMotor
@@ -45,6 +44,9 @@ from .duty import Duty, rms
 from .gear_rows import gear_checks
 from .table import Sizing
 from .task import SizingTask
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _GAP = "motor.air_gap_tau"
 _STANDS = 0.25

@@ -4,8 +4,7 @@ have been chosen, and a turn."""
 from __future__ import annotations
 
 from collections.abc import Iterator
-
-import xarray as xr
+from typing import TYPE_CHECKING
 
 from ...core.quantities import Layout
 from ...report import blocks as b
@@ -19,6 +18,9 @@ from ...study.torques import gear_torque
 from .analysis import StaticInertiaFindings
 from .runs import DutyNumbers, EventNumbers
 from .words import trial_words
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 PICTURE = "static_inertia.png"
 _MODELS = ("static", "with_terms")

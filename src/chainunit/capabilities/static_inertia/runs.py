@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from ...batch.transients import can_run
 from ...core.quantities import Value, declaration, quantity
@@ -25,6 +25,9 @@ from ...study.window import Window, whole_turns
 from ...system import Profile, Simulation
 from ...work.progress import Progress
 from .twin import SPEED
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _OF_STEADY = (
     "motor_torque_peak",

@@ -11,7 +11,6 @@ import math
 from typing import Any
 
 import numpy as np
-from scipy.signal import find_peaks
 
 from ...core.engines import numpy_
 from ...core.quantities import Value, declaration, quantity
@@ -277,6 +276,8 @@ class LineAnalysis:
 def _peaks(curve: Any) -> Any:
     """Indices of the inner maxima with a prominence of at least 2 %, which is above the ripple of torques
     that are sampled once a step."""
+    from scipy.signal import find_peaks
+
     is_known = np.isfinite(curve)
     if not is_known.any():
         return []

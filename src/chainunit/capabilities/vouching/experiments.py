@@ -17,7 +17,6 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.integrate import cumulative_simpson
 
 from ...core.engines import MATH
 from ...core.errors import InputError
@@ -218,6 +217,8 @@ def balance_of(names: Sequence[str]) -> EnergyBalance | None:
 
 def energy_residual(run: TimeTable, balance: EnergyBalance) -> tuple[float, float]:
     """The largest missing energy of a run, and the energy that went to and fro [J]."""
+    from scipy.integrate import cumulative_simpson
+
     column = dict(zip(run.names, run.values.T, strict=True))
     lost = cumulative_simpson(sum(column[n] for n in balance.losses), x=run.time, initial=0.0)
     if len(balance.supply) == 2:

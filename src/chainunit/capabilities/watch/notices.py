@@ -4,10 +4,9 @@ the rocker has carried by then."""
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from ...core.quantities import Value, declaration, quantity
 from ...machines.chain_unit import SIDES
@@ -18,6 +17,9 @@ from ...study.drive import Drive
 from ...study.event_torques import from_event_on
 from ...study.organ_limits import slack_and_mode
 from ...study.record import StudyRecord
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 AT_LIMIT = 0.99
 """Share of the limit of its current from which a motor counts as at the limit."""

@@ -1,19 +1,22 @@
 """Instructions of WebAssembly for lists of operations.
 
 A value that one operation takes stays on the stack; others are kept in locals, which are used again as soon as
-nothing needs their value. Functions beyond the basic operations are those of `chainunit.core.native.elementary`.
+nothing needs their value, the first ones first: their numbers are short, and operations that stand again and again
+have bytes that a packer finds again. Functions beyond the basic operations are those of
+`chainunit.core.native.elementary`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import Any
+from heapq import heappop, heappush
 
 from ..errors import InputError
 from ..native.elementary import OWN, ROOT_OF_HALF, recording
 from ..native.operations import NUMBER, Operation
 from ..native.recorder import CHOOSE, EXPONENT, MANTISSA, POWER2
+from ..native.repeats import Called
 from .encoding import Function, Module
 
 Store = Callable[[int, Callable[[], None]], None]
@@ -35,11 +38,24 @@ _DIGITS, _BIAS = 52, 1023
 
 
 class OwnFunctions:
-    """The functions of a module that compute sine, arctangent and the like, each written at its first use."""
+    """The functions of a module that compute sine, arctangent and the like, and those that `add` brings, each written
+    at its first use."""
 
     def __init__(self, module: Module) -> None:
         self._module = module
-        self._written: dict[Any, Function] = {}
+        self._added: dict[str, Called] = {}
+        self._written: dict[str, Function] = {}
+
+    def add(self, called: Mapping[str, Called]) -> None:
+        """Functions for further kinds of operations."""
+        self._added |= called
+
+    def called(self, kind: str) -> Called | None:
+        """The function that computes operations of this kind; None where none does."""
+        if kind in self._added or kind not in OWN:
+            return self._added.get(kind)
+        function, arguments, result = OWN[kind]
+        return Called(function.__name__, recording(kind), arguments, result)
 
     def of(self, kind: str) -> Function:
         """The function that computes operations of this kind.
@@ -49,21 +65,21 @@ class OwnFunctions:
         InputError
             for an operation that no function computes.
         """
-        if kind not in OWN:
+        called = self.called(kind)
+        if called is None:
             raise InputError(
                 f"{kind.lower()}: this function of an equation cannot be written as WebAssembly; a power x**y is "
                 "exp(y*log(x)), the others follow from sin, cos, asin, acos, atan2, exp and log"
             )
-        function, arguments, _ = OWN[kind]
-        if function not in self._written:
-            recorded = recording(kind)
-            own = self._module.function(["f64"] * arguments, ["f64"] * len(recorded.results))
-            self._written[function] = own
+        if called.key not in self._written:
+            recorded = called.function
+            own = self._module.function(["f64"] * called.arguments, ["f64"] * len(recorded.results))
+            self._written[called.key] = own
             writer = Writer(own, self, recorded.items, lambda place: own.get(recorded.items[place].entry[1]))
             writer.write(range(len(recorded.items)), recorded.results)
             for place in recorded.results:
                 writer.push(place)
-        return self._written[function]
+        return self._written[called.key]
 
 
 class Writer:
@@ -114,7 +130,7 @@ class Writer:
             if store is not None and root in kept and root in self._local:
                 store(root, partial(self.push, root))
                 if alone:
-                    self._free.append(self._local.pop(root))
+                    heappush(self._free, self._local.pop(root))
 
     def push(self, place: int) -> None:
         """Push the value of an operation."""
@@ -132,22 +148,21 @@ class Writer:
                 uses[operand] = uses.get(operand, 0) + _OFTEN.get(each.kind, 1)
         self._inside, self._uses = set(inside), uses
         self._deferred: set[int] = set()
-        self._twins: dict[tuple[Any, tuple[int, ...]], dict[int, int]] = {}
+        self._twins: dict[tuple[str, tuple[int, ...]], dict[int, int]] = {}
         sizes: dict[int, int] = {}
         for place in inside:
             each = self._items[place]
-            if self._twin(place):
-                function, _, result = OWN[each.kind]
-                self._twins.setdefault((function, each.operands), {})[result] = place
+            if (called := self._twin(place)) is not None:
+                self._twins.setdefault((called.key, each.operands), {})[called.result] = place
                 continue
             sizes[place] = 1 + sum(sizes[k] for k in each.operands if k in self._deferred)
             if uses.get(place) == 1 and place not in kept and sizes[place] <= _DEEPEST:
                 self._deferred.add(place)
 
-    def _twin(self, place: int) -> bool:
-        """Whether a function gives the value of this operation with that of another one, as sine and cosine."""
-        kind = self._items[place].kind
-        return kind in OWN and len(recording(kind).results) > 1
+    def _twin(self, place: int) -> Called | None:
+        """The function that gives the value of this operation with that of another one, as sine and cosine."""
+        called = self._own.called(self._items[place].kind)
+        return called if called is not None and len(called.function.results) > 1 else None
 
     def _leaves(self, root: int) -> Iterator[int]:
         """The values in locals that an operation takes, with all that is not in a local behind it."""
@@ -160,17 +175,16 @@ class Writer:
                 yield operand
 
     def _keep(self, place: int) -> None:
-        self._local[place] = self._free.pop() if self._free else self._function.local()
+        self._local[place] = heappop(self._free) if self._free else self._function.local()
         self._function.set(self._local[place])
 
     def _keep_results(self, place: int) -> None:
         """Pop the value of an operation, or the values of one and its twins, into locals."""
-        if not self._twin(place):
+        if (called := self._twin(place)) is None:
             self._keep(place)
             return
-        each = self._items[place]
-        places = self._twins[OWN[each.kind][0], each.operands]
-        for result in reversed(range(len(recording(each.kind).results))):
+        places = self._twins[called.key, self._items[place].operands]
+        for result in reversed(range(len(called.function.results))):
             if result in places:
                 self._keep(places[result])
             else:
@@ -179,7 +193,7 @@ class Writer:
     def _release(self, root: int, leaves: dict[int, list[int]], last: dict[int, int]) -> None:
         for leaf in leaves[root]:
             if last.get(leaf) == root and leaf in self._local:
-                self._free.append(self._local.pop(leaf))
+                heappush(self._free, self._local.pop(leaf))
 
     def _push_value(self, place: int) -> None:
         """Push the value of an operation that is in no local, with the instructions that compute it."""
@@ -191,7 +205,7 @@ class Writer:
         elif each.kind in _PLAIN:
             self._push_all(each)
             f.do(f"f64.{_PLAIN[each.kind]}")
-        elif each.kind in OWN:
+        elif self._own.called(each.kind) is not None:
             function = self._own.of(each.kind)
             self._push_all(each)
             f.call(function)

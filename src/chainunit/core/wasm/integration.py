@@ -88,7 +88,7 @@ def even(parts: RunParts, most: int) -> Function:
     f.f64(1e-9)
     f.do("f64.sub")
     f.set(count)
-    _leave_where_more(f, count, most)
+    leave_where_more(f, count, most)
     f.f64(1.0)
     f.get(count)
     f.do("f64.ceil", "f64.max")
@@ -122,7 +122,7 @@ def even(parts: RunParts, most: int) -> Function:
     return f
 
 
-def _leave_where_more(f: Function, count: int, most: int) -> None:
+def leave_where_more(f: Function, count: int, most: int) -> None:
     """Return 0 where the number in a local is larger than that at an address."""
     f.get(count)
     f.at(most)
@@ -144,30 +144,20 @@ class Controlled:
         self._since, self._taken, self._left, self._h = f.local(), f.local(), f.local(), f.local()
         self._pace, self._error, self._following, self._sum = f.local(), f.local(), f.local(), f.local()
         self._usable, self._last = f.local("i32"), f.local("i32")
-        self._stages = parts.memory.room("stages", parts.states * len(integrators.NODES))
+        self._stages = parts.memory["stages"]
 
     def write(self, most: int) -> Function:
         """The function; the parameter for the most substeps is at an address."""
         f, memory, parts = self._f, self._memory, self._parts
         f.call(parts.written["tolerance"])
         f.copy(memory["now"], memory["states"], parts.room)
-        f.at(memory["pace"])
-        f.set(self._pace)
-        f.f64(integrators.FIRST)
-        f.get(self._longest)
-        f.do("f64.mul")
-        f.get(self._pace, self._pace)
-        f.f64(0.0)
-        f.do("f64.eq")
-        # of two the first where the condition holds
-        f.do("select")
-        f.set(self._pace)
+        self._known_pace()
         with f.block(), f.loop():
             f.get(self._since, self._step)
             f.do("f64.ge")
             f.leave_if(1)
             self._increase(self._taken, 1.0)
-            _leave_where_more(f, self._taken, most)
+            leave_where_more(f, self._taken, most)
             self._choose_size()
             self._trial()
             self._judge()
@@ -179,6 +169,21 @@ class Controlled:
             f.get(self._pace)
         f.i32(1)
         return f
+
+    def _known_pace(self) -> None:
+        """The next substep: that of memory, or the first of all."""
+        f = self._f
+        f.at(self._memory["pace"])
+        f.set(self._pace)
+        f.f64(integrators.FIRST)
+        f.get(self._longest)
+        f.do("f64.mul")
+        f.get(self._pace, self._pace)
+        f.f64(0.0)
+        f.do("f64.eq")
+        # of two the first where the condition holds
+        f.do("select")
+        f.set(self._pace)
 
     def _increase(self, place: int, by: float) -> None:
         self._f.get(place)
@@ -205,22 +210,31 @@ class Controlled:
 
     def _trial(self) -> None:
         """The states after the substep, and the derivatives at its stages."""
-        f, memory, parts, states = self._f, self._memory, self._parts, self._states
+        f, memory, states = self._f, self._memory, self._states
+        self._first_stage()
         for k, (node, weights) in enumerate(zip(integrators.NODES, integrators.STAGES, strict=True)):
-            if weights:
+            if k:
                 with states.each(), states.into(memory["states"]):
                     states.push(memory["now"])
                     f.get(self._h)
                     states.weighted(weights, self._stages)
                     f.do("f64.mul", "f64.add")
-            else:
-                f.copy(memory["states"], memory["now"], parts.room)
-            f.get(self._begin, self._since, self._h)
-            f.f64(node)
-            f.do("f64.mul", "f64.add", "f64.add")
-            f.call(parts.signals)
-            f.call(parts.written["derivatives"])
-            f.copy(self._stages + k * parts.room, memory["derivatives"], parts.room)
+                self._stage(k, node)
+
+    def _first_stage(self) -> None:
+        """The derivatives at the begin of the substep."""
+        self._f.copy(self._memory["states"], self._memory["now"], self._parts.room)
+        self._stage(0, integrators.NODES[0])
+
+    def _stage(self, k: int, node: float) -> None:
+        """The derivatives at a stage, whose states are in memory."""
+        f, memory, parts = self._f, self._memory, self._parts
+        f.get(self._begin, self._since, self._h)
+        f.f64(node)
+        f.do("f64.mul", "f64.add", "f64.add")
+        f.call(parts.signals)
+        f.call(parts.written["derivatives"])
+        f.copy(self._stages + k * parts.room, memory["derivatives"], parts.room)
 
     def _judge(self) -> None:
         """Whether states and derivatives are finite, and the error over the permitted one."""
@@ -264,8 +278,8 @@ class Controlled:
         self._f.do("f64.mul")
 
     def _accept(self) -> None:
-        """Take the states over, corrected to the model's constraints, where the error permits it."""
-        f, memory, parts = self._f, self._memory, self._parts
+        """Take the states over where the error permits it."""
+        f = self._f
         f.get(self._usable)
         f.do("i32.eqz")
         f.get(self._last)
@@ -284,11 +298,16 @@ class Controlled:
             f.get(self._h, self._left)
             f.do("f64.ge", "select")
             f.set(self._since)
-            f.get(self._begin, self._since)
-            f.do("f64.add")
-            f.call(parts.signals)
-            f.call(parts.written["closed"])
-            f.copy(memory["now"], memory["closed"], parts.room)
+            self._take()
+
+    def _take(self) -> None:
+        """Take the states over, corrected to the model's constraints."""
+        f, memory, parts = self._f, self._memory, self._parts
+        f.get(self._begin, self._since)
+        f.do("f64.add")
+        f.call(parts.signals)
+        f.call(parts.written["closed"])
+        f.copy(memory["now"], memory["closed"], parts.room)
 
     def _next_size(self) -> None:
         """The substep that the error suggests."""

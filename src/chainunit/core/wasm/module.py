@@ -14,7 +14,8 @@ memory, at addresses that the description names.
 ``forward(groups)``
     the change of these outputs, and by one bit more of the derivatives, along changes of inputs and states
 ``run(begin, step, longest, rows, signals, chosen, into, groups)``
-    a run in the time, see `chainunit.core.wasm.runs`
+    a run in the time, see `chainunit.core.wasm.runs`; and ``dense(...)``, in fewer substeps, where the states have no
+    constraints
 
 The bytes follow from the equations alone. Each engine computes the same bits: the module calls no function of its
 host.
@@ -33,6 +34,7 @@ from ..model import Model, Requirement
 from ..native.division import Division
 from ..native.kernels import ModelFunction, groups_without_slopes, kernels, output_groups
 from ..native.operations import ARGUMENT, NUMBER, Operations
+from ..native.repeats import outlined
 from ..quantities import Variable
 from ..symbolic_trace import chosen_columns, outputs_of, trace
 from .encoding import Function, Module
@@ -85,7 +87,7 @@ def wasm_module(
             written[kernel.name] = _kernel(kernel, groups, memory, module, own)
     if model.state_layout:
         _start(model, memory, module, written)
-        write_run(model, memory, module, own, written)
+        write_run(t, memory, module, own, written)
     _fill(model, memory, module)
     return WasmModule(module.bytes_of(memory.size), _description(model, outputs, groups, memory, module))
 
@@ -96,6 +98,10 @@ def _kernel(
     """Write a kernel: a function for each part of its operations, and one that calls the needed parts."""
     operations = Operations(kernel.arguments, kernel.groups)
     items, results = operations.items, operations.results
+    if kernel.frequency == "ONCE":
+        short = outlined(items, results, kernel.name)
+        items, results = short.items, short.results
+        own.add(short.called)
     division = Division(items, results, _LONGEST)
     addresses = _addresses(kernel, groups, results, memory)
     # a result is computed to its place; one that stands twice, or is an argument or a number, is copied there

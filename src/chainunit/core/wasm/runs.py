@@ -7,6 +7,10 @@ A model with error control has that (`controlled`); its next substep [s] is in m
 ``start()`` sets to 0, as none is known. All others have equal substeps (`rk4`). Substeps are at most `longest` [s],
 or, where that is 0, as long as the model allows. At the end, the memory has the states of the last row.
 
+``dense(...)``, of the same arguments, is for models with error control and without constraints on their states. Its
+substeps end where a change of a profile begins or ends, and not at every row; the states of a row are interpolated,
+see `chainunit.core.wasm.interpolation`.
+
 ``signals`` is the address of a table, or 0: the number of signals, and from the next 8 bytes on 24 bytes for each:
 the address of an input, the kind of the signal, its number of points or changes, the address of its numbers, and a
 place for the point where it was read last, 0 at the begin; all whole numbers of 4 bytes, and 4 bytes free.
@@ -26,10 +30,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from .. import integrators
-from ..model import Model
+from ..symbolic_trace import Trace
 from .encoding import Function, Module
 from .expressions import OwnFunctions
 from .integration import Controlled, RunParts, StateLoop, even
+from .interpolation import Reaching
 from .memory import BYTES, Places
 from .signals import add, signals
 
@@ -38,9 +43,10 @@ RUN_PLACES = ("internal_step", "pace")
 
 
 def write_run(
-    model: type[Model], memory: Places, module: Module, own: OwnFunctions, written: Mapping[str, Function]
+    t: Trace, memory: Places, module: Module, own: OwnFunctions, written: Mapping[str, Function]
 ) -> None:
-    """Write the functions of runs."""
+    """Write the functions of runs of a traced model."""
+    model = t.model
     assert model.state_layout is not None
     n = len(model.state_layout.names)
     memory.room("table of signals", 1)
@@ -50,19 +56,29 @@ def write_run(
     if model.controlled:
         nominal = memory.room("nominal", n)
         module.fill(nominal, [v.quantity.nominal or 1.0 for v in model.state_layout.variables])
-        advance = Controlled(parts).write(most)
-    else:
-        advance = even(parts, most)
-    _run(parts, advance)
+        memory.room("stages", n * len(integrators.NODES))
+    memory.room("row", n)
+    _run(parts, Controlled(parts).write(most) if model.controlled else even(parts, most))
+    if model.controlled and t.is_free:
+        path = Reaching(parts)
+        _run(parts, path.write(most), path)
 
 
-def _run(parts: RunParts, advance: Function) -> None:
-    """The function of runs."""
+def _run(parts: RunParts, advance: Function, path: Reaching | None = None) -> None:
+    """The function of runs; `advance` ends at each row, or goes on along a path."""
     memory, written = parts.memory, parts.written
-    f = parts.module.function(["f64", "f64", "f64", "i32", "i32", "i32", "i32", "i32"], ["i32"], "run")
+    name = "run" if path is None else "dense"
+    f = parts.module.function(["f64", "f64", "f64", "i32", "i32", "i32", "i32", "i32"], ["i32"], name)
     begin, step, longest, rows, table, chosen, into, groups = range(8)
-    row, time, left, source = f.local("i32"), f.local(), f.local("i32"), f.local("i32")
-    x, kept, states = memory["states"], memory.room("row", parts.states), StateLoop(f, parts)
+    row, time, left, source, end = f.local("i32"), f.local(), f.local("i32"), f.local("i32"), f.local()
+    x, kept, states = memory["states"], memory["row"], StateLoop(f, parts)
+
+    def time_of_row() -> None:
+        f.get(begin, row)
+        f.do("f64.convert_i32_u")
+        f.get(step)
+        f.do("f64.mul", "f64.add")
+
     with f.into(memory["table of signals"], "i32"):
         f.get(table)
     f.get(longest)
@@ -73,14 +89,19 @@ def _run(parts: RunParts, advance: Function) -> None:
         f.at(memory["internal_step"])
         f.set(longest)
     sum_ = f.local()
+    if path is not None:
+        path.begin_at(f, begin)
+        f.get(begin, rows)
+        f.i32(1)
+        f.do("i32.sub", "f64.convert_i32_u")
+        f.get(step)
+        f.do("f64.mul", "f64.add")
+        f.set(end)
     with f.block(), f.loop():
         f.get(row, rows)
         f.do("i32.ge_s")
         f.leave_if(1)
-        f.get(begin, row)
-        f.do("f64.convert_i32_u")
-        f.get(step)
-        f.do("f64.mul", "f64.add")
+        time_of_row()
         f.set(time)
         f.get(time)
         f.call(parts.signals)
@@ -109,8 +130,15 @@ def _run(parts: RunParts, advance: Function) -> None:
         f.do("i32.ge_s")
         f.leave_if(1)
         f.copy(kept, x, parts.room)
-        f.get(time, step, longest)
-        f.call(advance)
+        if path is None:
+            f.get(time, step, longest)
+            f.call(advance)
+        else:
+            time_of_row()
+            f.set(time)
+            f.get(time, end, longest)
+            f.call(advance)
+            path.states_at(f, states, time)
         f.f64(0.0)
         f.set(sum_)
         with states.each():

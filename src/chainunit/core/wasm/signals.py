@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import math
+
 from .encoding import Function, Module
 from .memory import BYTES, Places
 
@@ -51,6 +53,72 @@ def signals(memory: Places, module: Module) -> Function:
             add(f, record, RECORD)
             add(f, left, -1)
             f.leave(0)
+    return f
+
+
+def next_bend(memory: Places, module: Module) -> Function:
+    """The function that gives the first time behind a time at which a change of a profile begins or ends; infinity
+    where none does."""
+    f = module.function(["f64"], ["f64"])
+    time, record, left, at, changes = 0, f.local("i32"), f.local("i32"), f.local("i32"), f.local("i32")
+    bend, candidate = f.local(), f.local()
+
+    def earlier() -> None:
+        """Take the candidate on the stack where it lies behind the time."""
+        f.set(candidate)
+        f.get(candidate)
+        f.f64(math.inf)
+        f.get(candidate, time)
+        f.do("f64.gt", "select")
+        f.get(bend)
+        f.do("f64.min")
+        f.set(bend)
+
+    f.f64(math.inf)
+    f.set(bend)
+    f.at(memory["table of signals"], "i32")
+    f.set(record)
+    with f.block():
+        f.get(record)
+        f.do("i32.eqz")
+        f.leave_if(0)
+        f.get(record)
+        f.load("i32")
+        f.set(left)
+        add(f, record, 8)
+        with f.loop():
+            f.get(left)
+            f.do("i32.eqz")
+            f.leave_if(1)
+            f.get(record)
+            f.load("i32", 12)
+            f.set(at)
+            f.get(record)
+            f.load("i32", 4)
+            f.get(record)
+            f.load("i32", 8)
+            f.do("i32.mul")  # no changes of lines, whose kind is 0
+            f.set(changes)
+            with f.block(), f.loop():
+                f.get(changes)
+                f.do("i32.eqz")
+                f.leave_if(1)
+                f.get(at)
+                f.load("f64", BYTES)
+                earlier()
+                f.get(at)
+                f.load("f64", BYTES)
+                f.get(at)
+                f.load("f64", 2 * BYTES)
+                f.do("f64.add")
+                earlier()
+                add(f, at, 3 * BYTES)
+                add(f, changes, -1)
+                f.leave(0)
+            add(f, record, RECORD)
+            add(f, left, -1)
+            f.leave(0)
+    f.get(bend)
     return f
 
 

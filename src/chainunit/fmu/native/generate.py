@@ -8,22 +8,30 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from functools import lru_cache
 from string import Formatter
 from typing import Any
 
 from ...core import integrators, messages
 from ...core.integrators import MAX_STEPS
+from ...core.model import Model
 from ...core.native.c_forms import constant, number
 from ...core.native.code import Program
 from ...core.native.kernels import difference_groups, output_groups
 from ...core.native.kernels import kernels as kernels_of
 from ...core.quantities import Variable
-from ..description import Interface
+from ..description import Interface, shared_interface
 
 
 def kernels(interface: Interface) -> tuple[str, int]:
-    """``kernels.c`` with the model's functions, and the memory that they need, as a number of doubles."""
-    programs = list(_programs(interface))
+    """``kernels.c`` with the model's functions, and the memory that they need, as a number of doubles. Start values
+    and the version of FMI do not change them."""
+    return _kernels(interface.model)
+
+
+@lru_cache(maxsize=16)
+def _kernels(model: type[Model]) -> tuple[str, int]:
+    programs = list(_programs(shared_interface(model)))
     table = [f"    .{program.name} = kernel_{program.name}," for program in programs]
     text = "\n".join([_BEFORE_KERNELS, *(program.text for program in programs), _TABLE, *table, "};", ""])
     return text, max(program.room for program in programs)

@@ -239,6 +239,22 @@ const liveModel = async (data, bytes) => {
     return g.friction + drag;
   };
 
+  // runs of which each goes on where the one before ends, as one
+  const joined = (runs) => {
+    const all = { made: 1 - runs.length, wanted: 1 - runs.length };
+    for (const each of runs) for (const count of ["made", "wanted"]) all[count] += each[count];
+    for (const name of Object.keys(runs[0]).filter((each) => !(each in all))) {
+      all[name] = new Float64Array(all.made);
+      let at = 0;
+      runs.forEach((each, n) => {
+        const rows = n ? each[name].subarray(1) : each[name];
+        all[name].set(rows, at);
+        at += rows.length;
+      });
+    }
+    return all;
+  };
+
   class Runs {
     constructor(values) {
       const of = data.runs, k = (this.k = runsKernel);
@@ -312,7 +328,9 @@ const liveModel = async (data, bytes) => {
       whole[numbers / 4] = count;
       this.columns.forEach((name, n) => (whole[numbers / 4 + 2 + n] = 8 * k.index[name]));
       const into = numbers + chosen;
-      const made = k.functions.run(begin, step, this.of.longest, rows, at, numbers, into, 1);
+      // between the steps of the integrator where the module interpolates
+      const go = k.functions.dense ?? k.functions.run;
+      const made = go(begin, step, this.of.longest, rows, at, numbers, into, 1);
       const found = { time: new Float64Array(made), made, wanted: rows };
       for (const name of this.columns) found[name] = new Float64Array(made);
       for (let r = 0; r < made; r++) {
@@ -335,9 +353,17 @@ const liveModel = async (data, bytes) => {
       for (const [name, s] of Object.entries(signals)) this.k.set(name, s.start);
     }
 
-    // the time of the step that the integrator took last is no part of the states
+    // the next step of the integrator, 0 where none is known; it is no part of the states
+    get pace() {
+      return this.k.numbers[this.k.places.pace / 8];
+    }
+
+    set pace(step) {
+      this.k.numbers[this.k.places.pace / 8] = step;
+    }
+
     forget() {
-      this.k.numbers[this.k.places.pace / 8] = 0;
+      this.pace = 0;
     }
 
     rowsOf(time) {
@@ -367,18 +393,30 @@ const liveModel = async (data, bytes) => {
     // start-up, with the feed of an event that is a start
     start(event = null) {
       const changes = event ? this.eventSignals(event, 0, () => 0) : {};
-      let signals = this.signals(changes, true);
+      const signals = this.signals(changes, true);
       this.setInputs(signals);
       this.k.functions.start();
       const fed = this.of.empty_start ? 2 : 1, time = this.rampEnd + fed * this.of.settle_turns * this.turnTime;
-      if (!this.of.empty_start || event) return this.run(0, this.rowsOf(time), signals);
-      const free = this.run(0, this.rowsOf(time), signals), speed = this.crank(free).speed;
-      const row = speed.findIndex((w) => w >= this.of.started * this.speed);
-      const from = row < 0 ? this.rampEnd + this.of.settle_turns * this.turnTime : Math.max(free.time[row], this.of.switched_until);
-      signals = this.signals({}, true, from);
-      this.setInputs(signals);
-      this.k.functions.start();
-      return this.run(0, this.rowsOf(Math.max(time, from + this.of.settle_turns * this.turnTime)), signals);
+      return this.of.empty_start && !event ? this.fedOnTheWay(time, signals) : this.run(0, this.rowsOf(time), signals);
+    }
+
+    // from rest for so long at least: empty, turn by turn, up to the one in which the crank is fast enough, and from
+    // there on with the feed; a crank that is never fast enough gets it late
+    fedOnTheWay(time, empty) {
+      const late = this.rampEnd + this.of.settle_turns * this.turnTime, size = this.rowsOf(this.turnTime), runs = [];
+      let begin = 0, from = null, other = null;
+      while (from === null) {
+        let here = { begin, count: runs.length, states: this.states, pace: this.pace };
+        const run = this.run(begin, size, empty), row = this.crank(run).speed.findIndex((w) => w >= this.of.started * this.speed);
+        begin += (size - 1) * this.of.step;
+        if (begin > late) other = other ?? here;
+        if (row >= 0) from = Math.max(run.time[row], this.of.switched_until);
+        else if (run.made < size || begin > time) [from, here] = [late, other ?? here];
+        else runs.push(run);
+        if (from !== null) [begin, this.states, this.pace, runs.length] = [here.begin, here.states, here.pace, here.count];
+      }
+      const until = Math.max(time, from + this.of.settle_turns * this.turnTime);
+      return joined([...runs, this.run(begin, this.rowsOf(until - begin), this.signals({}, true, from))]);
     }
 
     // the last turns of steady running, from the states in memory on; null where the motor does not settle

@@ -7,10 +7,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from ...core.engines import MATH
 from ...core.quantities import Value, declaration, quantity, variables
@@ -21,6 +20,9 @@ from ...reading.text import number
 from ..arrays import peak
 from ..drive import Drive
 from ..readings import turns_made
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 LONGEST_STEP = 0.3
 """Largest product of communication step and natural frequency; above it the coupling excites the vibration

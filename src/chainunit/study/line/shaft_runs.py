@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from ...core.engines import numpy_
 from ...core.errors import RunError
@@ -30,6 +29,9 @@ from .shaft import (
     shaft_answers,
     with_rigid,
 )
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @result
