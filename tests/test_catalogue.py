@@ -535,7 +535,8 @@ def test_templates_follow_from_the_declarations(tmp_path, kind):
     first = next(csv.reader(io.StringIO(kind.template())))
     assert [each.partition(" ")[0] for each in first] == [*kind.columns]
     found = offer(file)
-    (item,) = {"motor": found.motors, "gear": found.gears, "coupling": found.couplings}[kind.name]
+    items = zip(KINDS, (found.motors, found.gears, found.couplings, found.flexible), strict=True)
+    (item,) = {each.name: own for each, own in items}[kind.name]
     assert "made up" in item.source and item.order_number and item.price
 
 
@@ -543,11 +544,16 @@ def test_the_command_writes_templates_and_checks_files(tmp_path):
     written = chainunit("catalogue", "--template", cwd=tmp_path)
     assert written.returncode == 0 and "each row needs designation, ratio, rated_torque" in written.stdout
     files = sorted((tmp_path / "catalogue").iterdir())
-    assert [file.name for file in files] == ["gears.csv", "motors.csv", "safety_couplings.csv"]
+    assert [file.name for file in files] == [
+        "flexible_couplings.csv",
+        "gears.csv",
+        "motors.csv",
+        "safety_couplings.csv",
+    ]
     names = [str(file) for file in files]
     right = chainunit("catalogue", *names, cwd=tmp_path)
     assert right.returncode == 0 and "every row is right" in right.stdout and "1 gear" in right.stdout
-    gears = files[0]
+    gears = files[1]
     gears.write_text(gears.read_text().replace(",0.94,", ",94,").replace("99.7,1600", "99.7,-1"))
     wrong = chainunit("catalogue", *names, cwd=tmp_path)
     lines = wrong.stderr.splitlines()

@@ -6,11 +6,15 @@ import builtins
 import json
 import re
 from dataclasses import replace
+from html import unescape
+from importlib import resources
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 from chainunit import InputError
+from chainunit.capabilities.checks.pins import turning_pins
 from chainunit.report import blocks as b
 from chainunit.report import pdf
 from chainunit.report import study as study_report
@@ -35,6 +39,13 @@ step = 0.004
 crank_speed = 6
 [machine]
 ratio = 25
+[bearing.C]
+kind = "ball"
+C = "60 kN"
+C0 = "50 kN"
+[bearing.A1]
+kind = "roller"
+C = "60 kN"
 [[event]]
 type = "jam"
 side = "left"
@@ -55,7 +66,9 @@ def made(study):
 def test_the_sheet_has_each_section_once(study, made):
     names = [each.name for each in (*made.sections, *made.annex)]
     assert len(names) == len(set(names))
-    assert names[:3] == ["question", "answer", "assumptions"] and {"unchecked", "runs"} <= set(names)
+    assert names[:4] == ["question", "answer", "checks", "assumptions"] and {"unchecked", "runs"} <= set(
+        names
+    )
     whole = {each.name for each in study_report.report(study).sections}
     assert whole - set(names) == {"live", "motion"}, "what moves is not on paper, all else is"
     assert made.block["Project"] == "Quarry 7" and made.block["Revision"] == "B"
@@ -160,6 +173,43 @@ def test_a_study_clears_the_sheet_of_an_earlier_one():
     assert pdf.NAME in TASK.files and pdf.NAME in SHEET_TASK.files
 
 
+def test_blocks_for_the_sheet_stand_in_place_of_the_long_ones_which_are_in_the_annex(study):
+    long, own, both = (b.Text("long", form="long"), b.Text("own", form="sheet"), b.Text("both"))
+    whole = study_report.report(study)
+    checks = b.Section("checks", "Checks by clause", (long, own, both))
+    others = (each for each in whole.sections if each.name != "checks")
+    made = sheet(study, replace(whole, sections=(*others, checks)))
+    on_sheet = {each.name: each for each in made.sections}
+    in_annex = {each.name: each for each in made.annex}
+    assert [each.line for each in on_sheet["checks"].blocks] == ["own", "both"]
+    assert in_annex["checks_in_full"].blocks == (long,)
+    # neither the page nor the terminal has the block of the sheet
+    assert b.of_form(checks.blocks, "long") == [long, both] and b.of_form(checks.blocks, "short") == [both]
+
+
+def test_each_check_of_the_sheet_names_its_clause_and_formula(study, made):
+    (section,) = (each for each in made.sections if each.name == "checks")
+    rows = study_report.report(study).result["checks"]["rows"]
+    (table,) = (each for each in section.blocks if isinstance(each, b.Table))
+    assert len(table.rows) == len(rows) > 0
+    laws = [each.line for each in section.blocks if isinstance(each, b.Text) and each.role == "note"]
+    assert len(laws) == len(set(laws)) == len({(row["clause"], row["formula"]) for row in rows})
+    for row, check in zip(table.rows, rows, strict=True):
+        assert not row.note
+        (law,) = (each for each in laws if each.startswith(f"{row.cells[-1]} "))
+        assert law == f"{row.cells[-1]} {check['clause']}. {check['formula']}"
+    (full,) = (each for each in made.annex if each.name == "checks_in_full")
+    assert [len(each.rows) for each in full.blocks if isinstance(each, b.Table)] == [len(rows)]
+    assert all(row.note for each in full.blocks if isinstance(each, b.Table) for row in each.rows)
+
+
+def test_things_that_were_not_checked_for_one_reason_share_a_line(study, made):
+    (section,) = (each for each in made.sections if each.name == "unchecked")
+    text = re.sub(r"<[^>]+>", "", pdf.page_text(replace(made, sections=(section,), annex=()), {}))
+    missing = [each for each in study.findings["checks"].not_checked if not each.table]
+    assert missing and all(each.what in text and text.count(each.why) == 1 for each in missing)
+
+
 def pages_of(file):
     reader = pytest.importorskip("pypdf").PdfReader(file)
     return reader, [page.extract_text() for page in reader.pages]
@@ -190,3 +240,65 @@ def test_the_pdf_is_two_to_four_pages_and_an_annex(study, made, tmp_path):
     first = " ".join(pages[:annex])
     for words in ("Quarry 7", "Prepared", "What was not checked", "Basis and validity", "The question"):
         assert words in first
+
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+LEAST_LETTERS = 8.0
+"""Size of letters [pt] that is readable on paper."""
+NO_OTHER_RUNS = 'static_inertia_runs = "never"\n'
+
+
+def with_bearings(text):
+    """A study file with a bearing at each pin, of each kind in turn, and with overloads."""
+    kinds = ("ball", "roller", "plain")
+    rolling, plain = 'C = "62 kN"\nC0 = "48 kN"\n', 'diameter = "60 mm"\nwidth = "50 mm"\n'
+    plain += 'pressure = "20 N/mm2"\nspeed = 0.5\npv = 1e6\n'
+    for k, pin in enumerate(turning_pins(config.parse(text).machine.model)):
+        kind = kinds[k % len(kinds)]
+        text += f'\n[bearing."{pin}"]\nkind = "{kind}"\n{plain if kind == "plain" else rolling}'
+    return text
+
+
+def machine_of(name):
+    """The text of a study file: a heavy machine and a knife drive with a bearing at each pin; drives of catalogues
+    of one's own, and one that no motor fits."""
+    catalogues = f'"{EXAMPLES.as_posix()}/catalogue/'
+    read = {file.stem: file.read_text("utf-8") for file in EXAMPLES.glob("*.toml")}
+    if name == "heavy_mill":
+        events = '[[event]]\ntype = "jam"\nside = "left"\n[[event]]\ntype = "blocked"\n'
+        return f"{NO_OTHER_RUNS}{with_bearings(read[name].replace('event = []', ''))}{events}"
+    if name == "knife":
+        return with_bearings((resources.files("chainunit.data") / "knife.toml").read_text("utf-8"))
+    return NO_OTHER_RUNS + read[name].replace('"catalogue/', catalogues)
+
+
+@pytest.mark.second
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.parametrize("name", ["heavy_mill", "knife", "own_catalogue", "motor_rejected"])
+def test_the_sheet_of_each_machine_has_at_most_four_pages_with_readable_letters(name, tmp_path):
+    """The lettering of the drawing is smaller; the rest of the sheet has no smaller letters."""
+    try:
+        pdf.check_library()
+    except InputError as missing:
+        pytest.skip(str(missing))
+    study = run_study(config.parse(machine_of(name)), tmp_path)
+    made = sheet(study, study_report.report(study))
+    drawn = "".join(x.svg for each in made.sections for x in each.blocks if isinstance(x, b.Drawing))
+    drawn = unescape(re.sub(r"<[^>]+>|\s", "", drawn))
+    reader, pages = pages_of(pdf.write(made, {}, tmp_path / pdf.NAME))
+    heading = rf"A1\s+{re.escape(made.annex[0].heading)}"
+    annex = next(n for n, text in enumerate(pages) if n and re.search(heading, text))
+    assert 2 <= annex <= 4
+    small = []
+
+    def note(text, page, lines, font, size):
+        if text.strip() and size * abs(lines[3]) * abs(page[3]) < LEAST_LETTERS - 0.01:
+            small.append("".join(text.split()))
+
+    for page in reader.pages[:annex]:
+        page.extract_text(visitor_text=note)
+    assert small and all(each in drawn for each in small)
+    if name in ("heavy_mill", "knife"):
+        pins = turning_pins(study.drive.machine.model)
+        words = " ".join(" ".join(pages[:annex]).split())
+        assert len(pins) > 8 and all(f"{pin}:" in words for pin in pins)

@@ -7,7 +7,8 @@ are typical of such motors but belong to no maker: they vary smoothly with size,
 catalogue.
 
 Files of the user have the same columns, see `chainunit.drives.catalogue_rows`; beside motors they may have gears and
-couplings (`chainunit.drives.catalogue_gears`, `chainunit.drives.catalogue_couplings`).
+couplings (`chainunit.drives.catalogue_gears`, `chainunit.drives.catalogue_couplings`,
+`chainunit.drives.catalogue_flexible`).
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from ..core.errors import Faults, InputError, each_refusal, near_name, shown
 from ..core.quantities import Layout, Value, declaration, quantity
 from ..reading.tables import packaged
 from .catalogue_couplings import COUPLINGS, CatalogueCoupling
+from .catalogue_flexible import FLEXIBLE, CatalogueFlexible
 from .catalogue_gears import GEARS, CatalogueGear
 from .catalogue_rows import CatalogueItem, CatalogueKind, Sold, csv_rows, items_in
 from .induction_motor import InductionMotor
@@ -69,7 +71,7 @@ MOTOR_KIND = CatalogueKind(
         },
     ),
 )
-KINDS = (MOTOR_KIND, GEARS, COUPLINGS)
+KINDS = (MOTOR_KIND, GEARS, COUPLINGS, FLEXIBLE)
 """The kinds of things in catalogues."""
 
 
@@ -124,6 +126,7 @@ class Offer:
     motors: Sequence[CatalogueMotor] = ()
     gears: Sequence[CatalogueGear] = ()
     couplings: Sequence[CatalogueCoupling] = ()
+    flexible: Sequence[CatalogueFlexible] = ()
 
 
 def offer(*files: Path) -> Offer:
@@ -140,6 +143,7 @@ def offer(*files: Path) -> Offer:
         tuple(map(_motor, found[MOTOR_KIND.name])),
         tuple(CatalogueGear(**vars(item)) for item in found[GEARS.name]),
         tuple(CatalogueCoupling(**vars(item)) for item in found[COUPLINGS.name]),
+        tuple(CatalogueFlexible(**vars(item)) for item in found[FLEXIBLE.name]),
     )
 
 

@@ -1,7 +1,7 @@
 """The blocks of a report. Every section consists of blocks, and a renderer knows blocks alone.
 
 A block, a row or a column is in the ``short`` form of a report (the terminal), the ``long`` one (page and Markdown),
-or in both.
+or in both. Blocks of the form ``sheet`` stand on the sheet of a study, in place of the long ones of their section.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from .lines import Aside, Line, Number, Piece, Words, capital, line, pieces
 from .live_block import Live
 from .motion import Animation
 
-Form = Literal["both", "short", "long"]
+Form = Literal["both", "short", "long", "sheet"]
 Severity = Literal["good", "partly", "bad", "warning", "alarm", "remark"]
 Content: TypeAlias = "Number | Words | str"
 """The content of a given value: a number, words of the result, or the text of a switch or a list."""

@@ -24,7 +24,7 @@ def checked(files: Sequence[Path]) -> Report:
         with a line for each fault of all files; see `chainunit.drives.catalogue.check_own`.
     """
     found = check_own(files)
-    of_kinds = zip(KINDS, (found.motors, found.gears, found.couplings), strict=True)
+    of_kinds = zip(KINDS, (found.motors, found.gears, found.couplings, found.flexible), strict=True)
     tables = [_contents(kind, items) for kind, items in of_kinds if items]
     names = ", ".join(str(file) for file in files)
     more = "Name the files in a study file: catalogue = [...]."

@@ -166,7 +166,7 @@ def _origin_words(origin: str) -> str:
     return _ORIGIN.get(origin, "the declared start value" if origin == "declared" else f"chosen by {origin}")
 
 
-def _marks(block: b.Given) -> str:
+def marks(block: b.Given) -> str:
     """The legend of the marks that stand beside given values."""
     origins = {value.origin for _, values in block.sections for value in values} - {"", "file"}
     others = sorted(origins - _ORIGIN.keys(), key=lambda origin: origin == "declared")
@@ -260,7 +260,7 @@ class Page:
                 return f'<div class="given whole">{"".join(map(self._table, block.tables))}</div>'
             case b.Given():
                 tables = "".join(self._given(title, values) for title, values in block.sections if values)
-                return f'{_marks(block)}<div class="given">{tables}</div>'
+                return f'{marks(block)}<div class="given">{tables}</div>'
             case b.Drawing():
                 caption = f"<figcaption>{self.line(block.caption)}</figcaption>" if block.caption else ""
                 return f'<figure class="drawing">{block.svg}{caption}</figure>'
@@ -351,7 +351,7 @@ class Page:
     def _given(self, title: str, values: Iterable[b.GivenValue]) -> str:
         rows = "".join(
             f'<tr><th scope="row" title="{escape(value.name)}">{escape(value.description)}</th>'
-            f"<td>{self.line((value.value,))}{self._origin(value)}</td></tr>"
+            f"<td>{self.line((value.value,))}{self.origin(value)}</td></tr>"
             for value in values
         )
         return (
@@ -359,7 +359,7 @@ class Page:
             f"<tbody>{rows}</tbody></table></div>"
         )
 
-    def _origin(self, value: b.GivenValue) -> str:
+    def origin(self, value: b.GivenValue) -> str:
         """A mark at a value that the study file does not give."""
         if value.origin in ("", "file"):
             return ""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import base64
 import logging
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
 from itertools import groupby, starmap, zip_longest
@@ -20,7 +20,7 @@ from ..core.errors import InputError
 from ..reading.text import Units
 from . import blocks as b
 from .figure import Figure
-from .html import Page, resource
+from .html import Page, marks, resource
 from .live_block import Live
 from .motion import Animation
 
@@ -88,6 +88,28 @@ class _PrintedPage(Page):
         )
 
 
+class _SheetPage(_PrintedPage):
+    """The blocks of the sheet itself, which has few pages: given values run on."""
+
+    def block(self, block: b.Block) -> str:
+        """One block; see `_PrintedPage.block`."""
+        if not isinstance(block, b.Given):
+            return super().block(block)
+        groups = "".join(
+            f"<p><strong>{escape(title)}:</strong> {'; '.join(map(self._value, values))}.</p>"
+            for title, values in block.sections
+            if values
+        )
+        return f'{marks(block)}<div class="run-on">{groups}</div>'
+
+    def _value(self, value: b.GivenValue) -> str:
+        """A given value in running text."""
+        name = escape(value.description)
+        return (
+            f'<span title="{escape(value.name)}">{name}</span> {self.line(value.value)}{self.origin(value)}'
+        )
+
+
 def _without_bars(row: b.TableRow) -> b.TableRow:
     return replace(
         row, cells=tuple(cell.utilisation if isinstance(cell, b.Share) else cell for cell in row.cells)
@@ -128,13 +150,15 @@ def write(sheet: Sheet, pictures: Mapping[str, Path], file: Path) -> Path:
 
 def page_text(sheet: Sheet, pictures: Mapping[str, Path]) -> str:
     """The sheet as a page of HTML, from which the PDF is made."""
-    page = _PrintedPage(sheet.units, pictures)
-    numbered = [*_numbered(page, sheet.sections), *_numbered(page, sheet.annex, "A")]
+    own = [*_numbered(_SheetPage(sheet.units, pictures), sheet.sections, ("both", "long", "sheet"))]
+    annex = [*_numbered(_PrintedPage(sheet.units, pictures), sheet.annex, ("both", "long"), "A")]
     contents = "".join(
         f'<li><a href="#{_place(number)}"><span>{number}</span> {escape(each.heading)}</a></li>'
-        for number, each, _ in numbered
+        for number, each, _ in (*own, *annex)
     )
-    sections = "".join(starmap(_section, numbered))
+    sections = (
+        f'<div class="on-sheet">{"".join(starmap(_section, own))}</div>{"".join(starmap(_section, annex))}'
+    )
     labels = [f"<th>{escape(name)}</th><td>{escape(value)}</td>" for name, value in sheet.block.items()]
     half = (len(labels) + 1) // 2
     rows = "".join(f"<tr>{a}{z}</tr>" for a, z in zip_longest(labels[:half], labels[half:], fillvalue=""))
@@ -149,10 +173,11 @@ def page_text(sheet: Sheet, pictures: Mapping[str, Path]) -> str:
 
 
 def _numbered(
-    page: Page, sections: Iterable[b.Section], letter: str = ""
+    page: Page, sections: Iterable[b.Section], forms: Collection[str], letter: str = ""
 ) -> Iterator[tuple[str, b.Section, str]]:
-    """The sections that are not empty on paper, each with its number before it and its text behind it."""
-    texts = ((each, page.blocks(b.of_form(each.blocks, "long"))) for each in sections)
+    """The sections that are not empty on paper, with their blocks of these `forms`: each with its number before it
+    and its text behind it."""
+    texts = ((each, page.blocks([x for x in each.blocks if x.form in forms])) for each in sections)
     for n, (each, text) in enumerate(filter(itemgetter(1), texts), 1):
         yield f"{letter}{n}", each, text
 

@@ -35,7 +35,7 @@ def sheet(study: StudyRecord, report: b.Report) -> Sheet:
     sheets = [name for part in capabilities() for name in part.on_sheet() if name in given]
     sections = [
         *(given[name] for name in _FIRST if name in given),
-        *(_without_figures(given[name]) for name in sheets),
+        *(_on_sheet(given[name]) for name in sheets),
         b.Section(
             "assumptions",
             "Assumptions: values that the study file does not give",
@@ -46,7 +46,7 @@ def sheet(study: StudyRecord, report: b.Report) -> Sheet:
     ]
     shown = {*_FIRST, *sheets, "basis", "live", "motion"}
     annex = [each for each in report.sections if each.name not in shown]
-    annex += (each for name in sheets for each in _figures_of(given[name]))
+    annex += (each for name in sheets for each in _in_annex(given[name]))
     if "basis" in given:
         annex.append(b.Section("software", "Models and software", (software(s),)))
     return Sheet(
@@ -58,14 +58,22 @@ def sheet(study: StudyRecord, report: b.Report) -> Sheet:
     )
 
 
-def _without_figures(section: b.Section) -> b.Section:
-    """A section for the sheet: its figures, which repeat numbers of its tables, are in the annex."""
-    return replace(section, blocks=tuple(x for x in section.blocks if not isinstance(x, Figure)))
+def _on_sheet(section: b.Section) -> b.Section:
+    """A section for the sheet: without its figures, which repeat numbers of its tables, and with its blocks of the
+    form ``sheet``, if it has some, in place of its long ones."""
+    texts: list[b.Block] = [each for each in section.blocks if not isinstance(each, Figure)]
+    if any(each.form == "sheet" for each in texts):
+        texts = b.of_form(texts, "sheet")
+    return replace(section, blocks=tuple(texts))
 
 
-def _figures_of(section: b.Section) -> Iterator[b.Section]:
-    """The section of the annex with the figures of a section of the sheet, if it has any."""
+def _in_annex(section: b.Section) -> Iterator[b.Section]:
+    """The sections of the annex with the blocks that a section of the sheet leaves out: its long blocks, where it has
+    others for the sheet, and its figures."""
     figures = tuple(each for each in section.blocks if isinstance(each, Figure))
+    if any(each.form == "sheet" for each in section.blocks):
+        blocks = tuple(each for each in section.blocks if each.form == "long" and each not in figures)
+        yield b.Section(f"{section.name}_in_full", f"{section.heading}: in full", blocks)
     if figures:
         yield b.Section(f"{section.name}_figures", f"{section.heading}: figures", figures)
 

@@ -126,7 +126,11 @@ def _given(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """All given values of the study, by section."""
     # a motor on the line follows no reference
     unused_names = [] if study.drive.follows else ["run.ramp"]
-    unused_names += [name for part in capabilities() for name in part.unused_values(study.config.machine)]
+    unused_names += [
+        name
+        for part in capabilities()
+        for name in part.unused_values(study.config.machine, study.config.plans[part.name])
+    ]
     yield b.Given(
         tuple((section.title, tuple(_values(s, section, unused_names))) for section in given_sections(study))
     )

@@ -111,8 +111,8 @@ class StudyCapability:
         """Refusals of a plan that does not fit the rest of the study."""
         return ()
 
-    def unused_values(self, machine: Machine) -> Iterable[str]:
-        """Names of the values of its tables that have no meaning for that machine."""
+    def unused_values(self, machine: Machine, plan: Any) -> Iterable[str]:
+        """Names of the values of its tables that have no meaning for that machine and plan."""
         return ()
 
     def drive(

@@ -165,7 +165,7 @@ def key_tables() -> tuple[KeyTable, ...]:
 
 
 def catalogue_columns() -> tuple[KeyTable, ...]:
-    """The columns of catalogues, and keys of their tables [[motor]], [[gear]] and [[coupling]]."""
+    """The columns of catalogues, and keys of their tables [[motor]], [[gear]] and so on."""
     texts = tuple(
         Key(name, words, sort="text", follows=LEFT_OUT.get(name, "")) for name, words in TEXTS.items()
     )

@@ -148,7 +148,7 @@ CHOICES: Mapping[str, Any] = {
         FileNames,
         Field(
             "",
-            description="file with motors, gears or safety couplings of your own (CSV or TOML), or a list of such "
+            description="file with motors, gears or couplings of your own (CSV or TOML), or a list of such "
             "files; the motors stand beside the packaged ones",
         ),
     ),

@@ -257,6 +257,43 @@ def test_a_sized_drive_has_one_number_for_each_utilisation(folder):
     assert f"ratio {sizing['candidates'][0]['ratio']['value']:.6g}" in gear
 
 
+def test_order_numbers_of_catalogues_are_handed_over(tmp_path):
+    """Motor, gear and both couplings are rows of catalogues, and have the order numbers of these rows; without one
+    there, nothing is written."""
+    example = LINKAGES.parent / "own_catalogue.toml"
+    text = example.read_text("utf-8").replace('"catalogue/', f'"{example.parent.as_posix()}/catalogue/')
+    (tmp_path / "own.toml").write_text(f'static_inertia_runs = "never"\n{text}', "utf-8")
+    done = chainunit("study", "own.toml", "-o", "results", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    save(tmp_path / "results", tmp_path / "out", aasx=False)
+    said = json.loads((tmp_path / "out" / "handover.json").read_text("utf-8"))
+    rows = {}
+    for file in ("motors", "gears", "safety_couplings", "flexible_couplings"):
+        with (example.parent / "catalogue" / f"{file}.csv").open(newline="", encoding="utf-8") as table:
+            rows |= {row["designation"]: row["order_number"] for row in csv.DictReader(table)}
+    parts = {"motor": "MainComponent", "gear": "MainComponent02", "safety coupling": "OtherComponent"}
+    chosen = {each["part"]: each["designation"] for each in numbers(tmp_path)["sizing"]["parts"]["parts"]}
+    assert chosen.keys() == parts.keys()
+    flexible = numbers(tmp_path)["checks"]["flexible_coupling"]["candidates"][0]["designation"]
+    parts["flexible coupling"], chosen["flexible coupling"] = "OtherComponent02", flexible
+    for kind, element in parts.items():
+        at = f"SizingResult/{element}"
+        assert said["said"][f"{at}/ManufacturerOrderCode"]["value"] == rows[chosen[kind]] != ""
+        assert chosen[kind] in said["said"][f"{at}/ManufacturerProductDesignation"]["value"]
+        assert f"{at}/ManufacturerOrderCode" not in said["open"]
+    own, _ = read_by_basyx(tmp_path / "out" / "sizing.json")
+    path = f"{ROOT}/SizingResult/OtherComponent/ManufacturerOrderCode"
+    codes = [each.value for name, each in walked(own.submodel_element) if name == path]
+    assert codes == [rows[chosen["safety coupling"]], rows[flexible]]
+    spoilt = numbers(tmp_path)
+    spoilt["sizing"]["parts"]["parts"][1]["order_number"] = ""
+    (tmp_path / "results" / "result.json").write_text(json.dumps(spoilt), "utf-8")
+    save(tmp_path / "results", tmp_path / "other", aasx=False)
+    data = json.loads((tmp_path / "other" / "handover.json").read_text("utf-8"))
+    assert "SizingResult/MainComponent02/ManufacturerOrderCode" in data["open"]
+    assert "SizingResult/MainComponent/ManufacturerOrderCode" not in data["open"]
+
+
 def test_the_hours_of_the_usage_are_handed_over(folder):
     """Known with a table [usage] alone; half an hour is no whole number of the template, and stands beside it."""
     data = json.loads((folder / "out" / "handover.json").read_text("utf-8"))

@@ -384,7 +384,7 @@ def test_the_example_ends_in_a_list_of_parts(tmp_path):
 def test_a_gear_that_an_overload_breaks_is_told_with_a_stronger_one(tmp_path):
     text = EXAMPLE.read_text("utf-8")
     line = next(each for each in text.splitlines() if each.startswith("gear_torque"))
-    for name in ("motors", "gears", "safety_couplings"):
+    for name in ("motors", "gears", "safety_couplings", "flexible_couplings"):
         target = tmp_path / "catalogue" / f"{name}.csv"
         target.parent.mkdir(exist_ok=True)
         target.write_text((EXAMPLE.parent / "catalogue" / f"{name}.csv").read_text("utf-8"), encoding="utf-8")
@@ -405,6 +405,6 @@ def test_the_example_says_that_its_catalogues_are_made_up():
     assert "The catalogues beside this file are made up" in EXAMPLE.read_text("utf-8")
     config = load(EXAMPLE)
     found = offer(*config.file.catalogues)
-    items = (*found.motors, *found.gears, *found.couplings)
+    items = (*found.motors, *found.gears, *found.couplings, *found.flexible)
     assert all("made up" in item.source and item.order_number for item in items)
     assert any(gear.price is None for gear in found.gears)

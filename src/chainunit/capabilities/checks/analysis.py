@@ -13,7 +13,7 @@ from ...study.bearings import largest_load, pin_force
 from ...study.readings import has_turn, machine_series, turns_made
 from ...study.record import StudyRecord
 from . import coupling, gear, plain, relay, rigid, rolling, section, starting
-from .coupling import CouplingCheck
+from .coupling import CouplingCheck, remark_on_coupling
 from .gear import GearCheck, ShaftLoad
 from .pins import first_word, turning_pins
 from .plain import PlainBearing
@@ -46,7 +46,9 @@ class CheckFindings(Findings):
     not_checked: tuple[NotChecked, ...] = part("what was not checked", default=())
 
     def remark(self, study: StudyRecord) -> None:
-        """Warn of each check that does not hold."""
+        """Warn of each check that does not hold, and where no flexible coupling of a catalogue fits."""
+        if self.flexible_coupling is not None:
+            remark_on_coupling(study, self.flexible_coupling)
         for row in self.rows:
             if not row.holds:
                 share = number(row.utilisation, "1", "used")
@@ -118,11 +120,11 @@ class _Found:
 
 def _of_cycle(study: StudyRecord, plan: CheckPlan, found: _Found) -> dict[str, Any]:
     """The findings on parts that carry the cycle, by name; their checks are added."""
-    starts = plan.starts_per_hour
+    starts, at = plan.starts_per_hour, (plan.coupling_place, plan.coupling_name)
     return {
         "gear": found.of(*gear.find(study, plan.gear, plan.separate_bearing)),
         "motor_shaft": found.of(*gear.motor_shaft(study, plan.motor_shaft)),
-        "flexible_coupling": found.of(*coupling.find(study, plan.coupling, plan.coupling_place, starts)),
+        "flexible_coupling": found.of(*coupling.find(study, plan.coupling, *at, starts, plan.couplings)),
         "section": found.of(*section.find(study, plan.sections)),
     }
 

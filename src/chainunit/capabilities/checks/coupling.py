@@ -8,17 +8,20 @@ share of the rigid shaft times V = (1 + j psi/2pi)/(1 - (f/fe)^2 + j psi/2pi).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...core.quantities import Value, declaration, quantity
+from ...drives.catalogue_flexible import CatalogueFlexible
 from ...reading.results import part, result
 from ...study.readings import load_inertia
 from ...study.record import StudyRecord
 from ...study.torques import gear_torque
 from ...study.window import mean
+from .coupling_choice import CHOSEN, CouplingCandidate, tried, with_row
 from .row import CheckRow, NotChecked
 from .runs import largest
 from .tables import FlexibleCouplingTable
@@ -43,6 +46,9 @@ class CouplingDuty:
     largest: Value = quantity("N.m", "largest torque of all runs, without the coupling's elasticity")
     drive_inertia: Value = quantity("kg.m2", "inertia on the side of the motor")
     load_inertia: Value = quantity("kg.m2", "mean inertia on the side of the machine")
+    speed: Value = quantity(
+        "rad/s", "largest speed of its shaft, of all runs", default=0.0, min=0.0, kind="speed"
+    )
 
 
 @declaration
@@ -83,6 +89,10 @@ class CouplingCheck:
     peak: float = quantity("N.m", "peak torque that it needs")
     alternating: float | None = quantity("N.m", "alternating torque that it needs")
     passage: float | None = quantity("N.m", "peak torque that it needs for the passage through resonance")
+    candidates: tuple[CouplingCandidate, ...] = part(
+        "the flexible couplings of the catalogues, first the one that is checked; none where the file has its own",
+        default=(),
+    )
 
 
 def start_factor(starts: float) -> float | None:
@@ -197,10 +207,96 @@ def coupling_rows(
             yield CheckRow("coupling", title, _CLAUSE, formula, value, limit, f"{at}.{name}", numbers, "N.m")
 
 
+@dataclass(frozen=True)
+class _Cycle:
+    """The torque [N m] of steady running over time [s], both of shape (n,), at the place of a coupling; its `duty`
+    with the run of the largest torque, and the start factor."""
+
+    time: Any
+    torque: Any
+    duty: CouplingDuty
+    place: str
+    run: str
+    start: float
+
+    def check(self, table: FlexibleCouplingTable) -> CouplingCheck:
+        """The coupling of that table in this cycle. Half of its inertia turns with either side."""
+        swing, duty = None, self.duty
+        if table.stiffness and table.damping and duty.load_inertia > 0.0:
+            inertias = (x + 0.5 * table.J for x in (duty.drive_inertia, duty.load_inertia))
+            natural = natural_frequency(table.stiffness, *inertias)
+            swing = swinging(self.time, self.torque, natural, table.damping)
+        factors = CouplingFactors(
+            temperature=table.temperature_factor,
+            start=self.start,
+            surge=table.surge_factor,
+            resonance=abs(complex(amplification(1.0, 1.0, table.damping))) if table.damping else None,
+        )
+        return coupling_check(duty, factors, swing, self.place, self.run)
+
+
+def _cycle(study: StudyRecord, place: str, start: float) -> _Cycle:
+    """The cycle of a study at that place, with that start factor."""
+    drive, turns = study.drive, study.steady
+
+    def torque_of(run: xr.Dataset) -> Any:
+        return gear_torque(drive, run) if place == "crank" else run["motor.tau"].values
+
+    most, run = largest(study, torque_of)
+    ratio = drive.ratio if place == "crank" else 1.0
+    torque = torque_of(turns)
+    duty = CouplingDuty(
+        mean=mean(turns, torque),
+        rms=math.sqrt(mean(turns, torque**2)),
+        largest=most,
+        drive_inertia=float(drive.fmu_parameters.rotor.J) * ratio**2,
+        load_inertia=float(np.mean(load_inertia(drive, turns))) * ratio**2,
+        speed=largest(study, lambda run: run[drive.motor_speed].values)[0] / ratio,
+    )
+    return _Cycle(turns["time"].values, torque, duty, place, run, start)
+
+
+def remark_on_coupling(study: StudyRecord, of: CouplingCheck) -> None:
+    """Warn where no coupling of the catalogues keeps each limit, or the named one does not; note how it was
+    checked."""
+    if not of.candidates:
+        return
+    best = of.candidates[0]
+    if best.verdict != CHOSEN:
+        study.warn(
+            "flexible coupling too weak",
+            "The flexible coupling {name} of the catalogues does not keep each limit: {reason}.",
+            name=best.designation,
+            reason=best.reason,
+        )
+    study.note(
+        "flexible coupling",
+        "The flexible coupling is checked by the torque of a shaft without it, part by part of the frequencies with "
+        "its own amplification (DIN 740-2). Its inertia counts in its natural frequency; it is not in the runs.",
+    )
+
+
+def speed_row(of: CouplingCheck, table: FlexibleCouplingTable) -> CheckRow | NotChecked:
+    """The check of the speed of a coupling."""
+    if not table.largest_speed:
+        return NotChecked("coupling, speed", "add [flexible_coupling] with largest_speed, by its maker")
+    source, at = "Limit of the maker of the coupling", "checks.flexible_coupling.speed"
+    formula, speed = "largest |w| of all runs <= permitted", float(of.duty.speed)
+    return CheckRow(
+        "coupling", "speed", source, formula, speed, table.largest_speed, at, {}, "rad/s", "speed"
+    )
+
+
 def find(
-    study: StudyRecord, table: FlexibleCouplingTable | None, place: str, starts: float
+    study: StudyRecord,
+    table: FlexibleCouplingTable | None,
+    place: str,
+    name: str,
+    starts: float,
+    couplings: Sequence[CatalogueFlexible] = (),
 ) -> tuple[CouplingCheck | None, list[CheckRow | NotChecked]]:
-    """The coupling of a study, which makes so many `starts` an hour, and its checks, or the reason against them."""
+    """The coupling of a study, which makes so many `starts` an hour, and its checks, or the reason against them.
+    Beside `couplings` of a catalogue it is the one with that `name`, or the cheapest that carries the torque."""
     if table is None:
         return None, [
             NotChecked(
@@ -215,31 +311,19 @@ def find(
             f"{starts:g} starts an hour are more than the 240 of the standard; add start_factor, by its maker"
         )
         return None, [NotChecked("flexible coupling", why)]
-    drive = study.drive
-    turns = study.steady
+    cycle = _cycle(study, place, factor)
 
-    def torque_of(run: xr.Dataset) -> Any:
-        return gear_torque(drive, run) if place == "crank" else run["motor.tau"].values
+    def all_rows(own: FlexibleCouplingTable) -> list[CheckRow | NotChecked]:
+        of = cycle.check(own)
+        return [*coupling_rows(of, own, study.titles), speed_row(of, own)]
 
-    most, run = largest(study, torque_of)
-    ratio = drive.ratio if place == "crank" else 1.0
-    torque, time = torque_of(turns), turns["time"].values
-    duty = CouplingDuty(
-        mean=mean(turns, torque),
-        rms=math.sqrt(mean(turns, torque**2)),
-        largest=most,
-        drive_inertia=float(drive.fmu_parameters.rotor.J) * ratio**2,
-        load_inertia=float(np.mean(load_inertia(drive, turns))) * ratio**2,
-    )
-    swing = None
-    if table.stiffness and table.damping and duty.load_inertia > 0.0:
-        natural = natural_frequency(table.stiffness, duty.drive_inertia, duty.load_inertia)
-        swing = swinging(time, torque, natural, table.damping)
-    factors = CouplingFactors(
-        temperature=table.temperature_factor,
-        start=factor,
-        surge=table.surge_factor,
-        resonance=abs(complex(amplification(1.0, 1.0, table.damping))) if table.damping else None,
-    )
-    found = coupling_check(duty, factors, swing, place, run)
-    return found, list(coupling_rows(found, table, study.titles))
+    candidates: list[CouplingCandidate] = []
+    if couplings:
+
+        def rows_of(own: FlexibleCouplingTable) -> Iterator[CheckRow]:
+            return (row for row in all_rows(own) if isinstance(row, CheckRow))
+
+        candidates = tried(couplings, table, rows_of, name)
+        (sold,) = (each for each in couplings if each.designation == candidates[0].designation)
+        table = with_row(table, sold)
+    return replace(cycle.check(table), candidates=tuple(candidates)), all_rows(table)

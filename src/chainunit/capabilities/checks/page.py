@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from ...reading.text import number
 from ...report import blocks as b
 from ...report.lines import Line, join, line
 from ...study.record import StudyRecord
 from .analysis import CheckFindings
+from .coupling_choice import CHOSEN, CouplingCandidate
 from .row import CheckRow
+
+_COUPLINGS = "checks.flexible_coupling.candidates"
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The table of the checks."""
     found = CheckFindings.of_study(study)
     if found.rows:
+        couplings = () if found.flexible_coupling is None else found.flexible_coupling.candidates
+        if couplings:
+            yield _coupling_to_order(s, couplings)
         lead = (
-            "Each row is a check by the clause or source under it: the value of the run, the limit, and the share "
+            "Each row is a check by the clause or source {place}: the value of the run, the limit, and the share "
             "of the limit that is used. A check holds up to 100 %. docs/checks.md has each formula with its "
             "simplifications and an example."
         )
@@ -27,7 +34,8 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
                 " The values are of the runs of this study; the shares of limits under the answer are of the duty "
                 f"of {study.proposal.name}, so that both may differ."
             )
-        yield b.Text(lead, "lead", "long")
+        yield b.Text(lead.format(place="under it"), "lead", "long")
+        yield b.Text(lead.format(place="whose number stands behind it"), "lead", "sheet")
         yield b.Table(
             tuple(_row(s, found, k) for k in range(len(found.rows))),
             b.heads("check", "value", "limit", "used"),
@@ -35,12 +43,63 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
             note_title="clause, formula, numbers",
             form="long",
         )
+        yield from _on_sheet(s, found)
+        if couplings:
+            yield _tried_couplings(s, couplings)
         yield b.Table(
             tuple(_row(s, found, k, short=True) for k in range(len(found.rows))),
             b.heads("check", "value", "limit", "used"),
             title="Checks by clause",
             form="short",
         )
+
+
+def _on_sheet(s: b.Source, found: CheckFindings) -> Iterator[b.Block]:
+    """The checks with a line each, and behind them each clause and formula once, by its number in the table."""
+    laws = dict.fromkeys((row.clause, row.formula) for row in found.rows)
+    places = {law: place for place, law in enumerate(laws, 1)}
+    rows = []
+    for k, row in enumerate(found.rows):
+        short = _row(s, found, k, short=True)
+        rows.append(replace(short, cells=(*short.cells, f"[{places[row.clause, row.formula]}]")))
+    heads = (*b.heads("check", "value", "limit"), b.Column("used", of_text=True), *b.heads("by"))
+    yield b.Table(tuple(rows), heads, title="Checks by clause", form="sheet")
+    for (clause, formula), place in places.items():
+        yield b.Text(f"[{place}] {clause}. {formula}", "note", "sheet")
+
+
+def _coupling_to_order(s: b.Source, candidates: Sequence[CouplingCandidate]) -> b.Text:
+    """The flexible coupling of the catalogues that is checked."""
+    at, best = _COUPLINGS, candidates[0]
+    words: list[Line] = [s.words(f"{at}.0.designation")]
+    if best.order_number:
+        words.append(s.line(f"order number {{{at}.0.order_number}}"))
+    if best.price is not None:
+        words.append(s.line(f"price {{={at}.0.price:10}}"))
+    values = (s.number(f"{at}.0.{name}", as_given=True) for name in ("rated_torque", "stiffness", "damping"))
+    words += [line(name, value) for name, value in zip(("TKN ", "CTdyn ", "psi "), values, strict=True)]
+    count = f"{sum(each.fits for each in candidates)} of the {len(candidates)} of the catalogues fit"
+    reason = s.words(f"{at}.0.reason")
+    begin = (
+        "Flexible coupling to order: " if best.verdict == CHOSEN else "Flexible coupling that does not fit: "
+    )
+    return b.Text(line(begin, *join(words), ": ", reason, f" ({count})."))
+
+
+def _tried_couplings(s: b.Source, candidates: Sequence[CouplingCandidate]) -> b.Table:
+    """The flexible couplings of the catalogues."""
+    rows = []
+    for k, each in enumerate(candidates):
+        at = f"{_COUPLINGS}.{k}"
+        name, verdict, order, why = (
+            s.words(f"{at}.{x}") for x in ("designation", "verdict", "order_number", "reason")
+        )
+        price = s.number(f"{at}.price", as_given=True, none="-")
+        share = s.number(f"{at}.checks.{each.checks.index(each.hardest)}.utilisation", over=not each.fits)
+        rows.append(b.TableRow((name, verdict, share, price, order, why)))
+    heads = b.heads("flexible coupling", "verdict", "largest share", "price", "order number", "reason")
+    title = "Flexible couplings of the catalogues"
+    return b.Table(tuple(rows), heads, numeric=False, title=title, form="long")
 
 
 def missing(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:

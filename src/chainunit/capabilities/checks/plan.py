@@ -7,9 +7,12 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ...core.errors import Faults
+from ...drives.catalogue import offer
+from ...drives.catalogue_flexible import CatalogueFlexible
 from ...reading.lists import Entry
 from ...reading.tables import instance
 from ...study.file_reading import FileReading
+from ...study.parts import catalogues_of
 from .pins import no_pin, pins_named, turning_pins
 from .section_plan import SectionPlan, read_sections
 from .tables import (
@@ -58,6 +61,10 @@ class CheckPlan:
     motor_shaft: MotorShaftTable = field(default_factory=MotorShaftTable)
     coupling: FlexibleCouplingTable | None = None
     coupling_place: str = "motor"
+    coupling_name: str = ""
+    """the designation of the coupling of a catalogue; empty where the file does not name one"""
+    couplings: tuple[CatalogueFlexible, ...] = ()
+    """the flexible couplings of the catalogues among which it is"""
     sections: Mapping[str, SectionPlan] = field(default_factory=dict)
     separate_bearing: bool = False
     """whether the file says that the crank has bearings of its own, so that the gear does not carry its reaction"""
@@ -102,14 +109,17 @@ def _relay(reading: FileReading) -> RelayPlan:
     return RelayPlan(reading.values["relay"], reading.form.relay.trip_class or "")
 
 
-def _coupling(reading: FileReading) -> tuple[FlexibleCouplingTable | None, str]:
-    """The flexible coupling, if the file has one, and its place."""
+def _coupling(
+    reading: FileReading,
+) -> tuple[FlexibleCouplingTable | None, str, str, tuple[CatalogueFlexible, ...]]:
+    """The flexible coupling, if the file has one, its place, its designation in a catalogue, and those of the
+    catalogues."""
     name = "flexible_coupling"
-    return (
-        (reading.values[name], reading.form.flexible_coupling.place)
-        if name in reading.data
-        else (None, "motor")
-    )
+    if name not in reading.data:
+        return None, "motor", "", ()
+    form = reading.form.flexible_coupling
+    couplings = offer(*catalogues_of(reading.form.catalogue, reading.source)).flexible
+    return reading.values[name], form.place, form.designation, tuple(couplings)
 
 
 def _bearings(tables: Mapping[str, Any], titles: list[str], faults: Faults) -> dict[str, BearingPlan]:

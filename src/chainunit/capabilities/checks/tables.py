@@ -175,6 +175,8 @@ class FlexibleCouplingTable:
         min=0.0,
         max=10.0,
     )
+    J: Value = quantity("kg.m2", "inertia, at its own shaft", default=0.0, min=0.0)
+    largest_speed: Value = quantity("rad/s", "permitted speed", default=0.0, min=0.0, kind="speed")
     temperature_factor: Value = quantity(
         "1", "temperature factor St, by its maker for the elastic part", default=1.0, min=1.0, max=10.0
     )
@@ -196,6 +198,10 @@ class FlexibleCouplingTable:
 
 
 COUPLING_KEYS = {
+    "designation": (
+        str,
+        Field("", description="designation of a flexible coupling of the catalogues that the file names"),
+    ),
     "place": (Literal[PLACES], Field("motor", description="shaft that it is on")),
 }
 """Keys of [flexible_coupling] that are no quantities, as pydantic fields."""

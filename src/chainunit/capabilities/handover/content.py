@@ -5,13 +5,15 @@ the template has none with a crank or a linkage. The load of such a machine is t
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
+from ...core.errors import printable
 from ...study.record import LOAD_CYCLE
 from .cycle import COLUMNS
+from .rows import text_of
 from .shell import Content, LinkedFile, TextRange
 from .studied import StudiedDrive
 
@@ -19,6 +21,8 @@ STUDY, CYCLE, RUN = "study.json", "cycle.csv", "run.csv"
 """Names of the files beside the shell: the numbers of the study, the steady turns and the whole run."""
 MEDIA_TYPES = {STUDY: "application/json", LOAD_CYCLE: "text/csv", CYCLE: "text/csv", RUN: "text/csv"}
 """Media types of these files."""
+_SAFETY = "safety coupling"
+"""The kind of this part in the list of parts that sizing gives."""
 _KELVIN = 273.15
 _JOULE_PER_KWH = 3.6e6
 _RPM = 30.0 / np.pi
@@ -126,15 +130,19 @@ def _system(study: StudiedDrive) -> Content:
     )
 
 
-def _component(kind: str, designation: str, **numbers: float | None) -> Content:
-    """A main component. The maker, the article and the order code are required, and nobody knows them before an
-    order."""
+def _order_code(part: Mapping[str, Any]) -> str | None:
+    """The order number of a part of a catalogue, if it has one."""
+    return printable(text_of(part, "order_number")) or None
+
+
+def _component(kind: str, designation: str, order_code: str | None, **numbers: float | None) -> Content:
+    """A main component. Maker, article and order code are required; a catalogue has the order code alone."""
     return {
         "MainComponentType": kind,
         "ManufacturerName": None,
         "ManufacturerArticleNumber": None,
         "ManufacturerProductDesignation": designation,
-        "ManufacturerOrderCode": None,
+        "ManufacturerOrderCode": order_code,
         **_known(**numbers),
     }
 
@@ -150,11 +158,11 @@ def _components(study: StudiedDrive) -> Iterator[Content]:
             parts.append(f"rated output torque at least {_shown(rated, 'Nm')}")
         share = _times(_PERCENT, study.check("gear", "utilisation"))
         names = {"MaxTorqueUtilizationPercentage": share, "MaxTorqueUtilization": peak}
-        yield _component("gearbox", ", ".join(parts), **names)
+        yield _component("gearbox", ", ".join(parts), _order_code(study.ordered("gear")), **names)
     current = study.inverter_current
     if study.text("start") == "inverter":
         least = f", rated current at least {_shown(current, 'A')}" if current else ""
-        yield _component("drive controller", f"inverter{least}", ContinuousCurrent=current)
+        yield _component("drive controller", f"inverter{least}", None, ContinuousCurrent=current)
 
 
 def _motor(study: StudiedDrive) -> Content:
@@ -177,6 +185,7 @@ def _motor(study: StudiedDrive) -> Content:
     return _component(
         "motor",
         study.text("motor", "title"),
+        _order_code(study.ordered("motor")),
         MaxCurrentUtilizationPercentage=share(steady("current_peak"), rated("current")),
         MaxCurrentUtilization=steady("current_peak"),
         MaxThermalUtilizationPercentage=_times(_PERCENT, used),
@@ -214,7 +223,11 @@ def _others(study: StudiedDrive) -> Iterator[Content]:
         yield _part(f"flywheel of {_shown(wheel, 'kg m2')} on the motor shaft")
     trip = study.number("sizing", "protection", "trip_torque_at_motor")
     if trip:
-        yield _part(f"safety coupling, trip torque {_shown(trip, 'Nm')} at the motor's shaft")
+        name = " ".join(filter(None, (_SAFETY, printable(text_of(study.ordered(_SAFETY), "designation")))))
+        words = f"{name}, trip torque {_shown(trip, 'Nm')} at the motor's shaft"
+        yield _part(words, _order_code(study.ordered(_SAFETY)))
+    if flexible := study.flexible_coupling:
+        yield _part(f"flexible coupling {printable(text_of(flexible, 'designation'))}", _order_code(flexible))
     relay = study.number("sizing", "protection", "relay_current")
     if relay:
         device = study.text("sizing", "protection", "device")
@@ -222,8 +235,12 @@ def _others(study: StudiedDrive) -> Iterator[Content]:
         yield _part(", ".join(filter(None, (device, f"set at {_shown(relay, 'A')}", trip_class))))
 
 
-def _part(designation: str) -> Content:
-    return {"ManufacturerProductDesignation": designation, "QuantityOfParts": 1}
+def _part(designation: str, order_code: str | None = None) -> Content:
+    return {
+        "ManufacturerProductDesignation": designation,
+        **_known(ManufacturerOrderCode=order_code),
+        "QuantityOfParts": 1,
+    }
 
 
 def _messages(study: StudiedDrive) -> Iterator[Content]:

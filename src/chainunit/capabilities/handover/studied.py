@@ -82,6 +82,20 @@ class StudiedDrive:
         place = sizing.get("nearest") if sizing.get("chosen") is None else sizing["chosen"]
         return self.candidates[place] if isinstance(place, int) else {}
 
+    def ordered(self, kind: str) -> Mapping[str, Any]:
+        """The row of a catalogue that is a part of the drive of sizing, by its kind: "motor", "gear", "safety
+        coupling"; empty where the part is of no catalogue of the user."""
+        parts = _at(self.result.data, "sizing", "parts", "parts")
+        found = map(as_mapping, parts if isinstance(parts, list) else ())
+        return next((each for each in found if each.get("part") == kind), {})
+
+    @property
+    def flexible_coupling(self) -> Mapping[str, Any]:
+        """The row of a catalogue that is the flexible coupling; empty where no row carries the torque."""
+        found = _at(self.result.data, "checks", "flexible_coupling", "candidates")
+        first = as_mapping(found[0]) if isinstance(found, list) and found else {}
+        return first if first.get("verdict") == "chosen" else {}
+
     def check(self, name: str, part: str) -> float | None:
         """A number of a check of the drive of sizing: its ``value``, ``limit`` or ``utilisation``."""
         return _number(self.best, "checks", name, part)

@@ -81,7 +81,7 @@ class SizingCapability(Capability):
         if gears := offer(*config.file.catalogues).gears:
             yield from gear_faults(gears, config.file.given, config.drive.gear.ratio, torque)
 
-    def unused_values(self, machine: Machine) -> Iterable[str]:
+    def unused_values(self, machine: Machine, plan: SizingPlan | None) -> Iterable[str]:
         """A machine without sides has no one-sided feed."""
         return () if machine.model.sides else ("sizing.one_sided_share",)
 
