@@ -79,6 +79,7 @@ def test_a_small_job_needs_no_dask(tmp_path):
     assert made.stdout.split() == ["0", "False"]
 
 
+@pytest.mark.second
 def test_a_script_that_is_run_by_its_workers_is_told_what_to_do(tmp_path):
     """Each local process imports the script, which then starts processes itself."""
     script = tmp_path / "script.py"
@@ -101,6 +102,7 @@ def test_progress_and_the_end_are_told(tmp_path):
     assert [done for _, done, _ in said[1:]] == [0, 16, 32, 40]
 
 
+@pytest.mark.second
 def test_local_processes_make_the_same_store(unbroken, tmp_path):
     (tmp_path / "seen").mkdir()
     with contextlib.ExitStack() as stack:
@@ -250,6 +252,7 @@ def test_two_runs_do_not_write_to_one_store(tmp_path):
     runner.run(batches.job(), tmp_path, second, workers=1)
 
 
+@pytest.mark.second
 @pytest.mark.parametrize(
     ("workers", "wrong", "words"),
     [
@@ -270,6 +273,7 @@ def test_a_batch_that_fails_is_named_and_the_others_are_kept(workers, wrong, wor
     assert seen(tmp_path / "seen") == [32, 48, 64, 80, 96]
 
 
+@pytest.mark.second
 @pytest.mark.parametrize("workers", [1, 2])
 def test_ctrl_c_keeps_what_is_finished(workers, tmp_path):
     def interrupt(title, done, todo):
@@ -301,6 +305,7 @@ def test_results_that_were_not_declared_are_refused(tmp_path):
     assert runner.run(batches.job(), tmp_path, quiet, workers=1).earlier_points == 0
 
 
+@pytest.mark.second
 def test_few_batches_are_in_work(tmp_path, monkeypatch):
     """The memory holds a batch for each worker, and the one that is being written."""
     from distributed import Client
@@ -344,6 +349,7 @@ def test_a_scheduler_that_does_not_answer_is_refused(tmp_path, monkeypatch):
                 runner.check_scheduler(address)
 
 
+@pytest.mark.second
 def test_a_scheduler_with_two_workers_makes_the_same_store(unbroken, tmp_path):
     """Processes of their own, as on other machines; then one of them ends."""
     port = free_port()

@@ -302,6 +302,7 @@ def test_own_functions_have_the_bits_of_the_definition(engine):
             np.testing.assert_array_equal(np.signbit(got)[known], np.signbit(want)[known], kind)
 
 
+@pytest.mark.second
 @pytest.mark.parametrize("name, most", [("InductionMotor", 12_000), ("KnifeDrive", 100_000)])
 def test_the_bytes_are_the_same_in_every_process(name, most):
     """The equations alone make them: a new process, with other hashes of texts, has the same."""

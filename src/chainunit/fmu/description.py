@@ -93,9 +93,9 @@ class Interface:
         """Signals of one causality, in order."""
         return [s for s in self.signals if s.causality == causality]
 
-    @property
+    @cached_property
     def trace(self) -> Trace:
-        """The model in symbols."""
+        """The model in symbols: the same as long as the interface is there, as `derived` has them, too."""
         return trace(self.model)
 
     @property

@@ -30,7 +30,6 @@ from ..mechanism.linkage import Linkage
 from ..mechanism.models import DirectMachine, InverseMachine, LinkageModel, acceleration
 from .chain_organs import LEAST, MOST, Organs, Parameters, both
 from .chain_unit import SIDES, ChamberForces, Inputs, Outputs, drive
-from .hanging import split
 
 CLOSING = 20.0
 """Rate at which the gap between a chain and A2 is closed [1/s]."""
@@ -191,6 +190,8 @@ def with_rods(number: int, start: Mapping[str, float]) -> type[InverseMachine]:
     InputError
         for a number of rods that the model cannot have.
     """
+    from .hanging import split  # it takes numpy, which the Python of a simulator that runs the FMU may lack
+
     if not LEAST <= number <= MOST:
         raise InputError(f"rods = {number}: must be >= {LEAST} and <= {MOST}")
     lengths = ChamberForces.Parameters()

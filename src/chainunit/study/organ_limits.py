@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 from ..machines.api import ChainUnitMachine
@@ -14,6 +15,7 @@ _UNITS_OF_MOTION = ("1", "rad", "rad/s", "rad/s2", "m", "m/s", "m/s2")
 """Units of quantities of a turn that the loads of the organs do not change."""
 
 
+@lru_cache(maxsize=16)
 def slack_and_mode(machine: ChainUnitMachine, feed: Any) -> tuple[float, float]:
     """The crank speed at which a web first goes slack, and the lowest natural frequency of an organ as a chain
     [rad/s]; infinite where there is none."""

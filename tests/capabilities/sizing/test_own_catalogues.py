@@ -221,6 +221,7 @@ def test_the_thermal_rating_takes_the_power_of_either_direction(tmp_path, monkey
     assert checks["gear_speed"].utilisation == pytest.approx(150.0 / 6000.0)
 
 
+@pytest.mark.second
 def test_with_bearings_of_its_own_the_crank_does_not_load_the_gear(tmp_path):
     text = MACHINE.replace("candidates = 1", "candidates = 1\nseparate_bearing = true")
     weak = GEARS.replace("3000,6000,200", "3000,60,200").replace("6000,9000", "6000,90")
@@ -230,6 +231,7 @@ def test_with_bearings_of_its_own_the_crank_does_not_load_the_gear(tmp_path):
     assert chosen.drive.gear_rating == dataclasses.replace(chosen.sold.rating, overhung_load=0.0)
 
 
+@pytest.mark.second
 def test_an_overhung_load_beyond_the_permitted_one_rejects_a_gear(tmp_path):
     (tmp_path / "a").mkdir()
     weak = GEARS.replace("3000,6000,200", "3000,60,200")
