@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from functools import cached_property, lru_cache
+from functools import cache, cached_property, lru_cache
 from importlib import metadata
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
@@ -360,6 +360,7 @@ def _copyright() -> str:
     return line
 
 
+@cache
 def licence_text(package: str) -> str:
     """The licence of an installed package."""
     return metadata.distribution(package).read_text("licenses/LICENSE") or ""

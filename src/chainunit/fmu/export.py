@@ -13,6 +13,7 @@ import sys
 import uuid
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping
+from functools import lru_cache
 from importlib import metadata
 from pathlib import Path
 from xml.etree.ElementTree import Element, tostring
@@ -143,8 +144,14 @@ def _import_closure(script: str) -> dict[str, bytes]:
                 continue
             files[name] = path.read_bytes()
             place = module[:depth] if path.name == "__init__.py" else module[: depth - 1]
-            waiting += _imports(_at_import(ast.parse(files[name])), place)
+            waiting += _imported(files[name], place)
     return files
+
+
+@lru_cache(maxsize=512)
+def _imported(content: bytes, package: tuple[str, ...]) -> tuple[tuple[str, ...], ...]:
+    """The modules that a file with this content in that subpackage imports when it is imported."""
+    return tuple(_imports(_at_import(ast.parse(content)), package))
 
 
 def _imports(nodes: Iterable[ast.AST], package: tuple[str, ...]) -> Iterator[tuple[str, ...]]:

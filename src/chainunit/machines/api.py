@@ -270,12 +270,13 @@ class ChainUnitMachine(Machine):
         """Mean pull in web and wall of each side with weight [N] over `points` angles of a crank turn at constant
         `crank_speed` [rad/s]: shape (rods, ..., points), webs first; see `chain_unit.organ_pulls`."""
         phi = np.linspace(0.0, 2.0 * math.pi * self.p.ratio, points, endpoint=False)
-        motor = np.asarray(crank_speed, float)[..., None] * self.p.ratio
-        rocker = self.forces(phi, motor, 0.0, left, right).rocker
-        pulls = self.organ_pulls(rocker.psi, rocker.w, rocker.a, left, right)
+        speed = np.asarray(crank_speed, float)[..., None]
+        # at constant speed the speed of the rocker grows with that of the crank, its acceleration with the square
+        rocker = self.forces(phi, self.p.ratio, 0.0, left, right).rocker
+        pulls = self.organ_pulls(rocker.psi, rocker.w * speed, rocker.a * speed**2, left, right)
         sides = [side for side in SIDES if side in self.loaded_sides(Feed(left=left, right=right))]
         means = [sum(pulls[side][rod].values()) / 2.0 for rod in RODS for side in sides]
-        shape = np.broadcast_shapes(np.shape(motor), np.shape(phi))
+        shape = np.broadcast_shapes(np.shape(speed), np.shape(phi))
         return np.array([np.broadcast_to(mean, shape) for mean in means]).reshape(len(means), *shape)
 
     def least_web_pull(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any
@@ -69,16 +69,18 @@ class _Canvas:
         """Draw a label. `places` are the candidates for its middle; it gets the first one that is clear of other
         labels and of the `lines`, before others one that is nearest to its `own` lines."""
         boxes = [_box(text, place) for place in places]
+        nearest, nearest_own = _from_lines(boxes, lines), _from_lines(boxes, own)
         clear = [
             min(
-                [_gap(box, other) for other in self.label_boxes]
-                + [_from_line(box, line) for line in lines]
-                + [box[0] - 4.0, WIDTH + COLUMN - box[2]]
+                *[_gap(box, other) for other in self.label_boxes],
+                from_lines,
+                box[0] - 4.0,
+                WIDTH + COLUMN - box[2],
             )
-            for box in boxes
+            for box, from_lines in zip(boxes, nearest, strict=True)
         ]
         free = [k for k, room in enumerate(clear) if room >= 3.0]
-        beside = (k for k in free if own and _nearest(boxes[k], own) <= _nearest(boxes[k], lines))
+        beside = (k for k in free if own and nearest_own[k] <= nearest[k])
         # the first of the places that has room enough, else the one with most
         best = next(beside, free[0] if free else int(np.argmax(clear)))
         self.label_boxes.append(boxes[best])
@@ -100,19 +102,17 @@ def _gap(box: tuple[float, ...], other: tuple[float, ...]) -> float:
     return max(box[0] - other[2], other[0] - box[2], box[1] - other[3], other[1] - box[3])
 
 
-def _from_line(box: tuple[float, ...], line: tuple[Point, Point]) -> float:
-    """The distance of a line from a box, from 25 points of the line [px]."""
-    (x0, y0), (x1, y1) = line
-    gaps = []
-    for t in np.linspace(0.0, 1.0, 25):
-        x, y = x0 + t * (x1 - x0), y0 + t * (y1 - y0)
-        gaps.append(max(box[0] - x, x - box[2], box[1] - y, y - box[3]))
-    return min(gaps) - 3.0
-
-
-def _nearest(box: tuple[float, ...], lines: Collection[tuple[Point, Point]]) -> float:
-    """The distance of the nearest of some lines from a box [px]."""
-    return min(_from_line(box, line) for line in lines)
+def _from_lines(boxes: Sequence[tuple[float, ...]], lines: Collection[tuple[Point, Point]]) -> list[float]:
+    """The distance of the nearest line from each box, from 25 points of each line [px]; infinite without lines."""
+    if not lines:
+        return [math.inf] * len(boxes)
+    ends = np.array(list(lines), float)
+    along = np.linspace(0.0, 1.0, 25)[:, None]
+    points = ends[:, None, 0] + along * (ends[:, None, 1] - ends[:, None, 0])
+    x, y = points[..., 0], points[..., 1]
+    return [
+        float(np.min(np.max([box[0] - x, x - box[2], box[1] - y, y - box[3]], axis=0))) - 3.0 for box in boxes
+    ]
 
 
 def dimensions(machine: Machine) -> dict[tuple[str, ...], Dimension]:

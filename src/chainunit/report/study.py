@@ -225,6 +225,7 @@ def _certificate(
         yield b.Text(s.line(text, title=titles[run]), form="short")
 
 
+@cache
 def _version(name: str) -> str:
     try:
         return metadata.version(name)
