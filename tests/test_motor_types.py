@@ -44,6 +44,7 @@ def test_it_runs_as_an_fmu(tmp_path):
     np.testing.assert_allclose(seen["motor.tau"].values[-1], reference["motor.tau"].values[-1], rtol=1e-2)
 
 
+@pytest.mark.second
 def test_a_study_names_it(registered, tmp_path):
     choice = config.parse(STUDY)
     study = run.run_study(choice, tmp_path)

@@ -159,6 +159,7 @@ step = 0.002
 """
 
 
+@pytest.mark.second
 def test_what_blocks_the_rocker_decides_the_peak(tmp_path):
     """Peaks over a decade of the stop's stiffness, as studies with these stops give them; and --check of a stop."""
     from chainunit.study import config

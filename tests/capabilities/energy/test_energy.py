@@ -178,6 +178,7 @@ def test_the_interpolation_meets_its_points_and_its_borders():
     assert inverter.reference_losses(400e3)[-1] == pytest.approx(2.0 * inverter.reference_losses(200e3)[-1])
 
 
+@pytest.mark.second
 def test_the_losses_of_the_maker_stand_in_place_of_the_reference(tmp_path):
     given = "inverter_losses = [1, 1, 1, 1, 1, 1, 1, 1]\n".replace("1", "0.02")
     text = STUDY.format(start="inverter").replace("hours = 10\n", f"hours = 10\n{given}")
@@ -240,6 +241,7 @@ def test_the_regulation_covers_motors_for_50_and_60_hz():
     assert asked == {50.0: "IE3", 60.0: "IE3", 87.0: "", 100.0: ""}
 
 
+@pytest.mark.second
 def test_a_motor_of_75_kw_below_ie4_is_warned_of(tmp_path):
     """The row as the packaged catalogue had it before: of class IE3."""
     row = (
@@ -341,6 +343,7 @@ def test_the_winding_has_the_temperature_of_the_duty(study):
     assert settled == pytest.approx(own.temperature, abs=0.5) and not own.too_hot
 
 
+@pytest.mark.second
 def test_a_duty_that_is_too_hot_is_warned_of(tmp_path):
     made = run_study(parse(short_study(loads="[[usage.load]]\nfactor = 10\n")), tmp_path)
     own = found(made).own
@@ -354,6 +357,7 @@ def test_a_duty_that_is_too_hot_is_warned_of(tmp_path):
     assert "120 degC" in warning.text and "usage.load.factor" in warning.text
 
 
+@pytest.mark.second
 def test_another_motor_that_changes_the_speed_is_no_comparison(tmp_path):
     """A motor of two poles on the line turns the same gear and crank twice as fast."""
     made = run_study(parse(short_study(table='other = "IE3 2-pole 1.5 kW, 90S"\n')), tmp_path)

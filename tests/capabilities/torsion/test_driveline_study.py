@@ -236,6 +236,7 @@ def test_forced_vibration_of_small_bends_has_a_closed_form():
     np.testing.assert_allclose(found.peak3, want, rtol=5e-3)
 
 
+@pytest.mark.second
 def test_stiff_shafts_carry_what_rigid_ones_do():
     p = bent(30.0, 15.0)
     speed = np.array([0.4, 0.6]) * frequency(p)
