@@ -64,6 +64,28 @@ def write_run(
         _run(parts, path.write(most), path)
 
 
+def _keep_row(f: Function, chosen: int, into: int, source: int, left: int) -> None:
+    """Write the `chosen` values `into` the rows, and go on behind them; `source` and `left` are locals for it."""
+    f.get(chosen)
+    f.set(source)
+    f.get(source)
+    f.load("i32")
+    f.set(left)
+    add(f, source, 8)
+    with f.block(), f.loop():
+        f.get(left)
+        f.do("i32.eqz")
+        f.leave_if(1)
+        f.get(into, source)
+        f.load("i32")
+        f.load()
+        f.store()
+        add(f, source, 4)
+        add(f, into, BYTES)
+        add(f, left, -1)
+        f.leave(0)
+
+
 def _run(parts: RunParts, advance: Function, path: Reaching | None = None) -> None:
     """The function of runs; `advance` ends at each row, or goes on along a path."""
     memory, written = parts.memory, parts.written
@@ -107,24 +129,7 @@ def _run(parts: RunParts, advance: Function, path: Reaching | None = None) -> No
         f.call(parts.signals)
         f.get(groups)
         f.call(written["values"])
-        f.get(chosen)
-        f.set(source)
-        f.get(source)
-        f.load("i32")
-        f.set(left)
-        add(f, source, 8)
-        with f.block(), f.loop():
-            f.get(left)
-            f.do("i32.eqz")
-            f.leave_if(1)
-            f.get(into, source)
-            f.load("i32")
-            f.load()
-            f.store()
-            add(f, source, 4)
-            add(f, into, BYTES)
-            add(f, left, -1)
-            f.leave(0)
+        _keep_row(f, chosen, into, source, left)
         add(f, row, 1)
         f.get(row, rows)
         f.do("i32.ge_s")
