@@ -50,7 +50,7 @@ def in_node(content, steps):
 def in_chromium(content, steps):
     """The results of a job in a page of Chromium."""
     script = Path(__file__).with_name("wasm_job.mjs").read_text("utf-8").replace("export ", "")
-    with tempfile.TemporaryDirectory() as name:
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name:
         file = Path(name) / "empty.html"
         file.write_text("<!DOCTYPE html><title>job</title>", "utf-8")
         with Page(file, Path(name) / "browser") as page:
