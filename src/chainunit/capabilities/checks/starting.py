@@ -21,7 +21,7 @@ from ...study.verdict import STEADY
 from .row import CheckRow, NotChecked
 from .tables import StartingTable
 
-_WHAT = "starts per hour"
+_WHAT = "starts per hour by the rule of makers of motors"
 
 
 @declaration

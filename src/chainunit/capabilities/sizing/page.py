@@ -66,9 +66,14 @@ def _parts(s: b.Source) -> Iterator[b.Block]:
         price = s.number(f"{path}.price", as_given=True, none="-")
         rows.append(b.TableRow((capital(each["part"]), s.words(f"{path}.designation"), number, price)))
     if len(rows) > 1 and listed["total"]["value"] is not None:
-        rows.append(b.TableRow(("Together", "", "", s.number("sizing.parts.total", as_given=True))))
+        rows.append(
+            b.TableRow(("These parts together", "", "", s.number("sizing.parts.total", as_given=True)))
+        )
     columns = b.heads("part", "designation", "order number", "price")
     yield b.Table(tuple(rows), columns, title="Parts to order", numeric=False, form="long")
+    sources = {each["source"]: f"sizing.parts.parts.{k}.source" for k, each in enumerate(listed["parts"])}
+    named = join(s.words(path) for path in sources.values())
+    yield b.Text(line("Source of their values: ", *named, "."), "note", "long")
     yield from (b.Text(each, form="long") for each in s.lines("sizing.parts.open"))
 
 
