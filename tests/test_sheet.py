@@ -121,6 +121,15 @@ def test_it_names_each_pin_whose_bearing_was_not_checked(made):
     assert "bearings at O1 crank bearing, A crank pin, Bd coupler pin" in text
 
 
+def test_without_sizing_it_says_that_no_drive_was_chosen_and_without_order_numbers(study):
+    plans = {**study.config.plans, "sizing": None}
+    without = replace(study, config=replace(study.config, plans=plans))
+    made = sheet(without, study_report.report(without))
+    (section,) = (each for each in made.sections if each.name == "unchecked")
+    text = pdf.page_text(replace(made, sections=(section,), annex=()), {})
+    assert "and order numbers: the motor is that of" in text
+
+
 def test_figures_of_its_sections_and_the_versions_are_in_the_annex(study):
     whole = study_report.report(study)
     (plots,) = (each for each in whole.sections if each.name == "plots")

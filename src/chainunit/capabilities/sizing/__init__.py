@@ -11,6 +11,7 @@ from ...fmu.backends import Backend
 from ...machines.machine import Machine
 from ...report.blocks import Block, Source
 from ...report.capability import Capability, Contents
+from ...report.lines import Line
 from ...study.analysis import Analysis
 from ...study.conditions import given, has_entries, is_one_of
 from ...study.config import Config
@@ -117,6 +118,14 @@ class SizingCapability(Capability):
         from . import page
 
         return page.answer(s)
+
+    def unchecked(self, study: StudyRecord) -> Iterator[Line]:
+        """The choice of a drive, with order numbers, of a study whose file gives its motor."""
+        if study.config.plans[self.name] is None:
+            yield (
+                "whether another motor or gear serves better, and order numbers: the motor is that of the study "
+                "file, which has no table [sizing]"
+            )
 
     def judgements(self, s: Source, study: StudyRecord) -> Iterator[Block]:
         """The alarm where no motor fits."""
