@@ -88,7 +88,7 @@ def even(parts: RunParts, most: int) -> Function:
     f.f64(1e-9)
     f.do("f64.sub")
     f.set(count)
-    leave_where_more(f, count, most)
+    _leave_where_more(f, count, most)
     f.f64(1.0)
     f.get(count)
     f.do("f64.ceil", "f64.max")
@@ -122,7 +122,7 @@ def even(parts: RunParts, most: int) -> Function:
     return f
 
 
-def leave_where_more(f: Function, count: int, most: int) -> None:
+def _leave_where_more(f: Function, count: int, most: int) -> None:
     """Return 0 where the number in a local is larger than that at an address."""
     f.get(count)
     f.at(most)
@@ -152,23 +152,32 @@ class Controlled:
         f.call(parts.written["tolerance"])
         f.copy(memory["now"], memory["states"], parts.room)
         self._known_pace()
+        self._substeps(self._step, most)
+        f.copy(memory["states"], memory["now"], parts.room)
+        with f.into(memory["pace"]):
+            f.get(self._pace)
+        f.i32(1)
+        return f
+
+    def _substeps(self, until: int, most: int) -> None:
+        """Substeps until the time of the last one's end is that of the local `until`; see `write` for `most`."""
+        f = self._f
         with f.block(), f.loop():
-            f.get(self._since, self._step)
+            f.get(self._since, until)
             f.do("f64.ge")
             f.leave_if(1)
             self._increase(self._taken, 1.0)
-            leave_where_more(f, self._taken, most)
+            _leave_where_more(f, self._taken, most)
+            self._set_limit()
             self._choose_size()
             self._trial()
             self._judge()
             self._accept()
             self._next_size()
             f.leave(0)
-        f.copy(memory["states"], memory["now"], parts.room)
-        with f.into(memory["pace"]):
-            f.get(self._pace)
-        f.i32(1)
-        return f
+
+    def _set_limit(self) -> None:
+        """Find the time that a substep may not pass, where it is not the end of the step."""
 
     def _known_pace(self) -> None:
         """The next substep: that of memory, or the first of all."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from .. import integrators
 from .encoding import Function
-from .integration import Controlled, RunParts, StateLoop, leave_where_more
+from .integration import Controlled, RunParts, StateLoop
 from .signals import next_bend
 
 
@@ -37,27 +37,19 @@ class Reaching(Controlled):
             f.at(memory[name])
             f.set(kept[name])
         self._known_pace()
-        with f.block(), f.loop():
-            f.get(self._since, self._time)
-            f.do("f64.ge")
-            f.leave_if(1)
-            self._increase(self._taken, 1.0)
-            leave_where_more(f, self._taken, most)
-            f.get(self._end, self._since)
-            f.call(self._bend)
-            f.do("f64.min")
-            f.set(self._step)
-            self._choose_size()
-            self._trial()
-            self._judge()
-            self._accept()
-            self._next_size()
-            f.leave(0)
+        self._substeps(self._time, most)
         for name, place in kept.items():
             with f.into(memory[name]):
                 f.get(place)
         f.i32(1)
         return f
+
+    def _set_limit(self) -> None:
+        f = self._f
+        f.get(self._end, self._since)
+        f.call(self._bend)
+        f.do("f64.min")
+        f.set(self._step)
 
     def _first_stage(self) -> None:
         self._f.copy(self._stages, self._memory["slope"], self._parts.room)

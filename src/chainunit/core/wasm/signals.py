@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from .encoding import Function, Module
 from .memory import BYTES, Places
@@ -19,6 +21,31 @@ def signals(memory: Places, module: Module) -> Function:
     f = module.function(["f64"])
     time, record, left, points, value = 0, f.local("i32"), f.local("i32"), f.local("i32"), f.local()
     kinds = (_lines(module), _profile(module))
+    with _each_record(f, memory, record, left):
+        f.get(record)
+        f.load("i32", 12)
+        f.set(points)
+        f.get(record)
+        f.load("i32", 4)
+        with f.when():
+            f.get(time, points, record)
+            f.call(kinds[1])
+            f.set(value)
+            f.otherwise()
+            f.get(time, points, record)
+            f.call(kinds[0])
+            f.set(value)
+        f.get(record)
+        f.load("i32")
+        f.get(value)
+        f.store()
+    return f
+
+
+@contextmanager
+def _each_record(f: Function, memory: Places, record: int, left: int) -> Iterator[None]:
+    """A loop over the signals of the table, if there is one; the local `record` has the address of each, and `left`
+    is a local for it."""
     f.at(memory["table of signals"], "i32")
     f.set(record)
     with f.block():
@@ -33,27 +60,10 @@ def signals(memory: Places, module: Module) -> Function:
             f.get(left)
             f.do("i32.eqz")
             f.leave_if(1)
-            f.get(record)
-            f.load("i32", 12)
-            f.set(points)
-            f.get(record)
-            f.load("i32", 4)
-            with f.when():
-                f.get(time, points, record)
-                f.call(kinds[1])
-                f.set(value)
-                f.otherwise()
-                f.get(time, points, record)
-                f.call(kinds[0])
-                f.set(value)
-            f.get(record)
-            f.load("i32")
-            f.get(value)
-            f.store()
+            yield
             add(f, record, RECORD)
             add(f, left, -1)
             f.leave(0)
-    return f
 
 
 def next_bend(memory: Places, module: Module) -> Function:
@@ -76,47 +86,31 @@ def next_bend(memory: Places, module: Module) -> Function:
 
     f.f64(math.inf)
     f.set(bend)
-    f.at(memory["table of signals"], "i32")
-    f.set(record)
-    with f.block():
+    with _each_record(f, memory, record, left):
         f.get(record)
-        f.do("i32.eqz")
-        f.leave_if(0)
+        f.load("i32", 12)
+        f.set(at)
         f.get(record)
-        f.load("i32")
-        f.set(left)
-        add(f, record, 8)
-        with f.loop():
-            f.get(left)
+        f.load("i32", 4)
+        f.get(record)
+        f.load("i32", 8)
+        f.do("i32.mul")  # no changes of lines, whose kind is 0
+        f.set(changes)
+        with f.block(), f.loop():
+            f.get(changes)
             f.do("i32.eqz")
             f.leave_if(1)
-            f.get(record)
-            f.load("i32", 12)
-            f.set(at)
-            f.get(record)
-            f.load("i32", 4)
-            f.get(record)
-            f.load("i32", 8)
-            f.do("i32.mul")  # no changes of lines, whose kind is 0
-            f.set(changes)
-            with f.block(), f.loop():
-                f.get(changes)
-                f.do("i32.eqz")
-                f.leave_if(1)
-                f.get(at)
-                f.load("f64", BYTES)
-                earlier()
-                f.get(at)
-                f.load("f64", BYTES)
-                f.get(at)
-                f.load("f64", 2 * BYTES)
-                f.do("f64.add")
-                earlier()
-                add(f, at, 3 * BYTES)
-                add(f, changes, -1)
-                f.leave(0)
-            add(f, record, RECORD)
-            add(f, left, -1)
+            f.get(at)
+            f.load("f64", BYTES)
+            earlier()
+            f.get(at)
+            f.load("f64", BYTES)
+            f.get(at)
+            f.load("f64", 2 * BYTES)
+            f.do("f64.add")
+            earlier()
+            add(f, at, 3 * BYTES)
+            add(f, changes, -1)
             f.leave(0)
     f.get(bend)
     return f
