@@ -4,7 +4,7 @@ time of a start."""
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..core.quantities import Value, declaration, quantity
-from ..system import CompiledSimulation, Simulation, run_together
+from ..system import run_together
 from ..system.certificate import torque_names
 from .arrays import peak
 from .drive import Drive
@@ -84,14 +84,14 @@ def _starts_from(
     with ExitStack() as stack:
         simulations = [stack.enter_context(rig.from_rest(event)) for rig in rigs]
         names = _read(rigs[0])
-        runs = _run_all(simulations, [longest] * len(rigs), step, names, {name: goal})
+        runs = run_together(simulations, [longest] * len(rigs), step, names=names, guards={name: goal})
         reached = [
             float(simulation.time) if float(run[name][-1]) >= (1.0 - 1e-9) * goal else None
             for simulation, run in zip(simulations, runs, strict=True)
         ]
         # the change from star to delta is a part of the start
         ends = {k: max(t, drive.switched_until) + _AFTER for k, t in enumerate(reached) if t is not None}
-        later = _run_all([simulations[k] for k in ends], list(ends.values()), step, names)
+        later = run_together([simulations[k] for k in ends], list(ends.values()), step, names=names)
     for k, run in zip(ends, later, strict=True):
         runs[k] = join([runs[k], run])
     for k, run in enumerate(runs):
@@ -109,23 +109,6 @@ def _read(rig: Rig) -> list[str]:
     motor = [f"motor.{name}" for name in ("tau", "w", "a", "heat", drive.motor.current)]
     names = dict.fromkeys([drive.crank_output("w")[0], *motor, *torque_names(drive.machine_bond)])
     return [full for full in names if rig.gives(full)]
-
-
-def _run_all(
-    simulations: Sequence[Simulation],
-    stops: Sequence[float],
-    step: float,
-    names: Sequence[str],
-    guards: Mapping[str, float] | None = None,
-) -> list[xr.Dataset]:
-    """The runs of simulations to their ends [s]: side by side where they are compiled."""
-    together = [each for each in simulations if isinstance(each, CompiledSimulation)]
-    if len(together) == len(simulations):
-        return run_together(together, stops, step, guards=guards, names=names)
-    return [
-        each.run(stop, step, guards=guards, names=names)
-        for each, stop in zip(simulations, stops, strict=True)
-    ]
 
 
 def _numbers(drive: Drive, angle: float, run: xr.Dataset, reached: float | None, of: PeakOf) -> StartNumbers:

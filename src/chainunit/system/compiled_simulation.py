@@ -155,19 +155,20 @@ class CompiledSimulation(Simulation):
 
 
 def run_together(
-    simulations: Sequence[CompiledSimulation],
+    simulations: Sequence[Simulation],
     stops: Sequence[float],
     step: float,
     *,
     guards: Mapping[str, float] | None = None,
     names: Iterable[str] | None = None,
 ) -> list[xr.Dataset]:
-    """Continue simulations of one system side by side in one loop, each to its own end: eight cost little more than
-    one. They may differ in parameters, states, signals, and the present time.
+    """Continue simulations of one system, each to its own end: compiled ones side by side in one loop, where eight
+    cost little more than one, others one after the other. They may differ in parameters, states, signals, and the
+    present time.
 
     Parameters
     ----------
-    simulations : of systems that are one model
+    simulations : compiled ones of systems that are one model, or any others
     stops : end of each [s]
     step, guards, names : see `Simulation.run`
 
@@ -180,11 +181,15 @@ def run_together(
     InputError, RunError
         as `Simulation.run`; and InputError for systems that are different models.
     """
-    for simulation, stop in zip(simulations, stops, strict=True):
+    pairs = list(zip(simulations, stops, strict=True))
+    together = [each for each in simulations if isinstance(each, CompiledSimulation)]
+    if len(together) < len(pairs):
+        return [each.run(stop, step, guards=guards, names=names) for each, stop in pairs]
+    for simulation, stop in pairs:
         check_forward(simulation.time, stop, step)
     options = RunOptions(max(stops, default=0.0), step, None, guards or {}, 1, names, None)
     runs = []
-    for run, failure in _advance(simulations, stops, options):
+    for run, failure in _advance(together, stops, options):
         if failure is not None:
             failure.partial = run
             raise failure
