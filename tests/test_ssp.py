@@ -1,4 +1,4 @@
-"""SSP packages: schemas, connections, parameter sets, and runs in libcosim and ecos beside the own master."""
+"""SSP packages: schemas, connections, parameter sets, and runs in fmpy, libcosim and ecos beside the own master."""
 
 from __future__ import annotations
 
@@ -100,8 +100,8 @@ def test_pyssp_finds_nothing(package):
         for ssv in opened.ssv:
             ssv.__check_compliance__()
             values |= {f"{ssv.file_path.stem}.{p['name']}" for p in ssv.parameters}
-    # an input without a source has its value in a parameter set, and no other has
-    assert {line.rsplit(" ", 1)[1] for line in entries} == values > parameters
+    # an input without a source has its value in a parameter set, and is no connector
+    assert {line.rsplit(" ", 1)[1] for line in entries} == parameters < values
     loads = {f"machine.{s}.{x}" for s in ("left", "right") for x in ("material_mass", "processing_force")}
     assert values - parameters >= {"motor.w_ref", *loads}
 
@@ -142,8 +142,10 @@ def test_the_connections_are_those_of_the_terminals_in_the_fmus(package, tmp_pat
 
 
 def test_connectors_are_the_fmus_variables(package, tmp_path):
-    """Names, kinds and units, unit definitions included, are those of the FMU's own description."""
+    """Names, kinds and units, unit definitions included, are those of the FMU's own description. Inputs without
+    connection are no connectors."""
     assert connections(package) == pair("ChamberForces", "DcMotor").connections
+    targets = {target for _, target in connections(package)}
     with zipfile.ZipFile(package) as archive:
         archive.extractall(tmp_path)
     root = ElementTree.parse(tmp_path / "SystemStructure.ssd").getroot()
@@ -161,7 +163,9 @@ def test_connectors_are_the_fmus_variables(package, tmp_path):
             for c in node.iterfind("ssd:Connectors/ssd:Connector", ns)
         }
         causal = {
-            v.name: (v.causality, v.type, v.unit) for v in described.modelVariables if v.causality != "local"
+            v.name: (v.causality, v.type, v.unit)
+            for v in described.modelVariables
+            if v.causality in ("parameter", "output") or f"{node.get('name')}.{v.name}" in targets
         }
         assert connectors == causal
         for unit in described.unitDefinitions:
@@ -235,10 +239,32 @@ ECOS = """
     # one process in some hundred crashes in the exit handlers of TBB, which ecos runs on, with whatever FMUs
     os._exit(0)
 """
+# fmpy applies a set of its own alone, with the names of the whole system
+FMPY = """
+    import json, sys, zipfile
+    from fmpy.ssp.simulation import simulate_ssp
+    from fmpy.ssp.ssd import ParameterSet, read_ssv
+
+    file, stop, step, names = sys.argv[1], float(sys.argv[2]), float(sys.argv[3]), sys.argv[4:]
+    every = ParameterSet()
+    for member in zipfile.ZipFile(file).namelist():
+        if member.endswith(".ssv"):
+            instance = member.removeprefix("resources/").removesuffix(".ssv")
+            for parameter in read_ssv(file, member).parameters:
+                parameter.name = f"{instance}.{parameter.name}"
+                every.parameters.append(parameter)
+    step = step or 1e-3
+    # it adds its steps up: half a step less, or rounding makes one more
+    result = simulate_ssp(file, stop_time=stop - step / 2, step_size=step, parameter_set=every)
+    print("values", json.dumps([[float(row[name]) for name in names] for row in result]))
+"""
 TOOLS = [
     pytest.param(LIBCOSIM, id="libcosim", marks=[here("libcosimpy"), pytest.mark.second]),
     pytest.param(ECOS, id="ecos", marks=[here("ecospy"), pytest.mark.second]),
 ]
+
+
+ALL_TOOLS = [*TOOLS, pytest.param(FMPY, id="fmpy", marks=pytest.mark.second)]
 
 
 def run(tool, file, names, stop, step=0.0):
@@ -285,10 +311,11 @@ def rewritten(package, file):
     return file
 
 
-@pytest.mark.parametrize("tool", TOOLS)
+@pytest.mark.parametrize("tool", ALL_TOOLS)
 def test_runs_near_the_own_master_with_the_values_of_the_parameter_sets(tool, package, tmp_path):
     """Start-up from rest. The tools exchange once a step, so that the motor sees a load port that is one step
-    older, and extrapolates it: second order as before, 1e-4 of the largest speed at 1 ms."""
+    older, and extrapolates it: second order as before, 1e-4 of the largest speed at 1 ms. fmpy sets all connected
+    inputs to 0 for the first step, so that the motor speeds up without load: 8e-4."""
     other = rewritten(package, tmp_path / "other.ssp")
     names = ["motor.w", "motor.phi"]
     errors = []
@@ -296,15 +323,16 @@ def test_runs_near_the_own_master_with_the_values_of_the_parameter_sets(tool, pa
         got = run(tool, other, names, 1.0, step)
         reference = own(other, tmp_path / "out", names, 1.0, step)
         errors.append(np.max(np.abs(got - reference), axis=0) / np.max(np.abs(reference), axis=0))
-    assert np.all(errors[0] < 1e-4), errors
-    assert np.all(errors[1] < errors[0] / 3.0), errors
+    most, ratio = (1e-3, 2.5) if tool is FMPY else (1e-4, 3.0)
+    assert np.all(errors[0] < most), errors
+    assert np.all(errors[1] < errors[0] / ratio), errors
     before = own(package, tmp_path / "as it was", names, 1.0, 1e-3)
     assert abs(before[-1, 0] - got[-1, 0]) > 5.0
 
 
 @pytest.mark.parametrize("tool", TOOLS)
 def test_runs_as_it_is(tool, package, tmp_path):
-    """libcosim with the package's step; ecos with the FMUs' start values alone."""
+    """libcosim with the package's step; ecos with the FMUs' start values alone. Inputs need no connectors in them."""
     names = ["motor.w", "machine.ratio", "machine.left.material_mass", "motor.w_ref", "motor.limit.i"]
     got = run(tool, package, names, 0.5)
     reference = own(package, tmp_path, names[:1], 0.5, 1e-3)
@@ -335,7 +363,7 @@ def another(tmp_path_factory):
     return file
 
 
-@pytest.mark.parametrize("tool", TOOLS)
+@pytest.mark.parametrize("tool", ALL_TOOLS)
 def test_another_system_by_pythonfmu(tool, another, tmp_path):
     with zipfile.ZipFile(another) as archive:
         fmus = {name for name in archive.namelist() if name.endswith(".fmu")}
@@ -343,8 +371,8 @@ def test_another_system_by_pythonfmu(tool, another, tmp_path):
     names = ["motor.w", "second.w"]
     got = run(tool, another, names, 0.3, 1e-3)
     reference = own(another, tmp_path / "out", names, 0.3, 1e-3)
-    # what the second motor follows is one step old: first order
-    assert np.max(np.abs(got - reference)) < 1e-3 * np.max(reference)
+    # what the second motor follows is one step old: first order; in fmpy the first step is without load, too
+    assert np.max(np.abs(got - reference)) < (2e-3 if tool is FMPY else 1e-3) * np.max(reference)
 
 
 OBSERVED = System(
@@ -364,7 +392,7 @@ OBSERVED = System(
 )
 
 
-@pytest.mark.parametrize("tool", TOOLS)
+@pytest.mark.parametrize("tool", ALL_TOOLS)
 def test_an_observer_beside_machine_and_motor(tool, tmp_path):
     """It takes plain signals of the motor. Its estimates are the loads, in the own master and in the tools."""
     file = tmp_path / "observed.ssp"
@@ -385,7 +413,7 @@ def test_an_observer_beside_machine_and_motor(tool, tmp_path):
     np.testing.assert_allclose(got[-1], reference[-1], rtol=1e-2)
 
 
-@pytest.mark.parametrize("tool", TOOLS)
+@pytest.mark.parametrize("tool", ALL_TOOLS)
 def test_a_driveline_between_runs_near_the_own_master(tool, tmp_path):
     """Motor, line and machine: the shaft torque follows, though both ports are a step older in these tools."""
     text = '[machine]\nratio = 50\n[driveline]\nalpha1 = "12 deg"\nalpha2 = "8 deg"\nd2 = 20\nd3 = 20\n'
@@ -401,6 +429,24 @@ def test_a_driveline_between_runs_near_the_own_master(tool, tmp_path):
 
 
 # -- the file, and what is refused
+
+
+def test_connectors_are_connected_inputs_or_on_demand_all(package, tmp_path):
+    """fmpy takes whatever output it connected last for an input without connection (FMPy, issue 690)."""
+    ssp.export(ANOTHER, tmp_path / "all.ssp", backend="python", all_inputs=True)
+    ssp.export(ANOTHER, tmp_path / "connected.ssp", backend="python")
+    entries = {}
+    for name in ("all", "connected"):
+        elements = read_ssd(str(tmp_path / f"{name}.ssp")).system.elements
+        entries[name] = {f"{e.name}.{c.name}" for e in elements for c in e.connectors if c.kind == "input"}
+    assert entries["connected"] == {target for _, target in ANOTHER.connections}
+    assert entries["all"] == {
+        f"{name}.{c.name}"
+        for name, part in ANOTHER.components.items()
+        for c in part.connectors.values()
+        if c.causality == "input"
+    }
+    assert entries["connected"] < entries["all"]
 
 
 def test_feed_forward_and_sizing(tmp_path, monkeypatch):

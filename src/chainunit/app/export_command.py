@@ -105,6 +105,13 @@ def export_ssp(
     ] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="SSP file.")] = Path("ChainUnitDrive.ssp"),
     backend: BackendOption = None,
+    all_inputs: Annotated[
+        bool,
+        typer.Option(
+            "--all-inputs",
+            help="Connectors for inputs without connection, too; fmpy cannot run the package then.",
+        ),
+    ] = False,
 ) -> None:
     """Write motor and machine, connected, with their parameter sets, as an SSP 1.0 package of FMUs 2.0."""
     from ..study.package import export_study, left_out
@@ -114,7 +121,11 @@ def export_ssp(
     loaded = study_file(config)
     with terminal_console(stderr=True).status("exporting") as status:
         made = export_study(
-            loaded, output, backend=backend.value if backend else None, progress=status.update
+            loaded,
+            output,
+            all_inputs=all_inputs,
+            backend=backend.value if backend else None,
+            progress=status.update,
         )
     print(f"{output}: {made}")
     if words := left_out(loaded.operation, loaded.given_events):

@@ -201,12 +201,13 @@ def export_study(
     config: Config,
     file: Path,
     *,
+    all_inputs: bool = False,
     backend: Backend | None = None,
     progress: Callable[[str], None] = lambda what: None,
 ) -> str:
     """Write machine and motor of a study as an SSP package; returns its contents in words. Where the
     file leaves the motor open it is chosen first. The default experiment is as long as the study's
-    start-up and steady running.
+    start-up and steady running. With `all_inputs`, inputs without connection are connectors, too.
 
     Raises
     ------
@@ -221,6 +222,7 @@ def export_study(
         description=config.title,
         stop=_running(config.operation),
         step=config.run.step,
+        all_inputs=all_inputs,
         backend=backend,
         progress=progress,
     )

@@ -3,8 +3,10 @@
 Foreign FMUs are packaged unchanged, with their own names; the values that the system sets in them are in their
 parameter sets. The package runs without changes in libcosim, which reads every component's parameter set and, from an
 annotation, the step; and in ecos, which takes the set by name (``init(parameter_set="start")``). Each FMU also has
-its start values, so that a tool that ignores the sets runs the same system. Neither of the two reads connections to
-connectors of the system itself: inputs without connection stay open, with their values in the sets.
+its start values, so that a tool that ignores the sets, as fmpy does, runs the same system. Neither libcosim nor ecos
+reads connections to connectors of the system itself: inputs without connection stay open, with their values in the
+sets. Only on demand are they connectors of the package, as fmpy connects such connectors to whatever output it
+connected last (FMPy, issue 690).
 """
 
 from __future__ import annotations
@@ -47,6 +49,7 @@ def export(
     description: str = "",
     stop: float = 10.0,
     step: float = 1e-3,
+    all_inputs: bool = False,
     backend: Backend | None = None,
     progress: Callable[[str], None] = lambda what: None,
 ) -> str:
@@ -58,6 +61,7 @@ def export(
     file : path of the package; an existing file is replaced, in one step
     name, description : name and description of the system
     stop, step : end of the default experiment, and its communication step, an annotation that libcosim reads [s]
+    all_inputs : whether inputs without connection are connectors of their components, too
     backend : backend of the FMUs, which are FMI 2.0; see `chainunit.fmu.backends.export`
     progress : is called with texts on the work
 
@@ -72,7 +76,7 @@ def export(
     if not (0.0 < step < math.inf and 0.0 < stop < math.inf):
         raise InputError(f"an experiment of {stop:g} s in steps of {step:g} s: must go forward")
     parts = _parts(system)
-    targets = {target for _, target in system.connections}
+    free = _free_inputs(system, parts)
     file = Path(file)
     folder(file.parent)
     contents: dict[str, bytes] = {}
@@ -96,10 +100,10 @@ def export(
                 contents[paths[alike]] = fmu.read_bytes()
             sources[name_of] = paths[alike]
     for name_of, part in parts.items():
-        free = [c for c in part.of_kind("input") if f"{name_of}.{c.name}" not in targets]
         set_here = [c for c in part.of_kind("parameter") if c.name in part.start]
-        contents[_parameter_file(name_of)] = xml_bytes(_parameter_set(part, [*set_here, *free]))
-    structure = _description(system, parts, sources, (name, description), (stop, step))
+        contents[_parameter_file(name_of)] = xml_bytes(_parameter_set(part, [*set_here, *free[name_of]]))
+    hidden = {} if all_inputs else free
+    structure = _description(system, parts, sources, hidden, (name, description), (stop, step))
     contents["SystemStructure.ssd"] = xml_bytes(structure)
     with atomic_file(file) as temporary:
         pack(contents, temporary)
@@ -158,6 +162,15 @@ def _parts(system: System) -> dict[str, _Part]:
     return parts
 
 
+def _free_inputs(system: System, parts: Mapping[str, _Part]) -> dict[str, list[Connector]]:
+    """By component, its inputs without connection."""
+    targets = {target for _, target in system.connections}
+    return {
+        name: [c for c in part.of_kind("input") if f"{name}.{c.name}" not in targets]
+        for name, part in parts.items()
+    }
+
+
 # -- XML
 
 
@@ -205,18 +218,20 @@ def _description(
     system: System,
     parts: Mapping[str, _Part],
     sources: Mapping[str, str],
+    hidden: Mapping[str, Sequence[Connector]],
     title: tuple[str, str],
     experiment: tuple[float, float],
 ) -> Element:
-    """The XML tree of SystemStructure.ssd; `sources` are the FMUs' paths by component, `title` is name and
-    description of the system, `experiment` end and step [s]."""
+    """The XML tree of SystemStructure.ssd; `sources` are the FMUs' paths by component, `hidden` the variables without
+    a connector, `title` is name and description of the system, `experiment` end and step [s]."""
     # a description may hold characters that XML does not allow
     words = "".join(c if c.isprintable() else " " for c in title[1])
     root = _root("ssd:SystemStructureDescription", title[0], ("ssd", "ssc", "osp"), words)
     top = SubElement(root, "ssd:System", name=title[0])
     elements = SubElement(top, "ssd:Elements")
     for name, part in parts.items():
-        _component(elements, name, part, sources[name])
+        shown = [c for c in part.connectors if c not in hidden.get(name, ())]
+        _component(elements, name, part, shown, sources[name])
     if system.connections:
         connections = SubElement(top, "ssd:Connections")
         for ends in system.connections:
@@ -239,7 +254,7 @@ def _description(
     return root
 
 
-def _component(elements: Element, name: str, part: _Part, source: str) -> None:
+def _component(elements: Element, name: str, part: _Part, shown: Iterable[Connector], source: str) -> None:
     component = SubElement(
         elements,
         "ssd:Component",
@@ -250,7 +265,7 @@ def _component(elements: Element, name: str, part: _Part, source: str) -> None:
         implementation="CoSimulation",
     )
     connectors = SubElement(component, "ssd:Connectors")
-    for c in part.connectors:
+    for c in shown:
         node = SubElement(
             connectors, "ssd:Connector", name=part.name(c.name), description=c.description, kind=c.causality
         )
