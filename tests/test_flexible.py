@@ -457,6 +457,36 @@ def test_power_is_what_the_machine_stores_and_loses():
         np.testing.assert_allclose(residuals, 0.0, atol=2e-7 * size)
 
 
+def test_wall_and_web_of_a_chain_are_the_lines_to_b():
+    """Angles to the place of B; speeds and accelerations are the derivatives of the angles along the motion."""
+    rng = np.random.default_rng(35)
+    names = [f"{side}.{rod}" for side in SIDES for rod in ("wall", "web")]
+    for _ in range(12):
+        case = model, p, u, x = moving(rng)
+        now = named(model, p, u, model.state_layout.instance(x))
+        states = model.state_layout.by_name(model.state_layout.instance(x))
+        rocker = crank_rocker(p, u.phi / p.ratio).links["rocker"].at(p.e).p
+        walls = int(model.expression().split("(")[1].split(",")[0])
+        for side, a1 in (("left", -p.z), ("right", p.z)):
+            theta = [states[f"{side}.theta_{k + 1}"] for k in range(walls)]
+            b = np.array([a1, 0.0]) + p.l1 / walls * np.array(
+                [np.sin(theta), np.negative(np.cos(theta))]
+            ).sum(1)
+            for rod, start in (("wall", [a1, 0.0]), ("web", [rocker.x, rocker.y])):
+                x_way, y_way = b - start
+                angle = math.remainder(now[f"{side}.{rod}.angle"] - math.atan2(x_way, -y_way), 2.0 * math.pi)
+                assert abs(angle) < 1e-9
+            opening = {"left": 1.0, "right": -1.0}[side] * (
+                now[f"{side}.wall.angle"] - now[f"{side}.web.angle"]
+            )
+            assert now[f"{side}.spread_angle"] == pytest.approx(opening, abs=1e-12)
+        for of, by, rel in (("angle", "w", 1e-6), ("w", "a", 1e-5)):
+            rates = along(case, u.a, lambda o, of=of: [o[f"{name}.{of}"] for name in names], 2e-6)
+            for name, rate in zip(names, rates, strict=True):
+                size = abs(now[f"{name}.w"]) + (of == "w") * (now[f"{name}.w"] ** 2 + abs(now[f"{name}.a"]))
+                assert rate == pytest.approx(now[f"{name}.{by}"], abs=rel * (1.0 + size)), name
+
+
 def dense(model, p, u, x, side, a2):
     """A chain by mass matrix and multipliers: force at A2 and moment of the pin there, for the acceleration `a2`."""
     states, hand = (

@@ -109,6 +109,80 @@ def test_a_stop_holds_and_keeps_every_balance():
             assert abs(float(got) - bias.imag / 1e-30) < 1e-9 * max(size, abs(float(got)))
 
 
+def test_wall_and_web_turn_as_their_outputs_say():
+    """Angles against the places of the pins; speeds and accelerations as exact derivatives by time; and the kinetic
+    energy of the organs from the speeds, an independent sum."""
+    xp = engines.dual(engines.numpy_())
+    for seed in range(200):
+        machine, phi, w, a, left, right = draw(seed)
+        p = machine.p
+        u = ChamberForces.Inputs(phi=engines.Dual(phi, w), w=engines.Dual(w, a), a=a, left=left, right=right)
+        state = ChamberForces.shared(xp, p, u, None)
+        out = ChamberForces.parts[0].equations(xp, p, u, None, state)
+        pins = {
+            name: np.array([engines.value(pin.p.x), engines.value(pin.p.y)])
+            for name, pin in state.m.pins.items()
+        }
+        organs = 0.0
+        for side, loads in (("left", left), ("right", right)):
+            organ, masses = getattr(out, side), getattr(p, side)
+            b, a1, a2 = pins[f"B {side}"], pins[f"A1 {side}"], pins["A2"]
+            for rod, start, length in ((organ.wall, a1, p.l1), (organ.web, a2, p.l2)):
+                angle = engines.value(rod.angle)
+                along = length * np.array([math.sin(angle), -math.cos(angle)])
+                np.testing.assert_allclose(start + along, b, atol=1e-10 * length)
+                assert engines.slope(rod.angle) == pytest.approx(engines.value(rod.w), rel=1e-8, abs=1e-9)
+                size = abs(engines.value(rod.w)) ** 2 + abs(engines.value(rod.a))
+                assert abs(engines.slope(rod.w) - engines.value(rod.a)) <= 1e-8 * size
+            to_a1, to_a2 = (a1 - b) / p.l1, (a2 - b) / p.l2
+            spread = engines.value(organ.spread_angle)
+            assert 0.0 < spread < math.pi and math.cos(spread) == pytest.approx(to_a1 @ to_a2, abs=1e-10)
+            on_web = p.web_share * loads.material_mass
+            wall, web = masses.wall_mass + loads.material_mass - on_web, masses.web_mass + on_web
+            speed = engines.value(out.rocker.w) * p.e
+            psi, turn = engines.value(out.rocker.psi), engines.value(organ.web.w)
+            angle = engines.value(organ.web.angle)
+            middle = np.array([math.cos(psi), math.sin(psi)]) * speed
+            middle = middle + 0.5 * p.l2 * turn * np.array([math.cos(angle), math.sin(angle)])
+            organs += 0.5 * web * (middle @ middle + p.rod_inertia * (p.l2 * turn) ** 2 / 12.0)
+            of_wall = (p.l1 * engines.value(organ.wall.w)) ** 2
+            organs += 0.5 * wall * of_wall * (0.25 + p.rod_inertia / 12.0)
+        bare = dataclasses.replace(
+            p,
+            left=dataclasses.replace(p.left, wall_mass=0.0, web_mass=0.0),
+            right=dataclasses.replace(p.right, wall_mass=0.0, web_mass=0.0),
+        )
+        rest = ChainUnitMachine(bare).forces(phi, w, a, EMPTY, EMPTY).kinetic_energy
+        kinetic = engines.value(out.kinetic_energy)
+        assert kinetic == pytest.approx(float(rest) + organs, rel=1e-9)
+
+
+def test_the_coupler_drives_the_rocker():
+    """Its parts across and along the rocker against the momentum of the rocker; and eqs. (7)-(9) of paper 001 for a
+    coupler without mass: it pushes along itself, so that R^n is R sin theta and R^t is R cos theta."""
+    for seed in range(200):
+        machine, phi, w, a, left, right = draw(seed)
+        p, out = machine.p, machine.forces(phi, w, a, left, right)
+        rocker, body = out.rocker, machine.p.rocker
+        along = np.array([math.sin(rocker.psi), -math.cos(rocker.psi)])
+        size = scale_of(machine, phi, w, a, left, right)
+        torque = p.h * rocker.coupler_tangential - rocker.tau
+        torque -= body.m * p.g * body.s * math.sin(rocker.psi)
+        inertia = (body.I + body.m * body.s**2) * rocker.a
+        assert abs(float(torque - inertia)) < 1e-9 * size * p.ratio * max(1.0, p.h / p.l)
+        pull = rocker.coupler_normal + rocker.normal_load + body.m * p.g * math.cos(rocker.psi)
+        pull += along @ [out.pivot.fx, out.pivot.fy]
+        assert abs(float(pull + body.m * body.s * rocker.w**2)) < 1e-9 * size * p.ratio / p.l * max(1.0, p.l)
+        coupler = dataclasses.replace(p.coupler, m=0.0, I=0.0)
+        massless = ChainUnitMachine(dataclasses.replace(p, coupler=coupler))
+        out = massless.forces(phi, w, a, left, right)
+        R = out.rocker.coupler_tangential / math.cos(out.pressure_angle)
+        assert abs(R) == pytest.approx(math.hypot(out.coupler_pin.fx, out.coupler_pin.fy), rel=1e-6)
+        assert out.rocker.coupler_normal == pytest.approx(
+            R * math.sin(out.pressure_angle), rel=1e-6, abs=1e-9
+        )
+
+
 def test_forces_balance_gravity_and_inertia():
     """The frame's load against the momentum of the bodies, an independent sum over the whole machine."""
     xp = engines.numpy_()

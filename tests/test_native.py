@@ -40,7 +40,7 @@ from chainunit.fmu.native.export import export
 from chainunit.fmu.native.generate import rules
 from chainunit.fmu.native.platforms import HEADERS, KERNELS
 from chainunit.fmu.recipe import Experiment, script_of
-from chainunit.fmu.reference import INPUTS, READ, REFERENCE, STANDARD, STEPPED, excitation
+from chainunit.fmu.reference import INPUTS, READ, REFERENCE, SMOKE_TEST, STANDARD, STEPPED, excitation
 from chainunit.fmu.reference import reference_results as reference_results_of
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.models import MODELS
@@ -631,14 +631,20 @@ def reference_results(folder, name):
     assert root.tag == "fmiReferences"
     space = "{http://fmi-standard.org/fmi-ls-manifest}fmi-ls-"
     assert root.get(f"{space}name") == STANDARD == REFERENCE.split("/")[1]
-    assert root.get(f"{space}version") == "1.0.0-alpha.1"
+    assert root.get(f"{space}version") == "1.0.0-beta.1"
     files = {x.get("source"): x.get("role") for x in root.iter("Related")}
     assert files == {
         f"{name}_{INPUTS}.csv": "testcase",
         f"{name}_{STEPPED}.csv": "result",
         f"{name}_{READ}.csv": "result",
+        f"{name}_{SMOKE_TEST}": "experiment/smoke-test",
     }
-    return tuple(fmpy.util.read_csv(Path(folder) / REFERENCE / file) for file in files)
+    (test,) = etree.parse(Path(folder) / REFERENCE / f"{name}_{SMOKE_TEST}").getroot()
+    assert [x.get("source") for x in test] == [f"{name}_{INPUTS}.csv", f"{name}_{STEPPED}.csv"]
+    tables = tuple(fmpy.util.read_csv(Path(folder) / REFERENCE / file) for file in [*files][:3])
+    start, stop, step = (float(test.get(key)) for key in ("startTime", "stopTime", "stepSize"))
+    np.testing.assert_allclose(tables[0]["time"], np.arange(start, stop + 0.5 * step, step), atol=1e-12)
+    return tables
 
 
 def assert_met(name, got, wanted):
@@ -935,7 +941,7 @@ def test_what_an_fmu_carries(native, fmus):
         names = set(zipfile.ZipFile(native[name, 2][0]).namelist())
         common = {"documentation/index.html", "documentation/licenses/license.txt"}
         common |= {f"{REFERENCE}/{name}_{end}.csv" for end in (INPUTS, STEPPED, READ)}
-        common.add(f"{REFERENCE}/fmi-ls-manifest.xml")
+        common |= {f"{REFERENCE}/fmi-ls-manifest.xml", f"{REFERENCE}/{name}_{SMOKE_TEST}"}
         of_2 = {*common, "model.png", "terminalsAndIcons/terminalsAndIcons.xml"}
         assert of_2 <= names
         assert of_2 <= set(zipfile.ZipFile(fmus[name]).namelist())

@@ -1,8 +1,9 @@
 """The reference results inside an FMU.
 
 They are the results of a Co-Simulation master that holds its inputs over a step, computed by the Python kernels.
-There are two files of them, as masters read outputs at different moments. The files lie in the folder of the layered
-standard FMI-LS-REF (1.0.0-beta.1), whose manifest describes each file.
+There are two files of them, as masters read outputs at different moments, and a smoke test that names inputs and
+results. The files lie in the folder of the layered standard FMI-LS-REF (1.0.0-beta.1), whose manifest describes each
+file.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import logging
 import math
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from functools import lru_cache
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement, register_namespace
 
@@ -33,6 +34,9 @@ RELATED = f"{REFERENCE}/fmi-ls-manifest.xml"
 """The manifest of the layered standard, which tells the role of each related file."""
 INPUTS, STEPPED, READ = "in", "co_simulation", "set_then_read"
 """Endings of the names of the files: inputs; outputs at the end of each step; outputs at its beginning."""
+SMOKE_TEST = "smoke_test.exp"
+"""Ending of the name of the file with the experiment of these inputs and results."""
+EXPERIMENTS_TYPE = "application/x-ma-hs-experiments"
 STEP, ROWS = 0.04, 26  # s
 _NAMESPACE = "http://fmi-standard.org/fmi-ls-manifest"
 _MOST_STEPS = 100_000
@@ -40,6 +44,33 @@ _MOST_STEPS = 100_000
 hundred."""
 
 log = logging.getLogger("chainunit.fmu")
+
+
+class ReferenceExperiment(NamedTuple):
+    """An experiment over the time of the reference results: step [s], the files of its inputs and of its results, by
+    their places from the file of experiments, and the deviation that is allowed, in parts of the size of a column."""
+
+    name: str
+    description: str
+    step: float
+    stimuli: str
+    references: str
+    tolerance: float | None = None
+
+
+def experiments_file(name: str, description: str, experiments: Iterable[ReferenceExperiment]) -> bytes:
+    """A file of experiments in the format MA-HS-Experiments, to which FMI-LS-REF refers. Times are attributes, as its
+    text has them; the draft of its schema has them in an element of their own."""
+    root = Element("Experiments", name=name, description=description)
+    for each in experiments:
+        times = {"startTime": 0.0, "stopTime": (ROWS - 1) * STEP, "stepSize": each.step}
+        if each.tolerance is not None:
+            times["tolerance"] = each.tolerance
+        numbers = {key: repr(value) for key, value in times.items()}
+        node = SubElement(root, "Experiment", numbers, name=each.name, description=each.description)
+        SubElement(node, "Stimuli", source=each.stimuli, type="text/csv")
+        SubElement(node, "References", source=each.references, type="text/csv")
+    return xml_bytes(root)
 
 
 def reference_results(interface: Interface) -> dict[str, bytes]:
@@ -65,12 +96,25 @@ def reference_results(interface: Interface) -> dict[str, bytes]:
     }
     types = {s.name: s.variable.type for s in interface.signals}
     files = {f"{REFERENCE}/{name}_{end}.csv": csv_bytes(*table, types) for end, table in tables.items()}
+    test = ReferenceExperiment(
+        "reference",
+        f"{words[INPUTS]}; {words[STEPPED]}",
+        STEP,
+        f"{name}_{INPUTS}.csv",
+        f"{name}_{STEPPED}.csv",
+    )
+    smoke_test = f"{name}_{SMOKE_TEST}"
+    files[f"{REFERENCE}/{smoke_test}"] = experiments_file(name, "Smoke test in Co-Simulation", [test])
     root = related_files()
-    for end in tables:
-        role = "testcase" if end == INPUTS else "result"
-        SubElement(
-            root, "Related", type="text/csv", source=f"{name}_{end}.csv", role=role, description=words[end]
-        )
+    related = [
+        ("text/csv", f"{name}_{end}.csv", "testcase" if end == INPUTS else "result", words[end])
+        for end in tables
+    ]
+    related.append(
+        (EXPERIMENTS_TYPE, smoke_test, "experiment/smoke-test", f"{test.description}, as an experiment")
+    )
+    for kind, source, role, description in related:
+        SubElement(root, "Related", type=kind, source=source, role=role, description=description)
     return files | {RELATED: xml_bytes(root)}
 
 
@@ -80,10 +124,9 @@ def related_files(content: bytes | None = None) -> Element:
     register_namespace("fmi-ls", _NAMESPACE)
     if content is not None:
         return ElementTree.fromstring(content)
-    # the text of 1.0.0-beta.1 fixes this version
     said = {
         "name": STANDARD,
-        "version": "1.0.0-alpha.1",
+        "version": "1.0.0-beta.1",
         "description": "Layered Standard providing information on related files included in an FMU.",
     }
     return Element("fmiReferences", {f"{{{_NAMESPACE}}}fmi-ls-{key}": text for key, text in said.items()})

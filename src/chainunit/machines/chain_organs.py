@@ -13,7 +13,7 @@ from itertools import pairwise
 from typing import Any
 
 from ..core.integrators import Solver
-from ..core.planar import Vec2
+from ..core.planar import ZERO, Vec2
 from ..core.quantities import Layout, Value, declaration, declared_class, group, quantity
 from ..groups import hanging_chain
 from ..groups.chain import Rods
@@ -24,12 +24,25 @@ from ..mechanism.linkage import Linkage
 from ..mechanism.machine import Mechanism
 from ..mechanism.models import running
 from . import chain_unit
-from .chain_unit import NAMES, SIDES, ChamberForces, Rocker, on_drive, on_side, rocker_load, rocker_motion
+from .chain_unit import (
+    NAMES,
+    SIDES,
+    ChamberForces,
+    Rocker,
+    coupler_force,
+    on_drive,
+    on_side,
+    rocker_load,
+    rocker_motion,
+    rod_motions,
+)
 
 _CLOSED = 1e-6
 """Gap at the start above which a chain does not hang [m]."""
 _ANY_FOLD = 1e6
 """Angle beyond any fold [rad]."""
+_NO_LINE = 1e-30
+"""Squared length that is added to that of a line, so that a chain folded to nothing has a speed, too [m2]."""
 _NO_PULL = 1e-6  # N, range of the pull in which a rod changes from taut to slack
 LEAST, USUAL, MOST = 2, 8, 24
 """Least, usual and largest number of rods of an organ."""
@@ -226,7 +239,7 @@ class Organs:
     def _side(self, xp: Any, p: Any, s: ChainedState, a: Any, side: Any, due: Any) -> tuple[Any, Vec2]:
         """The declared loads of a side at crank acceleration `a`, and the force at its support."""
         h, hand, walls = s.chains[side], NAMES[side].hand, self.walls
-        _, forces = h.at(a)
+        accelerations, forces = h.at(a)
         theta = h.data.state[0]
         axes = [Vec2(xp.sin(angle), -xp.cos(angle)) for angle in theta]
         before = [u.dot(forces[k] - h.at_start[k]) for k, u in enumerate(axes)]
@@ -238,6 +251,7 @@ class Organs:
         kinetic, potential, per_kg = h.energies(xp, self._shares(p))
         loads = self.Side(
             **on_side(s.m.links["rocker"], hand, (-forces[0], forces[walls], forces[-1])),
+            **rod_motions(xp, hand, *self._lines(axes, h.data.rods.lengths, h.data.state[1], accelerations)),
             web_pull=functools.reduce(xp.minimum, least[walls:]),
             wall_pull=functools.reduce(xp.minimum, least[:walls]),
             slack_share=sum(slack) * (1.0 / self.number),
@@ -251,6 +265,20 @@ class Organs:
             **{f"fold_{k + 1}": fold for k, fold in enumerate(folds)},
         )
         return loads, -forces[0]
+
+    def _lines(
+        self, axes: Sequence[Vec2], lengths: Sequence[Any], omega: Sequence[Any], rates: Sequence[Any]
+    ) -> Iterator[tuple[Vec2, Any, Any]]:
+        """Of the lines from A1 to B and from A2 to B, which are wall and web if each is one rod: vector [m], angular
+        speed [rad/s] and acceleration [rad/s2], from unit vectors, lengths, speeds and accelerations of the rods."""
+        for sense, rods in ((1.0, slice(self.walls)), (-1.0, slice(self.walls, None))):
+            along = moving = turning = ZERO
+            for u, l, w, rate in zip(axes[rods], lengths[rods], omega[rods], rates[rods], strict=True):
+                along, moving = along.plus(u, sense * l), moving.plus(u.turned(), sense * l * w)
+                turning = turning + (u.turned() * rate - u * (w * w)) * (sense * l)
+            per_square = 1.0 / (along.squared() + _NO_LINE)
+            w = along.cross(moving) * per_square
+            yield along, w, (along.cross(turning) - 2.0 * w * along.dot(moving)) * per_square
 
     def probes(self, xp: Any, p: Any, u: Any, s: Any, a: Any) -> dict[str, Any]:
         """The outputs of the machine at the state `s` and the crank acceleration `a` [rad/s2]."""
@@ -274,7 +302,11 @@ class Organs:
                 fields["margin"] = xp.minimum(fields["margin"], xp.abs(xp.sin(web - wall)))
         return {
             **fields,
-            "rocker": Rocker(**rocker_motion(xp, s, a), **rocker_load(p, left, right, at_a2)),
+            "rocker": Rocker(
+                **rocker_motion(xp, s, a),
+                **coupler_force(s, reactions),
+                **rocker_load(p, left, right, at_a2),
+            ),
             **sides,
             **on_drive(xp, p, s, a, reactions, at_a1),
         }

@@ -136,8 +136,17 @@ class Inputs(Feed, CrankMotion):
 
 
 @declaration
+class RodMotion:
+    """How a rod turns."""
+
+    angle: Value = quantity("rad", "angle from the downward vertical, positive towards +x")
+    w: Value = quantity("rad/s", "angular speed")
+    a: Value = quantity("rad/s2", "angular acceleration")
+
+
+@declaration
 class Side:
-    """Loads of one organ."""
+    """Loads and motion of one organ."""
 
     tangential_load: Value = quantity(
         "N", "R_t, load across the rocker arm at A2; sign mirrored on the right", nominal=100.0
@@ -152,6 +161,9 @@ class Side:
     wall_pull: Value = quantity(
         "N", "least axial pull in the wall; negative where the wall would have to push", nominal=100.0
     )
+    wall: RodMotion = group(RodMotion, "wall, the line from A1 to B")
+    web: RodMotion = group(RodMotion, "web, the line from A2 to B")
+    spread_angle: Value = quantity("rad", "spread angle A1-B-A2 between wall and web")
 
 
 @declaration
@@ -172,6 +184,12 @@ class Rocker(RockerLoad):
     psi: Value = quantity("rad", "angle from the downward vertical, positive towards +x")
     w: Value = quantity("rad/s", "angular speed")
     a: Value = quantity("rad/s2", "angular acceleration")
+    coupler_tangential: Value = quantity(
+        "N", "force of the coupler on the rocker at Bd, across the rocker, positive along +psi", nominal=100.0
+    )
+    coupler_normal: Value = quantity(
+        "N", "force of the coupler on the rocker at Bd, along the rocker, positive away from C", nominal=100.0
+    )
 
 
 @declaration
@@ -263,15 +281,21 @@ def resistances(p: Any, u: Any) -> dict[str, Resistance]:
     }
 
 
-def _on_sides(xp: Any, p: Any, s: MachineState, reactions: Mapping[Any, Vec2], rocker: Link) -> Chamber:
-    """Loads of the organs, and of the rocker."""
+def _on_sides(xp: Any, p: Any, s: MachineState, a: Any, reactions: Mapping[Any, Vec2]) -> Chamber:
+    """Loads and motion of the organs, and loads of the rocker, at the acceleration `a` of the coordinate."""
     sides = []
+    rocker = s.m.links["rocker"]
     pulls = _pulls(s, reactions)
     for side, (a1, b, wall, web, _, hand) in NAMES.items():
         forces = reactions[a1, wall], reactions[b, wall], reactions["A2", web]
+        rods = tuple(
+            (link.u, link.t1 * s.w, link.t1 * a + link.t2 * (s.w * s.w))
+            for link in (s.m.links[wall], s.m.links[web])
+        )
         sides.append(
             Side(
                 **on_side(rocker, hand, forces),
+                **rod_motions(xp, hand, *rods),
                 web_pull=xp.minimum(*pulls[side]["web"].values()),
                 wall_pull=xp.minimum(*pulls[side]["wall"].values()),
             )
@@ -310,6 +334,24 @@ def on_side(rocker: Link, hand: float, forces: tuple[Vec2, Vec2, Vec2]) -> dict[
     }
 
 
+def rod_motions(
+    xp: Any, hand: float, wall: tuple[Vec2, Any, Any], web: tuple[Vec2, Any, Any]
+) -> dict[str, Any]:
+    """The fields of `Side` on the motion of wall and web, from a vector along each, towards B, its speed [rad/s] and
+    acceleration [rad/s2]; `hand` is +1 on the left and -1 on the right. The spread angle is eta = alpha1' + alpha2' -
+    psi of paper 000, before eq. (44); on the left, alpha1' is the angle of the wall, alpha2' - psi minus that of the
+    web."""
+    (along, *of_wall), (along_web, *of_web) = wall, web
+    angle = xp.atan2(along.x, -along.y)
+    # no jump at pi, which a chain passes where B goes through the line A1-A2
+    spread = math.pi - xp.atan2(along_web.cross(along) * hand, -along_web.dot(along))
+    return {
+        "wall": RodMotion(angle=angle, w=of_wall[0], a=of_wall[1]),
+        "web": RodMotion(angle=angle - spread * hand, w=of_web[0], a=of_web[1]),
+        "spread_angle": spread,
+    }
+
+
 def rocker_load(p: Any, left: Side, right: Side, at_a2: Any = 0.0) -> dict[str, Any]:
     """The fields of `RockerLoad`; `at_a2` is the moment of the rocker on both organs in A2 [N m]."""
     tangential = left.tangential_load - right.tangential_load
@@ -324,7 +366,7 @@ def chamber(xp: Any, p: Any, u: Any, psi: Any, psi_w: Any, psi_a: Any) -> Chambe
     """Both organs on a rocker at angle `psi` with speed `psi_w` and acceleration `psi_a`, independent of the drive.
     The rocker is the crank of this linkage; its crank angle, from the upward vertical, falls as psi rises."""
     s = _organs_on_rocker(xp, p, u, psi, psi_w)
-    return _on_sides(xp, p, s, s.reactions(-psi_a), s.m.links["rocker"])
+    return _on_sides(xp, p, s, -psi_a, s.reactions(-psi_a))
 
 
 def organ_pulls(xp: Any, p: Any, u: Any, psi: Any, psi_w: Any, psi_a: Any) -> Pulls:
@@ -407,6 +449,16 @@ def rocker_motion(xp: Any, s: Any, a: Any) -> dict[str, Any]:
     return {"psi": xp.asin(link.u.x), "w": link.t1 * s.w, "a": link.t1 * a + link.t2 * (s.w * s.w)}
 
 
+def coupler_force(s: Any, reactions: Mapping[Any, Vec2]) -> dict[str, Any]:
+    """The parts of the force of the coupler on the rocker, R^t and R^n of eqs. (7)-(9) of paper 001: fields of
+    `Rocker`."""
+    along, on_coupler = s.m.links["rocker"].u, reactions[ON_DRIVE["coupler_pin"]]
+    return {
+        "coupler_tangential": -along.turned().dot(on_coupler),
+        "coupler_normal": -along.dot(on_coupler),
+    }
+
+
 def drive(p: Any, u: Any, organs: tuple[Any, ...], processing: Mapping[str, Any]) -> Linkage:
     """The crank-rocker with its stop, and the organs on it."""
     rocker = Bar("rocker", "C", p.h, p.rocker, {"A2": (p.e, 0.0)})
@@ -425,9 +477,9 @@ def drive(p: Any, u: Any, organs: tuple[Any, ...], processing: Mapping[str, Any]
 
 def _probes(xp: Any, p: Any, u: Any, s: MachineState, a: Any) -> dict[str, Any]:
     reactions = s.reactions(a)
-    organs = _on_sides(xp, p, s, reactions, s.m.links["rocker"])
+    organs = _on_sides(xp, p, s, a, reactions)
     return {
-        "rocker": Rocker(**rocker_motion(xp, s, a), **vars(organs.rocker)),
+        "rocker": Rocker(**rocker_motion(xp, s, a), **coupler_force(s, reactions), **vars(organs.rocker)),
         "left": organs.left,
         "right": organs.right,
         **on_drive(xp, p, s, a, reactions),

@@ -91,6 +91,34 @@ def angles(psi: Any, zeta: float = ZETA, mu: float = MU) -> Angles:
     return Angles(gam, al1, 0.5 * np.pi + psi - gam)
 
 
+class Kinematics(NamedTuple):
+    """Speeds of wall and web [rad/s], and the accelerations of (41) and (42), in l1 rad/s2."""
+
+    w1: Any
+    w2: Any
+    a_n: Any
+    a_t: Any
+    a_BA2_n: Any
+    a_BA1_t: Any
+    a_BA2_t: Any
+
+
+def kinematics(psi: Any, w: Any, eps: Any) -> Kinematics:
+    """The left organ at rocker angle, speed and acceleration by the paper; `eps` is towards decreasing psi."""
+    mu, (gam, al1, al2) = MU, angles(psi)
+    # (40)
+    lam, theta = al1 - psi, gam - al1
+    v = w * mu
+    w2 = v * np.sin(lam) / np.cos(theta) / (1.0 - mu)
+    w1 = np.cos(gam - psi) * v / np.cos(theta)
+    # (41), (42)
+    a_n, a_t = w * w * mu, eps * mu
+    a_BA2_n, a_BA1_n = w2 * w2 * (1.0 - mu), w1 * w1
+    a_BA2_t = (a_n * np.cos(lam) + a_t * np.sin(lam) + a_BA2_n * np.sin(theta) - a_BA1_n) / np.cos(theta)
+    a_BA1_t = (a_t * np.sin(al2) - a_n * np.cos(al2) - a_BA2_n + a_BA1_n * np.sin(theta)) / np.cos(theta)
+    return Kinematics(w1, w2, a_n, a_t, a_BA2_n, a_BA1_t, a_BA2_t)
+
+
 def hinge_loading(psi: Any) -> Components:
     """Both weights in the hinge B, the second way of loading: two-force rods, eq. (35)."""
     _, al1, al2 = angles(psi)
@@ -125,17 +153,8 @@ class Scheme:
         rocker = machine().forces(phi, w_crank).rocker
         psi, w, eps = hand * rocker.psi, hand * rocker.w, -self.eps * hand * rocker.a
         mu, (gam, al1, al2) = MU, angles(psi)
-        # (40): velocities; accelerations are in l1 rad/s2
-        lam, theta = al1 - psi, gam - al1
-        v = w * mu
-        w2 = v * np.sin(lam) / np.cos(theta) / (1.0 - mu)
-        w1 = np.cos(gam - psi) * v / np.cos(theta)
-        # (41), (42)
-        a_n, a_t = w * w * mu, eps * mu
-        a_BA2_n, a_BA1_n = w2 * w2 * (1.0 - mu), w1 * w1
-        a_BA2_t = (a_n * np.cos(lam) + a_t * np.sin(lam) + a_BA2_n * np.sin(theta) - a_BA1_n) / np.cos(theta)
-        a_BA1_t = (a_t * np.sin(al2) - a_n * np.cos(al2) - a_BA2_n + a_BA1_n * np.sin(theta)) / np.cos(theta)
-        lam1 = lam + theta
+        _, _, a_n, a_t, a_BA2_n, a_BA1_t, a_BA2_t = kinematics(psi, w, eps)
+        lam1 = gam - psi
         per_g = self.length / G
         a_y = per_g * (a_n * np.cos(lam1) + a_t * np.sin(lam1) - 0.5 * a_BA2_t)
         a_z = per_g * (a_n * np.sin(lam1) - a_t * np.cos(lam1) + 0.5 * a_BA2_n)
@@ -277,6 +296,24 @@ def loads(by: str, phi: Any, crank_speed: Any) -> Any:
     return vars(of_side(out.left, 1.0, machine()))
 
 
+def motion_error(name: str) -> float:
+    """Item 7: largest error of a formula of the motion of the left organ over a turn at 10 rad/s, in parts of the
+    peak of the model. omega_2 counts towards decreasing angle of the web, as a_A2^t and a_BA1^t do."""
+    out = machine().forces(TURN, 10.0)
+    psi, left, of_paper = out.rocker.psi, out.left, kinematics(out.rocker.psi, out.rocker.w, -out.rocker.a)
+    _, al1, al2 = angles(psi)
+    model, formula = {
+        "alpha1'": (left.wall.angle, al1),
+        "alpha2'": (psi - left.web.angle, al2),
+        "eta": (left.spread_angle, al1 + al2 - psi),
+        "omega_1": (left.wall.w, of_paper.w1),
+        "omega_2": (-left.web.w, of_paper.w2),
+        "epsilon_1": (-left.wall.a, of_paper.a_BA1_t),
+        "epsilon_2": (left.web.a, of_paper.a_BA2_t / (1.0 - MU)),
+    }[name]
+    return float(np.max(np.abs(formula - model)) / np.max(np.abs(model)))
+
+
 def _dynamic_x(phi: Any) -> Any:
     """The dynamic part of X at 10 rad/s."""
     still, _ = statics(machine().forces(phi, 10.0).rocker.psi)
@@ -303,6 +340,11 @@ def error_share(by: str) -> float:
 def static_load(name: str, degrees: float) -> float:
     """Item 13: a load at rest at a rocker angle."""
     return float(getattr(statics(math.radians(degrees))[0], name))
+
+
+def spread_angle(degrees: float) -> float:
+    """Item 13: the spread angle of the left organ at a rocker angle [deg]."""
+    return math.degrees(machine().chamber(math.radians(degrees)).left.spread_angle)
 
 
 def growth_of_x() -> float:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..core.engines import MATH, numpy_
+from ..machines.api import ChainUnitMachine
 from ..machines.crank_rocker import (
     longest_crank,
     parallel_frame,
@@ -55,6 +56,21 @@ def signed_extreme(rho: float, end: str) -> float:
     """Item 4: largest or least pressure angle in the frozen frame [deg]."""
     largest, least = pressure_angle_extremes(MATH, rho, 1.0, LAM, FROZEN)
     return math.degrees({"largest": largest, "least": least}[end])
+
+
+def error_of_parts() -> float:
+    """Item 4: largest error of R^n and R^t by (7)-(9) with the signed theta, over a turn at 10 rad/s of the packaged
+    machine with a coupler without mass and pins without friction, in parts of the peak of R."""
+    unit = ChainUnitMachine.from_ratios(
+        0.1, LAM, 0.6, 0.5, {"coupler.m": 0.0, "coupler.I": 0.0, "pin.friction": 0.0}, l1=1.35
+    )
+    p, out = unit.p, unit.forces(np.linspace(0.0, 2.0 * math.pi, 721), 10.0)
+    rocker, arm = out.rocker, p.rocker.m * p.rocker.s
+    inertia = (p.rocker.I + arm * p.rocker.s) * rocker.a
+    R = (rocker.tau + inertia + p.g * arm * np.sin(rocker.psi)) / (p.h * np.cos(out.pressure_angle))
+    parts = R * np.sin(out.pressure_angle), R * np.cos(out.pressure_angle)
+    model = rocker.coupler_normal, rocker.coupler_tangential
+    return float(np.max(np.abs(np.subtract(parts, model))) / np.max(np.abs(R)))
 
 
 def fitting_rho0() -> float:

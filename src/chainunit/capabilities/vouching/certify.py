@@ -164,7 +164,7 @@ def _certified_fmu(
             members[SMOOTH_IN] = table_bytes(found.given, types)
             members[SMOOTH_OUT] = table_bytes(found.results, types)
         if found.tables:
-            members[docs.EXPERIMENTS] = docs.experiments_xml(
+            members[docs.EXPERIMENTS] = docs.experiments(
                 fmu.name, found.tolerance, smooth=found.given is not None
             )
         title = fmu.name

@@ -16,14 +16,23 @@ from xml.etree.ElementTree import Element, SubElement
 
 from ...fmu.description import generation_time
 from ...fmu.pack import xml_bytes
-from ...fmu.reference import REFERENCE, related_files
+from ...fmu.reference import (
+    EXPERIMENTS_TYPE,
+    INPUTS,
+    REFERENCE,
+    STEP,
+    STEPPED,
+    ReferenceExperiment,
+    experiments_file,
+    related_files,
+)
 from .manifest import OWN, sha3
 
 SRMD = "extra/org.ssp-standard.ssp-traceability.srmd/resourceMetaData.srmd"
 SRMD_VERSION = "1.0.0"
 SBOM, EVIDENCE, DOMAIN, REPORT, EXPERIMENTS = (
     f"{OWN}/{name}"
-    for name in ("sbom.cdx.json", "evidence.json", "domain.json", "report.md", "experiments.xml")
+    for name in ("sbom.cdx.json", "evidence.json", "domain.json", "report.md", "experiments.exp")
 )
 _FOLDER = OWN.rpartition("/")[2]
 _SRMD_SOURCE = "../" + SRMD.removeprefix("extra/")
@@ -34,7 +43,7 @@ _RELATED = (
     ("meta-data", _JSON, f"{_FOLDER}/domain.json", "Domain of validity by variable"),
     ("meta-data", "application/vnd.cyclonedx+json", f"{_FOLDER}/sbom.cdx.json", "Bill of materials, CycloneDX"),
     ("meta-data", "application/x-srmd-meta-data", _SRMD_SOURCE, "SRMD of SSP Traceability"),
-    ("experiment/validation", "application/xml", f"{_FOLDER}/experiments.xml", "Experiments with inputs and results"),
+    ("experiment/validation", EXPERIMENTS_TYPE, f"{_FOLDER}/experiments.exp", "Experiments with inputs and results"),
     ("signature", _JSON, f"{_FOLDER}/manifest.json", "SHA3-256 of every member of this file"),
     ("signature", _JSON, f"{_FOLDER}/signature.json", "Ed25519 signature of manifest.json"),
 )  # fmt: skip
@@ -66,36 +75,23 @@ def related(content: bytes | None, there: Sequence[str]) -> bytes | None:
     return xml_bytes(root) if len(root) else None
 
 
-def experiments_xml(name: str, tolerance: float, *, smooth: bool) -> bytes:
+def experiments(name: str, tolerance: float, *, smooth: bool) -> bytes:
     """The experiments of an FMU: file of inputs, file of results, step and tolerance of each."""
-    root = Element(
-        "Experiments", name=name, description="Experiments whose results a certified FMU must give"
-    )
-
-    def add(title: str, words: str, step: float, files: tuple[str, str]) -> None:
-        node = SubElement(
-            root,
-            "Experiment",
-            name=title,
-            description=words,
-            startTime="0.0",
-            stopTime="1.0",
-            stepSize=repr(step),
-            tolerance=repr(tolerance),
-        )
-        for tag, source in zip(("Stimuli", "References"), files, strict=True):
-            SubElement(node, tag, source=source, type="text/csv")
-
-    add(
+    reference = ReferenceExperiment(
         "reference",
         "all inputs move and are held over each step; results at the end of each step",
-        0.04,
-        (f"../{name}_in.csv", f"../{name}_co_simulation.csv"),
+        STEP,
+        f"../{name}_{INPUTS}.csv",
+        f"../{name}_{STEPPED}.csv",
+        tolerance,
     )
-    if smooth:
-        words = "a shaft moves smoothly, all else stays; results every 40 ms, read once the inputs are set"
-        add("smooth", words, 0.001, ("smooth_in.csv", "smooth_out.csv"))
-    return xml_bytes(root)
+    words = "a shaft moves smoothly, all else stays; results every 40 ms, read once the inputs are set"
+    smoothly = ReferenceExperiment("smooth", words, 0.001, "smooth_in.csv", "smooth_out.csv", tolerance)
+    return experiments_file(
+        name,
+        "Experiments whose results a certified FMU must give",
+        [reference, smoothly] if smooth else [reference],
+    )
 
 
 def srmd(
