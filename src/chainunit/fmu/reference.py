@@ -77,9 +77,8 @@ def reference_results(interface: Interface) -> dict[str, bytes]:
     """The files of reference results. Where, with the start values, the states run away or are too fast for the
     integrator, there are no files, and a warning is logged."""
     name = interface.model.name
-    starts = tuple((s.name, s.start) for s in interface.signals if s.start is not None)
     try:
-        tables = _tables(interface.model, cast(Hashable, interface.script), starts)
+        tables = reference_tables(interface)
     except (ArithmeticError, ValueError) as reason:  # ValueError: of `math`, where a linkage does not close
         log.warning(
             "The FMU %s: no reference results inside: %s; no run of this package needs them, an importer is checked "
@@ -116,6 +115,18 @@ def reference_results(interface: Interface) -> dict[str, bytes]:
     for kind, source, role, description in related:
         SubElement(root, "Related", type=kind, source=source, role=role, description=description)
     return files | {RELATED: xml_bytes(root)}
+
+
+def reference_tables(interface: Interface) -> dict[str, tuple[list[str], list[list[float]]]]:
+    """Head and rows of each file of reference results by the ending of its name, from the equations in Python.
+
+    Raises
+    ------
+    ArithmeticError, ValueError
+        where the states run away or are too fast for the integrator, or a linkage does not close.
+    """
+    starts = tuple((s.name, s.start) for s in interface.signals if s.start is not None)
+    return _tables(interface.model, cast(Hashable, interface.script), starts)
 
 
 def related_files(content: bytes | None = None) -> Element:

@@ -60,6 +60,13 @@ def head(raw: bytes, method: int, crc: int, packed: int, size: int) -> bytes:
     return _HEAD.pack(LOCAL, _VERSION, _flags(raw), method, 0, _DAY, crc, packed, size, len(raw), 0) + raw
 
 
+def is_entry(whole: bytes, name: str, content: bytes) -> bool:
+    """Whether the bytes of an entry are in the form that `entry` gives a member, by any compression."""
+    raw = name.encode()
+    packed, method = len(whole) - _HEAD.size - len(raw), int.from_bytes(whole[8:10], "little")
+    return packed >= 0 and whole.startswith(head(raw, method, zlib.crc32(content), packed, len(content)))
+
+
 def _flags(raw: bytes) -> int:
     return 0 if raw.isascii() else _UTF8
 

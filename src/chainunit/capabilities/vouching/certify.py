@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -12,7 +12,7 @@ from ... import __version__
 from ...core.errors import InputError, RunError, printable
 from ...core.files import atomic_file, regular_bytes
 from ...core.model import Model
-from ...fmu.description import Interface, generation_time
+from ...fmu.description import Interface, Signal, generation_time
 from ...fmu.pack import interface_of
 from ...fmu.recipe import recipes
 from ...fmu.reference import RELATED
@@ -20,7 +20,7 @@ from ...machines.flexible import with_rods
 from ...models import MODELS
 from . import documents as docs
 from . import experiments as ex
-from .archive import contents, unsafe
+from .archive import LOCAL, contents, unsafe
 from .domain import domain
 from .manifest import MANIFEST, OWN, SIGNATURE, json_bytes, sha3, signed
 from .rerun import TimeTable, UnpackedFmu, table_bytes, unpacked
@@ -91,7 +91,7 @@ def place_of(target: Path, members: Mapping[str, bytes], asked: bool) -> Path:
     InputError
         where its name does not end as that of such a file.
     """
-    ending = ".ssp" if "SystemStructure.ssd" in members else ".fmu"
+    ending = f".{kind_of(members) or 'fmu'}"
     if target.suffix.lower() != ending:
         what = "an SSP package" if ending == ".ssp" else "an FMU"
         remedy = "" if asked else "; name one with -o"
@@ -119,6 +119,12 @@ def place_beside(file: Path) -> Path:
     return place
 
 
+def kind_of(members: Mapping[str, bytes]) -> str:
+    """The kind of a file with these members, "fmu" or "ssp"; empty for another one."""
+    kinds = {"modelDescription.xml": "fmu", "SystemStructure.ssd": "ssp"}
+    return next((kind for name, kind in kinds.items() if name in members), "")
+
+
 def certified(
     members: Mapping[str, bytes], name: str, key: Ed25519PrivateKey, model: type[Model] | None, told: Told
 ) -> Certified:
@@ -137,9 +143,10 @@ def certified(
     RunError
         where the FMU does not run on this machine.
     """
-    if "modelDescription.xml" in members:
+    kind = kind_of(members)
+    if kind == "fmu":
         return _certified_fmu(dict(members), name, key, model, told)
-    if "SystemStructure.ssd" in members:
+    if kind == "ssp":
         return _certified_ssp(dict(members), name, key, told)
     raise InputError(
         f"{name}: is neither an FMU (modelDescription.xml) nor an SSP package (SystemStructure.ssd)"
@@ -152,9 +159,10 @@ def _certified_fmu(
     with unpacked(members, name) as fmu:
         _require_own(fmu, name)
         interface = interface_for(fmu, model)
-        if model and interface is None:
+        if interface is None and (model or fmu.name in MODELS):
+            remedy = "name another file by --of" if model else "export it anew"
             raise InputError(
-                f"{name}: is no FMU of {model.name}, or its start values make none; name another file by --of"
+                f"{name}: is no FMU of {model.name if model else fmu.name}, or its start values make none; {remedy}"
             )
         found = evidence(fmu, interface, told)
         given = [t for t in (found.tables and found.tables[0], found.given) if t]
@@ -174,17 +182,17 @@ def _certified_fmu(
 
 def _certified_ssp(members: dict[str, bytes], name: str, key: Ed25519PrivateKey, told: Told) -> Certified:
     words, inner = [], {}
-    for member in sorted(n for n in members if n.endswith(".fmu")):
+    for member, is_own in fmus_in(members).items():
         read = contents(members[member])
         if read.faults:
             raise InputError(f"{name}: {printable(member)} is damaged: {next(iter(read.faults.values()))}")
-        own = without_certification(read.members)
-        if f"chainunit {__version__}".encode() not in own.get("modelDescription.xml", b""):
+        if not is_own:
             words.append(
                 f"{printable(member)}: is not of this version of chainunit; its hash alone is signed"
             )
             inner[member] = "hash"
             continue
+        own = without_certification(read.members)
         made = _certified_fmu(own, f"{name}: {member}", key, None, told)
         members[member] = made.data
         words += [f"{printable(member)}: {line}" for line in made.words]
@@ -205,21 +213,34 @@ def _signed(
     members[docs.EVIDENCE] = json_bytes(data)
     if limits is not None:
         members[docs.DOMAIN] = json_bytes(limits)
-    report = [
-        f"# {title}",
-        "",
-        f"Certified by chainunit {__version__}.",
-        "",
-        *(f"- {line}" for line in words),
-    ]
-    members[docs.REPORT] = ("\n".join(report) + "\n").encode()
-    entries = classifications(data, limits)
-    members[docs.SRMD] = docs.srmd(title, entries, __version__)
+    # in the order of the files, from which a receiver makes the same texts
+    entries = classifications(*(json.loads(json_bytes(each)) for each in (data, limits)))
+    members |= reports(title, words, entries, generation_time())
     there = [*members, docs.SBOM, MANIFEST, SIGNATURE]
     members[RELATED] = docs.related(members.get(RELATED), there) or b""
     members[docs.SBOM] = json_bytes(docs.sbom(title, __version__, members))
     head = {"kind": kind, "name": title, "version": __version__, "time": generation_time()}
     return Certified(signed(members, key, **head), words, entries)
+
+
+def reports(
+    title: str, words: Sequence[str], entries: Mapping[str, Mapping[str, str]], time: str
+) -> dict[str, bytes]:
+    """The members that tell evidence and domain to people and to other programs."""
+    head = [f"# {title}", "", f"Certified by chainunit {__version__}.", ""]
+    text = "\n".join([*head, *(f"- {line}" for line in words)]) + "\n"
+    return {
+        docs.REPORT: text.encode(),
+        docs.SRMD: docs.srmd(title, entries, __version__, time=time),
+    }
+
+
+def fmus_in(members: Mapping[str, bytes]) -> dict[str, bool]:
+    """By the names of the FMUs in an SSP package, and of whatever else is an archive, whether it is an FMU of this
+    version of the package."""
+    archives = {n: contents(x) for n, x in members.items() if n.endswith(".fmu") or x.startswith(LOCAL)}
+    tool = f"chainunit {__version__}".encode()
+    return {n: tool in x.members.get("modelDescription.xml", b"") for n, x in sorted(archives.items())}
 
 
 def _require_own(fmu: UnpackedFmu, name: str) -> None:
@@ -248,8 +269,18 @@ def interface_for(fmu: UnpackedFmu, model: type[Model] | None = None) -> Interfa
         interface = interface_of(own, start)
     except (KeyError, InputError):
         return None
-    names = [s.name for s in interface.signals]
-    return interface if all(n in fmu.variables for n in names) else None
+    return interface if all(_is_in(fmu, s) for s in interface.signals) else None
+
+
+def _is_in(fmu: UnpackedFmu, signal: Signal) -> bool:
+    """Whether an FMU has a variable with its unit and its nominal size, over which deviations are told."""
+    own, variable = fmu.variables.get(signal.name), signal.variable
+    if own is None or own.type != variable.type:
+        return False
+    return variable.type != "Real" or (own.unit, own.nominal) == (
+        variable.unit,
+        variable.quantity.nominal or 1.0,
+    )
 
 
 class Evidence(NamedTuple):
@@ -271,8 +302,7 @@ def evidence(fmu: UnpackedFmu, interface: Interface | None, told: Told) -> Evide
     RunError
         where the FMU does not run on this machine, or does not give its results.
     """
-    has_states = bool(interface.states) if interface else True
-    tolerance = ex.TOLERANCE if has_states else ex.TOLERANCE_WITHOUT_STATES
+    tolerance = ex.allowed(interface)
     data: dict[str, Any] = {"model": fmu.name, "sources": sources_hash(), "tolerance": tolerance}
     told(f"{fmu.name}: reference experiment")
     tables = ex.reference_tables(fmu)
@@ -290,6 +320,7 @@ def evidence(fmu: UnpackedFmu, interface: Interface | None, told: Told) -> Evide
     outputs = [s.name for s in interface.signals_of("output")]
     found, run = ex.convergence(fmu, given, ex.with_shaft(fmu, outputs))
     data["convergence"] = found._asdict()
+    _balanced(found.error, ex.STEP_ERROR, "the error of its smallest step is {:.2g}, allowed is {:g}")
     balance = ex.balance_of(run.names)
     if balance:
         missing, flow = ex.energy_residual(run, balance)

@@ -99,6 +99,7 @@ def srmd(
     entries: Mapping[str, Mapping[str, str]],
     version: str,
     data: tuple[str, bytes] | None = None,
+    time: str = "",
 ) -> bytes:
     """Meta-data as SRMD.
 
@@ -107,6 +108,7 @@ def srmd(
     entries : by the type of a classification, its values by keyword
     version : of this package
     data : for a file beside a resource, its name and content, whose SHA3-256 becomes the checksum
+    time : of the file, by default that of this version
     """
     root = Element(
         "srmd:SimulationResourceMetaData",
@@ -116,7 +118,7 @@ def srmd(
             "version": SRMD_VERSION,
             "name": name,
             "generationTool": f"chainunit {version}",
-            "generationDateAndTime": generation_time(),
+            "generationDateAndTime": time or generation_time(),
         },
     )
     if data:

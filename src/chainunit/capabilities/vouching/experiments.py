@@ -22,7 +22,9 @@ from ...core.engines import MATH
 from ...core.errors import InputError
 from ...core.model import Model
 from ...fmu.description import Interface
-from ...fmu.reference import INPUTS, READ, REFERENCE, STEPPED, excitation
+from ...fmu.reference import INPUTS, READ, REFERENCE, ROWS, STEPPED, excitation
+from ...fmu.reference import STEP as REFERENCE_STEP
+from ...fmu.reference import reference_tables as equation_tables
 from .rerun import TimeTable, UnpackedFmu, deviation, sizes, slave, stepped, table
 
 STEP, END = 0.004, 1.0
@@ -35,9 +37,9 @@ TOLERANCE = 1e-5
 TOLERANCE_WITHOUT_STATES = 1e-9
 _ROUNDING = 1e-11
 """Differences of runs below this are of rounding and have no order."""
-MISSING, POWER_GAP = 1e-2, 1e-6
-"""Largest share of the energy that may be missing, of which a part is the interpolation between steps, and
-largest gap of the power balance, with which an FMU is certified."""
+MISSING, POWER_GAP, STEP_ERROR = 1e-2, 1e-6, 1e-2
+"""Largest share of the energy that may be missing, of which a part is the interpolation between steps, largest gap of
+the power balance, and largest error of the smallest step, with which an FMU is certified and holds."""
 POINTS, SPREAD = 12, 0.05
 """Number of points, and range of the factors of their parameters about 1."""
 _ANGLE = math.pi * (3.0 - math.sqrt(5.0))
@@ -51,6 +53,43 @@ class Deviation(NamedTuple):
     of: str
 
 
+def allowed(interface: Interface | None) -> float:
+    """The allowed deviation of an FMU of this model, or of an unknown one."""
+    return TOLERANCE if interface is None or interface.states else TOLERANCE_WITHOUT_STATES
+
+
+class Experiments(NamedTuple):
+    """What the equations in Python ask of an FMU with its start values: the tables of the reference experiment (None
+    where it has none), the inputs of the smooth experiment, and the points."""
+
+    reference: tuple[TimeTable, TimeTable, TimeTable] | None
+    smooth: TimeTable | None
+    points: list[StatePoint]
+
+
+def by_equations(interface: Interface) -> Experiments:
+    """The experiments of a model.
+
+    Raises
+    ------
+    ModuleNotFoundError
+        without casadi, for models with states or with a torque as input.
+    """
+    try:
+        tables = equation_tables(interface)
+    except (ArithmeticError, ValueError):
+        reference = None
+    else:
+        given, before, behind = (_time_table(*tables[end]) for end in (INPUTS, STEPPED, READ))
+        reference = given, before, behind
+    return Experiments(reference, smooth_inputs(interface), chosen_points(interface))
+
+
+def _time_table(head: Sequence[str], rows: Sequence[Sequence[float]]) -> TimeTable:
+    values = np.array(rows, float)
+    return TimeTable(tuple(head[1:]), values[:, 0], values[:, 1:])
+
+
 def reference_tables(fmu: UnpackedFmu) -> tuple[TimeTable, TimeTable, TimeTable] | None:
     """Inputs, and outputs before and after the inputs are set, of the reference experiment; None where the FMU has
     none.
@@ -58,7 +97,7 @@ def reference_tables(fmu: UnpackedFmu) -> tuple[TimeTable, TimeTable, TimeTable]
     Raises
     ------
     InputError
-        for files that are no tables of variables of the FMU.
+        for files that are no tables of variables of the FMU over the time of the experiment.
     """
     files = [f"{REFERENCE}/{fmu.name}_{end}.csv" for end in (INPUTS, STEPPED, READ)]
     texts = [fmu.file(name) for name in files]
@@ -72,8 +111,15 @@ def reference_tables(fmu: UnpackedFmu) -> tuple[TimeTable, TimeTable, TimeTable]
             raise InputError(f"{name}: {error}") from error
         if unknown := [each for each in own.names if each not in fmu.variables]:
             raise InputError(f"{name}: {unknown[0]}: is no variable of the FMU")
+        if not covers(own, REFERENCE_STEP, ROWS):
+            raise InputError(f"{name}: must have {ROWS} rows, one in {REFERENCE_STEP:g} s from 0 s on")
         found.append(own)
     return found[0], found[1], found[2]
+
+
+def covers(given: TimeTable, step: float, rows: int) -> bool:
+    """Whether a table has so many rows from the time 0 on, one in each step [s]."""
+    return given.time.shape == (rows,) and bool(np.allclose(given.time, step * np.arange(rows), 0.0, 1e-9))
 
 
 def rerun_reference(fmu: UnpackedFmu, tables: tuple[TimeTable, TimeTable, TimeTable]) -> Deviation:
@@ -333,13 +379,26 @@ def rerun_points(fmu: UnpackedFmu, points: Sequence[StatePoint]) -> Deviation:
     return worst
 
 
-def recompute_points(fmu: UnpackedFmu, model: type[Model], points: Sequence[StatePoint]) -> Deviation:
-    """The equations in Python on this machine against the outputs of the points."""
+def recomputed(model: type[Model], points: Sequence[StatePoint]) -> list[StatePoint]:
+    """The points with the outputs by the equations in Python on this machine, of which one without a machine has
+    none."""
+    layouts = (model.parameter_layout, model.input_layout)
+    return [
+        point._replace(outputs=outputs_at(model, *(_of(point, each.names) for each in layouts)) or {})
+        for point in points
+    ]
+
+
+def point_gap(fmu: UnpackedFmu, stated: Sequence[StatePoint], wanted: Sequence[StatePoint]) -> Deviation:
+    """The largest deviation of stated points, values and outputs, from the wanted ones."""
+    if len(stated) != len(wanted):
+        return Deviation(math.inf, "the number of points")
+    pairs = [pair for one, other in zip(stated, wanted, strict=True) for pair in zip(one, other, strict=True)]
     worst = Deviation(0.0, "")
-    for point in points:
-        given = (_of(point, layout.names) for layout in (model.parameter_layout, model.input_layout))
-        found = outputs_at(model, *given)
-        worst = max(worst, _largest(fmu, found or {}, point.outputs))
+    for got, own in pairs:
+        if got.keys() != own.keys():
+            return Deviation(math.inf, "the names of a point")
+        worst = max(worst, _largest(fmu, got, own))
     return worst
 
 

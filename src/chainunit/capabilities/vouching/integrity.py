@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -16,11 +17,13 @@ _MOST_NAMED = 12
 
 
 class Finding(NamedTuple):
-    """One line of a check: whether its `topic` holds, and the words on it; None for a remark."""
+    """One line of a check: whether its `topic` holds, and the words on it; None for a remark. Without the judgement
+    that is left `open` the file does not hold as a whole."""
 
     holds: bool | None
     topic: str
     words: str
+    open: str = ""
 
 
 @dataclass
@@ -39,9 +42,9 @@ class Integrity:
         """Whether nothing is wrong."""
         return all(each.holds is not False for each in self.findings)
 
-    def add(self, holds: bool | None, topic: str, words: str) -> None:
+    def add(self, holds: bool | None, topic: str, words: str, left_open: str = "") -> None:
         """Add a finding."""
-        self.findings.append(Finding(holds, topic, words))
+        self.findings.append(Finding(holds, topic, words, left_open))
 
 
 def integrity(data: bytes, key: bytes | None = None, whose: str = "the expected key") -> Integrity:
@@ -80,8 +83,8 @@ def _judge_signature(found: Integrity, contents: Mapping[str, bytes], key: bytes
         return
     found.public, of = public, fingerprint(public)
     if key is None:
-        words = f"holds, by the key {of}; whose key it is, a file cannot tell: compare it, or give --key"
-        found.add(True, "signature", words)
+        words = f"is of the key {of}; whose key it is, a file cannot tell: get the key of the signer, and give --key"
+        found.add(None, "signature", words, f"signed by {of}, whom you have not named")
     elif key == public:
         found.add(True, "signature", f"holds, by {whose} {of}")
     else:
@@ -100,8 +103,10 @@ def _judge_members(
         found.add(False, "manifest", f"{MANIFEST}: is of a form that this version of chainunit does not know")
         return
     found.manifest = stated
-    faults = list(_members(data, read, stated.members, behind)) or list(
-        _around(data, contents, stated.members)
+    faults = (
+        list(_members(data, read, stated.members, behind))
+        or list(_around(data, contents, stated.members))
+        or list(_forms(data, read, stated.members))
     )
     for words in faults:
         found.add(False, "members", words)
@@ -163,6 +168,20 @@ def _change(entry: bytes, signed: SignedMember) -> str:
     return "its content is changed"
 
 
+def _forms(data: bytes, read: archive.ArchiveContents, signed: Mapping[str, SignedMember]) -> Iterator[str]:
+    """Sentences on signed entries that are not of the one form: each holds the member that the manifest names, and
+    begins at the end of the one before."""
+    yield from (_told(name, fault) for name, fault in read.faults.items())
+    begin = 0
+    for name, own in signed.items():
+        content = read.members.get(name)
+        if content is None or not archive.is_entry(data[own.at : own.at + own.length], name, content):
+            yield f"{printable(name)}: its entry in the archive is of another member, or of another form"
+        elif own.at != begin or (own.size, own.content) != (len(content), sha3(content)):
+            yield f"{printable(name)}: its place, size or content is not as the manifest says"
+        begin = own.at + own.length
+
+
 def _around(data: bytes, contents: Mapping[str, bytes], signed: Mapping[str, SignedMember]) -> Iterator[str]:
     """Sentences on bytes of the archive beside the signed entries that are not as they must be."""
     heads = [(archive.head_of(data, own.at), own.at) for own in signed.values()]
@@ -175,8 +194,12 @@ def _around(data: bytes, contents: Mapping[str, bytes], signed: Mapping[str, Sig
         heads.append((last.head, at))
         names.append(name)
         at += len(last.whole)
-    records = archive.directory(heads)
-    end = archive.end(records, at)
+    try:
+        records = archive.directory(heads)
+        end = archive.end(records, at)
+    except struct.error:
+        yield f"{MANIFEST}: tells of entries that no archive has"
+        return
     for name, record in zip(names, records, strict=True):
         if data[at : at + len(record)] != record:
             yield f"{printable(name)}: its line in the directory of the archive is changed, its content is not"

@@ -32,10 +32,14 @@ def usable(fmu: UnpackedFmu) -> tuple[UnpackedFmu, str]:
     ------
     NoLibraryError
         where the FMU has no such code.
+    RunError
+        for a library for this machine that cannot be loaded: nobody here can use the FMU, whatever else is in it.
     """
     try:
         opened(fmu)
     except NoLibraryError as error:
+        if library_of(fmu, fmu.folder).exists():
+            raise RunError(str(error)) from error
         make, words = _interpreted(fmu, str(error)) or _compiled(fmu, str(error))
         own = replace(fmu, instead=make)
         opened(own)
@@ -59,14 +63,11 @@ def _compiled(fmu: UnpackedFmu, why: str) -> tuple[Callable[..., Any], str]:
         raise NoLibraryError(
             f"{why}; its sources cannot be compiled here: {printable(str(error), 300)}"
         ) from error
-    import fmpy
     from fmpy import fmi2, fmi3
 
     whole = fmu.folder / "built_here"
-    of_class, system = (
-        (fmi2.FMU2Slave, fmpy.platform) if fmu.fmi == 2 else (fmi3.FMU3Slave, fmpy.platform_tuple)
-    )
-    place = whole / "binaries" / system / f"{fmu.identifier}{fmpy.sharedLibraryExtension}"
+    of_class = fmi2.FMU2Slave if fmu.fmi == 2 else fmi3.FMU3Slave
+    place = library_of(fmu, whole)
     place.parent.mkdir(parents=True, exist_ok=True)
     place.write_bytes(content)
 
@@ -75,6 +76,14 @@ def _compiled(fmu: UnpackedFmu, why: str) -> tuple[Callable[..., Any], str]:
         return of_class(**arguments | {"unzipDirectory": str(whole)})
 
     return make, f"the experiments run with one that {own.name} made here from the sources in the FMU"
+
+
+def library_of(fmu: UnpackedFmu, folder: Path) -> Path:
+    """The place of the library for this machine in the folder of an FMU."""
+    import fmpy
+
+    system = fmpy.platform if fmu.fmi == 2 else fmpy.platform_tuple
+    return folder / "binaries" / system / f"{fmu.identifier}{fmpy.sharedLibraryExtension}"
 
 
 def _interpreted(fmu: UnpackedFmu, why: str) -> tuple[Callable[..., Any], str] | None:

@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from ...core.errors import InputError, printable
 from ...fmu.reference import REFERENCE
 from . import archive
 from .keys import fingerprint, is_signed
@@ -37,6 +38,26 @@ def sha3(content: bytes) -> str:
 def json_bytes(data: Any) -> bytes:
     """A file in JSON with one form only: sorted keys, no character beyond ASCII."""
     return json.dumps(data, indent=1, sort_keys=True, allow_nan=False).encode() + b"\n"
+
+
+def json_value(content: bytes | None, name: str) -> Any:
+    """The value in a file in JSON, whose numbers are finite.
+
+    Raises
+    ------
+    InputError
+        where there is no such file, or it is none.
+    """
+
+    def refuse(text: str) -> Any:
+        raise ValueError(f"{text} is no number")
+
+    try:
+        if content is None:
+            raise ValueError("is missing")
+        return json.loads(content, parse_constant=refuse)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{name}: cannot be read ({printable(str(error), 100)})") from error
 
 
 class SignedMember(NamedTuple):
@@ -71,9 +92,7 @@ class Manifest:
 def parsed(content: bytes) -> Manifest | None:
     """The manifest in the content of its file; None where it is not of this form."""
     try:
-        data = json.loads(content)
-        if data["form"] != FORM or data["hash"] != "SHA3-256":
-            return None
+        data = json_value(content, MANIFEST)
         members = {str(name): SignedMember(**own) for name, own in data["members"].items()}
         texts = [data[key] for key in ("kind", "name", "chainunit", "time")]
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
@@ -84,7 +103,9 @@ def parsed(content: bytes) -> Manifest | None:
             return None
     if not all(isinstance(text, str) for text in texts):
         return None
-    return Manifest(texts[0], texts[1], texts[2], texts[3], members)
+    manifest = Manifest(texts[0], texts[1], texts[2], texts[3], members)
+    # there is one form of these data: of a name that stands twice, another reader may take the other
+    return manifest if json_bytes(manifest.data()) == content else None
 
 
 def signed(

@@ -121,6 +121,12 @@ def unpacked(members: Mapping[str, bytes], name: str) -> Iterator[UnpackedFmu]:
         identifier = str(description.coSimulation.modelIdentifier)
         if re.fullmatch(r"[A-Za-z_]\w*", identifier, re.ASCII) is None:
             raise InputError(f"{name}: modelIdentifier {printable(identifier)!r}: must be a name in C")
+        other = description.modelExchange and str(description.modelExchange.modelIdentifier)
+        if other and other != identifier:
+            raise InputError(
+                f"{name}: modelIdentifier {printable(other)!r} of Model Exchange: must be that of Co-Simulation, "
+                f"{identifier!r}, as one library is judged"
+            )
         variables = [_variable(v) for v in description.modelVariables if v.type in _TYPES]
         yield UnpackedFmu(folder, description, {v.name: v for v in variables})
 
@@ -298,7 +304,7 @@ def table(content: bytes) -> TimeTable:
         values = np.array([[words[x] if x in words else float(x) for x in row] for row in rows], float)
         if values.ndim != 2 or values.shape[1] != len(head) or head[0] != "time":
             raise ValueError("the rows do not fit the head")
-    except ValueError as error:
+    except (ValueError, csv.Error) as error:
         raise InputError(f"is no table in CSV ({printable(str(error))})") from error
     return TimeTable(tuple(head[1:]), values[:, 0], values[:, 1:])
 
@@ -347,9 +353,11 @@ def sizes(of: TimeTable, fmu: UnpackedFmu) -> Any:
 
 def deviation(got: TimeTable, wanted: TimeTable, fmu: UnpackedFmu) -> tuple[float, str]:
     """The largest deviation of a table from the wanted one, over the size of its column, with the name of that;
-    infinite where a number is none."""
-    if got.values.shape != wanted.values.shape:
-        return float("inf"), "the number of rows"
+    infinite where a number is none, and for other columns or times."""
+    if got.names != wanted.names or got.values.shape != wanted.values.shape:
+        return float("inf"), "the columns or rows"
+    if not np.allclose(got.time, wanted.time, rtol=0.0, atol=1e-9):
+        return float("inf"), "the time"
     if not wanted.names:
         return 0.0, ""
     gaps = np.max(np.abs(got.values - wanted.values), axis=0, initial=0.0) / sizes(wanted, fmu)
