@@ -350,6 +350,21 @@ def test_a_motor_that_turns_slower_than_asked_for_settles(tmp_path):
 
 
 @pytest.mark.second
+def test_a_long_start_is_awaited(tmp_path):
+    """The flywheel takes the motor longer than the turns in which it should settle."""
+    config = study_of("on line")
+    live, _ = live_of(config, tmp_path)
+    found, text = in_node(
+        live,
+        f'{OUTCOME} const changed = {{"flywheel.J": 8}};'
+        'return [outcome(changed, "jam_left"), model.studyFile(values(changed))];',
+    )
+    copied = study_files.parse(text, str(tmp_path / "copied.toml"))
+    assert found["stall_time"] is None and found["speed_least"] > 0.9 * copied.run.crank_speed
+    check_event(copied, choose(copied, tmp_path), copied.events["jam_left"], found, rel=1e-2)
+
+
+@pytest.mark.second
 @pytest.mark.parametrize("name", ["chain-unit", "knife", "inverter", "jam_with_driveline.toml"])
 def test_every_overload_has_the_peaks_of_the_co_simulation(name, tmp_path):
     """The page integrates one system; a study couples FMUs, with an error of its step."""

@@ -16,11 +16,11 @@ from chainunit.study.catalogue_drive import catalogue_drive
 from chainunit.study.config import parse
 from chainunit.study.cycle import cycle
 from chainunit.study.gear_loss import GearAnalysis
-from chainunit.study.measures import read_measure
-from chainunit.study.readings import only_whole_turns, shaft_power
-from chainunit.study.remarks import _on_steady_running
+from chainunit.study.measures import read_answers, read_measure
+from chainunit.study.readings import breakdown_speed, crank_speed, only_whole_turns, shaft_power
+from chainunit.study.remarks import _on_steady_running, _stall_speed, _why_missed
 from chainunit.study.rig import Rig
-from chainunit.study.start_up import StartUp, start_up
+from chainunit.study.start_up import StartUp, speeds_up, start_up
 from chainunit.study.stored import energy_behind, energy_gap, energy_held
 from chainunit.study.window import CLOSED, DRIFT, STORED, Phase, Window, drift, end_gap, is_settled
 
@@ -156,3 +156,52 @@ def test_the_loss_of_the_gear_stands_beside_the_net_power(mill):
     assert note.quantities["share"][0] == loss.share and "efficiency of 94.0 %" in note.text
     assert "swings energy to and fro" in note.text and "without load (gear.d)" in note.text
     assert as_data(findings)["without_load"] == {"value": loss.without_load, "unit": "W"}
+
+
+@pytest.fixture(scope="module")
+def heavy(mill):
+    """The rig with a flywheel three times as heavy, whose start is longer than the time for which a study waits, and
+    its start-up."""
+    rig = mill[0]
+    drive = replace(rig.drive, added_inertia=3.0 * rig.drive.added_inertia)
+    operation = replace(rig.operation, run=replace(rig.operation.run, step=4e-3))
+    rig = Rig(operation, drive, None)
+    with pytest.MonkeyPatch.context() as patch, rig.from_rest() as simulation:
+        patch.setattr("chainunit.study.start_up.PATIENCE", 0.2)
+        patch.setattr("chainunit.study.start_up._SETTLES", 1.0)
+        return rig, start_up(rig, simulation, lambda time: None, {})
+
+
+def test_a_start_that_has_not_ended_is_awaited(heavy):
+    rig, started = heavy
+    steady = window(
+        rig, only_whole_turns(rig.drive, started.run.sel(time=slice(started.steady_from, None)), 1)
+    )
+    usual = rig.operation.stop + 1.0
+    at_speed = started.run["time"].values[
+        crank_speed(rig.drive, started.run) > 0.95 * rig.operation.crank_speed
+    ]
+    assert at_speed[0] > usual and started.steady_from > usual
+    assert is_settled(rig.drive, steady.run) and steady.lasts
+    assert read_measure("speed_mean", steady) == pytest.approx(rig.operation.crank_speed, rel=0.03)
+
+
+def test_only_a_machine_that_comes_to_its_speed_speeds_up(heavy):
+    rig, started = heavy
+    assert speeds_up(rig, started.run.sel(time=slice(None, 16.0)))
+    # by its rise it would come to its speed ten minutes after the ramp
+    assert not speeds_up(rig, started.run.sel(time=slice(None, 16.0)), 600.0)
+    assert not speeds_up(rig, started.run)
+    # it has made no turn yet
+    assert not speeds_up(rig, started.run.sel(time=slice(None, 2.0)))
+
+
+def test_a_machine_that_speeds_up_is_not_called_stalled(heavy):
+    rig, started = heavy
+    early = started.run.sel(time=slice(8.0, 16.0))
+    steady = window(rig, only_whole_turns(rig.drive, early, 1))
+    answers = read_answers(steady)
+    study = SimpleNamespace(reaches=False, drive=rig.drive, steady=steady.run)
+    assert answers.speed_mean < breakdown_speed(rig.drive, steady.run)
+    assert _stall_speed(study, answers) is None
+    assert "still speeds up" in _why_missed(study, answers) and "stalls" not in _why_missed(study, answers)

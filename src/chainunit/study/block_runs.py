@@ -23,9 +23,9 @@ from ..system import monolithic
 from ..system.compiled_simulation import LONGEST, CompiledSimulation, CompiledSystem, is_evaluated
 from ..system.signals import at_time
 from .event import Event, angle_of_begin
-from .readings import crank_angle, crank_speed
+from .readings import crank_angle, crank_speed, has_turn
 from .rig import Rig
-from .start_up import PATIENCE
+from .start_up import PATIENCE, speeds_up
 from .transients import follow, longest_lead
 from .window import is_settled, mean, time_at, whole_turns
 
@@ -335,18 +335,28 @@ class BlockRuns:
         states, faults = start.states, [_fault(start, k) for k in range(len(points))]
         last: dict[int, xr.Dataset] = {}
         waiting = [k for k, fault in enumerate(faults) if fault is None]
-        for _ in range(int(PATIENCE)):
-            if not waiting:
-                break
-            some = [points[k] for k in waiting]
-            stops = [(point.rig.operation.run.turns + 0.1) * point.rig.operation.turn for point in some]
+        usual = [(point.rig.operation.run.turns + 0.1) * point.rig.operation.turn for point in points]
+        pieces, times = [*usual], [start.end(k) for k in range(len(points))]
+        longest = [time + PATIENCE * piece for time, piece in zip(times, usual, strict=True)]
+        while waiting:
+            some, stops = [points[k] for k in waiting], [pieces[k] for k in waiting]
             runs = self._run(some, states[:, waiting], 0.0, stops)
             states[:, waiting] = runs.states
+            left = []
             for place, k in enumerate(waiting):
-                faults[k], last[k] = _fault(runs, place), self._series(runs, place)
-            waiting = [k for k in waiting if faults[k] is None and not _settles(points[k], last[k])]
-        for k in waiting:
-            faults[k] = RunFault(Cause.UNSETTLED)
+                faults[k], last[k], rig = _fault(runs, place), self._series(runs, place), points[k].rig
+                if faults[k] is not None or _settles(points[k], last[k]):
+                    continue
+                if speeds_up(rig, last[k], times[k]):
+                    longest[k] = times[k] + pieces[k] + max(PATIENCE * usual[k], 2.0 * times[k])
+                times[k] += pieces[k]
+                # the rise of the speed is read from a turn
+                pieces[k] = usual[k] if has_turn(rig.drive, last[k]) else 2.0 * pieces[k]
+                if times[k] < longest[k] - 0.5 * usual[k]:
+                    left.append(k)
+                else:
+                    faults[k] = RunFault(Cause.UNSETTLED)
+            waiting = left
         return states, faults, last
 
     def _waits(self, points: Sequence[RunPoint], states: Any, steady: Sequence[xr.Dataset]) -> list[float]:

@@ -173,9 +173,9 @@ def _on_limits(study: StudyRecord) -> None:
 
 
 def _stall_speed(study: StudyRecord, steady: Answers) -> float | None:
-    """The crank speed [rad/s] below which a load stalls the motor, if this motor is stalled; else None. It is
-    not known for a foreign motor."""
-    if study.reaches or study.drive.foreign is not None:
+    """The crank speed [rad/s] below which a load stalls the motor, if this motor is stalled; else None, as of one
+    that still speeds up. It is not known for a foreign motor."""
+    if study.reaches or study.drive.foreign is not None or steady.energy_gap > STORED:
         return None
     breakdown = breakdown_speed(study.drive, study.steady)
     return breakdown if steady.speed_mean < breakdown else None
@@ -188,6 +188,11 @@ def _why_missed(study: StudyRecord, steady: Answers) -> str:
         return (
             f"the motor stalls under the load: below {below}, the speed of its breakdown torque, its torque falls "
             "with the speed; take a larger motor, less load, or for a load that comes and goes a heavier flywheel"
+        )
+    if steady.energy_gap > STORED:
+        return (
+            "the machine still speeds up, too slowly for a start that ends; take a larger motor, a lighter flywheel "
+            "or less load"
         )
     if study.drive.follows:
         return "the motor's voltage or current is at its limit, or the run is too short to settle"

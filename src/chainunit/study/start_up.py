@@ -7,10 +7,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..system import Simulation
 from ..work.progress import Progress
 from .measures import STARTED
-from .readings import only_whole_turns, turns_made
+from .readings import crank_motion, only_whole_turns, turns_made
 from .rig import Rig, join
 from .window import Phase, Window, is_settled, whole_turns
 
@@ -18,13 +20,18 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _LONGEST_START = 30.0
-"""Time after the ramp at which an empty machine is fed, unless it would reach its speed in `_LONGEST_RISE`
+"""Time after the ramp at which an empty machine is fed, unless it would reach its speed in `LONGEST_RISE`
 [s]."""
-_LONGEST_RISE = 600.0
-"""Time after the ramp at which an empty machine is fed, however slowly it turns [s]."""
+LONGEST_RISE = 600.0
+"""Time after the ramp at which an empty machine is fed, however slowly it turns, and for which a machine may speed
+up [s]."""
+RISES = 1e-4
+"""Relative change of the speed over a turn from which the machine counts as one that speeds up."""
 PATIENCE = 20.0
 """Number of turns, at the requested speed, for which a study runs on until the motor has settled and made its
-turns; for a fast machine at least the time `_SETTLES`."""
+turns; for a fast machine at least the time `_SETTLES`, and after a long start twice as long as it took."""
+_PIECE = 0.1
+"""Part of the time since rest that a machine which still speeds up is run on."""
 _SETTLES = 5.0
 """Time in which every drive settles, whatever the speed of its crank [s]."""
 
@@ -60,7 +67,7 @@ def _start_empty(
     name, ratio = rig.drive.crank_output("w")
     goal = STARTED * rig.operation.crank_speed * ratio
     speed_limit = {**guards, name: goal}
-    longest, piece = rig.operation.ramp_end + _LONGEST_RISE, max(rig.operation.turn, 1.0)
+    longest, piece = rig.operation.ramp_end + LONGEST_RISE, max(rig.operation.turn, 1.0)
     stop = rig.operation.ramp_end + _LONGEST_START
     run = simulation.run(stop, rig.step, progress, guards=speed_limit)
     while stop - 0.5 * rig.step <= simulation.time < longest:
@@ -92,29 +99,57 @@ def start_up(rig: Rig, simulation: Simulation, progress: Progress, guards: Mappi
         stop, steady_from = stop + later, steady_from + later
         if any(abs(float(run[name][-1])) >= limit for name, limit in guards.items()):
             return StartUp(run, steady_from, stop, rig)
-    longest = stop + max(PATIENCE * rig.operation.turn, _SETTLES)
+    patience = max(PATIENCE * rig.operation.turn, _SETTLES)
+    longest = stop + patience
     run = join([*pieces, simulation.run(stop, rig.step, progress, guards=guards)])
     while stop - 0.5 * rig.step <= simulation.time < longest:
-        lack, steady_from = _missing(rig, run, steady_from)
+        lack, later = _missing(rig, run, steady_from)
         if lack is None:
             break
-        # at most at the requested speed; the next round finds the turns that are still missing then
-        stop = min(longest, stop + max(lack * rig.operation.turn, rig.step))
+        if speeds_up(rig, run):
+            # its turns cannot close yet
+            stop, later = stop + max(rig.operation.turn, _PIECE * stop), simulation.time
+            longest = stop + max(patience, 2.0 * simulation.time)
+        else:
+            # at most at the requested speed; the next round finds the turns that are still missing then
+            stop = min(longest, stop + max(lack * rig.operation.turn, rig.step))
+        steady_from = later
         run = join([run, simulation.run(stop, rig.step, progress, guards=guards)])
     return StartUp(run, steady_from, stop, rig)
+
+
+def speeds_up(rig: Rig, run: xr.Dataset, before: float = 0.0) -> bool:
+    """Whether the start has not ended with the last turn of a run, and ends by the rise of its speed over this turn
+    within `LONGEST_RISE` after the ramp. `before` is the time from rest to the zero of the run's own time [s]."""
+    angle, speed = crank_motion(rig.drive, run)
+    time, since = run["time"].values, angle[-1] - 2.0 * math.pi
+    if angle[0] > since:
+        return False
+    # the crank may swing back at rest
+    turned = np.maximum.accumulate(angle)
+    begin, slower = (float(np.interp(since, turned, x)) for x in (time, speed))
+    span = float(time[-1]) - begin
+    rise, mean = float(speed[-1]) - slower, 2.0 * math.pi / span
+    lack = STARTED * rig.operation.crank_speed - mean
+    left = rig.operation.ramp_end + LONGEST_RISE - before - float(time[-1])
+    return lack > 0.0 and rise > RISES * mean and lack * span <= rise * left
 
 
 def until_settled(
     rig: Rig, simulation: Simulation, stop: float, length: float, most: float = math.inf
 ) -> list[xr.Dataset]:
     """Runs of a turning drive, the first to the time `stop` [s], each further one of the `length` [turns], until the
-    whole turns of a run, at most `most`, close, it makes none, or `PATIENCE` has passed."""
+    whole turns of a run, at most `most`, close, it makes none, or `PATIENCE` has passed; a start that has not ended
+    is awaited."""
     turn, drive = rig.operation.turn, rig.drive
     runs = [simulation.run(stop, rig.step)]
-    while simulation.time < stop + PATIENCE * turn:
+    longest = stop + PATIENCE * turn
+    while simulation.time < longest:
         turns = only_whole_turns(drive, runs[-1], most)
         if turns is None or is_settled(drive, turns):
             break
+        if speeds_up(rig, runs[-1]):
+            longest = simulation.time + max(PATIENCE * turn, 2.0 * simulation.time)
         runs.append(simulation.run(simulation.time + length * turn, rig.step))
     return runs
 

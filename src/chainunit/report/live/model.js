@@ -422,13 +422,34 @@ const liveModel = async (data, bytes) => {
     // the last turns of steady running, from the states in memory on; null where the motor does not settle
     settle(most = this.of.patience) {
       const signals = this.signals();
-      for (let k = 0; k < most; k++) {
+      const usual = (this.of.turns + 0.1) * this.turnTime;
+      for (let time = usual, waited = 0, longest = most * usual; waited < longest - 0.5 * usual;) {
         this.forget();
-        const run = this.run(0, this.rowsOf((this.of.turns + 0.1) * this.turnTime), signals);
+        const run = this.run(0, this.rowsOf(time), signals);
         if (run.made < run.wanted) return null;
         if (this.isSettled(run)) return run;
+        waited += time;
+        const rise = this.riseOfTurn(run);
+        // a start that has not ended is awaited, see chainunit.study.start_up
+        if (rise && this.speedsUp(rise, waited)) longest = waited + Math.max(most * usual, 2 * waited);
+        time = rise ? usual : 2 * time;
       }
       return null;
+    }
+
+    // the time of the first turn of a run, and the change of the speed over it; null where the crank makes none
+    riseOfTurn(run) {
+      const { speed } = this.crank(run), angle = run[this.of.names.angle], goal = angle[0] + TURN * this.crankRatio();
+      const row = angle.findIndex((x) => x >= goal);
+      if (row < 0) return null;
+      const share = (goal - angle[row - 1]) / (angle[row] - angle[row - 1]);
+      const at = (x) => x[row - 1] + share * (x[row] - x[row - 1]);
+      return { span: at(run.time) - run.time[0], change: at(speed) - speed[0] };
+    }
+
+    speedsUp({ span, change }, waited) {
+      const mean = TURN / span, lack = this.of.started * this.speed - mean;
+      return lack > 0 && change > this.of.rises * mean && lack * span <= change * (this.of.longest_rise - waited);
     }
 
     isSettled(run) {

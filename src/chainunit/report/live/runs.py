@@ -18,7 +18,7 @@ from ...study.measures import STARTED, Answers
 from ...study.operation import OperatingConditions
 from ...study.rig import FEED_RISE, Rig
 from ...study.sections import Coupling, Run
-from ...study.start_up import PATIENCE
+from ...study.start_up import LONGEST_RISE, PATIENCE, RISES
 from ...study.window import CLOSED, DRIFT
 from ...system.certificate import torque_names
 from ...system.compiled_simulation import LONGEST, CompiledSystem
@@ -113,6 +113,8 @@ def live_runs(
         "feed_rise": FEED_RISE,
         "started": STARTED,
         "patience": PATIENCE,
+        "rises": RISES,
+        "longest_rise": LONGEST_RISE,
         "closed": CLOSED,
         "drift": DRIFT,
         "trip": None if operation.coupling is None else float(operation.coupling.trip_torque),
