@@ -14,12 +14,13 @@ from command import chainunit
 from linkage_files import MACHINES, pressed_both_ways
 from reports import pictures
 
-from chainunit.core.errors import GeometryError
+from chainunit.core.errors import GeometryError, RemarkWarning
 from chainunit.core.native.compilers import compiler
 from chainunit.fmu.native.export import export
-from chainunit.machines.linkages.file import read_linkage
+from chainunit.machines.linkages.file import linkage_in, read_linkage
 from chainunit.machines.machine import Machine
-from chainunit.report.blocks import Table
+from chainunit.report import terminal
+from chainunit.report.blocks import Judgement, Table
 from chainunit.report.lines import Name, line
 from chainunit.report.linkage_report import linkage_report
 from chainunit.report.motion import Animation
@@ -221,6 +222,94 @@ force = [-700, 0]
 [start]
 angles = { tube = "45 deg" }
 """
+
+
+ABSURD = """
+gravity = 9810
+[parameters]
+heavy = 50000
+span = "600 mm"
+[inputs]
+pull = { value = "2000 kN", description = "load of the rocker" }
+[ground]
+O1 = [0, 0]
+O2 = [600, "400 mm"]
+[driver]
+link = "crank"
+[links.crank]
+points = { O1 = [0, 0], A = ["50 mm", 0] }
+mass = "2500 kg"
+inertia = "800 kg mm2"
+centroid = [20, 0]
+[links.coupler]
+points = { A = [0, 0], B = ["span", 0] }
+bar = { from = "A", to = "B", area = 600, density = 7.85 }
+[links.rocker]
+points = { O2 = [0, 0], B = ["400 mm", 0] }
+masses = { B = "heavy" }
+[pins]
+friction = 2
+diameter = 60
+[loads.spring]
+type = "spring"
+on = "rocker.B"
+by = "ground.O1"
+stiffness = "3 N/mm"
+length = 250
+[loads.pulling]
+on = "rocker.B"
+force = ["pull", 0]
+[start]
+points = { B = [600, 0] }
+"""
+
+
+def test_absurd_values_of_a_linkage_are_doubted(tmp_path):
+    """Each once: without a unit with the size that was probably meant, with one in a note. What a study replaces is
+    doubted in the study."""
+    file = tmp_path / "absurd.toml"
+    file.write_text(ABSURD.replace("O2 = [600", 'O2 = ["600 mm"'), "utf-8")
+    _, unusual = linkage_in(file)
+    assert {(value.name, value.meant) for value in unusual} == {
+        ("gravity", "9810 mm/s2"),
+        ("parameters.heavy", "50000 g"),
+        ("inputs.pull", None),
+        ("links.crank.inertia", None),
+        ("links.crank.centroid", "20 mm"),
+        ("links.coupler.bar.area", "600 mm2"),
+        ("links.coupler.bar.density", "7.85 g/cm3"),
+        ("pins.friction", None),
+        ("pins.diameter", "60 mm"),
+        ("loads.spring.length", "250 mm"),
+        ("start.points.B", "600 mm"),
+    }
+    with pytest.warns(RemarkWarning) as warned:
+        machine = Machine(read_linkage(file))
+    assert len(warned) == len(unusual) - 2
+    report = linkage_report(linkage_findings(machine, 1.0), file.name, unusual)
+    shown = terminal.plain(report)
+    for value in unusual:
+        assert shown.count(f"{value.name} = ") == 1, value
+    (question,) = [each for each in report.opening if isinstance(each, Judgement)]
+    assert len(question.items) == len(unusual) - 2
+    study = f'[machine]\nlinkage = "{file}"\n[feed]\npull = "3000 kN"\n[run]\ncrank_speed = 3'
+    in_study = config.parse(study).file.unusual
+    assert {value.name for value in in_study} == {
+        "feed.pull" if value.name == "inputs.pull" else value.name for value in unusual
+    }
+
+
+def test_a_length_without_a_unit_is_doubted_though_the_linkage_is_refused(tmp_path):
+    """[600, 400] is 600 m; the linkage cannot close."""
+    (tmp_path / "absurd.toml").write_text(ABSURD, "utf-8")
+    done = run("linkage", "absurd.toml", cwd=tmp_path, status=2)
+    assert "absurd.toml:10: ground.O2 = 600 m: is unusual" in done.stderr
+    assert 'was "600 mm" meant?' in done.stderr
+
+
+def test_no_machine_of_the_gallery_is_doubted():
+    files = sorted(PRESS.parent.glob("*.toml"))
+    assert len(files) > 10 and all(not linkage_in(file)[1] for file in files)
 
 
 def test_a_load_at_a_pin_moves_with_the_pin(tmp_path):

@@ -115,13 +115,12 @@ def test_the_example_and_random_machines_give_no_remark():
     ("text", "name", "meant"),
     [
         ("[machine]\npin = { diameter = 60 }", "machine.pin.diameter", "60 mm"),
-        ('[machine]\npin = { diameter = "60 m" }', "machine.pin.diameter", "60 mm"),
-        ('[feed]\nleft = { material_mass = "30 t" }', "feed.left.material_mass", "30 kg"),
+        ("[machine]\npin = { friction = 2 }", "machine.pin.friction", None),
+        ("[machine]\ng = 9810", "machine.g", "9810 mm/s2"),
         ("[feed]\nleft = { material_mass = 30000 }", "feed.left.material_mass", "30000 g"),
         ("[machine]\ncrank = { m = 1e6 }", "machine.crank.m", "1000000 g"),
         ("[machine]\ncrank = { s = 50 }", "machine.crank.s", "50 mm"),
         ("[machine]\nrocker = { s = -120 }", "machine.rocker.s", "-120 mm"),
-        ('[[event]]\ntype = "jam"\nside = "left"\nforce = "2000 kN"', "event.jam_left.force", "2000 N"),
         ('[[event]]\ntype = "jam"\nside = "left"\nforce = 5e7', "event.jam_left.force", None),
         ('[[event]]\ntype = "jam"\nside = "right"\nduration = 300', "event.jam_right.duration", "300 ms"),
         ('[[event]]\ntype = "dip"\ncrank_angle = 90', "event.dip.crank_angle", "90 deg"),
@@ -143,6 +142,38 @@ def test_a_slip_of_the_unit_is_named_with_what_was_meant(text, name, meant):
         for key in reversed(keys[1:]):
             inner = f"{{ {key} = {inner} }}"
         assert config.parse(f"[{section}]\n{keys[0]} = {inner}").file.unusual == ()
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        ('[machine]\npin = { diameter = "60 m" }', "machine.pin.diameter"),
+        ('[feed]\nleft = { material_mass = "30 t" }', "feed.left.material_mass"),
+        ('[[event]]\ntype = "jam"\nside = "left"\nforce = "2000 kN"', "event.jam_left.force"),
+    ],
+)
+def test_a_value_with_its_unit_is_doubted_once_in_a_note(text, name):
+    """And nobody asks whether a number of another unit was meant."""
+    from chainunit.study.drive import Drive
+    from chainunit.study.remarks import conclude
+    from chainunit.study.result import as_dict
+
+    values = config.parse(text)
+    assert values.file.slips == ()
+    study = record_of(values, Drive(DcMotor, values.motor.parameters, values.machine))
+    conclude(study)
+    result = as_dict(study)
+    (note,) = [each["text"] for each in result["notes"] if each["kind"] == "unusual value"]
+    assert note.startswith(f"By the file, {name} = ") and "usual: " in note and "meant" not in note
+    said = said_of(study)
+    assert result["slips"] == [] and said.count(f"{name} = ") == 1 and "?" not in said
+
+
+def test_an_angle_of_more_than_a_turn_is_told_to_be_in_radians():
+    (slip,) = config.parse('[[event]]\ntype = "dip"\ncrank_angle = 90').file.unusual
+    assert "; a number without a unit is in radians; was" in str(slip)
+    (slip,) = config.parse('[[event]]\ntype = "dip"\ncrank_angle = "500 deg"').file.unusual
+    assert "radians" not in str(slip)
 
 
 def test_a_machine_in_millimetres_is_told_for_each_length():

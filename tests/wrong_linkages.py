@@ -40,6 +40,8 @@ phi = "20 deg"
 points = { C = ["25 mm", "-356 mm"] }
 """
 
+RADIANS = "more than a turn; a number without a unit is in radians"
+SPRING = '[loads.s]\ntype = "spring"\non = "ram.C"'
 GUIDE = '[joints.guide]\non = "ram.C"\nby = "ground.G"\ntoward = "G2"\n'
 ROUGH = 'points = { C = ["25 mm", "-356 mm"] }'
 R = 'r = { value = "80 mm", min = "10 mm", max = "200 mm" }'
@@ -220,12 +222,29 @@ CHANGES = [
     ([(ROUGH, 'angles = { rode = "3 deg" }')], [(37, "start.angles.rode", 'was "rod" meant?')]),
     ([(ROUGH, "poses = { rod = [0, 0] }")], [(37, "start.poses.rod", "a list of three")]),
     # springs
-    (added('[loads.s]\ntype = "spring"\non = "ram.C"\nby = "rod.C"'),
+    (added(f'{SPRING}\nby = "rod.C"\nstiffness = 3\nlength = 0'),
      [(35, "loads.s", "give points that move apart")]),
-    (added('[loads.s]\ntype = "spring"\non = "ram.C"\nby = "ram.T"'),
+    (added(f'{SPRING}\nby = "ram.T"\ndamping = 3'),
      [(35, "loads.s", "give points of two links")]),
-    (added('[loads.s]\ntype = "spring"\non = "ram.C"\nby = "ground.G"\nstiffness = -3'),
-     [(39, "loads.s.stiffness", "must be >= 0")]),
+    (added(f'{SPRING}\nby = "ground.G"\nlength = 0\nstiffness = -3'),
+     [(40, "loads.s.stiffness", "must be >= 0")]),
+    (added(f'{SPRING}\nby = "ground.G"\nstiffness = 3'),
+     [(35, "loads.s.length", "the length at which the spring has no force")]),
+    (added(f'{SPRING}\nby = "ground.G"\nlength = 3'), [(35, "loads.s", "has neither stiffness nor damping")]),
+    # angles that are meant in degrees
+    ([('zero = "0 deg"', "zero = 90")], [(16, "driver.zero", f'{RADIANS}, write degrees as "90 deg"')]),
+    ([('zero = "0 deg"', 'zero = "-90"')], [(16, "driver.zero", f'{RADIANS}, write degrees as "-90 deg"')]),
+    ([('zero = "0 deg"', 'zero = "tilt"'), ("[parameters]", "[parameters]\ntilt = 30")],
+     [(3, "parameters.tilt", f'{RADIANS}, write degrees as "30 deg"')]),
+    ([('zero = "0 deg"', "range = [95, 100]")], [(16, "driver.range", f'{RADIANS}, write degrees as "95 deg"')]),
+    ([('"0 deg", "120 deg", "240 deg"', "0, 120, 240")],
+     [(7, "tables.share", f'{RADIANS}, write degrees as "120 deg"')]),
+    ([('toward = "G2"', 'toward = "G2"\nangle = 90')],
+     [(32, "joints.guide.angle", f'{RADIANS}, write degrees as "90 deg"')]),
+    ([('phi = "20 deg"', "phi = 20")], [(36, "start.phi", f'{RADIANS}, write degrees as "20 deg"')]),
+    ([(ROUGH, "angles = { rod = 22 }")], [(37, "start.angles.rod", f'{RADIANS}, write degrees as "22 deg"')]),
+    ([(ROUGH, "poses = { rod = [0, 0, -22] }")],
+     [(37, "start.poses.rod", f'{RADIANS}, write degrees as "-22 deg"')]),
     # names
     (called("lambda"), [(4, "parameters.lambda", "choose another name, such as lambda_1")]),
     (called("sin"), [(4, "parameters.sin", "has a meaning in expressions")]),

@@ -20,7 +20,7 @@ from ..capabilities import modules
 from ..core.errors import InputError, InterruptedRunError, RunError, printable
 from ..core.files import full, written
 from ..report.command_options import BackendOption, OutputFolder
-from ..report.console import carry_out, exit_status, study_file, terminal_console
+from ..report.console import carry_out, exit_status, show_slips, study_file, terminal_console
 from ..work import interrupts
 from .catalogue_command import catalogue
 from .export_command import ExportCommand, export, export_ssp
@@ -203,13 +203,15 @@ def linkage_command(
 
     Writes report.html, linkage.json, linkage.md and pictures into the output folder.
     """
-    from ..machines.linkages.file import read_linkage
+    from ..machines.linkages.file import linkage_in
     from ..machines.machine import Machine
     from ..report.linkage_report import TASK, LinkageQuestion
     from ..study.linkage_turn import speed_of_driver
 
-    machine = Machine(read_linkage(file))
-    carry_out(TASK, LinkageQuestion(machine, speed_of_driver(machine, speed), str(file)), output)
+    model, unusual = linkage_in(file)
+    show_slips(unusual)
+    machine = Machine(model)
+    carry_out(TASK, LinkageQuestion(machine, speed_of_driver(machine, speed), str(file), unusual), output)
 
 
 @app.command()

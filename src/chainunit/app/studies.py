@@ -119,7 +119,7 @@ class Study(StudyMethods):
         if self._changes:
             config = config.with_file(source=f"{source} with {self._changed}")
         self.config = config
-        for value in config.file.unusual:
+        for value in config.file.slips:
             warnings.warn(value.sentence, RemarkWarning, stacklevel=3)
         return self
 

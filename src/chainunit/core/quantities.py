@@ -167,7 +167,13 @@ MOST: dict[str, float] = {
 """By unit, the upper bound of a quantity that declares only a lower bound. No machine reaches it, and up to
 it the equations do not overflow."""
 
-USUAL: dict[str, tuple[float, float]] = {"m": (1e-4, 30.0), "kg": (1e-3, 2e4), "N": (1e-3, 1e6)}
+USUAL: dict[str, tuple[float, float]] = {
+    "m": (1e-4, 30.0),
+    "m/s2": (0.5, 30.0),
+    "kg": (1e-3, 2e4),
+    "N": (1e-3, 1e6),
+    "rad": (0.0, 6.3),
+}
 """By unit, the range of usual sizes of a quantity whose declaration gives none; 0 is always usual."""
 
 ROUNDING = 1e-9

@@ -44,7 +44,9 @@ _TORQUE_CONSTANT = base_units("N.m/A")
 FITTING: dict[str, tuple[str, ...]] = {
     "m": ("mm", "cm", "m"),
     "m/s": ("m/s", "mm/s"),
-    "m/s2": ("m/s2",),
+    "m/s2": ("m/s2", "mm/s2"),
+    "m2": ("mm2", "cm2", "m2"),
+    "kg/m3": ("kg/m3", "g/cm3"),
     "kg": ("kg", "g", "t"),
     "kg.m2": ("kg m2", "kg cm2"),
     "N": ("N", "kN"),
@@ -70,6 +72,8 @@ _KINDS = {
     "m": "a length",
     "m/s": "a speed along a path",
     "m/s2": "an acceleration",
+    "m2": "an area",
+    "kg/m3": "a density",
     "kg": "a mass",
     "kg.m2": "an inertia",
     "N": "a force",
@@ -98,6 +102,15 @@ def fitting(unit: str, kind: str = "") -> tuple[str, ...]:
     if unit == "1":
         return ("%",) if kind == "percent" else ()
     return FITTING.get(unit, (unit.replace(".", " "),))
+
+
+IN_RADIANS = "a number without a unit is in radians"
+
+
+def has_unit(given: object) -> bool:
+    """Whether a value of a file is a text with a unit."""
+    parts = split(given) if isinstance(given, str) else None
+    return parts is not None and bool(parts[1])
 
 
 def split(text: str) -> tuple[float, str] | None:
@@ -231,10 +244,15 @@ def must_be(unit: str) -> str:
     return f"must be {_KINDS[unit]}, such as {such}"
 
 
+def kind_of(unit: str) -> str:
+    """What a quantity of the declared `unit` is, as ``a length``."""
+    return _KINDS.get(unit, "a number")
+
+
 def with_units(unit: str) -> str:
     """A quantity of the declared `unit` as a person has to write it: ``a speed in rev/min, rad/s, deg/s or Hz``."""
     *names, last = _OF_OPTIONS.get(unit, fitting(unit))
-    return f"{_KINDS.get(unit, 'a number')} in {', '.join(names)}{' or ' if names else ''}{last}"
+    return f"{kind_of(unit)} in {', '.join(names)}{' or ' if names else ''}{last}"
 
 
 _OF_OPTIONS = {"rad/s": ("rev/min", "rad/s", "deg/s", "Hz")}

@@ -26,7 +26,9 @@ class Rod:
 class Pin:
     """The pins; all have the same parameters."""
 
-    friction: Value = quantity("1", "coefficient of friction", default=0.12, min=0.0, max=100.0, tunable=True)
+    friction: Value = quantity(
+        "1", "coefficient of friction", default=0.12, min=0.0, max=100.0, tunable=True, usual=(0.0, 1.0)
+    )
     diameter: Value = quantity(
         "m", "diameter", default=0.06, min=0.0, max=100.0, tunable=True, usual=(1e-3, 0.5)
     )
@@ -39,7 +41,9 @@ class Pin:
 class GuideLaw:
     """The guides, all alike."""
 
-    friction: Value = quantity("1", "coefficient of friction", default=0.0, min=0.0, max=100.0, tunable=True)
+    friction: Value = quantity(
+        "1", "coefficient of friction", default=0.0, min=0.0, max=100.0, tunable=True, usual=(0.0, 1.0)
+    )
     v_smooth: Value = quantity(
         "m/s", "relative speed below which friction is smoothed", default=0.02, min=1e-9, tunable=True
     )

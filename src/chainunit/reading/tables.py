@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import tomllib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib import resources
 from pathlib import Path
@@ -58,7 +58,8 @@ def to_number(variable: Variable, given: Any) -> float:
         raise ValueError(f"{variable.name}: the number is too large; must be {_kind(variable)}") from None
     if not variable.quantity.admits(value):
         meant = _meant(variable, given)
-        raise ValueError(complaint(variable, value) + (f'; was "{meant}" meant?' if meant else ""))
+        radians = f"; {units.IN_RADIANS}" * (variable.unit == "rad" and not units.has_unit(given))
+        raise ValueError(complaint(variable, value) + radians + (f'; was "{meant}" meant?' if meant else ""))
     return variable.quantity.within_bounds(value)
 
 
@@ -116,11 +117,23 @@ def option_value(name: str, text: str, unit: str, description: str) -> float:
 
 @result
 class UnusualValue:
-    """A value that no machine of this kind has, so that a mistaken unit is likely."""
+    """A value that no machine of this kind has, so that a mistaken unit is likely.
+
+    A value that the file has `with_unit` was hardly meant in another one: it is a note, and asks no question.
+    """
 
     variable: Variable
     value: float
+    with_unit: bool
     meant: str | None = part("the probable value, in the form of a study file")
+
+    @classmethod
+    def of(cls, variable: Variable, given: Any, value: float) -> UnusualValue | None:
+        """The unusual `value` of a variable, `given` so in a file; None for a usual one."""
+        if variable.quantity.is_usual(value):
+            return None
+        with_unit = units.has_unit(given)
+        return cls(variable, value, with_unit, None if with_unit else _meant(variable, given))
 
     @derived()
     def name(self) -> str:
@@ -146,8 +159,15 @@ class UnusualValue:
         v, (low, high) = self.variable, self.variable.quantity.usual or (0.0, 0.0)
         unit = unit_behind(v.unit)
         hint = f'; was "{self.meant}" meant?' if self.meant else ""
+        if v.unit == "rad" and not self.with_unit:
+            hint = f"; {units.IN_RADIANS}{hint}"
         usual = f"usual: {low:g} to {high:g}{unit}"
         return f"{v.name} = {self.value:g}{unit}: is unusual ({v.description}; {usual}){hint}"
+
+
+def slips_of(unusual: Iterable[UnusualValue]) -> tuple[UnusualValue, ...]:
+    """Those of the unusual values whose unit is likely mistaken, as the file does not state it."""
+    return tuple(value for value in unusual if not value.with_unit)
 
 
 def unusual_values(
@@ -167,9 +187,8 @@ def unusual_values(
                 variable = dataclasses.replace(
                     variable, quantity=dataclasses.replace(variable.quantity, usual=here)
                 )
-                value = to_number(variable, given)
-                if not variable.quantity.is_usual(value):
-                    yield UnusualValue(variable, value, _meant(variable, given))
+                if value := UnusualValue.of(variable, given, to_number(variable, given)):
+                    yield value
 
 
 def _meant(variable: Variable, given: Any) -> str | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +17,7 @@ from ..core.errors import InputError, InterruptedRunError, RemarkWarning, printa
 from ..work import interrupts
 
 if TYPE_CHECKING:
+    from ..reading.tables import UnusualValue
     from .task import Outcome, Question, Task
 
 
@@ -121,6 +122,13 @@ def study_file(file: Path | None) -> Any:
     from ..study import config as configuration
 
     loaded = configuration.load(file)
-    for value in loaded.file.unusual:
-        show_remark(value.sentence)
+    show_slips(loaded.file.unusual)
     return loaded
+
+
+def show_slips(unusual: Iterable[UnusualValue]) -> None:
+    """Show those of the unusual values of a file whose unit is likely mistaken."""
+    from ..reading.tables import slips_of
+
+    for value in slips_of(unusual):
+        show_remark(value.sentence)

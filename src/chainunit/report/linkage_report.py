@@ -13,13 +13,14 @@ from ..core.quantities import Layout
 from ..machines.machine import Machine
 from ..mechanism.assur import PRISMATIC
 from ..mechanism.machine import MachineState
+from ..reading.tables import UnusualValue, slips_of
 from ..reading.text import array_entry
 from ..study.linkage_turn import GroupTurn, JointTurn, LinkageFindings, linkage_findings
 from . import blocks as b
 from . import figure as fig
 from . import linkage, linkage_loads, linkage_rest
 from .drawing import drawing
-from .lines import Line, Name, Number, capital, join, line
+from .lines import Line, Name, Number, Strong, capital, join, line
 from .live_block import Live, LiveMachine
 from .motion import Animation, Clip, Reading
 from .task import Task, no_check
@@ -38,11 +39,17 @@ class LinkageQuestion(NamedTuple):
     speed: float
     """[rad/s], of a driver that slides [m/s]"""
     file: str
+    unusual: tuple[UnusualValue, ...] = ()
+    """values of the file that are of an unusual size"""
 
 
-def linkage_report(findings: LinkageFindings, source: str) -> b.Report:
-    """The report on a linkage from the file `source`."""
-    result = _result(findings, source)
+def linkage_report(
+    findings: LinkageFindings, source: str, unusual: tuple[UnusualValue, ...] = ()
+) -> b.Report:
+    """The report on a linkage from the file `source`, which has these values of an unusual size."""
+    slips = [str(value) for value in slips_of(unusual)]
+    notes = [value.sentence for value in unusual if value.with_unit]
+    result = _result(findings, source) | {"slips": slips, "notes": notes}
     s = b.Source(result)
     return b.Report(
         result["title"],
@@ -135,6 +142,10 @@ def _over_the_way(f: LinkageFindings) -> dict[str, Any]:
 
 def _opening(s: b.Source, f: LinkageFindings) -> Iterator[b.Block]:
     yield b.Text(s.line("The driver gives one degree of freedom: {groups_in_words}."))
+    if slips := s.result["slips"]:
+        items = tuple(s.words(f"slips.{i}") for i in range(len(slips)))
+        yield b.Judgement("remark", Strong("Is this what was meant?"), items=items)
+    yield from (b.Text(s.words(f"notes.{i}"), "note") for i in range(len(s.result["notes"])))
     yield b.Drawing(
         drawing(f.machine), "The linkage: its pins, links and dimensions", PICTURES[0],
         "A pair of hatched lines is a guide in the ground; a box is a block.",
@@ -382,10 +393,15 @@ def _variables(f: LinkageFindings) -> Iterator[b.Block]:
             yield b.Given(((title, sections),))
 
 
-TASK: Task[LinkageQuestion, tuple[LinkageFindings, str]] = Task(
+TASK: Task[LinkageQuestion, tuple[LinkageFindings, str, tuple[UnusualValue, ...]]] = Task(
     "linkage",
-    lambda question, folder, progress: (linkage_findings(question.machine, question.speed), question.file),
+    lambda question, folder, progress: (
+        linkage_findings(question.machine, question.speed),
+        question.file,
+        question.unusual,
+    ),
     lambda outcome: linkage_report(*outcome),
     files=PICTURES,
     accept=no_check,
+    tells_remarks=True,
 )

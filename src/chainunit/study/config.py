@@ -23,6 +23,7 @@ from ..reading.tables import (
     in_file,
     read,
     read_table,
+    slips_of,
     toml,
     unusual_values,
 )
@@ -38,7 +39,16 @@ from .first_checks import check_values, independent, missing_recordings, plate_o
 from .foreign_machine import ForeignMachine, ForeignModel
 from .motor_sources import ForeignMotor, MotorSource, NamedMotor, OwnMotor
 from .operation import OperatingConditions
-from .parts import Parts, beside, catalogues_of, example, motor_is_left, over_example, with_linkage
+from .parts import (
+    Parts,
+    beside,
+    catalogues_of,
+    example,
+    motor_is_left,
+    named_table,
+    over_example,
+    with_linkage,
+)
 from .registry import registered
 from .run_checks import endless, loads_beyond
 from .sections import (
@@ -65,7 +75,7 @@ class FileContents:
     catalogues: tuple[Path, ...] = ()
     """the catalogues that it names"""
     unusual: tuple[UnusualValue, ...] = ()
-    """values whose unit is likely mistaken"""
+    """values of an unusual size, those of the linkage file that the study does not replace among them"""
     tables: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     """the tables and keys as the file has them"""
     lines: Mapping[str, int] = dataclasses.field(default_factory=dict)
@@ -79,6 +89,11 @@ class FileContents:
         """A context in which an InputError begins with the name of the study file and the line of its key; with
         tables from Python the error stays as it is."""
         return in_file(self.source, lambda: self.lines) if self.lines else nullcontext()
+
+    @property
+    def slips(self) -> tuple[UnusualValue, ...]:
+        """The unusual values whose unit is likely mistaken, as the file does not state it."""
+        return slips_of(self.unusual)
 
     def gives(self, section: str) -> bool:
         """Whether the file sets anything in that table."""
@@ -241,7 +256,10 @@ def _of_values(data: Mapping[str, Any], parts: Parts, source: str) -> Config:
     whole = over_example(data, parts)
     form = read_table(parts.form, whole)
     declared = {name: section.declaration for name, section in parts.sections.items()}
-    unusual = tuple(unusual_values(declared, data, {"run.crank_speed": parts.machine.usual_speed}))
+    replaced = {f"parameters.{name}" for name in named_table(data, "machine")}
+    replaced |= {f"inputs.{name}" for name in named_table(data, "feed")}
+    unusual = tuple(value for value in parts.unusual if value.name not in replaced)
+    unusual += tuple(unusual_values(declared, data, {"run.crank_speed": parts.machine.usual_speed}))
     with each_refusal(lambda fault: _with_hints(fault, unusual)):
         events = read_events(form.event, parts.machine)
         if "event" in data:

@@ -63,12 +63,7 @@ copyreg.pickle(EventType, _reduced)
 class Timing:
     """When an event begins, and for how long the machine is followed."""
 
-    crank_angle: Value = quantity(
-        "rad",
-        "{driver} angle at which the event begins",
-        default=0.0,
-        usual=(0.0, 6.3),
-    )
+    crank_angle: Value = quantity("rad", "{driver} angle at which the event begins", default=0.0)
     turns: Value = quantity(
         "1",
         "{driver} turns that are followed after the event begins; a turn after its last change at least",

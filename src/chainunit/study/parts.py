@@ -16,10 +16,19 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from ..core.errors import Faults, InputError, near_name, refusal_prefix, shown
 from ..drives.motor import Motor
 from ..drives.motors import MOTORS
-from ..machines.linkages.file import read_linkage
+from ..machines.linkages.file import linkage_in
 from ..mechanism.models import MachineModel
 from ..models import MACHINES
-from ..reading.tables import Title, file_form, given_values, merged, packaged, read_table, toml
+from ..reading.tables import (
+    Title,
+    UnusualValue,
+    file_form,
+    given_values,
+    merged,
+    packaged,
+    read_table,
+    toml,
+)
 from .file_section import FileSection
 from .foreign_machine import foreign_model
 from .registry import registered
@@ -68,6 +77,8 @@ class Parts:
     """designation of a motor in the catalogue; empty for another motor"""
     file: str = ""
     """file of a motor that is a foreign FMU; empty for another motor"""
+    unusual: tuple[UnusualValue, ...] = ()
+    """the values of an unusual size in the linkage file of the machine"""
 
     @property
     def named_motor(self) -> str:
@@ -140,22 +151,23 @@ def parts_of(data: Mapping[str, Any], source: str) -> Parts:
     table = read_table(SystemTable, named_table(data, "system"), "system.")
     motor = table.motor
     machine: type[MachineModel] = MACHINES["ChamberForces"]
+    unusual: tuple[UnusualValue, ...] = ()
     with faults.collected(), refusal_prefix("system.motor = ", "system.motor"):
         if _is_fmu(motor):
             beside(motor, source)
     with faults.collected():
-        machine = _machine_model(table, source)
+        machine, unusual = _machine_model(table, source)
     faults.refuse()
-    parts = Parts(machine, MOTORS["DcMotor"])
+    parts = Parts(machine, MOTORS["DcMotor"], unusual=unusual)
     if not motor and "motor" not in data and not motor_is_left(data):
         motor = parts.example.get("system", {}).get("motor", "")
     if not motor:
         return parts
     if _is_fmu(motor):
-        return Parts(machine, Motor, file=motor)
+        return dataclasses.replace(parts, motor=Motor, file=motor)
     if motor in MOTORS:
-        return Parts(machine, MOTORS[motor])
-    return Parts(machine, MOTORS["InductionMotor"], designation=motor)
+        return dataclasses.replace(parts, motor=MOTORS[motor])
+    return dataclasses.replace(parts, motor=MOTORS["InductionMotor"], designation=motor)
 
 
 def motor_is_left(data: Mapping[str, Any]) -> bool:
@@ -163,11 +175,11 @@ def motor_is_left(data: Mapping[str, Any]) -> bool:
     return any(part.motor_table and part.motor_table in data for part in registered())
 
 
-def _machine_model(table: Any, source: str) -> type[MachineModel]:
-    """The machine that the table [system] names."""
+def _machine_model(table: Any, source: str) -> tuple[type[MachineModel], tuple[UnusualValue, ...]]:
+    """The machine that the table [system] names, and the unusual values of its linkage file."""
     if table.machine.lower().endswith(LINKAGE):
         with refusal_prefix("system.machine: ", "system.machine"):
-            model = read_linkage(beside(table.machine, source))
+            model, unusual = linkage_in(beside(table.machine, source))
             if not (model.turns or model.slides):
                 low, high = (math.degrees(end) for end in model.span)
                 raise InputError(
@@ -181,17 +193,17 @@ def _machine_model(table: Any, source: str) -> type[MachineModel]:
                     f"{table.machine} has a driver that slides, and a motor turns; export it as an FMU, or drive it "
                     "by a crank"
                 )
-            return model
+            return model, unusual
     if not _is_fmu(table.machine):
         if table.machine in MACHINES:
-            return MACHINES[table.machine]
+            return MACHINES[table.machine], ()
         raise InputError(
             f"system.machine = {shown(table.machine)}: must be one of {', '.join(MACHINES)}, a linkage file "
             ".toml, or a file .fmu" + near_name(table.machine, MACHINES),
             key="system.machine",
         )
     with refusal_prefix("system.machine: ", "system.machine"):
-        return foreign_model(beside(table.machine, source), given_values(table.machine_names))
+        return foreign_model(beside(table.machine, source), given_values(table.machine_names)), ()
 
 
 def with_linkage(data: Mapping[str, Any]) -> Mapping[str, Any]:

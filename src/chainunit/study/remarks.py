@@ -46,6 +46,9 @@ def conclude(study: StudyRecord) -> None:
             "Friction is smoothed: at rest nothing sticks, so that the torque to break away from a loaded stop is "
             "not in the start-up.",
         )
+    for value in config.file.unusual:
+        if value.with_unit:
+            note("unusual value", "By the file, {value}.", value=str(value))
     if left_out := list(_left_out(study)):
         note(
             "values left out",

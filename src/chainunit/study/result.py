@@ -95,7 +95,7 @@ class StudyData:
     verdict: Verdicts = part("the verdicts")
     warnings: list[Remark] = part("faults, and demands that are not met")
     notes: list[Remark] = part("assumptions behind the numbers")
-    slips: tuple[UnusualValue, ...] = part("given values of an unusual size")
+    slips: tuple[UnusualValue, ...] = part("given values without a unit that are of an unusual size")
     driver: str = part("the noun of the link that the motor turns")
     speed_loop: Mapping[str, Loop] = part("the linearised speed loop, by inertia")
     rigid_line: RigidLine | None = part(
@@ -122,7 +122,7 @@ def _data(study: StudyRecord) -> StudyData:
         verdict=Verdicts(study.verdict, motor_verdict(study)),
         warnings=study.warnings,
         notes=study.notes,
-        slips=study.config.file.unusual,
+        slips=study.config.file.slips,
         driver=study.driver_noun,
         speed_loop=study.statics.loops,
         rigid_line=study.statics.rigid_line,

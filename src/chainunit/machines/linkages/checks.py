@@ -157,6 +157,34 @@ def freedom_faults(
 Places = Mapping[str, Mapping[str, tuple[float, float]]]
 
 
+def usual_distance(link: str, points: Places, ends: set[tuple[str, ...]]) -> float:
+    """The distance from the origin of a link [m] beyond which neither a point nor the centroid of it is expected: ten
+    times the size of the linkage farther than its joints. `ends` are the points of all joints, by link and name; 0
+    for a linkage without a size."""
+    joined = {
+        name: [at for point, at in those.items() if (name, point) in ends] for name, those in points.items()
+    }
+    size = max((math.dist(a, b) for those in joined.values() for a in those for b in those), default=0.0)
+    return max((math.hypot(*at) for at in joined[link]), default=0.0) + 10.0 * size if size else 0.0
+
+
+_DENSITY = 8000.0
+"""[kg/m3], of steel: no usual part is denser."""
+
+
+def usual_inertia(mass: float, points: Iterable[tuple[float, float]]) -> tuple[float, float]:
+    """The least and the largest inertia [kg m2] that is expected of a `mass` [kg] with these points [m].
+
+    The radius of gyration is compared with that of a steel ball of the mass and with the size of the link: a slip of
+    mm2 or cm2 for m2 is a factor of 1000 or 100 in it. A disc on a short crank, and a drive that is reckoned to it,
+    have a large one.
+    """
+    ball = math.sqrt(0.4) * (0.75 * mass / (math.pi * _DENSITY)) ** (1.0 / 3.0)
+    at = list(points)
+    size = max((math.dist(a, b) for a in at for b in at), default=0.0)
+    return mass * max(ball / 30.0, size / 200.0) ** 2, mass * (100.0 * max(ball, size)) ** 2
+
+
 def length_faults(points: Places, joints: Entries, driver: str) -> Iterator[Fault]:
     """Lines without a direction and links without a length, but for the driver, at the start values of the
     parameters."""

@@ -25,7 +25,9 @@ class CommonParameters:
     """Parameters that every linkage has; `guides` only one in which a joint slides."""
 
     g: Value = quantity("m/s2", "gravity, against y", default=9.81, min=0.0, tunable=True)
-    ratio: Value = quantity("1", "gear ratio, motor turns per driver turn", default=1.0, above=0.0, max=1e6)
+    ratio: Value = quantity(
+        "1", "gear ratio, motor turns per driver turn", default=1.0, above=0.0, max=1e6, usual=(0.1, 500.0)
+    )
     pins: PinLaw = group(PinLaw, "pins", default=PinLaw(friction=0.0, diameter=0.05))
     guides: GuideLaw = group(GuideLaw, "guides", default=GuideLaw())
 

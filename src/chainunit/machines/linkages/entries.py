@@ -6,19 +6,21 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 from ...core import units
 from ...core.errors import InputError, near_name, printable, shown
 from ...core.model import About
-from ...core.quantities import Layout, base_units
+from ...core.quantities import USUAL, Layout, Quantity, Variable, base_units
 from ...mechanism.expressions import CONSTANTS, WORDS, Expression, expression
 from ...reading.lists import Entry
+from ...reading.tables import UnusualValue
 from .checks import name_fault, words
 from .declarations import CommonParameters
 from .dimensions import checked_dimension
 from .loads import MOTION, OF_POINT
+from .way import WHOLE
 
 UNITS = (
     "1", "m", "rad", "kg", "kg.m2", "N", "N.m", "N/m", "N.s/m", "N.m/rad", "N.m.s/rad", "m2", "m3", "kg/m", "kg/m3",
@@ -26,6 +28,9 @@ UNITS = (
 )  # fmt: skip
 """Units of parameters and inputs, in the order in which they are tried on a text."""
 
+
+_USUAL = USUAL | {"m": (0.0, USUAL["m"][1]), "m2": (1e-8, 10.0), "kg/m3": (10.0, 3e4)}
+"""Usual sizes by unit; a length may be a coordinate, of any small size."""
 
 Known = Mapping[str, str | None]
 
@@ -42,6 +47,7 @@ class EntryReader(Entry):
         self.used: set[str] = set()
         self.refused: set[str] = set()
         self.points: dict[str, dict[str, list[Any]]] = {}
+        self.unusual: list[UnusualValue] = []
 
     def table(
         self, key: str, parent: Mapping[str, Any] | None = None, default: Any = None
@@ -91,8 +97,14 @@ class EntryReader(Entry):
                 self.fault(f"{key}.{each}", wrong)
                 self.refused.add(each)
 
-    def number(self, key: str, given: Any, unit: str) -> float:
-        """A number, or a text with a unit."""
+    def doubt(self, variable: Variable, given: Any, value: float) -> None:
+        """Note the `value` of a key, which the file has as `given`, where it is of no usual size."""
+        doubt = UnusualValue.of(variable, given, value)
+        if doubt is not None and doubt not in self.unusual:
+            self.unusual.append(doubt)
+
+    def number(self, key: str, given: Any, unit: str, words: str = "") -> float:
+        """A number, or a text with a unit; `words` are its description. One of an unusual size is noted."""
         if isinstance(given, bool) or not isinstance(given, int | float | str):
             raise InputError(
                 f"{is_given(given)}; must be a number or a text with a unit, such as {_like(unit)}"
@@ -113,6 +125,12 @@ class EntryReader(Entry):
             value = float(given)
         if not math.isfinite(value):
             raise InputError(f"is {shown(given)}; must be finite")
+        if unit == "rad" and abs(value) > WHOLE * (1.0 + 1e-12) and not units.has_unit(given):
+            raise InputError(
+                f'is {shown(given)}, more than a turn; {units.IN_RADIANS}, write degrees as "{value:g} deg"'
+            )
+        if unit != "rad" and key:
+            self.doubt(sized(key, unit, _USUAL.get(unit), words), given, value)
         return value
 
     def limit(self, end: str, whole: Mapping[str, Any], unit: str) -> float:
@@ -214,12 +232,12 @@ class EntryReader(Entry):
         for key, name, value in entries:
             if value is not None:
                 with self.at(key):
-                    x = self.number(key, value, declared[name].unit)
-                    if not declared[name].quantity.admits(x):
-                        raise InputError(
-                            f"is {shown(value)}; must be {declared[name].quantity.allowed_range}"
-                        )
-                    common[name] = declared[name].quantity.within_bounds(x)
+                    quantity = declared[name].quantity
+                    x = self.number("", value, quantity.unit)
+                    if not quantity.admits(x):
+                        raise InputError(f"is {shown(value)}; must be {quantity.allowed_range}")
+                    self.doubt(replace(declared[name], name=key), value, x)
+                    common[name] = quantity.within_bounds(x)
         return common
 
     def about(self) -> dict[str, str]:
@@ -335,6 +353,12 @@ class EntryReader(Entry):
                     continue
             raise InputError(f"is {shown(given)}; the unit is not known; write it as in {_like('m')}")
         return self.number("", given, "1"), None
+
+
+def sized(key: str, unit: str, usual: tuple[float, float] | None, words: str = "") -> Variable:
+    """The value of a key as a variable of these `usual` sizes; `words` are its description."""
+    words = words or units.kind_of(unit)
+    return Variable(key, words, Quantity(unit, words, usual=usual))
 
 
 def is_expression(given: Any) -> bool:

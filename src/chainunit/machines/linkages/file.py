@@ -8,17 +8,18 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from ...core.engines import MATH
-from ...core.errors import InputError, each_refusal, meant, near_name, printable, shown
+from ...core.errors import InputError, RemarkWarning, each_refusal, meant, near_name, printable, shown
 from ...mechanism.assur import DYADS, GROUND, PRISMATIC, REVOLUTE
 from ...mechanism.expressions import expression
 from ...mechanism.models import InverseMachine
 from ...reading import toml_lines
-from ...reading.tables import file_text, in_file, toml
+from ...reading.tables import UnusualValue, file_text, in_file, slips_of, toml
 from .checks import (
     POINT_NAMES,
     alike_points,
@@ -30,10 +31,12 @@ from .checks import (
     quantity_names,
     spring_faults,
     study_fault,
+    usual_distance,
+    usual_inertia,
     words,
 )
 from .declarations import RESERVED
-from .entries import is_given
+from .entries import is_given, sized
 from .load_entries import LoadReader
 from .model import machine_of
 from .shared_pins import shared_pins
@@ -57,13 +60,40 @@ def read_linkage(file: Path) -> type[InverseMachine]:
     ------
     InputError
         with a line for each fault, which names file, line and key.
+
+    Warns
+    -----
+    RemarkWarning
+        for a value that looks like a slip of its unit.
+    """
+    machine, unusual = linkage_in(file)
+    for value in slips_of(unusual):
+        warnings.warn(value.sentence, RemarkWarning, stacklevel=2)
+    return machine
+
+
+def linkage_in(file: Path) -> tuple[type[InverseMachine], tuple[UnusualValue, ...]]:
+    """The model of the machine in a linkage file, and the values of the file that are of an unusual size.
+
+    Raises
+    ------
+    InputError
+        as `read_linkage`.
     """
     text = file_text(file)
     with in_file(str(file), lambda: toml_lines.lines_of(text)):
-        description = description_of(toml(text), file.stem, file.parent)
-        # what is wrong of a group is told at its first link
-        with each_refusal(lambda fault: InputError(f"{fault.key or 'links'}: {fault}", fault.key or "links")):
-            return machine_of(description)
+        reader = _LinkageReader(toml(text), file.stem, file.parent)
+        try:
+            description = reader.description()
+            # what is wrong of a group is told at its first link
+            with each_refusal(
+                lambda fault: InputError(f"{fault.key or 'links'}: {fault}", fault.key or "links")
+            ):
+                return machine_of(description), tuple(reader.unusual)
+        except InputError as error:
+            # where lengths do not fit together, one may be a slip of the unit
+            slips = [InputError(str(value), value.name) for value in reader.unusual if value.meant]
+            raise InputError.joined([*error.faults, *slips]) from error
 
 
 def description_of(data: Mapping[str, Any], name: str, folder: Path = Path()) -> str:
@@ -169,12 +199,20 @@ class _LinkageReader(LoadReader):
                 if name not in self.used | self.refused and not (spoilt and name in mentioned):
                     self.fault(f"{kind}.{name}", "nothing uses it; use it, or take it out")
                 each["unit"] = each["unit"] or self.units[name] or "1"
+                with self.at(f"{kind}.{name}"):
+                    self.in_its_unit(f"{kind}.{name}", self.table(kind)[name], each)
         for name in self.derived:
             if name not in self.used and not (spoilt and name in mentioned):
                 self.fault(f"parameters.{name}", "nothing uses it; use it, or take it out")
         for name in tables:
             if name not in self.used | self.refused and not (spoilt and name in mentioned):
                 self.fault(f"tables.{name}", "no load uses it; use it, or take it out")
+
+    def in_its_unit(self, key: str, given: Any, entry: Mapping[str, Any]) -> None:
+        """Look at the size of a parameter or an input, whose unit its first use may tell."""
+        whole = given if isinstance(given, Mapping) else {"value": given}
+        value = f"{whole['value']} {whole['unit']}" if "unit" in whole else whole["value"]
+        self.number(key, value, entry["unit"], entry["description"])
 
     def links(self) -> Mapping[str, Any]:
         """The tables of the links."""
@@ -396,6 +434,7 @@ class _LinkageReader(LoadReader):
         self.keys("start", table, ("phi", "points", "angles", "poses"))
         values = {each["name"]: each["value"] for each in parameters}
         values |= dict.fromkeys(self.inputs, 0.0)
+        values |= {f"{name}_of_{each['name']}": x for each in links for name, x in each["own"].items()}
 
         def number(entry: Any) -> float:
             return float(expression(entry).value(MATH, values)) if isinstance(entry, str) else float(entry)
@@ -405,6 +444,7 @@ class _LinkageReader(LoadReader):
             for link, those in self.points.items()
         }
         self.all(length_faults(points, joints, driver["link"]))
+        self.doubt_bodies(links, points, joints, number)
         entries = [
             (
                 JointEntry(j["name"], j["type"], tuple(j["on"]), tuple(j["by"]), j.get("toward", "")),
@@ -430,6 +470,36 @@ class _LinkageReader(LoadReader):
             return {"value": value, "poses": pose.complete()}
         return {}
 
+    def doubt_bodies(
+        self,
+        links: list[dict[str, Any]],
+        points: Mapping[str, Mapping[str, tuple[float, float]]],
+        joints: list[dict[str, Any]],
+        number: Callable[[Any], float],
+    ) -> None:
+        """Note centroids and points that lie far outside the linkage, and inertias that do not go with their masses,
+        at the start values of the parameters."""
+        ends = {tuple(joint[end]) for joint in joints for end in ("on", "by")}
+        usual = {link: usual_distance(link, points, ends) for link in points}
+        for link in links:
+            name, table = link["name"], self.table(f"links.{link['name']}", self.table("links"))
+            places = [(f"points.{point}", table["points"][point], at) for point, at in points[name].items()]
+            if "centroid" in table:
+                x, y = map(number, link["centroid"])
+                places.append(("centroid", table["centroid"], (x, y)))
+            known = {value.name for value in self.unusual}
+            for key, given, place in places:
+                variable = sized(f"links.{name}.{key}", "m", (0.0, usual[name]))
+                for text, x in zip(given, place, strict=True):
+                    if usual[name] and variable.name not in known:
+                        self.doubt(variable, text, x)
+            mass = number(link.get("mass", 0.0))
+            if "inertia" in table and mass > 0.0:
+                words = f"inertia of {mass:g} kg about the centroid"
+                limits = usual_inertia(mass, points[name].values())
+                variable = sized(f"links.{name}.inertia", "kg.m2", limits, words)
+                self.doubt(variable, table["inertia"], number(link["inertia"]))
+
     def given_pose(self, table: Mapping[str, Any], pose: StartPose) -> None:
         """Points, angles and poses that the file gives."""
         for name, at in self.table("start.points", table).items():
@@ -440,14 +510,15 @@ class _LinkageReader(LoadReader):
         for link, angle in self.table("start.angles", table).items():
             with self.at(f"start.angles.{link}"):
                 self.known_link(link)
-                pose.angles[link] = self.number("", angle, "rad")
+                pose.angles[link] = self.number(f"start.angles.{link}", angle, "rad")
         for link, given in self.table("start.poses", table).items():
             with self.at(f"start.poses.{link}"):
                 self.known_link(link)
                 if not isinstance(given, list) or len(given) != 3:
                     raise InputError("must be a list of three: x, y and angle of the frame of the link")
                 x, y, angle = (
-                    self.number("", v, unit) for v, unit in zip(given, ("m", "m", "rad"), strict=True)
+                    self.number(f"start.poses.{link}", v, unit)
+                    for v, unit in zip(given, ("m", "m", "rad"), strict=True)
                 )
                 pose.poses[link] = x, y, angle
 
@@ -474,5 +545,5 @@ class _LinkageReader(LoadReader):
                     raise InputError(f"{point} is no point of {link}")
                 if not isinstance(place, list) or len(place) != 2:
                     raise InputError(f"is {shown(place)}; must be a list of two, along x and y")
-                x, y = (self.number("", each, "m") for each in place)
+                x, y = (self.number(key, each, "m") for each in place)
                 yield link, point, (x, y)

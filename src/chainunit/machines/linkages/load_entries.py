@@ -216,6 +216,14 @@ class LoadReader(EntryReader):
                 if kind != "spring" and load[each][0] == GROUND:
                     raise InputError("acts on the ground; give a point of a link")
         if kind == "spring":
+            if "stiffness" not in table and "damping" not in table:
+                self.fault(key, "has neither stiffness nor damping; give one of them, or take the spring out")
+            if "stiffness" in table and "length" not in table:
+                self.fault(
+                    f"{key}.length",
+                    'is missing; must be the length at which the spring has no force, such as "200 mm", or 0 for '
+                    "one that pulls at every length",
+                )
             for each, unit in (("stiffness", "N/m"), ("length", "m"), ("damping", "N.s/m")):
                 load[each] = self.positive(f"{key}.{each}", table.get(each, 0.0), unit)
             return load
