@@ -190,7 +190,8 @@ def measure(
 @declaration
 class Answers:
     """The demands of a run on the drive. Torques and speeds are the crank's unless they are called the motor's. Means
-    and RMS are over the time of whole turns of the crank. Steady running is the turns in `load_cycle.csv`.
+    and RMS of steady running are over the time of whole turns of the crank, the turns in `load_cycle.csv`; those of
+    an event are over all the time that it is followed, as its peaks are.
     Times count from the event.
 
     - ripple: (largest - least)/mean of the speed

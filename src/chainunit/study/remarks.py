@@ -11,7 +11,6 @@ import numpy as np
 from ..reading.text import number
 from .catalogue_drive import SLIP
 from .coupling import remark_on_coupling, remark_on_rams
-from .event_torques import peaks_in_events
 from .judgement import lasts, model_verdict, motor_limits, no_reserve
 from .measures import STARTED, Answers
 from .readings import breakdown_speed, crank_speed, has_turn
@@ -268,7 +267,6 @@ _HAPPENINGS = {
     "rod end pushed": "An end of a rod is pushed, though the rod is pulled in the mean; more rods are nearer to a "
     "chain",
     "current limit": "The motor runs into its current limit of {limit}",
-    "gear passed": "The torque passes the gear's permitted {limit}",
     "stall": "The {driver} stands after the event",
     "trip": "The safety coupling opens after the event",
     "not recovered": "The speed does not return to its steady band within the time followed",
@@ -278,7 +276,7 @@ _HAPPENINGS = {
 
 def _on_runs(study: StudyRecord) -> None:
     """A remark for each kind of happening in the runs, with all runs in which it occurred."""
-    limits: dict[str, Amount] = {"gear passed": (study.config.drive.gear.torque_limit, "N.m")}
+    limits: dict[str, Amount] = {}
     if (largest := study.drive.motor.current_limit(study.motor)) is not None:
         limits["current limit"] = largest, "A"
     happenings = [(name, *each) for name in study.answers for each in _happenings(study, name)]
@@ -307,9 +305,6 @@ def _happenings(study: StudyRecord, name: str) -> Iterator[tuple[str, str, dict[
     largest = study.drive.motor.current_limit(study.motor)
     if largest is not None and answers.current_peak > 0.999 * largest:
         yield "current limit", "", {}
-    peak = peaks_in_events(study).get(name, 0.0)
-    if "gear.torque_limit" in config.file.given and peak > config.drive.gear.torque_limit:
-        yield "gear passed", number(peak, "N.m"), {"torque": (peak, "N.m")}
     if answers.stall_time is not None:
         late = answers.stall_time > 10.0 * config.run.step
         after = f"after {number(answers.stall_time, 's')}{'' if late else ', as it hardly turned before'}"
