@@ -13,7 +13,7 @@ from .catalogue_drive import SLIP
 from .coupling import remark_on_coupling, remark_on_rams
 from .judgement import lasts, model_verdict, motor_limits, no_reserve
 from .measures import STARTED, Answers
-from .readings import breakdown_speed, crank_speed, has_turn
+from .readings import breakdown_speed, crank_speed, has_turn, less_than_a_turn
 from .record import LOAD_CYCLE, Amount, StudyRecord
 from .registry import capabilities, parts_of_line
 from .verdict import START, STEADY, shown_speed
@@ -213,9 +213,9 @@ def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
     if not has_turn(study.drive, study.steady):
         warn(
             "no whole turn",
-            "steady running: the {driver} does not make a whole turn; means are over the whole run, and there is no "
-            f"{LOAD_CYCLE}.{{refused}}",
+            f"steady running: {{made}}; means are over this time, and there is no {LOAD_CYCLE}.{{refused}}",
             STEADY,
+            made=less_than_a_turn(study.drive, study.steady),
             refused="" if lasts(study) else _REFUSED,
         )
     elif steady.cycle_gap > CLOSED:

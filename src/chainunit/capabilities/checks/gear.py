@@ -1,11 +1,11 @@
-"""A gear beside its ratings: torque of running, largest torque, thermal rating, overhung load, speed; and the overhung
-load of the motor's shaft.
+"""A gear beside its ratings: torque of running, largest torque, thermal rating, overhung load, speed; and the
+overhung load of the motor's shaft.
 
 ISO 6336-6 takes the application factor from the spectrum of the torque: KA = Teq/Tn, with Teq of the same damage by
 Woehler's line of exponent p and Palmgren and Miner's rule, and Tn the mean torque of the machine. A gear with the
-rated torque TN that is rated for the factor KAN carries Teq = KA Tn <= KAN TN. A wheel on the crank's shaft meets each
-angle of the crank with the same teeth: they carry the largest torque of the turn in each turn, so that without an
-exponent Teq is the largest torque of running.
+rated torque TN that is rated for the factor KAN carries Teq = KA Tn <= KAN TN. A wheel on the crank's shaft meets
+each angle of the crank with the same teeth: they carry the largest torque of the turn in each turn, so that without
+an exponent Teq is the largest torque of running.
 """
 
 from __future__ import annotations
@@ -65,7 +65,9 @@ class GearCheck:
     bearing: str = part("pin whose reaction the output shaft carries; empty where it carries none")
     load: GearDuty = part(inline=True)
     rated_torque: float | None = quantity("N.m", "rated torque of the output TN")
-    application_factor: float | None = quantity("1", "application factor of the cycle, Teq over the mean torque")
+    application_factor: float | None = quantity(
+        "1", "application factor of the cycle, Teq over the mean torque"
+    )
     running_limit: float | None = quantity("N.m", "permitted torque of the output in running")
     torque_limit: float | None = quantity("N.m", "permitted torque of the output in peaks")
 
@@ -123,7 +125,8 @@ def gear_rows(
             "gear",
             "torque of running",
             "ISO 6336-6:2019, annex on KA from a load spectrum",
-            f"Teq <= KAN TN, KAN: application factor that the gear permits; {teq}; KA = Teq/mean |T| of steady running",
+            f"Teq <= KAN TN, KAN: application factor that the gear permits; {teq}; KA = Teq/mean |T|, both of steady "
+            "running",
             own.running,
             of.running_limit,
             f"{at}.running",
