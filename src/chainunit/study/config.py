@@ -38,7 +38,16 @@ from .first_checks import check_values, independent, missing_recordings, plate_o
 from .foreign_machine import ForeignMachine, ForeignModel
 from .motor_sources import ForeignMotor, MotorSource, NamedMotor, OwnMotor
 from .operation import OperatingConditions
-from .parts import Parts, beside, catalogues_of, example, motor_is_left, over_example, with_linkage
+from .parts import (
+    Parts,
+    beside,
+    catalogues_of,
+    example,
+    linkage_lines,
+    motor_is_left,
+    over_example,
+    with_linkage,
+)
 from .registry import registered
 from .run_checks import endless, loads_beyond
 from .sections import (
@@ -70,6 +79,10 @@ class FileContents:
     """the tables and keys as the file has them"""
     lines: Mapping[str, int] = dataclasses.field(default_factory=dict)
     """the line of each key in the file"""
+    linkage: str = ""
+    """name of the linkage file of its machine, if it names one"""
+    linkage_lines: Mapping[str, int] = dataclasses.field(default_factory=dict)
+    """the line of each key in the linkage file"""
     labels: Mapping[str, str] = dataclasses.field(default_factory=dict)
     """project, author, date and revision, as far as the file gives them"""
     is_packaged: bool = False
@@ -249,6 +262,7 @@ def _of_values(data: Mapping[str, Any], parts: Parts, source: str) -> Config:
             tables = dict(zip(events, data["event"], strict=True))
             unusual += tuple(unusual_values(kinds, {"event": tables}))
         given, names = frozenset(_names(data, events)), frozenset(_names(whole, events))
+        linkage, lines = linkage_lines(data, source)
         contents = FileContents(
             source,
             given,
@@ -256,6 +270,8 @@ def _of_values(data: Mapping[str, Any], parts: Parts, source: str) -> Config:
             choices=_choices(form, parts),
             unusual=unusual,
             tables=data,
+            linkage=linkage,
+            linkage_lines=lines,
             labels=form.report.labels,
         )
         return _config(form, parts, events, contents)

@@ -23,7 +23,7 @@ from .window import CLOSED, DRIFT, STORED
 def conclude(study: StudyRecord) -> None:
     """Judge the model, and add every remark to the study."""
     config, note = study.config, study.note
-    assumed = "Values that the study file does not name are the declared start values, which are assumed."
+    assumed = "Values that no file names are the program's defaults, which are assumed."
     if config.file.is_packaged:
         assumed = "Masses, pins, feed and drive are assumed; the papers print none."
     elif config.file.of_example:

@@ -113,7 +113,7 @@ def test_the_relay_that_is_ordered_is_simulated(on_line, monkeypatch):
         since, current = after["time"].values - study.event[name], after["motor.i"].values
         lasts = float(np.sqrt(np.mean(current[-max(1, len(current) // 5) :] ** 2)))
         before = study.window(Phase.STEADY, study.steady).rms("motor.i")
-        by_hand = relay_trip(since, current, study.drive.rated_current, before, lasts, 30)
+        by_hand = relay_trip(since, current, study.drive.rated_current, before, lasts, 30, 1.2)
         later = study.answers[name].thermal_trip_time
         assert later == by_hand and (later is None or later > light[name])
     # an analysis that reads the trips comes after the class is known, so that a report has one time
@@ -235,6 +235,9 @@ def test_a_setting_carries_every_start():
     # where running alone leaves no setting either, the start is not the reason
     assert Setting(200.0, 800.0, 600.0, 240.0, shocks).obstacle is Obstacle.GEAR
     assert not Setting(200.0, 210.0, 600.0, 1000.0, shocks).start_decides
+    # a start ends in running: what differs by a per cent is the torque of running
+    alike, more = (Setting(200.0, start, 600.0, 1000.0, shocks) for start in (201.9, 202.1))
+    assert (alike.normal, alike.is_of_start, more.normal, more.is_of_start) == (200.0, False, 202.1, True)
 
 
 def test_a_coupling_that_saves_nothing_is_not_recommended():
