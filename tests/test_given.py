@@ -7,6 +7,7 @@ import dataclasses
 import json
 import math
 from functools import partial
+from pathlib import Path
 
 import pytest
 from records import record_of
@@ -16,7 +17,8 @@ from test_foreign_system import build
 
 from chainunit.core.errors import InputError
 from chainunit.core.quantities import Layout
-from chainunit.report import blocks
+from chainunit.report import blocks, html
+from chainunit.report.sheet import sheet
 from chainunit.report.study import report
 from chainunit.study import remarks
 from chainunit.study.catalogue_drive import with_inertia
@@ -140,6 +142,51 @@ def test_what_no_example_gives_is_at_its_declared_start_value(tmp_path):
     (note,) = (str(each) for each in study.notes if each.kind == "assumed")
     assert "example" not in note and "An eccentric pump" in note
     assert "machine.throw" not in as_dict(study)["origins"]
+
+
+LINKAGE_STUDY = """
+[machine]
+linkage = "press.toml"
+[run]
+crank_speed = 6
+[machine.pins]
+friction = 0.1
+"""
+
+
+def test_a_value_of_the_linkage_file_is_no_assumption(tmp_path):
+    """Its origin is that file and the line there; that of the study file has its line, too; the rest is a default."""
+    linkage = (Path(__file__).parents[1] / "examples" / "linkages" / "slider_crank_press.toml").read_text(
+        "utf-8"
+    )
+    (tmp_path / "press.toml").write_text(linkage, "utf-8")
+    study = study_of(parse(LINKAGE_STUDY, str(tmp_path / "own.toml")), tmp_path)
+    result, lines = as_dict(study), linkage.splitlines()
+    for name, key in (
+        ("machine.ram.mass", "mass = "),
+        ("machine.r", "r = "),
+        ("feed.press_force", "press_force = "),
+    ):
+        assert result["origins"][name] == "linkage"
+        file, line = result["places"][name].split(", line ")
+        assert file == "press.toml" and lines[int(line) - 1].startswith(key)
+    assert result["origins"]["machine.pins.friction"] == "file"
+    assert result["places"]["machine.pins.friction"] == "own.toml, line 7"
+    assert result["places"]["run.crank_speed"] == "own.toml, line 5"
+    assert "machine.g" not in result["origins"] and "machine.g" not in result["places"]
+    page = html.render(report(study, result))
+    assert (
+        f'<abbr class="from" title="the linkage file&#x27;s">{result["places"]["machine.r"]}</abbr>' in page
+    )
+    on_sheet = {
+        value.name
+        for section in sheet(study, report(study, result)).sections
+        for block in section.blocks
+        if isinstance(block, blocks.Given)
+        for _, values in block.sections
+        for value in values
+    }
+    assert "machine.g" in on_sheet and not on_sheet & {"machine.ram.mass", "machine.r", "feed.press_force"}
 
 
 ALL = """

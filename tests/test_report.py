@@ -133,8 +133,8 @@ def test_what_the_file_does_not_give_is_marked():
         ("run.turns", "declared"),
     ]
     page, document = html.render(a_report()), markdown(a_report(), [])
-    assert page.count('<abbr class="from" title="the declared start value">d</abbr>') == 1
-    assert "Not in the study file: d: the declared start value." in page and "t: tuned" not in page
+    assert page.count('<abbr class="from" title="the program&#x27;s default">d</abbr>') == 1
+    assert "Not in the study file: d: the program's default." in page and "t: tuned" not in page
     rows = [line for line in document.splitlines() if line.startswith("| run.")]
     assert rows[0].endswith("| file |") and rows[1].endswith("| declared |")
 

@@ -53,11 +53,11 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
 
 
 def _speed(s: b.Source, study: StudyRecord, run: str) -> Line:
-    """The crank speed of a run: the speed asked for, or, marked, the mean speed where the motor misses it."""
+    """The mean speed of the crank in a run, marked where the motor misses the speed asked for."""
+    mean_speed = s.line(f"{{answers.{run}.speed_mean}}")
     if run != "steady" or study.reaches:
-        return s.line("{=run.crank_speed:4}")
-    mean_speed = Strong(s.line(f"▲ {{answers.{run}.speed_mean}}"))
-    return line(mean_speed, s.line(", not the {=run.crank_speed:4} asked for"))
+        return mean_speed
+    return line(Strong(line("▲ ", mean_speed)), s.line(", not the {=run.crank_speed:4} asked for"))
 
 
 def _cards(s: b.Source, study: StudyRecord, run: str) -> Iterator[b.Card]:

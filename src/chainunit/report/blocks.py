@@ -131,6 +131,8 @@ class GivenValue:
     value: Content
     origin: str = ""
     """see `chainunit.study.origins.origin_of`; empty where it is not known"""
+    place: str = ""
+    """file and line that give it; empty where no file does"""
 
 
 @dataclass(frozen=True)
@@ -347,15 +349,16 @@ class Source:
         cls = declaration if isinstance(declaration, type) else type(declaration)
         for v in Layout(cls).variables:
             if v.name in entries:
-                full, origin = f"{name}.{v.name}", self.origin(f"{name}.{v.name}")
+                full = f"{name}.{v.name}"
+                origin = self.origin(full), self.place(full)
                 words = v.described(self.driver)
                 if isinstance(entries[v.name]["value"], list):
                     for i, end in enumerate(("least", "most")):
                         value = self.number(f"{path}.{v.name}", i, as_given=True)
-                        yield GivenValue(full, f"{words}, {end}", value, origin)
+                        yield GivenValue(full, f"{words}, {end}", value, *origin)
                 else:
                     value = self.number(f"{path}.{v.name}", as_given=True, none="none")
-                    yield GivenValue(full, words, value, origin)
+                    yield GivenValue(full, words, value, *origin)
 
     def origin(self, path: str) -> str:
         """The origin of the given value at `path`; empty where the result has no origins."""
@@ -363,3 +366,8 @@ class Source:
             return ""
         origin: str = self.result["origins"].get(path, "declared")
         return origin
+
+    def place(self, path: str) -> str:
+        """File and line of the given value at `path`; empty where no file gives it."""
+        place: str = self.result.get("places", {}).get(path, "")
+        return place

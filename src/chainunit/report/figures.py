@@ -79,7 +79,9 @@ def _torque_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
 def _duty(s: b.Source, study: StudyRecord) -> Iterator[fig.Item]:
     """The speed of normal running and, where the motor has a nameplate, its rated point and the rated torque, which
     it may give without a limit of time (S1)."""
-    yield fig.Mark(study.config.run.crank_speed * study.drive.ratio, "normal running", look="mark")
+    if "steady" in study.answers:
+        speed = study.answers["steady"].speed_mean * study.drive.ratio
+        yield fig.Mark(speed, "steady running, mean", look="mark")
     if "rated_torque" in s.result["motor"]:
         speed, torque = (s.value(f"motor.rated_{name}") for name in ("speed", "torque"))
         yield fig.Mark(float(torque or 0.0), "rated torque (S1)", axis="y", look="reference")
@@ -374,7 +376,7 @@ def _reactions(s: b.Source, study: StudyRecord) -> fig.Figure:
         "Bars of the reaction of every pin: peak and RMS in steady running, and the largest peak of all runs.",
         ((fig.Panel(x, fig.Axis("pin", names=tuple(pins)), items),),),
         s.line(
-            f"Means are taken over whole {{driver}} turns of {of_run}. Beside a bar: the run of the largest peak."
+            f"RMS is taken over whole {{driver}} turns of {of_run}. Beside a bar: the run of the largest peak."
         ),
         heights=(max(0.6, 38.0 * len(pins) / 250.0),),
     )

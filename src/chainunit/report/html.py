@@ -40,6 +40,7 @@ _WASM = " 'wasm-unsafe-eval'"
 _SIGN = {"good": "✓", "partly": "◐", "bad": "✗", "warning": "!"}
 _ORIGIN = {
     "file": "the study file's",
+    "linkage": "the linkage file's",
     "example": "the example's",
     "tuned": "tuned to the machine",
     "catalogue": "from the row of the catalogue",
@@ -163,12 +164,17 @@ def _short(name: str) -> str:
 
 def _origin_words(origin: str) -> str:
     """The origin of a given value in words; another origin than those of a study is the question that chose it."""
-    return _ORIGIN.get(origin, "the declared start value" if origin == "declared" else f"chosen by {origin}")
+    return _ORIGIN.get(origin, "the program's default" if origin == "declared" else f"chosen by {origin}")
+
+
+def _named(value: b.GivenValue) -> str:
+    """The name of a given value, with its file and line."""
+    return f"{value.name}: {value.place}" if value.place else value.name
 
 
 def marks(block: b.Given) -> str:
     """The legend of the marks that stand beside given values."""
-    origins = {value.origin for _, values in block.sections for value in values} - {"", "file"}
+    origins = {value.origin for _, values in block.sections for value in values} - {"", "file", "linkage"}
     others = sorted(origins - _ORIGIN.keys(), key=lambda origin: origin == "declared")
     words = (f"{o[0]}: {_origin_words(o)}" for o in (*_ORIGIN, *others) if o in origins)
     return f'<p class="hint marks">Not in the study file: {"; ".join(words)}.</p>' if origins else ""
@@ -350,7 +356,7 @@ class Page:
 
     def _given(self, title: str, values: Iterable[b.GivenValue]) -> str:
         rows = "".join(
-            f'<tr><th scope="row" title="{escape(value.name)}">{escape(value.description)}</th>'
+            f'<tr><th scope="row" title="{escape(_named(value))}">{escape(value.description)}</th>'
             f"<td>{self.line((value.value,))}{self.origin(value)}</td></tr>"
             for value in values
         )
@@ -360,10 +366,11 @@ class Page:
         )
 
     def origin(self, value: b.GivenValue) -> str:
-        """A mark at a value that the study file does not give."""
+        """A mark at a value that the study file does not give; one of another file has its place there."""
         if value.origin in ("", "file"):
             return ""
-        return f'<abbr class="from" title="{escape(_origin_words(value.origin))}">{value.origin[0]}</abbr>'
+        mark = value.place or value.origin[0]
+        return f'<abbr class="from" title="{escape(_origin_words(value.origin))}">{escape(mark)}</abbr>'
 
     def _figure(self, figure: Figure) -> str:
         from .page_figures import height

@@ -78,7 +78,12 @@ def block_lines(block: Block, units: Units, pictures: Collection[str] = ()) -> l
             return [text for table in block.tables for text in _table(table, units)]
         case Given():
             entries = [
-                (value.name, _line((value.value,), units), markdown_text(value.description), value.origin)
+                (
+                    value.name,
+                    _line((value.value,), units),
+                    markdown_text(value.description),
+                    value.place or value.origin,
+                )
                 for _, values in block.sections
                 for value in values
             ]

@@ -86,9 +86,9 @@ def table_of_runs(s: b.Source, study: StudyRecord) -> b.Table:
         or any(answers[run][v.name]["value"] is not None for run in runs)
         or (v.name == "recovery_time" and study.returns and study.overloads)
     )
-    head = "{driver} at {=run.crank_speed:4}"
+    head = "{driver} at {answers.steady.speed_mean}" if "steady" in answers else ""
     if not study.reaches:
-        head = "{driver} at {answers.steady.speed_mean}; {=run.crank_speed:4} NOT reached"
+        head += "; {=run.crank_speed:4} NOT reached"
     title = f"Demands of each run on the drive{'; the motor is insufficient' if study.insufficient else ''}"
     return over_runs(study, runs, rows, title, plain_line(s.line(head), study.config.units))
 
@@ -124,7 +124,7 @@ def _pins(s: b.Source, study: StudyRecord) -> b.Table:
             b.Column("in the run", form="long"),
             b.Column("in", form="short"),
         ),
-        title="Forces in the bearings (equivalent load: ISO 281)",
+        title="Forces in the bearings (equivalent load: ISO 281, for balls and for rollers)",
     )
 
 

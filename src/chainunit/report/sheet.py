@@ -38,7 +38,7 @@ def sheet(study: StudyRecord, report: b.Report) -> Sheet:
         *(_on_sheet(given[name]) for name in sheets),
         b.Section(
             "assumptions",
-            "Assumptions: values that the study file does not give",
+            "Assumptions: values that no file gives",
             tuple(_assumed(given, study)),
         ),
         *([_basis(s, study)] if "basis" in given else []),
@@ -112,7 +112,7 @@ def _title_block(study: StudyRecord, report: b.Report) -> dict[str, str]:
 
 
 def _assumed(given: dict[str, b.Section], study: StudyRecord) -> Iterator[b.Block]:
-    """The values that the file leaves out, but those that were chosen, which are the answer, and those of a motor of
+    """The values that the files leave out, but those that were chosen, which are the answer, and those of a motor of
     a catalogue beside its surroundings."""
     chosen = "" if study.proposal is None else study.proposal.name
     for block in given["given"].blocks if "given" in given else ():
@@ -128,9 +128,9 @@ def _assumed(given: dict[str, b.Section], study: StudyRecord) -> Iterator[b.Bloc
 
 
 def _is_assumed(value: b.GivenValue, study: StudyRecord, chosen: str) -> bool:
-    """Whether the file leaves out a number that is neither `chosen` nor of an event; beside a motor of a catalogue,
+    """Whether the files leave out a number that is neither `chosen` nor of an event; beside a motor of a catalogue,
     neither its own nor of a starter that is not used."""
-    if value.origin in ("", "file", chosen) or not isinstance(value.value, Number):
+    if value.origin in ("", "file", "linkage", chosen) or not isinstance(value.value, Number):
         return False
     of, _, name = value.name.partition(".")
     if of == "event" or study.plate is None:

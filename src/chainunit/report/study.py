@@ -152,7 +152,7 @@ def _values(s: b.Source, section: GivenSection, unused_names: Iterable[str]) -> 
             content = s.number(place, as_given=True)
         else:
             content = ", ".join(x if isinstance(x, str) else f"{x:g}" for x in choice)
-        yield b.GivenValue(name, description(name), content, s.origin(name))
+        yield b.GivenValue(name, description(name), content, s.origin(name), s.place(name))
 
 
 def _live(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:

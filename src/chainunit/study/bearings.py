@@ -11,28 +11,32 @@ import numpy as np
 from ..core.engines import MATH
 from .drive import Drive
 from .readings import machine_series
-from .window import mean, whole_turns
+from .window import mean
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
+EXPONENT = {"ball": 3.0, "roller": 10.0 / 3.0}
+"""Exponent p of the rating life of ISO 281, by the kind of bearing."""
+
+
 def pin_loads(drive: Drive, run: xr.Dataset) -> dict[str, dict[str, float | None]]:
-    """Peak, RMS and equivalent load (mean of ISO 281 over the angle that the pin turns) of the reaction of every pin
-    and guide [N]; a guide, which does not turn, has no equivalent load. Empty for a machine that is a foreign FMU."""
+    """Peak, RMS and, by kind of rolling bearing, equivalent load (mean of ISO 281 over the angle that the pin turns)
+    of the reaction of every pin and guide [N]; a guide, which does not turn, has no equivalent load. Empty for a
+    machine that is a foreign FMU."""
     if drive.foreign_machine:
         return {}
     table: dict[str, dict[str, float | None]] = {}
-    turns = whole_turns(drive, run)
     machine = drive.simulated_machine
-    angles = machine.pin_turns(machine_series(turns))
+    angles = machine.pin_turns(machine_series(run))
     for title, name in machine.model.pins.items():
-        forces, forces_of_turns = (pin_force(drive, of, title) for of in (run, turns))
-        table[title] = {
-            "peak": float(np.max(forces)),
-            "rms": math.sqrt(mean(turns, forces_of_turns**2)),
-            "equivalent": mean_load(forces_of_turns, angles[name]) if name in angles else None,
-        }
+        forces = pin_force(drive, run, title)
+        table[title] = {"peak": float(np.max(forces)), "rms": math.sqrt(mean(run, forces**2))}
+        for kind, p in EXPONENT.items():
+            table[title][f"{kind}_equivalent"] = (
+                mean_load(forces, angles[name], p) if name in angles else None
+            )
     return table
 
 

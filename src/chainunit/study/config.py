@@ -44,6 +44,7 @@ from .parts import (
     beside,
     catalogues_of,
     example,
+    linkage_lines,
     motor_is_left,
     named_table,
     over_example,
@@ -80,6 +81,10 @@ class FileContents:
     """the tables and keys as the file has them"""
     lines: Mapping[str, int] = dataclasses.field(default_factory=dict)
     """the line of each key in the file"""
+    linkage: str = ""
+    """name of the linkage file of its machine, if it names one"""
+    linkage_lines: Mapping[str, int] = dataclasses.field(default_factory=dict)
+    """the line of each key in the linkage file"""
     labels: Mapping[str, str] = dataclasses.field(default_factory=dict)
     """project, author, date and revision, as far as the file gives them"""
     is_packaged: bool = False
@@ -267,6 +272,7 @@ def _of_values(data: Mapping[str, Any], parts: Parts, source: str) -> Config:
             tables = dict(zip(events, data["event"], strict=True))
             unusual += tuple(unusual_values(kinds, {"event": tables}))
         given, names = frozenset(_names(data, events)), frozenset(_names(whole, events))
+        linkage, lines = linkage_lines(data, source)
         contents = FileContents(
             source,
             given,
@@ -274,6 +280,8 @@ def _of_values(data: Mapping[str, Any], parts: Parts, source: str) -> Config:
             choices=_choices(form, parts),
             unusual=unusual,
             tables=data,
+            linkage=linkage,
+            linkage_lines=lines,
             labels=form.report.labels,
         )
         return _config(form, parts, events, contents)

@@ -10,7 +10,7 @@ from ..reading.text import number
 from . import verdict
 from .limits import Check, given_motor, reaches
 from .organ_limits import has_empty_side, slack_and_mode
-from .readings import has_turn
+from .readings import has_turn, less_than_a_turn
 from .record import StudyRecord
 from .registry import registered
 from .rig import worst_residual
@@ -113,7 +113,7 @@ def _no_judgement(study: StudyRecord, speed: str) -> str:
         return f"The motor does NOT bring the {driver} to its speed from {where}, though it turns at {speed} here"
     if lasts(study):
         return ""
-    steady, why = study.answers[STEADY], f"the {driver} does not make a whole turn"
+    steady, why = study.answers[STEADY], less_than_a_turn(study.drive, study.steady)
     if has_turn(study.drive, study.steady):
         gap, energy = (number(abs(x), "1", "percent") for x in (steady.cycle_gap, steady.energy_gap))
         why = f"their ends differ by {gap}, and the moving masses take up or give {energy} of the energy that passes"

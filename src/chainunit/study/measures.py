@@ -14,7 +14,7 @@ from .arrays import peak
 from .drive import AbsentError, Drive
 from .limits import reaches
 from .readings import crank_speed, crank_torque, largest_torque, shaft_power
-from .relay import lasting_current, relay_trip
+from .relay import TRIPS_AT, lasting_current, relay_trip
 from .stored import energy_gap, energy_held, stored_shares
 from .verdict import CREEPS
 from .window import Phase, Window, drift, end_gap
@@ -86,15 +86,15 @@ def _recovery(w: Window) -> float | None:
 
 
 def _relay(w: Window) -> float | None:
-    """Time after the event at which the thermal relay trips, set to the motor's rated current and of the class that
-    the start of the drive needs. None after the coupling opened, as no load is left that could trip the relay."""
+    """Time after the event at which the slowest thermal relay trips, set to the rated current of the motor, of the class
+    of the study. None after the coupling opened, as no load is left that could trip the relay."""
     setting = w.drive.rated_current
     if setting is None or w.trip is not None:
         return None
     assert w.steady is not None
     current = w.value(w.current)
     before, lasts = w.steady.rms(w.current), lasting_current(current)
-    return relay_trip(w.since, current, setting, before, lasts, w.relay_class)
+    return relay_trip(w.since, current, setting, before, lasts, w.relay_class, TRIPS_AT)
 
 
 def _slack_time(w: Window) -> float | None:
@@ -190,7 +190,8 @@ def measure(
 @declaration
 class Answers:
     """The demands of a run on the drive. Torques and speeds are the crank's unless they are called the motor's. Means
-    and RMS are over the time of whole turns of the crank. Steady running is the turns in `load_cycle.csv`.
+    and RMS of steady running are over the time of whole turns of the crank, the turns in `load_cycle.csv`; those of
+    an event are over all the time that it is followed, as its peaks are.
     Times count from the event.
 
     - ripple: (largest - least)/mean of the speed
@@ -352,7 +353,9 @@ class Answers:
         lambda w: stall(w.since, w.speed, w.normal_speed),
         during=_EVENTS,
     )
-    thermal_trip_time: Value = measure("s", "thermal relay trips after", _relay, during=_EVENTS)
+    thermal_trip_time: Value = measure(
+        "s", "thermal relay trips after, at the latest", _relay, during=_EVENTS
+    )
     coupling_trip_time: Value = measure(
         "s",
         "safety coupling trips after",

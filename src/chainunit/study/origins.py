@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from .catalogue_drive import SLIP
 from .config import FileContents
 from .parts import LENGTHS
@@ -12,8 +14,9 @@ _CHOSEN = ("gear.efficiency", "starter.inverter.boost", SLIP)
 
 
 def origin_of(study: StudyRecord, name: str) -> str:
-    """The origin of the value of a quantity, by its name in a study file ("motor.rotor.J"): "file", "example",
-    "tuned", "catalogue" (by the motor that the file names), the name of a proposal, or "declared"."""
+    """The origin of the value of a quantity, by its name in a study file ("motor.rotor.J"): "file", "linkage" (the
+    file of the machine), "example", "tuned", "catalogue" (by the motor that the file names), the name of a proposal,
+    or "declared"."""
     config, (section, _, parameter) = study.config, name.partition(".")
     if name in _CHOSEN and study.proposal is not None and _of(config.file, name) == "declared":
         return study.proposal.name
@@ -33,11 +36,33 @@ def origin_of(study: StudyRecord, name: str) -> str:
     return _of(config.file, name)
 
 
+def place_of(study: StudyRecord, name: str) -> str:
+    """The file and the line that give the value of a quantity ("jaw.toml, line 23"); empty where no file does."""
+    file, origin = study.config.file, origin_of(study, name)
+    if origin == "file" and (line := file.lines.get(name)):
+        return f"{Path(file.source).name}, line {line}"
+    return f"{file.linkage}, line {_linkage_line(file, name)}" if origin == "linkage" else ""
+
+
 def _of(file: FileContents, name: str) -> str:
-    """The origin of a value that only the study file or the example can give."""
+    """The origin of a value that only a file or the example can give."""
     if name in file.given:
         return "file"
+    if _linkage_line(file, name):
+        return "linkage"
     return "example" if name in file.of_example else "declared"
+
+
+def _linkage_line(file: FileContents, name: str) -> int:
+    """The line of the linkage file that gives the value of a quantity; 0 where it does not."""
+    table, _, key = name.partition(".")
+    # a link whose name has another meaning, too, has its kind in the name of its quantities
+    links = (f"links.{key}", f"links.{key.replace('_link.', '.', 1)}")
+    keys = {"feed": (f"inputs.{key}",), "machine": (_GRAVITY.get(key, key), f"parameters.{key}", *links)}
+    return next((file.linkage_lines[each] for each in keys.get(table, ()) if each in file.linkage_lines), 0)
+
+
+_GRAVITY = {"g": "gravity"}
 
 
 def _name_in_file(study: StudyRecord, parameter: str) -> str:

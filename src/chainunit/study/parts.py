@@ -23,12 +23,14 @@ from ..reading.tables import (
     Title,
     UnusualValue,
     file_form,
+    file_text,
     given_values,
     merged,
     packaged,
     read_table,
     toml,
 )
+from ..reading.toml_lines import lines_of
 from .file_section import FileSection
 from .foreign_machine import foreign_model
 from .registry import registered
@@ -204,6 +206,16 @@ def _machine_model(table: Any, source: str) -> tuple[type[MachineModel], tuple[U
         )
     with refusal_prefix("system.machine: ", "system.machine"):
         return foreign_model(beside(table.machine, source), given_values(table.machine_names)), ()
+
+
+def linkage_lines(data: Mapping[str, Any], source: str) -> tuple[str, Mapping[str, int]]:
+    """The name of the linkage file that the table [system] names, and the line of each key in it; empty for another
+    machine."""
+    name = data.get("system", {}).get("machine", "")
+    if not name.lower().endswith(LINKAGE):
+        return "", {}
+    file = beside(name, source)
+    return file.name, lines_of(file_text(file))
 
 
 def with_linkage(data: Mapping[str, Any]) -> Mapping[str, Any]:

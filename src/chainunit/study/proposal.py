@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -59,6 +60,8 @@ class DriveProposal:
     """trip class of the relay that holds in each start; 0 for an inverter"""
     duty: DutyPeak | None = None
     """the largest torque at the crank in normal duty beside that of the study; None for a drive that does not fit"""
+    permitted_starts: float = math.inf
+    """starts an hour that the criteria of the choice permit"""
     inverter_current: float | None = None
     """least rated current of the inverter to be ordered [A]"""
     chooser: Chooser | None = None

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..reading.text import number
 from ..system import shaft_torque, through
 from .arrays import peak
 from .drive import AbsentError, Drive
@@ -120,6 +121,13 @@ def only_whole_turns(drive: Drive, run: xr.Dataset, most: float = math.inf) -> x
 def has_turn(drive: Drive, run: xr.Dataset) -> bool:
     """Whether the crank makes a whole turn in a run."""
     return only_whole_turns(drive, run, 1) is not None
+
+
+def less_than_a_turn(drive: Drive, run: xr.Dataset) -> str:
+    """The words on a run without a whole turn of the crank."""
+    made, time = number(turns_made(drive, run), "1"), run["time"].values
+    span = number(float(time[-1] - time[0]), "s")
+    return f"the {drive.driver_noun} makes {made} of a turn in the {span} that are evaluated"
 
 
 def largest_torque(drive: Drive, run: xr.Dataset, T: float) -> Any:

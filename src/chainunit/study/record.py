@@ -113,7 +113,7 @@ class StudyRecord:
     spreads: dict[str, Spread] = field(default_factory=dict)
     """the spread of each event that rests on an assumption"""
     relay_class: int = LIGHT
-    """trip class of the thermal relay that holds in the start, of a motor of the catalogue on the line"""
+    """trip class of the thermal relay of a motor of the catalogue on the line, see `protecting_class`"""
     findings: dict[str, Findings] = field(default_factory=dict)
     """findings of each analysis, by its name"""
     verdict: Verdict | None = None
@@ -186,6 +186,12 @@ class StudyRecord:
     def steady_begin(self) -> float:
         """Time from which running counts as steady [s]."""
         return self.config.operation.steady_begin if self.started is None else self.started.steady_from
+
+    @property
+    def start_end(self) -> float | None:
+        """Time at which the start ends for the relay [s]: at speed, and in delta; None where it does not end."""
+        time = None if self.start is None else self.start.start_time
+        return None if time is None else max(time, self.drive.switched_until)
 
     @property
     def plate(self) -> CatalogueMotor | None:

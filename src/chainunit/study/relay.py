@@ -30,12 +30,12 @@ CLASSES = (
 )
 """The classes in common use, the fastest first. Class 10A trips as surely as class 10, and may trip earlier: no start
 is recommended for it, nor for class 5."""
-LIGHT, HEAVIEST = 10, 30
-"""The usual class, and the heaviest."""
+QUICK, LIGHT, HEAVIEST = 5, 10, 30
+"""The class for a motor that may not stand long, the usual class, and the heaviest."""
 HEAVIER = 40
 """The class of a start during which a relay of class 30 may trip."""
-TRIPS_AT = 1.2
-"""Multiple of its setting at which a relay must trip within two hours; at 1.05 it must not."""
+HOLDS_AT, TRIPS_AT = 1.05, 1.2
+"""Multiples of its setting: at the first a relay must not trip within two hours, at the second it must."""
 _PICK_UP = 1.1  # between the two
 _LASTING = 5
 
@@ -58,6 +58,30 @@ def start_seconds(time: Any, current: Any, setting: float) -> float:
     class."""
     share = np.square(np.asarray(current) / (MULTIPLE * setting))
     return float(np.trapezoid(share, np.asarray(time)))
+
+
+def protecting_class(
+    least: int, seconds: float, setting: float, before: float, stall_current: float, stall_time: float
+) -> int:
+    """The trip class `least`, or the class `QUICK` in place of the usual one, if that trips too late in a stall and
+    the quick one lets every start through, which heats it as `start_seconds` says. Other arguments as of
+    `stall_trip`; the rotor of a warm motor may be locked for the `stall_time` [s]."""
+    if least != LIGHT:
+        return least
+    usual, quick = (next(each for each in CLASSES if each.name == str(number)) for number in (LIGHT, QUICK))
+    late, early = (stall_trip(each, setting, before, stall_current) for each in (usual, quick))
+    is_late = late is None or late > stall_time
+    saves = seconds <= quick.shortest and early is not None and early <= stall_time
+    return QUICK if is_late and saves else least
+
+
+def stall_trip(of: TripClass, setting: float, before: float, current: float) -> float | None:
+    """Time [s] after which the slowest relay of a class trips at a steady `current` [A], warm from the RMS current
+    `before` [A]; None where it never does, and where it does not let the motor run, either."""
+    if before >= TRIPS_AT * setting:
+        return None
+    # a record without a row of the stall: all of it is the current that flows on
+    return relay_trip([0.0], [current], setting, before, current, of.longest, TRIPS_AT)
 
 
 def lasting_current(current: Any) -> float:

@@ -11,10 +11,9 @@ import numpy as np
 from ..reading.text import number
 from .catalogue_drive import SLIP
 from .coupling import remark_on_coupling, remark_on_rams
-from .event_torques import peaks_in_events
 from .judgement import lasts, model_verdict, motor_limits, no_reserve
 from .measures import STARTED, Answers
-from .readings import breakdown_speed, crank_speed, has_turn
+from .readings import breakdown_speed, crank_speed, has_turn, less_than_a_turn
 from .record import LOAD_CYCLE, Amount, StudyRecord
 from .registry import capabilities, parts_of_line
 from .verdict import START, STEADY, shown_speed
@@ -24,7 +23,7 @@ from .window import CLOSED, DRIFT, STORED
 def conclude(study: StudyRecord) -> None:
     """Judge the model, and add every remark to the study."""
     config, note = study.config, study.note
-    assumed = "Values that the study file does not name are the declared start values, which are assumed."
+    assumed = "Values that no file names are the program's defaults, which are assumed."
     if config.file.is_packaged:
         assumed = "Masses, pins, feed and drive are assumed; the papers print none."
     elif config.file.of_example:
@@ -222,9 +221,9 @@ def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
     if not has_turn(study.drive, study.steady):
         warn(
             "no whole turn",
-            "steady running: the {driver} does not make a whole turn; means are over the whole run, and there is no "
-            f"{LOAD_CYCLE}.{{refused}}",
+            f"steady running: {{made}}; means are over this time, and there is no {LOAD_CYCLE}.{{refused}}",
             STEADY,
+            made=less_than_a_turn(study.drive, study.steady),
             refused="" if lasts(study) else _REFUSED,
         )
     elif steady.cycle_gap > CLOSED:
@@ -276,7 +275,6 @@ _HAPPENINGS = {
     "rod end pushed": "An end of a rod is pushed, though the rod is pulled in the mean; more rods are nearer to a "
     "chain",
     "current limit": "The motor runs into its current limit of {limit}",
-    "gear passed": "The torque passes the gear's permitted {limit}",
     "stall": "The {driver} stands after the event",
     "trip": "The safety coupling opens after the event",
     "not recovered": "The speed does not return to its steady band within the time followed",
@@ -286,7 +284,7 @@ _HAPPENINGS = {
 
 def _on_runs(study: StudyRecord) -> None:
     """A remark for each kind of happening in the runs, with all runs in which it occurred."""
-    limits: dict[str, Amount] = {"gear passed": (study.config.drive.gear.torque_limit, "N.m")}
+    limits: dict[str, Amount] = {}
     if (largest := study.drive.motor.current_limit(study.motor)) is not None:
         limits["current limit"] = largest, "A"
     happenings = [(name, *each) for name in study.answers for each in _happenings(study, name)]
@@ -315,9 +313,6 @@ def _happenings(study: StudyRecord, name: str) -> Iterator[tuple[str, str, dict[
     largest = study.drive.motor.current_limit(study.motor)
     if largest is not None and answers.current_peak > 0.999 * largest:
         yield "current limit", "", {}
-    peak = peaks_in_events(study).get(name, 0.0)
-    if "gear.torque_limit" in config.file.given and peak > config.drive.gear.torque_limit:
-        yield "gear passed", number(peak, "N.m"), {"torque": (peak, "N.m")}
     if answers.stall_time is not None:
         late = answers.stall_time > 10.0 * config.run.step
         after = f"after {number(answers.stall_time, 's')}{'' if late else ', as it hardly turned before'}"

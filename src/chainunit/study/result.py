@@ -18,7 +18,7 @@ from .line.rigid_line import RigidLine
 from .line.shaft import driveline_of
 from .line.shaft_runs import shaft_findings
 from .measures import Answers, measures_of
-from .origins import origin_of
+from .origins import origin_of, place_of
 from .record import Remark, StudyRecord
 from .verdict import Verdict
 from .window import Phase
@@ -139,7 +139,7 @@ def _data(study: StudyRecord) -> StudyData:
 
 def _given_values(study: StudyRecord) -> dict[str, Any]:
     """The given values of the study; `origins` gives the origin of each value that is not its declared start
-    value."""
+    value, `places` the file and the line of each value that a file gives."""
     sections = given_sections(study)
     names = [name for section in sections for name in section.names]
     values: dict[str, Any] = {"event": {}, "motor": _motor(study)}
@@ -147,7 +147,8 @@ def _given_values(study: StudyRecord) -> dict[str, Any]:
         if section.name != "motor":
             _put(values, section.place, section.data)
     origins = {name: origin for name in names if (origin := origin_of(study, name)) != "declared"}
-    return {"origins": origins} | values
+    places = {name: place for name in names if (place := place_of(study, name))}
+    return {"origins": origins, "places": places} | values
 
 
 def _motor(study: StudyRecord) -> dict[str, Any]:

@@ -32,7 +32,7 @@ from .pulls import least_pulls
 from .readings import crank_angle
 from .record import Spread, StudyRecord
 from .registry import registered
-from .relay import start_class
+from .relay import protecting_class, start_class
 from .remarks import conclude
 from .rig import Rig
 from .start_up import start_up
@@ -138,12 +138,18 @@ def _analyse(study: StudyRecord, work: Work, *, needs_runs: bool, at_end: bool =
 
 
 def _with_class_of_all_starts(study: StudyRecord) -> None:
-    """Where a start from another crank angle takes a relay of a heavier class, read its trips in the events once
-    more."""
-    found = StartFindings.found_in(study)
-    if found is None or found.start_class <= study.relay_class:
+    """Where the starts from all crank angles, or a stall, take a relay of another class, read its trips in the events
+    once more."""
+    found, plate = StartFindings.found_in(study), study.plate
+    if found is None or plate is None or study.drive.follows:
         return
-    study.relay_class = found.start_class
+    least, of = max(found.start_class, study.relay_class), plate.nameplate
+    before, stall = study.answers[verdict.STEADY].current_rms, of.rated_current * of.locked_current_ratio
+    seconds = found.start_seconds(of.rated_current, study.drive.switched_until)
+    trip_class = protecting_class(least, seconds, of.rated_current, before, stall, of.locked_time)
+    if trip_class == study.relay_class:
+        return
+    study.relay_class = trip_class
     for name in study.overloads:
         if study.answers[name].coupling_trip_time is None:
             phase = Phase.LOADED_START if study.config.events[name].from_rest else Phase.EVENT
@@ -252,8 +258,7 @@ class Runner:
         """Record the trip class of the relay that the start-up needs; that of a proposed drive holds from
         every crank angle."""
         study, drive = self.study, self.rig.drive
-        assert study.start is not None
-        time, rated = study.start.start_time, drive.rated_current
+        time, rated = study.start_end, drive.rated_current
         if time is None or rated is None or drive.follows:
             return
         rise = run.sel(time=slice(None, time))

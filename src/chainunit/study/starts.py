@@ -14,6 +14,7 @@ from .analysis import Analysis, Findings, Work
 from .drive import Drive
 from .event_torques import running_peak, running_words
 from .record import StudyRecord
+from .relay import MULTIPLE
 from .sections import SOFTER
 from .start_runs import StartNumbers, longest_start, starts_from_all
 from .torques import at_gear
@@ -37,6 +38,17 @@ class StartFindings(Findings):
     def start_class(self) -> int:
         """Trip class of the relay that holds in every start that reaches its speed; 0 for an inverter."""
         return int(max((start.start_class or 0 for start in self.starts), default=0))
+
+    def start_seconds(self, setting: float, switched_until: float) -> float:
+        """An upper bound of the time [s] for which `MULTIPLE` times the `setting` [A] of a relay heats it as much as
+        the hardest start does, which ends after the motor is `switched_until` its last connection [s]; infinite where
+        a start does not reach its speed."""
+        return max(
+            math.inf
+            if each.start_time is None
+            else max(each.start_time, switched_until) * (each.current / (MULTIPLE * setting)) ** 2
+            for each in self.starts
+        )
 
     @property
     def stuck(self) -> list[StartNumbers]:

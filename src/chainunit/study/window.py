@@ -85,8 +85,9 @@ class Window:
 
     @cached_property
     def turns(self) -> xr.Dataset:
-        """Whole turns of the run; all of it where the crank does not make one."""
-        return whole_turns(self.drive, self.run)
+        """The rows over which means and RMS are taken: whole turns of steady running, or all of it where the crank
+        does not make one; of another run all that is followed, as its turns differ."""
+        return whole_turns(self.drive, self.run) if self.phase is Phase.STEADY else self.run
 
     @cached_property
     def crank_torque(self) -> Any:
@@ -100,7 +101,7 @@ class Window:
 
     @cached_property
     def speed_mean(self) -> float:
-        """Mean speed of the crank over whole turns [rad/s]."""
+        """Mean speed of the crank over the `turns` [rad/s]."""
         return self.mean(crank_speed)
 
     @property
@@ -142,7 +143,7 @@ class Window:
         return min(BURNT, (self.steady or self).settled_temperature)
 
     def mean(self, of: str | Reading) -> float:
-        """Mean over the time of whole turns, of a variable or of a value read from them."""
+        """Mean over the time of the `turns`, of a variable or of a value read from them."""
         return mean(self.turns, self._read(of))
 
     @cached_property
@@ -167,7 +168,7 @@ class Window:
         return machine, whole
 
     def rms(self, of: str | Reading) -> float:
-        """RMS over the time of whole turns."""
+        """RMS over the time of the `turns`."""
         return math.sqrt(mean(self.turns, self._read(of) ** 2))
 
     def _read(self, of: str | Reading) -> Any:
@@ -178,7 +179,7 @@ class Window:
         return peak(self.value(name))
 
     def swing(self, *names: str) -> float:
-        """Largest deviation of a vector from its mean over whole turns."""
+        """Largest deviation of a vector from its mean over the `turns`."""
         parts = [(self.value(name), self.mean(name)) for name in names]
         return float(np.max(np.sqrt(sum((x - middle) ** 2 for x, middle in parts))))
 

@@ -43,7 +43,7 @@ RATING = GearRating(
     largest_speed=188.5,
 )
 LOAD = GearDuty(
-    ratio=50.0, exponent=6.6, equivalent=721.4, mean=600.0, largest=1700.0, power=600.0, radial=6000.0,
+    ratio=50.0, exponent=6.6, equivalent=721.4, running=721.4, mean=600.0, largest=1700.0, power=600.0, radial=6000.0,
     largest_radial=9500.0, speed=160.0,
 )  # fmt: skip
 
@@ -64,8 +64,8 @@ def test_the_example():
     assert equivalent_torque(torque, angle, 6.6) == pytest.approx(by_hand, rel=1e-3)
     assert equivalent_torque(torque, angle, 0.0) == 800.0
     shares = used()
-    assert shares["application factor"] == pytest.approx(0.577, rel=0.01)
-    assert used(replace(LOAD, equivalent=800.0))["application factor"] == pytest.approx(0.64, rel=0.01)
+    assert shares["torque of running"] == pytest.approx(0.577, rel=0.01)
+    assert used(replace(LOAD, running=800.0))["torque of running"] == pytest.approx(0.64, rel=0.01)
     assert shares["largest torque of the output (start-up)"] == pytest.approx(0.85, rel=0.01)
     assert shares["mean power"] == pytest.approx(0.12, rel=0.01)
     assert shares["overhung load"] == pytest.approx(0.667, rel=0.01)
@@ -84,7 +84,7 @@ def test_the_torque_of_equal_damage_lies_between_mean_and_largest_and_grows_with
 
 
 SIGNS = {
-    "application factor": ("equivalent", "application_factor"),
+    "torque of running": ("running", "application_factor"),
     "largest torque of the output (start-up)": ("largest", "rated_torque"),
     "mean power": ("power", "thermal_power"),
     "overhung load": ("radial", "overhung_load"),
@@ -102,7 +102,7 @@ def test_the_used_share_rises_with_its_load_and_falls_with_its_rating(title):
         ]
         assert (np.diff(shares) > 0.0) == (name[0] == load)
     for name in vars(RATING):
-        both = (rating, "rated_torque") if title == "application factor" else (rating,)
+        both = (rating, "rated_torque") if title == "torque of running" else (rating,)
         shares = [
             used(rating=replace(RATING, **{name: getattr(RATING, name) * factor}))[title]
             for factor in (1.0, 1.3)
@@ -132,12 +132,13 @@ def test_a_crank_with_bearings_of_its_own_puts_no_load_on_the_gear():
     assert [plan.separate_bearing for plan in plans] == [True, False, False]
 
 
-def test_the_numbers_of_the_application_factor_are_those_of_its_formula():
-    for load, symbols in ((LOAD, ["Teq", "TN", "p"]), (replace(LOAD, exponent=None), ["Teq", "TN"])):
+def test_the_application_factor_is_over_the_mean_torque_and_stands_beside_the_torque_of_running():
+    for load, symbols in ((LOAD, ["TN", "p", "KA"]), (replace(LOAD, exponent=None), ["TN", "KA"])):
         found = gear_check(load, RATING, 2.0)
         row = next(gear_rows(found, RATING, 0.0, {}))
         assert list(row.numbers) == symbols and all(each in row.formula for each in symbols)
-        assert found.application_factor == found.load.equivalent / found.rated_torque
+        assert found.application_factor == pytest.approx(721.4 / 600.0)
+        assert (row.value, row.limit, row.unit) == (721.4, 1250.0, "N.m")
 
 
 def test_the_bearing_of_the_crank_is_that_in_the_ground_wherever_it_stands_in_the_file(tmp_path):
@@ -205,7 +206,9 @@ def test_the_numbers_of_a_study_follow_from_its_runs(done):
     equivalent = (np.sum(middle**6.6 * way) / np.sum(way)) ** (1.0 / 6.6)
     assert found["bearing"] == "O1 crank bearing"
     assert found["equivalent"]["value"] == pytest.approx(equivalent, rel=2e-3)
-    assert found["application_factor"]["value"] == pytest.approx(equivalent / 200.0, rel=2e-3)
+    mean = np.trapezoid(np.abs(torque), turns["time"]) / float(turns["time"][-1] - turns["time"][0])
+    assert found["application_factor"]["value"] == pytest.approx(equivalent / mean, rel=2e-3)
+    assert found["running"]["value"] == found["equivalent"]["value"]
     assert found["power"]["value"] == pytest.approx(np.mean(np.abs(power)), rel=2e-3)
     assert found["radial"]["value"] == pytest.approx(np.max(force), rel=1e-3)
     assert found["speed"]["value"] == pytest.approx(fastest, rel=1e-9)

@@ -12,11 +12,11 @@ import pytest
 import xarray as xr
 from command import chainunit
 
-from chainunit.capabilities.checks.relay import RelaySetting, relay_findings, relay_rows, stall_trip
+from chainunit.capabilities.checks.relay import RelaySetting, relay_findings, relay_rows
 from chainunit.core.errors import InputError
 from chainunit.report.blocks import at
 from chainunit.study.config import parse
-from chainunit.study.relay import CLASSES, start_seconds
+from chainunit.study.relay import CLASSES, protecting_class, stall_trip, start_seconds
 
 DOCS = (Path(__file__).parents[3] / "docs" / "checks.md").read_text("utf-8")
 BASE = {"setting": 20.0, "before": 16.0, "start_seconds": 1.890, "stall_current": 140.0, "stall_time": 12.0}
@@ -101,7 +101,28 @@ def test_the_classes_that_let_the_start_through_and_protect():
     assert suitable(stall_time=4.0).suitable == ()
     heaviest = suitable(least=40, start_seconds=10.0)
     assert heaviest.trip_class == "30" and not heaviest.suitable
-    assert not next(relay_rows(heaviest, {})).holds
+    assert not {row.title: row.holds for row in relay_rows(heaviest, {})}["start"]
+
+
+def test_a_relay_that_running_trips_passes_no_check():
+    """A motor of jaw crushers that never came to its speed: the relay trips at once, and no heat is counted."""
+    found = relay_findings("20", RelaySetting(**BASE | {"before": 24.0}), {"jam": (*JAM[:2], 24.0)})
+    assert not found.suitable and not found.events
+    start, running, missing = relay_rows(found, {"jam": "a jam"})
+    assert (running.title, running.holds, running.limit) == ("running", False, 21.0) and start.holds
+    assert missing.why == "running alone trips it"
+    assert used(before=20.9)["running"].holds and not used(before=21.1)["running"].holds
+
+
+@pytest.mark.parametrize(
+    ("least", "seconds", "stall_time", "trip_class"),
+    [(10, 0.4, 12.0, 10), (10, 0.4, 5.9, 5), (10, 0.6, 5.9, 10), (10, 0.4, 2.0, 10), (20, 0.4, 5.9, 20)],
+)
+def test_a_class_that_trips_too_late_gives_way_to_one_that_passes(least, seconds, stall_time, trip_class):
+    """Class 10 trips after 5.921 s in the example."""
+    assert protecting_class(least, seconds, 20.0, 16.0, 140.0, stall_time) == trip_class
+    rows = used(str(trip_class), start_seconds=seconds, stall_time=stall_time)
+    assert rows["trip with the rotor locked"].holds == (stall_time == 12.0 or trip_class == 5)
 
 
 def test_a_relay_that_never_trips_in_a_stall_does_not_protect():
@@ -144,7 +165,7 @@ def test_the_numbers_of_a_study_follow_from_its_run(done):
     assert found["start_seconds"]["value"] == pytest.approx(expected, rel=1e-6)
     # a relay of class 20 is too slow for a stall of 14 s
     rows = [row for row in result["checks"]["rows"] if row["of"] == "thermal relay of class 20"]
-    assert [row["holds"] for row in rows] == [True, False]
+    assert [row["holds"] for row in rows] == [True, True, False]
     for row in rows:
         assert at(result, row["number"])["value"] == row["value"]["value"]
         assert all(at(result, place)["value"] is not None for place in row["numbers"].values())

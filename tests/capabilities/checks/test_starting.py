@@ -11,13 +11,13 @@ import pytest
 import xarray as xr
 from command import chainunit
 
-from chainunit.capabilities.checks.starting import (
+from chainunit.capabilities.checks.starting import starting_rows
+from chainunit.study.config import parse
+from chainunit.study.permitted_starts import (
     StartingData,
     start_torques,
     starting,
-    starting_rows,
 )
-from chainunit.study.config import parse
 
 DOCS = (Path(__file__).parents[3] / "docs" / "checks.md").read_text("utf-8")
 BASE = {
@@ -66,6 +66,14 @@ def test_the_heat_of_the_slip_is_larger_than_that_of_the_bare_rotor_by_the_facto
 def test_the_used_share_moves_in_the_right_direction(name, sign):
     steps = np.diff([row(**{name: BASE[name] * factor}).utilisation for factor in (1.0, 1.1, 1.5)])
     assert np.all(sign * steps > 0.0)
+
+
+def test_another_rule_may_permit_fewer_starts():
+    """Sizing and the check show one number: the least of the rule of the maker and the heat of the winding."""
+    of = StartingData(**BASE)
+    assert starting(of, 164.0).permitted == 164.0 and starting(of, 390.0).permitted == starting(of).permitted
+    (row,) = starting_rows(starting(of, 164.0), is_chosen=True)
+    assert row.limit == 164.0 and row.formula.endswith("by the heat of its winding")
 
 
 def test_a_motor_at_its_rated_current_may_not_start_again():

@@ -41,7 +41,7 @@ class CheckCapability(Capability):
             keys=RELAY_KEYS,
             title="Thermal overload relay",
             follows={
-                "trip_class": "10, or the heavier one that the start needs",
+                "trip_class": "10, a heavier one if the start needs it, or 5 if 10 trips too late in a stall",
                 "setting": "the rated current of the motor",
                 "stall_time": "that of the nameplate",
                 "stall_current": "that of the nameplate",

@@ -10,7 +10,7 @@ from ...reading.results import part, result
 from ...reading.text import number
 from ...study.analysis import Analysis, Findings, Work
 from ...study.bearings import largest_load, pin_force
-from ...study.readings import has_turn, machine_series, turns_made
+from ...study.readings import has_turn, less_than_a_turn, machine_series, turns_made
 from ...study.record import StudyRecord
 from . import coupling, gear, plain, relay, rigid, rolling, section, starting
 from .coupling import CouplingCheck, remark_on_coupling
@@ -89,7 +89,7 @@ class CheckAnalysis(Analysis):
             parts |= _of_cycle(study, plan, found)
         else:
             what = "bearings, gear, shaft of the motor, coupling, shaft sections"
-            found.add([NotChecked(what, f"the {study.driver_noun} does not make a whole turn")])
+            found.add([NotChecked(what, less_than_a_turn(study.drive, study.steady))])
         return CheckFindings(
             found.rolling, found.plain, rows=tuple(found.rows), not_checked=tuple(found.missing), **parts
         )

@@ -1,9 +1,11 @@
-"""A gear beside its ratings: application factor, largest torque, thermal rating, overhung load, speed; and the
+"""A gear beside its ratings: torque of running, largest torque, thermal rating, overhung load, speed; and the
 overhung load of the motor's shaft.
 
 ISO 6336-6 takes the application factor from the spectrum of the torque: KA = Teq/Tn, with Teq of the same damage by
-Woehler's line of exponent p and Palmgren and Miner's rule. A wheel on the crank's shaft meets each angle of the crank
-with the same teeth: they carry the largest torque of the turn in each turn, so that without an exponent Teq is that.
+Woehler's line of exponent p and Palmgren and Miner's rule, and Tn the mean torque of the machine. A gear with the
+rated torque TN that is rated for the factor KAN carries Teq = KA Tn <= KAN TN. A wheel on the crank's shaft meets
+each angle of the crank with the same teeth: they carry the largest torque of the turn in each turn, so that without
+an exponent Teq is the largest torque of running.
 """
 
 from __future__ import annotations
@@ -19,10 +21,11 @@ from ...drives.gearing import Transmission
 from ...reading.results import part, result
 from ...study.arrays import peak
 from ...study.bearings import driver_bearing, largest_load, mean_load, pin_force
+from ...study.event_torques import running_peak
 from ...study.readings import crank_angle, shaft_power
 from ...study.record import StudyRecord
 from ...study.starts import StartFindings
-from ...study.torques import gear_torque
+from ...study.torques import at_gear, gear_torque
 from ...study.window import mean
 from .row import CheckRow, NotChecked
 from .runs import largest
@@ -44,6 +47,9 @@ class GearDuty:
     exponent: Value = quantity("1", "exponent of Woehler's line; none where Teq is the largest torque")
     equivalent: Value = quantity("N.m", "torque of equal damage Teq at the output, in steady running")
     mean: Value = quantity("N.m", "mean of the size of the torque at the output, in steady running")
+    running: Value = quantity(
+        "N.m", "torque of running beside the rating: Teq, or the largest torque without an exponent"
+    )
     largest: Value = quantity("N.m", "largest torque at the output, of all runs")
     power: Value = quantity("W", "mean of the size of the power in steady running")
     radial: Value = quantity("N", "largest reaction of the {driver}'s bearing in steady running")
@@ -53,14 +59,16 @@ class GearDuty:
 
 @result
 class GearCheck:
-    """The gear. Its application factors are the torque of equal damage over its rated torque, and over the mean."""
+    """The gear. Its application factor is the torque of equal damage over the mean one."""
 
     run: str = part("the run with the largest torque")
     bearing: str = part("pin whose reaction the output shaft carries; empty where it carries none")
     load: GearDuty = part(inline=True)
     rated_torque: float | None = quantity("N.m", "rated torque of the output TN")
-    application_factor: float | None = quantity("1", "application factor of the cycle, Teq over rated torque")
-    over_mean: float | None = quantity("1", "torque of equal damage over the mean one")
+    application_factor: float | None = quantity(
+        "1", "application factor of the cycle, Teq over the mean torque"
+    )
+    running_limit: float | None = quantity("N.m", "permitted torque of the output in running")
     torque_limit: float | None = quantity("N.m", "permitted torque of the output in peaks")
 
 
@@ -90,8 +98,8 @@ def gear_check(
         bearing=bearing,
         load=load,
         rated_torque=rated,
-        application_factor=load.equivalent / rated if rated else None,
-        over_mean=load.equivalent / load.mean if load.mean else None,
+        application_factor=load.equivalent / load.mean if load.mean else None,
+        running_limit=rated * rating.application_factor if rated else None,
         torque_limit=rated * peak_factor if rated else None,
     )
 
@@ -106,22 +114,24 @@ def gear_rows(
     """The rows of a gear; `permitted_peak` is the permitted radial force in events [N], 0 where it is unknown, and
     `titles` are those of runs. `unloaded` says why the output shaft carries no reaction, where it carries none."""
     own, at = of.load, "checks.gear"
-    if of.application_factor is not None and of.torque_limit is not None:
+    if of.running_limit is not None and of.torque_limit is not None:
         rated = {"TN": f"{at}.rated_torque"}
-        teq = "Teq: largest |T| of steady running"
+        teq = "Teq: largest |T| of running"
         exponent = {}
         if own.exponent:
             teq = "Teq = (sum |T|^p |dphi| / sum |dphi|)^(1/p)"
             exponent = {"p": f"{at}.exponent"}
         yield CheckRow(
             "gear",
-            "application factor",
+            "torque of running",
             "ISO 6336-6:2019, annex on KA from a load spectrum",
-            f"KA = Teq/TN, {teq}",
-            of.application_factor,
-            rating.application_factor,
-            f"{at}.application_factor",
-            {"Teq": f"{at}.equivalent", **rated, **exponent},
+            f"Teq <= KAN TN, KAN: application factor that the gear permits; {teq}; KA = Teq/mean |T|, both of steady "
+            "running",
+            own.running,
+            of.running_limit,
+            f"{at}.running",
+            {**rated, **exponent, "KA": f"{at}.application_factor"},
+            "N.m",
         )
         yield CheckRow(
             "gear",
@@ -135,7 +145,7 @@ def gear_rows(
             "N.m",
         )
     else:
-        yield _lacks("application factor and largest torque", "rated_torque")
+        yield _lacks("torque of running and largest torque", "rated_torque")
     ratings = (
         ("mean power", "thermal_power", "mean of |P| <= thermal rating", "power", "W", ""),
         ("overhung load", "overhung_load", "largest |F| of the bearing <= permitted", "radial", "N", ""),
@@ -195,10 +205,12 @@ def find(
     if starts is not None and starts.worst.gear_torque > most:
         most, run = starts.worst.gear_torque, "start_up"
     title, radial, largest_radial = ("", None, None) if separate else bearing_force(study, turns)
+    equivalent = equivalent_torque(torque, crank_angle(drive, turns), table.exponent)
     load = GearDuty(
         ratio=drive.ratio,
         exponent=table.exponent or None,
-        equivalent=equivalent_torque(torque, crank_angle(drive, turns), table.exponent),
+        equivalent=equivalent,
+        running=equivalent if table.exponent else running_peak(study, at_gear).torque,
         mean=mean(turns, np.abs(torque)),
         largest=most,
         power=mean(turns, np.abs(shaft_power(drive, turns))),

@@ -10,6 +10,7 @@ from ...reading.text import number
 from ...report import blocks as b
 from ...report.lines import Line, join, line
 from ...study.record import StudyRecord
+from ...study.relay import TRIPS_AT
 from .analysis import CheckFindings
 from .coupling_choice import CHOSEN, CouplingCandidate
 from .row import CheckRow
@@ -121,6 +122,7 @@ def relay(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     if found is None:
         return
     rows = []
+    never = "trips in running" if found.numbers.before >= TRIPS_AT * found.numbers.setting else "never"
     for name in found.classes:
         path = f"checks.relay.classes.{name}"
         rows.append(
@@ -128,7 +130,7 @@ def relay(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
                 (
                     name,
                     s.number(f"{path}.shortest"),
-                    s.number(f"{path}.stall_trip", none="never"),
+                    s.number(f"{path}.stall_trip", none=never),
                     "yes" if name in found.suitable else "no",
                 )
             )

@@ -19,12 +19,14 @@ from ...study.event_torques import from_event_on
 from ...study.record import StudyRecord
 from ...study.relay import (
     CLASSES,
+    HOLDS_AT,
     LIGHT,
     MULTIPLE,
     TRIPS_AT,
     TripClass,
     lasting_current,
     relay_trip,
+    stall_trip,
     start_seconds,
 )
 from ...study.verdict import STEADY
@@ -53,7 +55,8 @@ class RelayOfClass:
     shortest: Value = quantity("s", "least trip time of a cold relay at 7.2 times its setting")
     longest: Value = quantity("s", "largest trip time of a cold relay at 7.2 times its setting")
     stall_trip: Value = quantity(
-        "s", "trip time of the slowest relay, warm from running, with the rotor locked"
+        "s",
+        "trip time of the slowest relay, warm from running, with the rotor locked; none if running trips it",
     )
 
 
@@ -67,22 +70,16 @@ class StallHeat:
 
 @result
 class RelayFindings:
-    """The relay: its class is that of the file, or else the usual one, or the heavier one that the start needs."""
+    """The relay: its class is that of the file, or else the one of the study, see `StudyRecord.relay_class`."""
 
     trip_class: str = part("name of the class")
     numbers: RelaySetting = part(inline=True)
+    holds_up_to: float = quantity("A", "current at which no relay of this setting trips")
     classes: Mapping[str, RelayOfClass] = part("relays by their class")
     suitable: tuple[str, ...] = part(
         "classes that let the start through and trip within the time of the stall"
     )
     events: Mapping[str, StallHeat] = part("events, with the relay of the class")
-
-
-def stall_trip(of: TripClass, setting: float, before: float, current: float) -> float | None:
-    """Time [s] after which the slowest relay of a class trips at a steady `current` [A], warm from the RMS current
-    `before` [A]; None where it never does."""
-    # a record without a row of the stall: all of it is the current that flows on
-    return relay_trip([0.0], [current], setting, before, current, of.longest, TRIPS_AT)
 
 
 def stall_heat(
@@ -91,6 +88,8 @@ def stall_heat(
     """An event: the trip of the slowest relay of a class, and the heat of the motor until then. `time` [s] since the
     event and `current` [A] are of shape (n,); its `lasting_current` flows on. None where the relay never
     trips."""
+    if before >= TRIPS_AT * setting:
+        return None
     lasts = lasting_current(current)
     trip = relay_trip(time, current, setting, before, lasts, of.longest, TRIPS_AT)
     if trip is None:
@@ -129,7 +128,8 @@ def relay_findings(
         for name, (time, current, before) in runs.items()
     }
     events = {name: heat for name, heat in heats.items() if heat is not None}
-    return RelayFindings(own.name, numbers, classes, tuple(suitable), events)
+    holds = HOLDS_AT * numbers.setting
+    return RelayFindings(own.name, numbers, holds, classes, tuple(suitable), events)
 
 
 def find(study: StudyRecord, plan: RelayPlan) -> tuple[RelayFindings | None, list[CheckRow | NotChecked]]:
@@ -150,7 +150,7 @@ def find(study: StudyRecord, plan: RelayPlan) -> tuple[RelayFindings | None, lis
         return None, [NotChecked(_WHAT, f"the motor has no nameplate; add [relay] with {', '.join(missing)}")]
     assert study.start is not None
     name, before = f"motor.{study.drive.motor.current}", study.answers[STEADY].current_rms
-    rise = study.runs["start_up"].sel(time=slice(None, study.start.start_time))
+    rise = study.runs["start_up"].sel(time=slice(None, study.start_end))
     seconds = start_seconds(rise["time"].values, np.abs(rise[name].values), given["setting"])
     runs: dict[str, tuple[Any, Any, float]] = {}
     for event in study.overloads:
@@ -174,7 +174,7 @@ def _why_none(study: StudyRecord) -> str:
     return ""
 
 
-def relay_rows(of: RelayFindings, titles: Mapping[str, str]) -> Iterator[CheckRow]:
+def relay_rows(of: RelayFindings, titles: Mapping[str, str]) -> Iterator[CheckRow | NotChecked]:
     """The rows of a relay; `titles` are those of its events."""
     own, at = of.classes[of.trip_class], "checks.relay"
     here = f"{at}.classes.{of.trip_class}"
@@ -190,6 +190,20 @@ def relay_rows(of: RelayFindings, titles: Mapping[str, str]) -> Iterator[CheckRo
         {"Ir": f"{at}.setting", "limit": f"{here}.shortest"},
         "s",
     )
+    yield CheckRow(
+        name,
+        "running",
+        "IEC 60947-4-1, limits of operation",
+        f"RMS current of steady running <= {HOLDS_AT:g} Ir, at which the relay must not trip",
+        of.numbers.before,
+        of.holds_up_to,
+        f"{at}.before",
+        {"Ir": f"{at}.setting"},
+        "A",
+    )
+    if of.numbers.before >= TRIPS_AT * of.numbers.setting:
+        yield NotChecked(f"{name}, stall and events", "running alone trips it")
+        return
     numbers = {"Ir": f"{at}.setting", "IA": f"{at}.stall_current", "I0": f"{at}.before"}
     yield CheckRow(
         name,

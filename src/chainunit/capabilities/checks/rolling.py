@@ -18,11 +18,9 @@ import numpy as np
 from ...core.quantities import Value, declaration, quantity
 from ...reading.results import part, result
 from ...reading.text import number
-from ...study.bearings import mean_load
+from ...study.bearings import EXPONENT, mean_load
 from .row import CheckRow, NotChecked
 
-EXPONENT = {"ball": 3.0, "roller": 10.0 / 3.0}
-"""Exponent p of the rating life, by kind."""
 _CLAUSE = {"ball": "ISO 281:2007, 5.3", "roller": "ISO 281:2007, 7.3"}
 _MILLION_TURNS = 2e6 * math.pi
 MOST_LOAD = 0.5

@@ -1,20 +1,13 @@
-"""Starts per hour of a motor on the line, beside the number that its maker permits for the bare rotor, reduced by
-inertia, counter torque and running.
-
-In a start the cage takes up the heat of its slip, W = integral of (ws - w) M dt = 1/2 J ws^2 M/(M - ML) for a motor
-torque M against a counter torque ML; that of the stator goes with it. Beside the start of the bare rotor it is larger
-by FI/(1 - ML/MH), and running takes a share of the heat that the surface gives off.
-"""
+"""Starts per hour of a motor on the line, beside the number that `chainunit.study.permitted_starts` gives."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
-from ...core.quantities import Value, declaration, quantity
-from ...reading.results import result
+from ...study.permitted_starts import Starting, StartingData, start_torques, starting
 from ...study.readings import load_inertia
 from ...study.record import StudyRecord
 from ...study.verdict import STEADY
@@ -22,52 +15,6 @@ from .row import CheckRow, NotChecked
 from .tables import StartingTable
 
 _WHAT = "starts per hour by the rule of makers of motors"
-
-
-@declaration
-class StartingData:
-    """The start of a study, and the motor."""
-
-    per_hour: Value = quantity("1", "starts an hour that are asked for")
-    bare: Value = quantity("1", "permitted starts an hour of the bare rotor, Z0")
-    rotor_inertia: Value = quantity("kg.m2", "inertia of the rotor")
-    inertia: Value = quantity("kg.m2", "mean inertia at the motor's shaft, with that of the rotor")
-    motor_torque: Value = quantity("N.m", "mean torque of the motor in the start, MH")
-    counter_torque: Value = quantity("N.m", "mean counter torque in the start, ML")
-    current: Value = quantity("A", "RMS current of steady running")
-    rated_current: Value = quantity("A", "rated current of the motor")
-
-
-@result
-class Starting(StartingData):
-    """The permitted starts, and the factors behind them."""
-
-    inertia_factor: float = quantity("1", "factor of inertia FI")
-    torque_factor: float = quantity("1", "factor of the counter torque, KM")
-    running_factor: float = quantity("1", "factor of running, KP")
-    permitted: float = quantity("1", "permitted starts an hour")
-
-
-def starting(of: StartingData) -> Starting:
-    """The permitted starts of a motor."""
-    inertia = of.inertia / of.rotor_inertia
-    torque = max(0.0, 1.0 - of.counter_torque / of.motor_torque)
-    running = max(0.0, 1.0 - (of.current / of.rated_current) ** 2)
-    return Starting(
-        **vars(of),
-        inertia_factor=inertia,
-        torque_factor=torque,
-        running_factor=running,
-        permitted=of.bare * torque * running / inertia,
-    )
-
-
-def start_torques(time: Any, torque: Any, speed: Any, inertia: float) -> tuple[float, float]:
-    """Mean torque of the motor in a start, and mean counter torque [N m]: what of its impulse does not end in the
-    motion of the `inertia` [kg m2]. `time` [s], `torque` [N m] and `speed` [rad/s] are of shape (n,)."""
-    span = float(time[-1] - time[0])
-    motor = float(np.trapezoid(torque, time)) / span
-    return motor, max(0.0, motor - inertia * float(speed[-1] - speed[0]) / span)
 
 
 def find(
@@ -97,19 +44,25 @@ def find(
             counter_torque=counter,
             current=study.answers[STEADY].current_rms,
             rated_current=plate.rated_current,
-        )
+        ),
+        math.inf if study.proposal is None else study.proposal.permitted_starts,
     )
-    return found, list(starting_rows(found))
+    return found, list(starting_rows(found, is_chosen=study.proposal is not None))
 
 
-def starting_rows(of: Starting) -> Iterator[CheckRow]:
-    """The row of the starts."""
+def starting_rows(of: Starting, is_chosen: bool = False) -> Iterator[CheckRow]:
+    """The row of the starts; those of a motor that `is_chosen` are limited by the criteria of the choice, too."""
     at = {name: f"checks.starting.{name}" for name in vars(of)}
+    both = (
+        "; at most as many as the choice of the motor permits, by the heat of its winding"
+        if is_chosen
+        else ""
+    )
     yield CheckRow(
         "motor",
         "starts per hour",
         "Rule of makers of motors, Z = Z0 KJ KM KP (SEW-Eurodrive, Project planning for AC motors)",
-        "Z <= Z0 (1 - ML/MH) (1 - (I/IN)^2)/FI, FI = J/JM",
+        f"Z <= Z0 (1 - ML/MH) (1 - (I/IN)^2)/FI, FI = J/JM{both}",
         of.per_hour,
         of.permitted,
         at["per_hour"],

@@ -204,16 +204,17 @@ class _Task:
         )
 
     def _duty(self, drive: Drive, inverter: InverterRating | None, words: str) -> LoadDuty:
-        steady = self.study.answers[STEADY]
-        usual = (
-            drive.parameters.ambient.T if steady.winding_temperature is None else steady.winding_temperature
-        )
+        steady = self.study.answers[STEADY].winding_temperature
+        usual = drive.parameters.ambient.T if steady is None else steady
+        # a duty with the feed of the study is its steady running
+        full = all(each.factor == 1.0 for each in self.plan.loads.values())
+        is_steady = full and steady is not None and drive is self.study.drive
 
         def progress(name: str) -> None:
             self.work.progress(f"energy: {name}{words}", 0.0, 1.0)
 
         hottest = self.study.config.permitted_temperature[1]
-        return duty_of(self.work.rig, drive, self.plan.loads, inverter, usual, hottest, progress)
+        return duty_of(self.work.rig, drive, self.plan.loads, inverter, usual, hottest, progress, is_steady)
 
     def _inverter(self, drive: Drive, motor: CatalogueMotor | None) -> InverterRating | None:
         if not drive.follows or motor is None:

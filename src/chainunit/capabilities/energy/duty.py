@@ -63,9 +63,11 @@ def duty_of(
     temperature: float,
     hottest: float,
     progress: Callable[[str], None],
+    is_steady: bool = False,
 ) -> LoadDuty:
     """The duty of a `drive`. Its winding begins at `temperature` [K]; where the whole duty makes it warmer or colder
-    than that by more than `_CLOSE`, all is run once more at that of the duty, at most at the `hottest` [K].
+    than that by more than `_CLOSE`, all is run once more at that of the duty, at most at the `hottest` [K]. With
+    `is_steady` it is the temperature of this duty, known from elsewhere.
 
     Raises
     ------
@@ -88,9 +90,12 @@ def duty_of(
     for k in range(_PASSES):
         if duty.unsteady:
             return duty
-        settled = drive.motor.settled_temperature(
-            drive.fmu_parameters, duty.mean("motor.heat"), duty.temperature, duty.mean(drive.motor_speed)
-        )
+        if is_steady:
+            settled = temperature
+        else:
+            settled = drive.motor.settled_temperature(
+                drive.fmu_parameters, duty.mean("motor.heat"), duty.temperature, duty.mean(drive.motor_speed)
+            )
         duty = replace(duty, is_too_hot=settled > hottest)
         settled = min(settled, hottest)
         if abs(settled - duty.temperature) <= _CLOSE or k == _PASSES - 1:

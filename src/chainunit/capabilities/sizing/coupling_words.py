@@ -70,7 +70,7 @@ def coupling_sentence(study: StudyRecord, setting: Setting, alternatives: Sequen
     caveat = f" ({study.verdict.caveat})" if study.verdict and study.verdict.caveat else ""
     hardest, running = hardest_start(study), running_peak(study)
     start = hardest.named(study)
-    of = f"that {start}" if setting.start > setting.running else f"that {running_words(study, running.run)}"
+    of = f"that {start}" if setting.is_of_start else f"that {running_words(study, running.run)}"
     above = f"{_torque(setting.least)}, {MARGIN:g} times the {_torque(setting.normal)} {of} puts on it"
     if setting.obstacle is not None:
         return of_driver(_OBSTACLES[setting.obstacle], study.driver_noun).format(

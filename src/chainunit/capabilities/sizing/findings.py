@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -148,6 +149,7 @@ class SizingFindings(Findings):
             keys={"ambient.T": "sizing.ambient"},
             start_class=trial.start_class or 0,
             duty=trial.duty if fits else None,
+            permitted_starts=trial.checks["starts"].limit if "starts" in trial.checks else math.inf,
             inverter_current=trial.inverter_current,
         )
 

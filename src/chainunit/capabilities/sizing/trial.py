@@ -20,8 +20,10 @@ from ...machines.chain_unit import SideName
 from ...study.arrays import peak
 from ...study.drive import Drive
 from ...study.events import one_sided_event
-from ...study.limits import Check, heating, keeping_speed, starting
+from ...study.limits import Check, heating, keeping_speed
+from ...study.limits import starting as start_on_line
 from ...study.measures import time_to_start
+from ...study.permitted_starts import StartingData, start_torques, starting
 from ...study.readings import crank_angle, load_inertia, turns_made
 from ...study.relay import start_class
 from ...study.rig import Rig
@@ -186,19 +188,31 @@ class Trial:
 
     @cached_property
     def permitted_starts(self) -> float:
-        """Starts per hour that the winding permits; for a motor on the line at most the number that the
-        catalogue permits."""
+        """Starts per hour that the winding permits; for a motor on the line at most the number by the rule of its
+        maker, see `chainunit.study.permitted_starts`."""
         p, plate = self.drive.fmu_parameters, self.motor.nameplate
         warm, cold = (1.0 + p.stator.alpha * (T - T_RATED) for T in (self._demands.temperature, self._ran_at))
         # the runs are short and their winding is as cold as the surroundings; a warm winding has larger
         # losses
         running, start = (warm / cold * heat for heat in self._heat)
         starts = permitted_starts(p, running, start, self._cooling, self._demands.temperature)
-        if plate.starts and self.task.tables.start == "direct":
-            # the number of starts in the catalogue is that of the bare rotor
-            total = p.rotor.J + float(np.mean(load_inertia(self.drive, self.steady)))
-            starts = min(starts, plate.starts * plate.J / total)
-        return starts
+        if not plate.starts or self.drive.follows or self._first is None:
+            return starts
+        rise = self.start.sel(time=slice(None, self._first))
+        inertia = float(p.rotor.J + np.mean(load_inertia(self.drive, self.steady)))
+        time, torque, speed = (rise[name].values for name in ("time", _GAP, "motor.w"))
+        torques = start_torques(time, torque, speed, inertia)
+        current = self._rms(f"motor.{self.drive.motor.current}")
+        of = StartingData(
+            self._demands.starts_per_hour,
+            plate.starts,
+            plate.J,
+            inertia,
+            *torques,
+            current,
+            plate.rated_current,
+        )
+        return starting(of, starts).permitted
 
     @property
     def _cooling(self) -> float:
@@ -263,7 +277,7 @@ class Trial:
         speed."""
         demands, plate, p = self._demands, self.motor.nameplate, self.drive.fmu_parameters
 
-        start = starting(self.start_time, plate)
+        start = start_on_line(self.start_time, plate)
         if self.drive.follows:
             start = dataclasses.replace(start, limit=1.0 + 1.2 * self.task.operation.run.ramp)
         weaker = min(1.0, plate.frequency / self.frequency)
@@ -281,7 +295,10 @@ class Trial:
                 "RMS torque", self._rms(_GAP), plate.torque * weaker * math.sqrt(min(1.0, cooling)), "N.m"
             ),
             "peak_torque": Check("peak torque", peak_torque, breakdown, "N.m"),
-            "temperature": heating(self.temperature, p.ambient.T, demands.temperature),
+            "temperature": dataclasses.replace(
+                heating(self.temperature, p.ambient.T, demands.temperature),
+                title="rise of temperature with starts",
+            ),
             "starts": Check(
                 "starts per hour", demands.starts_per_hour, self.permitted_starts, "1", forbidden=too_hot
             ),

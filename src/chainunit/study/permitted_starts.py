@@ -1,0 +1,62 @@
+"""Starts per hour that a maker permits for the bare rotor of a motor, reduced by inertia, counter torque and running.
+
+In a start the cage takes up the heat of its slip, W = integral of (ws - w) M dt = 1/2 J ws^2 M/(M - ML) for a motor
+torque M against a counter torque ML; that of the stator goes with it. Beside the start of the bare rotor it is larger
+by FI/(1 - ML/MH), and running takes a share of the heat that the surface gives off.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ..core.quantities import Value, declaration, quantity
+from ..reading.results import result
+
+
+@declaration
+class StartingData:
+    """The start of a study, and the motor."""
+
+    per_hour: Value = quantity("1", "starts an hour that are asked for")
+    bare: Value = quantity("1", "permitted starts an hour of the bare rotor, Z0")
+    rotor_inertia: Value = quantity("kg.m2", "inertia of the rotor")
+    inertia: Value = quantity("kg.m2", "mean inertia at the motor's shaft, with that of the rotor")
+    motor_torque: Value = quantity("N.m", "mean torque of the motor in the start, MH")
+    counter_torque: Value = quantity("N.m", "mean counter torque in the start, ML")
+    current: Value = quantity("A", "RMS current of steady running")
+    rated_current: Value = quantity("A", "rated current of the motor")
+
+
+@result
+class Starting(StartingData):
+    """The permitted starts, and the factors behind them."""
+
+    inertia_factor: float = quantity("1", "factor of inertia FI")
+    torque_factor: float = quantity("1", "factor of the counter torque, KM")
+    running_factor: float = quantity("1", "factor of running, KP")
+    permitted: float = quantity("1", "permitted starts an hour")
+
+
+def starting(of: StartingData, most: float = math.inf) -> Starting:
+    """The permitted starts of a motor, at most so many an hour as another rule permits."""
+    inertia = of.inertia / of.rotor_inertia
+    torque = max(0.0, 1.0 - of.counter_torque / of.motor_torque)
+    running = max(0.0, 1.0 - (of.current / of.rated_current) ** 2)
+    return Starting(
+        **vars(of),
+        inertia_factor=inertia,
+        torque_factor=torque,
+        running_factor=running,
+        permitted=min(most, of.bare * torque * running / inertia),
+    )
+
+
+def start_torques(time: Any, torque: Any, speed: Any, inertia: float) -> tuple[float, float]:
+    """Mean torque of the motor in a start, and mean counter torque [N m]: what of its impulse does not end in the
+    motion of the `inertia` [kg m2]. `time` [s], `torque` [N m] and `speed` [rad/s] are of shape (n,)."""
+    span = float(time[-1] - time[0])
+    motor = float(np.trapezoid(torque, time)) / span
+    return motor, max(0.0, motor - inertia * float(speed[-1] - speed[0]) / span)
