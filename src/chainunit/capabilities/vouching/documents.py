@@ -88,7 +88,7 @@ def experiments_xml(name: str, tolerance: float, *, smooth: bool) -> bytes:
 
     add(
         "reference",
-        "all inputs move and are held over each step; results at the end of each step",
+        "all inputs move and are set at the begin of each step; results at the end of each step",
         0.04,
         (f"../{name}_in.csv", f"../{name}_co_simulation.csv"),
     )
