@@ -118,37 +118,42 @@ def master(kind, pair, outputs):
 
 @pytest.fixture(scope="module")
 def jacobi(pair, outputs):
-    """The pair by hand: all connected outputs are read, then written, then both FMUs step; before the first step
-    twice, for the port to come round. `outputs` at the end, before and after the last exchange."""
-    with contextlib.ExitStack() as stack:
-        instances = {}
-        for name, file in pair[2].items():
-            fmu = stack.enter_context(contextlib.closing(Fmu(file)))
-            instances[name] = stack.enter_context(contextlib.closing(Instance(fmu, name)))
+    """``jacobi(rounds)``: the pair by hand. All connected outputs are read, then written, then both FMUs step; before
+    the first step so many times: port and motion come round in two, the acceleration under that port in three.
+    `outputs` at the end, before and after the last exchange."""
 
-        def get(full):
-            return instances[full.partition(".")[0]].get([full.partition(".")[2]])[0]
+    def run(rounds):
+        with contextlib.ExitStack() as stack:
+            instances = {}
+            for name, file in pair[2].items():
+                fmu = stack.enter_context(contextlib.closing(Fmu(file)))
+                instances[name] = stack.enter_context(contextlib.closing(Instance(fmu, name)))
 
-        def exchange():
-            for target, value in [(target, get(source)) for source, target in CONNECTIONS]:
-                instances[target.partition(".")[0]].set([target.partition(".")[2]], [value])
+            def get(full):
+                return instances[full.partition(".")[0]].get([full.partition(".")[2]])[0]
 
-        start = PARAMETERS | INPUTS
-        for name, instance in instances.items():
-            own = {full.partition(".")[2]: v for full, v in start.items() if full.startswith(name)}
-            instance.initialize(own, 0.0)
-        exchange()
-        exchange()
-        for instance in instances.values():
-            instance.finish_initialization()
-        for k in range(STEPS):
-            if k:
+            def exchange():
+                for target, value in [(target, get(source)) for source, target in CONNECTIONS]:
+                    instances[target.partition(".")[0]].set([target.partition(".")[2]], [value])
+
+            start = PARAMETERS | INPUTS
+            for name, instance in instances.items():
+                own = {full.partition(".")[2]: v for full, v in start.items() if full.startswith(name)}
+                instance.initialize(own, 0.0)
+            for _ in range(rounds):
                 exchange()
             for instance in instances.values():
-                instance.step(k * STEP, STEP)
-        before = [get(full) for full in outputs]
-        exchange()
-        return before, [get(full) for full in outputs]
+                instance.finish_initialization()
+            for k in range(STEPS):
+                if k:
+                    exchange()
+                for instance in instances.values():
+                    instance.step(k * STEP, STEP)
+            before = [get(full) for full in outputs]
+            exchange()
+            return before, [get(full) for full in outputs]
+
+    return run
 
 
 def here(package):
@@ -253,7 +258,7 @@ def test_ecos_connects(pair, jacobi, outputs, fmi):
     """
     files = {name: str(file) for name, file in pair[fmi].items()}
     inputs = (files, CONNECTIONS, PARAMETERS | INPUTS, STEP, STEPS, outputs)
-    assert in_ecos(script, *map(json.dumps, inputs)) == pytest.approx(jacobi[1], rel=1e-12)
+    assert in_ecos(script, *map(json.dumps, inputs)) == pytest.approx(jacobi(2)[1], rel=1e-12)
 
 
 @here("fmu_manipulation_toolbox")
@@ -316,25 +321,27 @@ def fmucontainer(files, outputs, fmi, sequential, folder):
 def test_fmucontainer_parallel(pair, jacobi, outputs, fmi, tmp_path):
     """Jacobi's exchange; what the container shows is from before the exchange."""
     run = simulated(fmucontainer(pair[fmi], outputs, fmi, False, tmp_path), outputs, start_values=INPUTS)
-    assert [run[name][-1] for name in outputs] == pytest.approx(jacobi[0], rel=1e-12)
+    assert [run[name][-1] for name in outputs] == pytest.approx(jacobi(3)[0], rel=1e-12)
 
 
 @here("fmu_manipulation_toolbox")
 @pytest.mark.parametrize("fmi", (2, 3))
 def test_fmucontainer_sequential(kind, pair, master, outputs, fmi, tmp_path):
-    """Gauss-Seidel, the motor first: its step and the machine's answer are those of this package's master. The
-    acceleration that the container shows and gives to the machine still is that under the port of the step
-    before; the machine's outputs are those of that acceleration."""
+    """Gauss-Seidel, the motor first: the machine takes the motion of the end of a step for that of its begin, and is
+    one step ahead. The load port says to which point it belongs, so that the motor's run is that of this package's
+    master to second order."""
     run = simulated(fmucontainer(pair[fmi], outputs, fmi, True, tmp_path), outputs, start_values=INPUTS)
-    for name in FROM_STATES:
-        np.testing.assert_allclose(run[name], master[name], rtol=1e-12, err_msg=name)
-    motion = {x: run[f"motor.{x}"] for x in ("phi", "w", "a")}
+    for name in ("motor.phi", "motor.w", "motor.armature.i", "motor.load_energy"):
+        most = 1e-5 * np.max(np.abs(master[name]))
+        np.testing.assert_allclose(run[name], master[name], rtol=0.0, atol=most, err_msg=name)
+    phi, w, a = (run[f"motor.{x}"][1:] for x in ("phi", "w", "a"))
+    motion = {"phi": phi + STEP * (w + 0.5 * STEP * a), "w": w + STEP * a, "a": a}
     model = MODELS[kind]
     p = model.parameter_layout.from_names({"ratio": PARAMETERS["machine.ratio"]})
     (want, _) = model.evaluate(numpy_(), model.with_derived(MATH, p), model.input_layout.from_names(motion))
-    for name in ("tau", "power", MACHINES[kind]):
+    for name in ("tau_bias", "J", "kinetic_energy", "tau", "power", MACHINES[kind]):
         wanted = attrgetter(name)(want)
-        np.testing.assert_allclose(run[f"machine.{name}"], wanted, rtol=1e-9, atol=1e-9, err_msg=name)
+        np.testing.assert_allclose(run[f"machine.{name}"][1:], wanted, rtol=1e-9, atol=1e-9, err_msg=name)
 
 
 @here("fmpy.container_fmu")

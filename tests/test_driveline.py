@@ -21,6 +21,7 @@ from chainunit.drives import cardan
 from chainunit.drives.cardan import ShaftLine, Twist
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.driveline import CardanDriveline
+from chainunit.fmu.native.export import export as export_native
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.system import CoSimulation, Profile, System, certify, export, monolithic, rigid, shaft_joints
 
@@ -221,6 +222,33 @@ def test_from_rest_the_coupling_is_of_first_order(system, speed, ramp, order, of
     shown = re.findall(r"\S+ %", of_page)
     assert [f"{100.0 * each:.2g} %" for each in errors.max(axis=1)] == shown
     assert all(f"| {each} |" in page for each in shown)
+
+
+def test_a_shaft_that_signals_turn_is_followed_to_second_order(tmp_path):
+    """Angle and speed run on inside a step from where they are at its begin, and lie on their signals at its end."""
+    start = {**BENT, "d3": 3.0, "w_start": 40.0}
+    file = export_native(CardanDriveline, tmp_path / "line.fmu", start)
+    system = System({"line": component(CardanDriveline, file, start)})
+    signals = {
+        "line.phi": lambda t: 40.0 * t + 1.0 - np.cos(20.0 * t),
+        "line.w": lambda t: 40.0 + 20.0 * np.sin(20.0 * t),
+        "line.a": lambda t: 400.0 * np.cos(20.0 * t),
+        "line.load.J": 1.0,
+        "line.load.tau_bias": lambda t: 30.0 * np.sin(15.0 * t),
+    }
+    times = np.linspace(0.0, 0.1, 101)
+    exact, errors = monolithic(system, signals, times, rtol=1e-10), []
+    for every in (1, 2):
+        with CoSimulation(system, signals) as simulation:
+            run = simulation.run(0.1, 1e-3 / every)
+        np.testing.assert_array_equal(run["line.phi"][::every], signals["line.phi"](times))
+        for name in ("line.driven.w", "line.tau"):
+            wrong = np.abs(run[name].values[::every] - exact[name].values)
+            errors.append(np.max(wrong) / np.ptp(exact[name].values))
+    assert max(errors[:2]) < 5e-6 and np.all(np.array(errors[:2]) > 3.0 * np.array(errors[2:])), errors
+    # a shaft that stands by its signals stands, whatever its speed
+    with CoSimulation(system, {"line.phi": 0.7, "line.w": 2.0}) as simulation:
+        assert np.all(simulation.run(0.01, 2e-3)["line.phi"] == 0.7)
 
 
 def test_too_long_a_step_runs_away_and_no_fmu_can_tell(tmp_path):

@@ -156,6 +156,66 @@ def test_an_input_that_runs_out_of_its_bounds_in_a_step_discards_it(unit):
 
 
 @both
+def test_a_shaft_turns_on_inside_a_step(unit, fmi):
+    """Angle and speed follow speed and acceleration. A saved state, a refused step and a reset know where they
+    are."""
+    names = ("phi", "w", "phi0", "w0", "tau", "rocker.psi")
+    one = unit("ChamberForces", fmi).start(phi=1.0, w=4.0, a=-3.0)
+    begin = one.get(*names)
+    one.step(0.0, 0.1)
+    assert one.get("phi", "w") == one.get("phi0", "w0") == pytest.approx([1.385, 3.7], rel=1e-15)
+    saved, here = one.serialized(), one.get(*names)
+    assert here[4:] != begin[4:]
+    for size in (-0.1, float("nan"), float("inf")):
+        one.refused(one.step, 0.1, size)
+    if fmi == 2:
+        one.step(0.1, 0.0)
+    assert one.get(*names) == here
+    one.step(0.1, 0.2)
+    there = one.get(*names)
+    assert there[:2] == pytest.approx([1.0 + 1.2 - 0.135, 3.1], rel=1e-15)
+    one.restore(saved)
+    assert one.get(*names) == here
+    one.step(0.1, 0.2)
+    assert one.get(*names) == there
+    one.set({"phi": 1.0, "w": 4.0})
+    assert one.get(*names) == begin
+    one.api.reset()
+    one.start(phi=1.0).step(0.0, 0.1)
+    assert one.get("phi", "w", "phi0", "w0") == [1.0, 0.0, 1.0, 0.0]
+
+
+@both
+def test_a_shaft_stands_where_it_is_set_in_model_exchange(unit, fmi):
+    one = unit("ChamberForces", fmi, exchange=True).start(phi=1.0, w=4.0, a=-3.0)
+    (one.api.newDiscreteStates if fmi == 2 else one.api.updateDiscreteStates)()
+    one.api.enterContinuousTimeMode()
+    before = one.get("phi0", "tau", "rocker.psi")
+    one.api.setTime(0.1)
+    one.api.completedIntegratorStep()
+    assert one.get("phi0", "tau", "rocker.psi") == before and before[0] == 1.0
+
+
+def test_derivatives_of_the_importer_hold_in_place_of_the_own(unit):
+    """Those of the value 0, too, by which a master sets inputs that are of the end of the step. They are of one step,
+    and a saved state has them."""
+    one = unit("ChamberForces", 2).start(phi=1.0, w=4.0, a=-3.0)
+    shaft = [one.reference["phi"], one.reference["w"]]
+    one.api.setRealInputDerivatives(shaft, [1, 1], [10.0, 0.0])
+    one.step(0.0, 0.1)
+    assert one.get("phi", "w") == [2.0, 4.0]
+    one.step(0.1, 0.1)
+    assert one.get("phi", "w") == pytest.approx([2.385, 3.7])
+    at = one.get("phi", "w")
+    one.api.setRealInputDerivatives(shaft, [1, 1], [0.0, 0.0])
+    saved, outputs = one.serialized(), one.get("tau", "rocker.psi")
+    for _ in range(2):
+        one.step(0.2, 0.1)
+        assert one.get("phi", "w") == at and one.get("tau", "rocker.psi") == outputs
+        one.restore(saved)
+
+
+@both
 @pytest.mark.parametrize("name", ["ChamberForces", "DcMotor"])
 def test_the_communication_point_and_the_stop_time_are_honoured(unit, name, fmi):
     one = unit(name, fmi).start(2.0, 3.0)
@@ -415,7 +475,7 @@ def test_a_serialized_state_out_of_bounds_is_refused(unit, fmi):
     raw = one.serialized()
     assert sealed(raw[8:]) == raw
     first = len(raw) - 8 * (
-        len(MODELS["DcMotor"].parameter_layout.names) + 2 * len(MODELS["DcMotor"].input_layout.names)
+        len(MODELS["DcMotor"].parameter_layout.names) + 3 * len(MODELS["DcMotor"].input_layout.names)
     )
     first -= 8 * (
         len(MODELS["DcMotor"].state_layout.names)

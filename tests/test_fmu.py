@@ -20,6 +20,8 @@ from fmpy.validation import validate_fmu
 from test_reference import POINTS, deviation
 
 from chainunit import ChainUnitMachine, GeometryError, InputError, RunError
+from chainunit.core.engines import MATH
+from chainunit.core.native.compilers import compiler
 from chainunit.fmu.description import Interface
 from chainunit.fmu.export import export
 from chainunit.machines.chain_unit import ChamberForces
@@ -76,11 +78,77 @@ def test_reference_points(chamber, point):
     inputs = {name: 0.0 for name, v in chamber.variables.items() if v.causality == "input"}
     with Running(chamber, point["parameters"]) as unit:
         unit.set([*(inputs | point["inputs"])], [*(inputs | point["inputs"]).values()])
-        unit.step(0.0, 1e-3)
         got = dict(zip(point["outputs"], unit.get(list(point["outputs"])), strict=True))
     assert {n for n, v in chamber.variables.items() if v.causality == "output"} == set(point["outputs"])
     worst = {name: deviation(got[name], wanted) for name, wanted in point["outputs"].items()}
     assert max(worst.values()) < 1e-9, max(worst.items(), key=lambda kv: kv[1])
+
+
+def outputs_of(name, inputs):
+    """The outputs of a model without states at its start values, by the equations."""
+    model = MODELS[name]
+    p = model.check(model.Parameters())
+    parts = model.evaluate(MATH, p, model.input_layout.from_names(inputs))
+    return {
+        n: v
+        for part, out in zip(model.parts, parts, strict=True)
+        for n, v in part.layout.by_name(out).items()
+    }
+
+
+NATIVE = pytest.mark.skipif(compiler() is None, reason="no C compiler")
+BY_EACH = pytest.mark.parametrize(
+    "make", ["python", pytest.param(2, marks=NATIVE), pytest.param(3, marks=NATIVE)]
+)
+
+
+@pytest.fixture
+def made(request, make):
+    """``made(name)``: the FMU of that model, by pythonfmu or native by a version of FMI."""
+    if make == "python":
+        return request.getfixturevalue("fmus").__getitem__
+    files = request.getfixturevalue("native_fmus")
+    return lambda name: files[name, make][0]
+
+
+@BY_EACH
+@pytest.mark.parametrize("step", [0.004, 0.05])
+def test_outputs_in_fmpy_are_those_of_the_end_of_a_step(made, step):
+    """README's snippet over a turn of the crank: every output at every communication point."""
+    feed = {"left.material_mass": 30.0, "right.material_mass": 10.0}
+    feed |= {"left.processing_force": 0.0, "right.processing_force": 20.0}
+    motion = np.array(
+        [(0.0, 0.0, 150.0), (2.1, 315.0, 150.0)], [("time", float), ("phi", float), ("w", float)]
+    )
+    rows = fmpy.simulate_fmu(
+        str(made("ChamberForces")), fmi_type="CoSimulation", stop_time=2.1, output_interval=step,
+        start_values={"ratio": 50.0, **feed}, input=motion,
+    )  # fmt: skip
+    time = rows["time"]
+    assert len(time) == round(2.1 / step) + 1
+    wanted = ChainUnitMachine(ratio=50.0).evaluate(
+        {**feed, "phi": 150.0 * time, "w": np.full_like(time, 150.0)}
+    )
+    for name, exact in wanted.items():
+        size = np.max(np.abs(exact))
+        np.testing.assert_allclose(rows[name], exact, rtol=0.0, atol=1e-12 * size + 1e-14, err_msg=name)
+    assert np.ptp(rows["rocker.psi"]) > 0.2 and np.ptp(rows["tau"]) > 0.5
+
+
+@BY_EACH
+@pytest.mark.parametrize("name", ["KnifeDrive", "Accelerator"])
+def test_outputs_of_other_machines_are_those_of_the_end_of_a_step(made, name):
+    """Angle and speed follow speed and acceleration from step to step, until they are set again."""
+    rows = fmpy.simulate_fmu(
+        str(made(name)), fmi_type="CoSimulation", stop_time=0.3, output_interval=0.1,
+        start_values={"phi": 1.0, "w": 4.0, "a": -3.0},
+    )  # fmt: skip
+    for row in rows:
+        t = float(row["time"])
+        wanted = outputs_of(name, {"phi": 1.0 + 4.0 * t - 1.5 * t * t, "w": 4.0 - 3.0 * t, "a": -3.0})
+        for output, exact in wanted.items():
+            assert row[output] == pytest.approx(exact, rel=1e-12, abs=1e-11), (output, t)
+    assert len(rows) == 4 and rows["phi0"][-1] > 2.0
 
 
 @pytest.mark.second

@@ -155,23 +155,26 @@ def test_fmus_agree_with_the_independent_solution_and_refuse_an_angle_outside(na
         return fmpy.simulate_fmu(
             str(file), stop_time=0.01, step_size=0.01, output=names, fmi_type="CoSimulation",
             start_values={"phi": phi, "w": w, "a": 3.0},
-        )[0]  # fmt: skip
+        )  # fmt: skip
 
     if make != "native 3":  # there fmpy misses the aliases, see test_gallery_clients
         assert not validate_fmu(str(file))
     for phi, w in ((LOW, 2.0), (0.8, -2.0), (HIGH, -1.0)):
         wanted = own.solution(own.followed(phi), phi, w, 3.0)
         names = [key for key in wanted if key == "tau" or key.endswith((".fx", ".fy"))]
-        got = values(phi, w, names)
+        got = values(phi, w, names)[0]
         size = max(abs(wanted[key]) for key in names)
         for key in names:
             assert got[key] == pytest.approx(wanted[key], abs=1e-11 * size), key
     for phi in (LOW - 1e-3, HIGH + 1e-3, 0.8 + 2.0 * math.pi):
         if make == "python":  # pythonfmu has no status of a value that is read: it is not a number
-            assert np.isnan(values(phi, 0.0, ["tau"])["tau"])
+            assert np.isnan(values(phi, 0.0, ["tau"])["tau"]).all()
             continue
         with pytest.raises(Exception, match=r"EnterInitializationMode failed"):
             values(phi, 0.0, ["tau"])
+    # inside a step the driver goes on, to the end of its range at most
+    end = values(HIGH - 1e-3, 2.0, ["phi0", "w0", "tau"])[-1]
+    assert (end["phi0"], end["w0"]) == (HIGH, pytest.approx(2.03)) and np.isfinite(end["tau"])
     with zipfile.ZipFile(file) as inside:  # the shaft of the reference results swings within its range
         name = next(name for name in inside.namelist() if name.endswith("_in.csv"))
         rows = np.genfromtxt(io.BytesIO(inside.read(name)), delimiter=",", names=True)

@@ -123,6 +123,7 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
         CHECK(k < (unsigned)model.n_u, "a value reference is not that of an input");
         CHECK(isfinite(value[i]), "a derivative is not a finite number");
         INSTANCE->du[k] = value[i];
+        INSTANCE->is_set[k] = 1.0;
     }
     return fmi2OK;
 }

@@ -31,9 +31,9 @@ struct Instance {
     Mode mode;
     int model_exchange;
     double time, stop; /* stop: the last admissible time, with an allowance for rounding */
-    /* one block: parameters, inputs, their derivatives, states, derived values, discrete outputs, derivatives, outputs,
-     * work */
-    double *block, *p, *u, *du, *x, *k, *d, *dx, *y, *work, *w; /* w: memory of the kernels */
+    /* one block: parameters, inputs, their derivatives and whether the host has set these (1 or 0), states, derived
+     * values, discrete outputs, derivatives, outputs, work */
+    double *block, *p, *u, *du, *is_set, *x, *k, *d, *dx, *y, *work, *w; /* w: memory of the kernels */
     size_t block_size;
     unsigned n_references;
     unsigned *slot, *needs; /* by value reference: place in the block, and the groups to evaluate for it */
@@ -103,11 +103,11 @@ static Instance *instance_new(const char *name, const char *const *type_names, R
     const int n_in = model.n_u + model.n_x;
     int work = 4 * model.n_x + 3 * n_in + 2 * model.n_y + model.n_x + 3 * (model.n_required + model.n_start_required) + 2 * model.n_z;
     if (kernels.closed && work < 3 * model.n_u + 10 * model.n_x) work = 3 * model.n_u + 10 * model.n_x;
-    const int n_d = count_discrete(), saved = model.n_p + n_in + model.n_u + model.n_k + n_d;
+    const int n_d = count_discrete(), saved = model.n_p + n_in + 2 * model.n_u + model.n_k + n_d;
     if (work < saved) work = saved;
     const int moved = 2 * model.n_p + model.n_u + n_in + model.n_k + 2 * (2 * model.n_x + model.n_y) + 2 * model.n_z;
     if (work < moved) work = moved;
-    const int values = model.n_p + 2 * model.n_u + 2 * model.n_x + model.n_k + n_d + model.n_y;
+    const int values = model.n_p + 3 * model.n_u + 2 * model.n_x + model.n_k + n_d + model.n_y;
     const size_t n = (size_t)(values + work + 1 + model.n_w);
     Instance *c = calloc(1, sizeof *c);
     if (!c) return NULL;
@@ -124,7 +124,8 @@ static Instance *instance_new(const char *name, const char *const *type_names, R
     c->p = c->block;
     c->u = c->p + model.n_p;
     c->du = c->u + model.n_u;
-    c->x = c->du + model.n_u;
+    c->is_set = c->du + model.n_u;
+    c->x = c->is_set + model.n_u;
     c->k = c->x + model.n_x;
     c->d = c->k + model.n_k;
     c->dx = c->d + n_d;
@@ -419,7 +420,7 @@ static Status get(Instance *c, Type type, const unsigned *reference, size_t n, d
 
 /* After a step the outputs continue along its inputs. The first input that is set after it begins the next step. */
 static void begin_inputs(Instance *c) {
-    if (c->spent) memset(c->du, 0, (size_t)model.n_u * sizeof(double));
+    if (c->spent) memset(c->du, 0, 2 * (size_t)model.n_u * sizeof(double)); /* and `is_set`, behind them */
     c->spent = 0;
 }
 
@@ -613,12 +614,12 @@ static Status forward(Instance *c, const unsigned *unknown, size_t n_unknown, co
 
 /* The time derivative of an input: the one of the host, or else the input that the model declares as its derivative. */
 static double input_rate(const Instance *c, int i) {
-    if (c->du[i] != 0.0) return c->du[i];
+    if (c->is_set[i] != 0.0) return c->du[i];
     return model.rate_of[i] < 0 ? 0.0 : c->u[model.rate_of[i]];
 }
 
 static double input_curvature(const Instance *c, int i) {
-    return c->du[i] != 0.0 || model.rate_of[i] < 0 ? 0.0 : input_rate(c, model.rate_of[i]);
+    return c->is_set[i] != 0.0 || model.rate_of[i] < 0 ? 0.0 : input_rate(c, model.rate_of[i]);
 }
 
 static Status output_derivatives(Instance *c, const unsigned *reference, size_t n, double *value) {
@@ -773,6 +774,8 @@ static Status step(Instance *c, double time, double size) {
         u[i] = c->u[i];
         if (rate[i] == 0.0 && half[i] == 0.0) continue;
         u[i] += size * (rate[i] + size * half[i]);
+        /* an input that only the model extrapolates ends at its bound */
+        if (c->is_set[i] == 0.0) u[i] = bounded(&model.declared[model.n_p + i], u[i]);
         if (!admitted(&model.declared[model.n_p + i], u[i])) {
             char where[96] = "";
             append(where, sizeof where, "at the end of the step from t = %g s, ", time);
@@ -879,8 +882,7 @@ static uint64_t sum_of(const void *memory, size_t size) {
     return ~crc;
 }
 
-/* size of the saved values: parameters, inputs and their derivatives, states, derived values, discrete outputs; others
- * are recomputed */
+/* size of the saved values, up to the discrete outputs; others are recomputed */
 static size_t kept(const Instance *c) { return (size_t)(c->dx - c->block); }
 
 static size_t state_size(const Instance *c) { return sizeof(Saved) + kept(c) * sizeof(double); }

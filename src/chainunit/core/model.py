@@ -214,8 +214,8 @@ class Model(metaclass=ModelType):
     `derive`."""
     input_rates: ClassVar[Mapping[str, str]] = {}
     """Inputs of a co-simulation FMU whose time derivative is another input (``phi`` has ``w``, ``w`` has
-    ``a``). They are extrapolated inside a step; without that a turning shaft would stand still in each
-    step."""
+    ``a``). They are extrapolated inside a step, up to their bounds; without that a turning shaft would stand
+    still in each step, and outputs at its end would be those of its begin."""
     start_problem: ClassVar[StartProblem] = StartProblem()
     """Iteration for the states at the start; see `start`."""
     controlled: ClassVar[bool] = False

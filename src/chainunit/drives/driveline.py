@@ -173,8 +173,7 @@ class CardanDriveline(Model):
     the driven side.
 
     Connect the motor's phi, w, a to the inputs of these names, and the port tau_bias ... w0 to the motor's load.
-    Connect driven.phi, driven.w, driven.a to the machine's phi, w, a, and the machine's port to load. In a
-    co-simulation phi follows w, and w follows a, inside a step.
+    Connect driven.phi, driven.w, driven.a to the machine's phi, w, a, and the machine's port to load.
 
     The communication step must be well below the period of the torsional vibration: at most 0.3/k, with the natural
     frequency k in rad/s of the line between the inertias of both sides. No FMU checks this, as none knows the inertia

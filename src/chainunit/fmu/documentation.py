@@ -24,6 +24,10 @@ _FIGURE = (
     "the driven link is coloured."
 )
 _NOT_CONNECTED = "An input that is not connected keeps its start value."
+_FOLLOWS = (
+    " In Co-Simulation {pairs} inside a step, so that the outputs after it are those of its end. Derivatives of these "
+    "inputs that the importer sets (FMI 2.0) hold instead."
+)
 _MOTION = (
     " Inputs phi, w and a belong together: give all of them. As declared, the {what} stands at phi = {at:g}."
 )
@@ -46,6 +50,8 @@ def page(interface: Interface, version: str, sketch: Sketch | None) -> str:
         inputs += _MOTION.format(
             what="shaft" if phi.variable.unit == "rad" else "driver", at=phi.start or 0.0
         )
+    if model.input_rates:
+        inputs += _FOLLOWS.format(pairs=", ".join(f"{a} follows {b}" for a, b in model.input_rates.items()))
     return (
         f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{model.name}</title>'
         f"<style>{_STYLE}</style></head>\n<body><h1>{model.name}</h1>\n<p>{escape(model.description)}</p>\n"

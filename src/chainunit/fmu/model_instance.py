@@ -97,7 +97,7 @@ class ModelInstance:
             if bad:
                 self.tell(bad)
                 return False
-            if self.model.state_layout and size and not self._integrate(time, size):
+            if size and not self._advance(time, size):
                 return False
             self._time = time + size
             return True
@@ -119,8 +119,26 @@ class ModelInstance:
             return messages.STEP_END.format(size=size, time=time, stop=self._stop)
         return ""
 
-    def _integrate(self, time: float, step: float) -> bool:
-        p, model, run = self._p, self.model, self._running()
+    def _advance(self, time: float, step: float) -> bool:
+        """Take states and inputs to the end of a step; False where a state runs away."""
+        run = self._running()
+        if self.model.state_layout:
+            x = self._integrate(run, step)
+            if not all(map(math.isfinite, x)):
+                self.tell(messages.ASTRAY.format(time=time))
+                return False
+            self._x = x
+        for at, rate, half in run:
+            quantity = self.references.settable[at].quantity
+            self._set[at] = quantity.within_bounds(self._set[at] + step * (rate + step * half))
+            self._u = None
+            self._doubtful = True
+        self._touch()
+        self._closed = self.model.controlled
+        return True
+
+    def _integrate(self, run: Any, step: float) -> list[float]:
+        p, model = self._p, self.model
         layout = model.state_layout
         assert layout is not None
         longest = model.internal_step(MATH, p)
@@ -129,21 +147,8 @@ class ModelInstance:
             return model.derivatives(MATH, p, self._inputs(run, since), layout.instance(x))
 
         if model.controlled:
-            x = self._integrate_with_control(rates, run, step, longest)
-        else:
-            x = rk4(rates, self._x, step, longest, p.solver.max_steps)
-        if not all(map(math.isfinite, x)):
-            self.tell(messages.ASTRAY.format(time=time))
-            return False
-        self._x = x
-        for at, rate, half in run:
-            self._set[at] += step * (rate + step * half)
-        if run:
-            self._u = None
-            self._doubtful = True
-        self._touch()
-        self._closed = model.controlled
-        return True
+            return self._integrate_with_control(rates, run, step, longest)
+        return rk4(rates, self._x, step, longest, p.solver.max_steps)
 
     def _integrate_with_control(self, rates: Any, run: Any, step: float, longest: float) -> list[float]:
         p, model, x = self._p, self.model, self._x
@@ -292,10 +297,12 @@ class ModelInstance:
         return self._u
 
     def _running(self) -> list[tuple[int, float, float]]:
-        """Place, rate and half of the second derivative of each input that follows another one."""
+        """Place, rate and half of the second derivative of each input that follows another one and moves."""
         first = self.references.first_input
         return [
-            (first + place, rate, half) for place, rate, half in self.model.extrapolations(self._set[first:])
+            (first + place, rate, half)
+            for place, rate, half in self.model.extrapolations(self._set[first:])
+            if rate or half
         ]
 
     def _bad_input(self) -> str:

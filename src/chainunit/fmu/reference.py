@@ -1,9 +1,9 @@
 """The reference results inside an FMU.
 
-They are the results of a Co-Simulation master that holds its inputs over a step, computed by the Python kernels.
-There are two files of them, as masters read outputs at different moments, and a smoke test that names inputs and
-results. The files lie in the folder of the layered standard FMI-LS-REF (1.0.0-beta.1), whose manifest describes each
-file.
+They are the results of a Co-Simulation master that sets its inputs at the begin of each step, computed by the Python
+kernels. There are two files of them, as masters read outputs at different moments, and a smoke test that names inputs
+and results. The files lie in the folder of the layered standard FMI-LS-REF (1.0.0-beta.1), whose manifest describes
+each file.
 """
 
 from __future__ import annotations
@@ -88,7 +88,8 @@ def reference_results(interface: Interface) -> dict[str, bytes]:
         )
         return {}
     words = {
-        INPUTS: f"inputs, set at each time and held for {STEP * 1e3:g} ms",
+        INPUTS: f"inputs, set every {STEP * 1e3:g} ms; in between each stays, or follows another input that is its "
+        "derivative",
         STEPPED: "outputs at the end of each step, before the inputs of that time are set",
         READ: "outputs after the inputs of the time are set, before an event there and the step from it: of "
         "Model Exchange, and of Co-Simulation masters that read there, which the FMI standard does not allow",

@@ -18,7 +18,6 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from types import MappingProxyType
 from typing import Any, ClassVar
 
 from ..core.errors import InputError
@@ -205,10 +204,9 @@ def _flexible(walls: int, webs: int) -> type[InverseMachine]:
     class ChainUnitFlexible(ChainedModel, InverseMachine):
         """The chain unit with its organs as chains of rods; `flexible` sets their numbers.
 
-        Inputs, outputs and load port are those of ChamberForces and connect in the same way. In a co-simulation phi
-        follows w, and w follows a, inside a step; the internal integrator controls the error to `tolerance`. In Model
-        Exchange phi, w and a must be set before each evaluation of the derivatives. Rods are counted from A1; a rod
-        is slack where its mean axial pull is below zero.
+        Inputs, outputs and load port are those of ChamberForces and connect in the same way. The internal integrator
+        controls the error to `tolerance`. In Model Exchange phi, w and a must be set before each evaluation of the
+        derivatives. Rods are counted from A1; a rod is slack where its mean axial pull is below zero.
         """
 
         name = "ChainUnitFlexible"
@@ -229,7 +227,6 @@ def _flexible(walls: int, webs: int) -> type[InverseMachine]:
         Outputs = declared_class("ChainOutputs", (Outputs,), both(chains.Side))
         joints, pins = ChamberForces.joints, ChamberForces.pins
         probes = chains.probes
-        input_rates = MappingProxyType({"phi": "w", "w": "a"})
         by_differences = frozenset(("dJ_dphi", *Layout(PortSlopes).names))
         required = (*ChamberForces.required, *_MASSES)
 

@@ -11,6 +11,7 @@ import dataclasses
 import math
 from collections.abc import Iterator, Mapping
 from functools import cache
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 from ..core.descriptions import USUAL_DRIVER, of_driver
@@ -131,6 +132,7 @@ class InverseMachine(LinkageModel, MachineModel):
     direct_description: ClassVar[str] = ""
     by_differences: ClassVar[frozenset[str]] = frozenset()
     """Outputs whose derivatives are taken by differences, see `chainunit.core.model.Part`."""
+    input_rates = MappingProxyType({"phi": "w", "w": "a"})
 
     span: ClassVar[tuple[float, float]] = (0.0, 2.0 * math.pi)
     """Places of the driver from which to which it goes: a whole turn [rad], or its range [rad, m]."""

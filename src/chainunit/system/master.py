@@ -2,7 +2,8 @@
 
 With a load port the driver sees the linearised load inside its step, and the coupling is of second order (through a
 driveline near rest of first order, see `chainunit.drives.driveline`). An external signal that varies within a step
-acts with its value at the middle of the step, which is of second order, too.
+acts with its value at the middle of the step, which is of second order, too. Angle and speed of a shaft that is an
+input act with their values at the begin of the step, as the FMU may let them run on inside it.
 """
 
 from __future__ import annotations
@@ -36,6 +37,10 @@ class CoSimulation(FmuSimulation):
         points = self._signal_values(times)
         middles = self._signal_values(0.5 * (times[:-1] + times[1:]))
         moves_inside, moves_over = _moves(points, middles, len(times) - 1)
+        for (instance, handle, at), (_, _, between) in zip(points, middles, strict=True):
+            run_on = [name in self._run_on(instance.name) for name in handle.names]
+            between[:, run_on] = at[:-1, run_on]
+            moves_over = [any(run_on) or moves for moves in moves_over]
         for k, after in enumerate(times[1:].tolist()):
             if moves_inside[k]:
                 _apply(middles, k)
@@ -48,6 +53,11 @@ class CoSimulation(FmuSimulation):
                 _apply(points, k + 1)
             self._transfer()
             yield
+
+    def _run_on(self, name: str) -> set[str]:
+        """Angle and speed, or way and speed, at each terminal of a component that has their acceleration, too."""
+        members = [terminal.members for terminal in self.system.components[name].terminals.values()]
+        return {own[n] for own in members if {"phi", "w", "a"} <= set(own) for n in ("phi", "w")}
 
 
 def _apply(signals: _Table, row: int) -> None:

@@ -79,7 +79,7 @@ def experiments(name: str, tolerance: float, *, smooth: bool) -> bytes:
     """The experiments of an FMU: file of inputs, file of results, step and tolerance of each."""
     reference = ReferenceExperiment(
         "reference",
-        "all inputs move and are held over each step; results at the end of each step",
+        "all inputs move and are set at the begin of each step; results at the end of each step",
         STEP,
         f"../{name}_{INPUTS}.csv",
         f"../{name}_{STEPPED}.csv",

@@ -2,7 +2,7 @@
 
 Three experiments are of a certified FMU:
 
-- the *reference experiment*, which every FMU of this package has: all inputs move, each is held over a step of 40 ms;
+- the *reference experiment*, which every FMU of this package has: all inputs move, and are set every 40 ms;
   its results come from the equations in Python under CVODES;
 - the *smooth experiment*: a shaft or ram that is an input moves smoothly, all other inputs stay. The FMU itself runs
   it at the steps h, h/2 and h/4, from which the error of the step and its order follow, at h/4 the energy balance;
