@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from enum import Enum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeAlias
 
 import typer
 import typer.core
@@ -11,6 +12,21 @@ import typer.core
 from ..core.errors import InputError
 from ..report.command_options import BackendOption
 from ..report.console import study_file, terminal_console
+
+
+class VariableNames(Enum):
+    """The names of an FMU's variables, see `chainunit.fmu.script.Names`."""
+
+    structured = "structured"
+    flat = "flat"
+
+
+NamesOption: TypeAlias = Annotated[
+    VariableNames,
+    typer.Option(
+        "--names", help="left.material_mass (structured), or left_material_mass (flat), as for Simulink."
+    ),
+]
 
 
 class ExportCommand(typer.core.TyperCommand):
@@ -60,6 +76,7 @@ def export(
     direct: Annotated[
         bool, typer.Option("--direct", help="Of a linkage file: torque in and motion out.")
     ] = False,
+    names: NamesOption = VariableNames.structured,
 ) -> None:
     """Write a model as an FMU; of a study file its whole system, from control to machine, as one FMU."""
     from ..fmu.backends import export as write
@@ -92,6 +109,7 @@ def export(
             fmi=fmi,
             platforms=_platforms(platforms, fmi),
             wasm=wasm,
+            names=names.value,
             progress=status.update,
         )
     print(f"{file}: {model.name}, {made}")
@@ -112,6 +130,7 @@ def export_ssp(
             help="Connectors for inputs without connection, too; fmpy cannot run the package then.",
         ),
     ] = False,
+    names: NamesOption = VariableNames.structured,
 ) -> None:
     """Write motor and machine, connected, with their parameter sets, as an SSP 1.0 package of FMUs 2.0."""
     from ..study.package import export_study, left_out
@@ -124,6 +143,7 @@ def export_ssp(
             loaded,
             output,
             all_inputs=all_inputs,
+            names=names.value,
             backend=backend.value if backend else None,
             progress=status.update,
         )

@@ -12,6 +12,7 @@ from ..core.model import Model
 from . import export as python
 from .native import export as native
 from .native import platforms as targets
+from .script import Names
 
 Backend = Literal["native", "python"]
 
@@ -36,13 +37,14 @@ def export(
     fmi: int = 2,
     platforms: Sequence[str] = (),
     wasm: bool = False,
+    names: Names = "structured",
     progress: Callable[[str], None] = lambda what: None,
 ) -> Origin:
     """Write `model` as an FMU; the result tells which backend made it, and why.
 
     Parameters
     ----------
-    model, file, start : see `chainunit.fmu.export.export`
+    model, file, start, names : see `chainunit.fmu.export.export`
     backend : "native" or "python"; by default native where a C compiler is found and works
     fmi : 2 or 3; 3 only by the native backend
     platforms, wasm, progress : see `chainunit.fmu.native.export.export`; the first two only by the native backend
@@ -56,24 +58,30 @@ def export(
         raise InputError(f"fmi = {fmi}: must be 2 or 3")
     if backend not in (None, *get_args(Backend)):
         raise InputError(f"backend = {shown(backend)}: must be {one_of(backend, get_args(Backend))}")
+    if names not in get_args(Names):
+        raise InputError(f"names = {shown(names)}: must be {one_of(names, get_args(Names))}")
     if wasm and backend == "python":
         raise InputError("--wasm needs the native backend; leave out --backend python")
     if backend == "python":
-        return _by_python(model, file, start, fmi, platforms, "")
+        return _by_python(model, file, start, names, fmi, platforms, "")
     if backend is None and not platforms and not wasm and not targets.compiles(fmi):
-        return _by_python(model, file, start, fmi, platforms, ", no C compiler for this machine found")
-    names, compiler = targets.choose(platforms, fmi)
+        return _by_python(model, file, start, names, fmi, platforms, ", no C compiler for this machine found")
+    built, compiler = targets.choose(platforms, fmi)
     try:
-        native.export(model, file, start, fmi=fmi, platforms=platforms, wasm=wasm, progress=progress)
+        native.export(
+            model, file, start, fmi=fmi, platforms=platforms, wasm=wasm, names=names, progress=progress
+        )
     except WriteError:
         raise
     except RunError:
         if backend or fmi != 2 or platforms or wasm:
             raise
-        return _by_python(model, file, start, fmi, platforms, f", the C compiler {compiler.name} failed")
+        return _by_python(
+            model, file, start, names, fmi, platforms, f", the C compiler {compiler.name} failed"
+        )
     words = f"FMI {fmi}.0, Co-Simulation and Model Exchange, native code by {compiler.name}"
     if platforms:
-        words += " for " + ", ".join(f"{name} ({targets.PLATFORMS[name].tests})" for name in names)
+        words += " for " + ", ".join(f"{name} ({targets.PLATFORMS[name].tests})" for name in built)
     elif backend is None:
         words += ", the C compiler found here"
     if wasm:
@@ -85,6 +93,7 @@ def _by_python(
     model: type[Model],
     file: Path,
     start: dict[str, float] | None,
+    names: Names,
     fmi: int,
     platforms: Sequence[str],
     why: str,
@@ -96,6 +105,6 @@ def _by_python(
         )
     if platforms:
         raise InputError("--platforms needs the native backend; a Python FMU runs on Linux and Windows alike")
-    python.export(model, file, start)
+    python.export(model, file, start, names=names)
     words = f"FMI 2.0 Co-Simulation, by pythonfmu{why}; needs Python 3.11 in the importing process"
     return Origin("python", words)

@@ -17,10 +17,11 @@ def companion_files(
     """Files by their path inside the FMU; `libraries` are the packages whose code the FMU contains: their licences
     are added."""
     model = interface.model
-    sketch = model.sketch({s.name: s.start for s in interface.signals_of("parameter") if s.start is not None})
+    start = {s.variable.name: s.start for s in interface.signals_of("parameter") if s.start is not None}
+    sketch = model.sketch(start)
     png, svg = (icon(model, kind, sketch) for kind in ("png", "svg"))
     files = {
-        "documentation/index.html": page(interface, version, sketch).encode(),
+        "documentation/index.html": interface.words(page(interface, version, sketch)).encode(),
         "documentation/licenses/license.txt": licence("chainunit", *libraries).encode(),
     }
     if fmi == 2:

@@ -17,7 +17,7 @@ from ..core.model import About, Model
 from ..core.quantities import DISPLAY_UNITS, TYPES, Type, Variable, base_units, written
 from ..core.symbolic_trace import Trace, trace
 from .recipe import Experiment, script_of
-from .script import Script
+from .script import Script, name_in_fmu, words_in_fmu
 
 RELEASED = "2026-11-21"
 """The day of this version's release, equal to the one in CITATION.cff."""
@@ -27,17 +27,13 @@ TYPES_3: Mapping[Type, str] = {"Real": "Float64", "Integer": "Int32", "Boolean":
 
 @dataclass(frozen=True)
 class Signal:
-    """A variable of the FMU: declaration, causality, start value, value reference."""
+    """A variable of the FMU: its name, its declaration in the model, causality, start value, value reference."""
 
+    name: str
     variable: Variable
     causality: str
     start: float | None
     reference: int
-
-    @property
-    def name(self) -> str:
-        """The full name of the variable."""
-        return self.variable.name
 
 
 class Interface:
@@ -76,13 +72,25 @@ class Interface:
         ):
             for v in group:
                 value = None if causality == "output" else start.get(v.name, v.quantity.start)
-                self.signals.append(Signal(v, causality, value, len(self.signals)))
+                self.signals.append(Signal(self.name(v.name), v, causality, value, len(self.signals)))
+
+    def name(self, variable: str) -> str:
+        """The name in the FMU of the variable of the model with that name."""
+        return name_in_fmu(variable, self.script.names)
+
+    def words(self, text: str) -> str:
+        """A text with the names in the FMU of the variables that it names."""
+        return words_in_fmu(text, self._variables, self.script.names)
+
+    @cached_property
+    def _variables(self) -> frozenset[str]:
+        return frozenset(signal.variable.name for signal in self.signals)
 
     @cached_property
     def repeated(self) -> dict[str, Signal]:
-        """The outputs that repeat another one, by name, with the signal of that one."""
-        own = {signal.name: signal for signal in self.signals_of("output")}
-        return {name: own[of] for name, of in self.model.repeated.items()}
+        """The outputs that repeat another one, by name in the FMU, with the signal of that one."""
+        own = {signal.variable.name: signal for signal in self.signals_of("output")}
+        return {own[name].name: own[of] for name, of in self.model.repeated.items()}
 
     @property
     def discrete(self) -> list[int]:
@@ -208,7 +216,7 @@ def model_description(
     `identifier` is the name of its library, by default the name of the model.
     """
     exchange = "ModelExchange" in kinds
-    root = _root(interface.model, version, {"fmiVersion": "2.0", "guid": guid})
+    root = _root(interface, version, {"fmiVersion": "2.0", "guid": guid})
     root.set("numberOfEventIndicators", "0")
     for kind, options in kinds.items():
         element = SubElement(root, kind, {"modelIdentifier": identifier or interface.model.name, **options})
@@ -246,7 +254,7 @@ def model_description_3(
     interface: Interface, token: str, kinds: Mapping[str, Mapping[str, str]], version: str
 ) -> Element:
     """The XML tree of an FMI 3.0 FMU; the value references are those of FMI 2.0, followed by the time."""
-    root = _root(interface.model, version, {"fmiVersion": "3.0", "instantiationToken": token})
+    root = _root(interface, version, {"fmiVersion": "3.0", "instantiationToken": token})
     for kind, options in kinds.items():
         SubElement(root, kind, {"modelIdentifier": interface.model.name, **options})
 
@@ -266,7 +274,8 @@ def model_description_3(
         elements[attributes["name"]] = SubElement(variables, tag, {**attributes, **own, **derivative})
     for signal in interface.signals_of("output"):
         if (one := interface.repeated.get(signal.name)) is not None:
-            SubElement(elements[one.name], "Alias", name=signal.name, description=signal.variable.description)
+            words = interface.words(signal.variable.description)
+            SubElement(elements[one.name], "Alias", name=signal.name, description=words)
     time = {
         "name": "time",
         "valueReference": str(last + 1),
@@ -291,18 +300,20 @@ def _variables(
     and, for a derivative, the value reference of its state."""
     reinitialized = interface.reinitialized if derivatives else frozenset[str]()
     for signal in interface.signals:
-        kind, events = signal.variable.type, {"reinit": "true"} if signal.name in reinitialized else {}
-        if (value := interface.model.constant.get(signal.name)) is not None:
+        model_name, kind = signal.variable.name, signal.variable.type
+        events = {"reinit": "true"} if model_name in reinitialized else {}
+        own = _attributes(signal, interface.words(signal.variable.description))
+        if (value := interface.model.constant.get(model_name)) is not None:
             constant = {"variability": "constant", "initial": "exact"}
-            yield _attributes(signal) | constant, kind, _typed(replace(signal, start=value)), None
+            yield own | constant, kind, _typed(replace(signal, start=value)), None
         else:
-            yield _attributes(signal), kind, _typed(signal) | events, None
+            yield own, kind, _typed(signal) | events, None
     first = len(interface.parameters) + len(interface.inputs)
     for i, state in enumerate(interface.states if derivatives else ()):
         attributes = {
-            "name": f"der({state.name})",
+            "name": f"der({interface.name(state.name)})",
             "valueReference": str(len(interface.signals) + i),
-            "description": f"derivative by time: {state.description}",
+            "description": interface.words(f"derivative by time: {state.description}"),
             "causality": "local",
             "variability": "continuous",
             "initial": "calculated",
@@ -318,7 +329,7 @@ def _structure(interface: Interface, derivatives: bool) -> Iterator[tuple[str, i
     unknowns = list(zip(kinds, [*outputs, *rates], interface.dependencies, strict=False))
     for kind, reference, (in_run, _) in unknowns:
         yield kind, reference, in_run
-    constant = {signal.reference for signal in interface.signals if signal.name in interface.model.constant}
+    constant = {s.reference for s in interface.signals if s.variable.name in interface.model.constant}
     for _, reference, (_, at_start) in unknowns:
         if reference not in constant:
             yield "InitialUnknown", reference, at_start
@@ -329,9 +340,10 @@ def _dependencies(references: Iterable[int]) -> dict[str, str]:
     return {"dependencies": " ".join(texts), "dependenciesKind": " ".join("dependent" for _ in texts)}
 
 
-def _root(model: type[Model], version: str, identity: Mapping[str, str]) -> Element:
+def _root(interface: Interface, version: str, identity: Mapping[str, str]) -> Element:
     """The root element, with the attributes that are common to both versions of FMI. `version` is that of this
     package."""
+    model = interface.model
     fmi, identifier = identity.items()
     about = model.fmu_data.about or About(
         metadata.metadata("chainunit")["Author"], _copyright(), "MIT", version
@@ -349,7 +361,7 @@ def _root(model: type[Model], version: str, identity: Mapping[str, str]) -> Elem
                 *((name, text) for name, text in given.items() if text),
                 ("generationTool", f"chainunit {version}"),
                 ("generationDateAndTime", generation_time()),
-                ("variableNamingConvention", "structured"),
+                ("variableNamingConvention", interface.script.names),
             ]
         ),
     )
@@ -439,16 +451,16 @@ def _unit(unit: str) -> dict[str, str]:
     return ({"declaredType": TYPES[unit]} if unit in TYPES else {}) | _display_unit(unit)
 
 
-def _attributes(signal: Signal) -> dict[str, str]:
-    v, q = signal.variable, signal.variable.quantity
+def _attributes(signal: Signal, description: str) -> dict[str, str]:
+    q = signal.variable.quantity
     if signal.causality == "parameter":
         variability = "tunable" if q.tunable else "fixed"
     else:
         variability = "continuous" if q.type == "Real" else "discrete"
     attributes = {
-        "name": v.name,
+        "name": signal.name,
         "valueReference": str(signal.reference),
-        "description": v.description,
+        "description": description,
         "causality": signal.causality,
         "variability": variability,
     }
@@ -496,7 +508,8 @@ def terminals(interface: Interface, *, with_icon: bool = True) -> Element:
         )
         for member, variable in terminal.members.items():
             kind = terminal.flows.get(member, "signal")
+            name = interface.name(variable)
             SubElement(
-                node, "TerminalMemberVariable", variableName=variable, memberName=member, variableKind=kind
+                node, "TerminalMemberVariable", variableName=name, memberName=member, variableKind=kind
             )
     return root

@@ -28,8 +28,8 @@ from ..core.temporary_folders import scratch
 from .companion_files import companion_files
 from .description import Interface, model_description
 from .pack import interface_of, pack
-from .recipe import script_file, script_of
-from .script import Script
+from .recipe import script_file, script_of, script_with_names
+from .script import Names, Script
 
 _PACKAGE = Path(__file__).parents[1]
 _KINDS = {
@@ -43,27 +43,34 @@ _KINDS = {
 }
 
 
-def export(model: type[Model], file: Path, start: dict[str, float] | None = None) -> Path:
+def export(
+    model: type[Model],
+    file: Path,
+    start: dict[str, float] | None = None,
+    *,
+    names: Names = "structured",
+) -> Path:
     """Write `model` as a co-simulation FMU 2.0.
 
     Parameters
     ----------
     model : the model's class
     file : path of the FMU; an existing file is replaced, in one step
-    start : start values of parameters and inputs, by name, in place of the declared ones
+    start : start values of parameters and inputs, by their names in the model, in place of the declared ones
+    names : "structured" for the names of the model, "flat" for underscores in place of their dots
 
     Raises
     ------
     KeyError
         for a name in `start` that the model does not have.
     InputError
-        where the start values are out of bounds or make no machine.
+        where the start values are out of bounds or make no machine, or two flat names are the same.
     """
-    interface = interface_of(model, start)
+    interface = interface_of(model, start, script_with_names(model, names))
     file = Path(file)
     folder(file.parent)
     with scratch() as work:
-        text = _script(model, start or {})
+        text = _script(model, start or {}, names)
         script = work / f"{model.name}_{_hash(interface, _import_closure(text), model.name)}.py"
         script.write_text(text)
         raw = _build(script, work / "raw.fmu")
@@ -204,9 +211,9 @@ class {name}(ModelSlave):
 {more}"""
 
 
-def _script(model: type[Model], start: dict[str, float]) -> str:
-    """The model's script in `fmu/`, or else a script of the same form, with these start values and, for a class that
-    a function makes, the arguments of that function."""
+def _script(model: type[Model], start: dict[str, float], names: Names) -> str:
+    """The model's script in `fmu/`, or else a script of the same form, with these start values and names and, for a
+    class that a function makes, the arguments of that function."""
     file = script_file(model)
     module = model.__module__.rpartition(".")[2]
     made, call = model.made, model.expression()
@@ -222,6 +229,8 @@ def _script(model: type[Model], start: dict[str, float]) -> str:
     text = file.read_text() if file else plain
     if made:
         text = re.sub(r"(?m)^(    model = \w+\.)\w+\([\d, ]*\)(?:\.\w+\(\))*", rf"\g<1>{call}", text)
+    if names != own.names:
+        text += f"    names = {names!r}\n"
     values = {name: float(start[name]) for name in sorted(start)}
     return text + (f"    start = {values!r}\n" if values else "")
 

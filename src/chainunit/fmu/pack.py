@@ -26,14 +26,26 @@ def interface_of(
     KeyError
         for a name in `start` that the model does not have.
     InputError
-        where the start values are out of bounds or make no machine.
+        where the start values are out of bounds or make no machine, or two flat names are the same.
     """
     interface = Interface(model, {name: float(value) for name, value in (start or {}).items()}, script)
+    _refuse_same_names(interface)
     for signal in interface.signals_of("input"):
         if not signal.variable.quantity.admits(signal.start or 0.0):
             raise InputError(complaint(signal.variable, signal.start))
     model.check(model.parameter_layout.instance([s.start for s in interface.signals_of("parameter")]))
     return interface
+
+
+def _refuse_same_names(interface: Interface) -> None:
+    by_name: dict[str, list[str]] = {}
+    for signal in interface.signals:
+        by_name.setdefault(signal.name, []).append(signal.variable.name)
+    same = [f"{' and '.join(of)} would both be {name}" for name, of in by_name.items() if len(of) > 1]
+    if same:
+        raise InputError(
+            f"flat names of {interface.model.name}: {'; '.join(same)}: rename one of them, or take structured names"
+        )
 
 
 def pack(contents: Mapping[str, bytes], file: Path) -> None:

@@ -15,7 +15,7 @@ from pathlib import Path
 from ..core.model import Model, Sketch
 from ..core.ports import LOAD
 from . import pictures
-from .script import Script
+from .script import Names, Script
 
 
 @dataclass(frozen=True)
@@ -51,6 +51,12 @@ def script_of(model: type[Model]) -> type[Script]:
     experiment |= model.fmu_data.experiment
     members = {"experiment": experiment, "sizes": {full: x for full, x in sizes.items() if full in inputs}}
     return type("SystemScript", (Script,), members)
+
+
+def script_with_names(model: type[Model], names: Names) -> type[Script]:
+    """The class of the model's script, with these names of the FMU's variables."""
+    script = script_of(model)
+    return script if script.names == names else type(script.__name__, (script,), {"names": names})
 
 
 def script_file(model: type[Model]) -> Path | None:

@@ -126,7 +126,7 @@ def reference_tables(interface: Interface) -> dict[str, tuple[list[str], list[li
     ArithmeticError, ValueError
         where the states run away or are too fast for the integrator, or a linkage does not close.
     """
-    starts = tuple((s.name, s.start) for s in interface.signals if s.start is not None)
+    starts = tuple((s.variable.name, s.start) for s in interface.signals if s.start is not None)
     return _tables(interface.model, cast(Hashable, interface.script), starts)
 
 
@@ -174,7 +174,8 @@ def _tables(
     x: list[float] = []
     for k in range(ROWS):
         t = k * STEP
-        new = model.input_layout.values(model.input_layout.from_names(inputs(t)))
+        values = inputs(t)
+        new = [values[s.name] for s in interface.signals_of("input")]
         if k == 0:
             u = new
             x = layout.values(model.begin(p, model.input_layout.instance(new))) if layout else []
@@ -269,7 +270,8 @@ _RUN = 4.0
 
 
 def excitation(interface: Interface) -> Callable[[float], dict[str, float]]:
-    """The inputs as functions of time [s], for the reference results: all change smoothly, within their bounds.
+    """The inputs by name as functions of time [s], for the reference results: all change smoothly, within their
+    bounds. The names are those of the FMU.
 
     A shaft runs from rest, unevenly, or swings within its bounds. A load or a torque has a size that suits the
     inertia of its shaft. Every other input swings about its start value, or about its usual size where the start
@@ -284,17 +286,20 @@ def excitation(interface: Interface) -> Callable[[float], dict[str, float]]:
             moving = _load(sizes.get(terminal.members["tau_bias"], _PUSH * inertia), inertia)
         elif terminal.kind == FLANGE:
             moving = _shaft(interface, terminal.members.get("phi", ""))
-            turning = [s for s in interface.signals_of("input") if s.name == terminal.members.get("tau")]
+            torque = terminal.members.get("tau", "")
+            turning = [s for s in interface.signals_of("input") if s.variable.name == torque]
             if turning and model.state_layout:
                 # with a usual torque the states of a light shaft would run away
-                tau, most = turning[0], _PUSH * _inertia(interface, turning[0].name)
-                usual = _size(tau.variable.quantity, tau.start, sizes.get(tau.name))
-                sizes = {**sizes, tau.name: min(usual, most)}
+                tau, most = turning[0], _PUSH * _inertia(interface, torque)
+                usual = _size(tau.variable.quantity, tau.start, sizes.get(torque))
+                sizes = {**sizes, torque: min(usual, most)}
         else:
             continue
-        courses |= {terminal.members[member]: course for member, course in moving.items()}
+        courses |= {interface.name(terminal.members[member]): course for member, course in moving.items()}
     others = {
-        s.name: _swing(s.variable.quantity, _size(s.variable.quantity, s.start, sizes.get(s.name)), k)
+        s.name: _swing(
+            s.variable.quantity, _size(s.variable.quantity, s.start, sizes.get(s.variable.name)), k
+        )
         for k, s in enumerate(interface.signals_of("input"))
     }
     courses = others | {name: course for name, course in courses.items() if name in others}
@@ -310,7 +315,7 @@ _SHAFT: dict[str, Callable[[float], float]] = {
 
 def _shaft(interface: Interface, phi: str) -> dict[str, Callable[[float], float]]:
     """The motion of a shaft: it runs from rest, or swings where the input `phi` has bounds."""
-    bounds = [s.variable.quantity for s in interface.signals_of("input") if s.name == phi]
+    bounds = [v.quantity for v in interface.inputs if v.name == phi]
     if not bounds or not math.isfinite(bounds[0].high - bounds[0].low):
         return _SHAFT
     middle, reach = 0.5 * (bounds[0].low + bounds[0].high), 0.45 * (bounds[0].high - bounds[0].low)

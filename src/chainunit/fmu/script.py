@@ -2,9 +2,27 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+import re
+from collections.abc import Container
+from typing import ClassVar, Literal
 
 from ..core.model import Model
+
+Names = Literal["structured", "flat"]
+"""The names of an FMU's variables: those of the model, as ``left.material_mass``, or with an underscore in place of
+each dot, as ``left_material_mass``."""
+
+
+def name_in_fmu(name: str, names: Names) -> str:
+    """The name in the FMU of the variable of the model with that name."""
+    return name.replace(".", "_") if names == "flat" else name
+
+
+def words_in_fmu(text: str, variables: Container[str], names: Names) -> str:
+    """A text with the names in the FMU of the model's `variables` in it."""
+    if names == "structured":
+        return text
+    return re.sub(r"\w+(?:\.\w+)+", lambda m: name_in_fmu(m[0], names) if m[0] in variables else m[0], text)
 
 
 class Script:
@@ -15,5 +33,7 @@ class Script:
     """Start values of parameters and inputs, by name, in place of the declared ones."""
     experiment: ClassVar[dict[str, float]] = {}
     """``step``, ``stop`` [s] or ``tolerance`` of the default experiment, in place of the usual ones."""
+    names: ClassVar[Names] = "structured"
+    """The names of the variables in the FMU; all others here are those of the model."""
     sizes: ClassVar[dict[str, float]] = {}
     """Sizes of inputs in the reference results, by name, in place of the usual ones."""

@@ -25,7 +25,7 @@ from pythonfmu.fmi2slave import Fmi2Slave
 
 from ..core import messages
 from .model_instance import NAN, ModelInstance
-from .script import Script
+from .script import Script, words_in_fmu
 
 _NOTHING: dict[str, Any] = {"Real": NAN, "Integer": 0, "Boolean": False, "String": ""}
 """By type of FMI, what stands for a value that cannot be told."""
@@ -75,7 +75,11 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
         _release_at_exit(Path(self.resources).parent / "binaries" / "linux64" / f"{type(self).__name__}.so")
-        self._instance = ModelInstance(self.model, self.start, lambda line: self.log(line, Fmi2Status.error))
+        self._instance = ModelInstance(self.model, self.start, self._tell)
+
+    def _tell(self, line: str) -> None:
+        variables = [v.name for v in self._instance.references.settable]
+        self.log(words_in_fmu(line, variables, self.names), Fmi2Status.error)
 
     # -- life cycle
 

@@ -12,6 +12,7 @@ from ..core.quantities import Layout
 from ..core.temporary_folders import scratch
 from ..drives.motor import Motor
 from ..fmu.backends import Backend
+from ..fmu.script import Names
 from ..machines.api import ChainedUnit
 from ..machines.chain_organs import USUAL
 from ..machines.flexible import ChainedModel, with_rods
@@ -202,12 +203,14 @@ def export_study(
     file: Path,
     *,
     all_inputs: bool = False,
+    names: Names = "structured",
     backend: Backend | None = None,
     progress: Callable[[str], None] = lambda what: None,
 ) -> str:
     """Write machine and motor of a study as an SSP package; returns its contents in words. Where the
     file leaves the motor open it is chosen first. The default experiment is as long as the study's
-    start-up and steady running. With `all_inputs`, inputs without connection are connectors, too.
+    start-up and steady running. With `all_inputs`, inputs without connection are connectors, too; `names` are
+    those of the variables of its FMUs.
 
     Raises
     ------
@@ -223,6 +226,7 @@ def export_study(
         stop=_running(config.operation),
         step=config.run.step,
         all_inputs=all_inputs,
+        names=names,
         backend=backend,
         progress=progress,
     )

@@ -26,6 +26,7 @@ from ..core.temporary_folders import scratch
 from ..fmu.backends import Backend
 from ..fmu.backends import export as export_fmu
 from ..fmu.pack import interface_of, pack, xml_bytes
+from ..fmu.script import Names, name_in_fmu
 from .graph import Connector, FmuComponent, System
 
 PARAMETER_SET = "start"
@@ -50,6 +51,7 @@ def export(
     stop: float = 10.0,
     step: float = 1e-3,
     all_inputs: bool = False,
+    names: Names = "structured",
     backend: Backend | None = None,
     progress: Callable[[str], None] = lambda what: None,
 ) -> str:
@@ -62,6 +64,7 @@ def export(
     name, description : name and description of the system
     stop, step : end of the default experiment, and its communication step, an annotation that libcosim reads [s]
     all_inputs : whether inputs without connection are connectors of their components, too
+    names : of the variables of the models' FMUs, see `chainunit.fmu.export.export`
     backend : backend of the FMUs, which are FMI 2.0; see `chainunit.fmu.backends.export`
     progress : is called with texts on the work
 
@@ -75,7 +78,7 @@ def export(
     """
     if not (0.0 < step < math.inf and 0.0 < stop < math.inf):
         raise InputError(f"an experiment of {stop:g} s in steps of {step:g} s: must go forward")
-    parts = _parts(system)
+    parts = _parts(system, names)
     free = _free_inputs(system, parts)
     file = Path(file)
     folder(file.parent)
@@ -95,7 +98,11 @@ def export(
                 else:
                     fmu = made / f"{part.title}.fmu"
                     origins.append(
-                        str(export_fmu(part.of, fmu, part.start, backend=backend, progress=progress))
+                        str(
+                            export_fmu(
+                                part.of, fmu, part.start, names=names, backend=backend, progress=progress
+                            )
+                        )
                     )
                 contents[paths[alike]] = fmu.read_bytes()
             sources[name_of] = paths[alike]
@@ -133,8 +140,8 @@ class _Part:
         return self.names.get(variable, variable)
 
 
-def _parts(system: System) -> dict[str, _Part]:
-    """The components with their start values."""
+def _parts(system: System, names: Names) -> dict[str, _Part]:
+    """The components with their start values; `names` are those of the variables of models."""
     start: dict[str, dict[str, float]] = {name: {} for name in system.components}
     for full, value in system.values.items():
         name, _, variable = full.partition(".")
@@ -151,14 +158,15 @@ def _parts(system: System) -> dict[str, _Part]:
         with refusal_prefix(f"{name}: "):
             interface = interface_of(component.model, start[name])
         known = component.connectors
-        own = [replace(known[s.name], start=float(s.start or 0.0)) for s in interface.signals]
+        own = [replace(known[s.variable.name], start=float(s.start or 0.0)) for s in interface.signals]
         connectors = [
             replace(c, description=s.variable.description)
             for c, s in zip(own, interface.signals, strict=True)
         ]
         values = {c.name: c.start for c in connectors if c.causality != "output"}
         model = component.model
-        parts[name] = _Part(model, model.name, model.description, connectors, values, {})
+        in_fmu = {c.name: name_in_fmu(c.name, names) for c in connectors}
+        parts[name] = _Part(model, model.name, model.description, connectors, values, in_fmu)
     return parts
 
 

@@ -19,7 +19,8 @@ from ...core.native.elementary_code import HEADER, header
 from ..companion_files import companion_files
 from ..description import model_description, model_description_3
 from ..pack import interface_of, pack, xml_bytes
-from ..recipe import recipes
+from ..recipe import recipes, script_with_names
+from ..script import Names
 from .generate import kernels, rules, tables
 from .platforms import build, choose, units_of
 from .wasm import COMPONENT, wasm_compiler, wasm_files
@@ -72,13 +73,14 @@ def export(
     fmi: int = 2,
     platforms: Sequence[str] = (),
     wasm: bool = False,
+    names: Names = "structured",
     progress: Callable[[str], None] = lambda what: None,
 ) -> Path:
     """Write `model` as a native FMU, Co-Simulation and Model Exchange.
 
     Parameters
     ----------
-    model, file, start : see `chainunit.fmu.export.export`
+    model, file, start, names : see `chainunit.fmu.export.export`
     fmi : version of FMI, 2 or 3
     platforms : names from `chainunit.fmu.native.platforms.PLATFORMS`; by default the platform of this machine
     wasm : whether a component for WebAssembly stands beside the libraries, see `chainunit.fmu.native.wasm`; of FMI 3
@@ -91,9 +93,9 @@ def export(
     RunError
         where the compiler fails, with its messages.
     """
-    names, compiler = choose(platforms, fmi)
+    targets, compiler = choose(platforms, fmi)
     for_wasm = wasm_compiler(fmi) if wasm else None
-    interface = interface_of(model, start)
+    interface = interface_of(model, start, script_with_names(model, names))
     file = Path(file)
     folder(file.parent)
     of_version = _VERSIONS[fmi]
@@ -113,21 +115,21 @@ def export(
         description = model_description_3(interface, "", kinds, version)
     functions, room = kernels(interface)
     sources = {name: (recipes() / "native" / name).read_bytes() for name in layer}
-    sources |= {"kernels.c": functions.encode(), "rules.h": rules().encode()}
+    sources |= {"kernels.c": functions.encode(), "rules.h": interface.words(rules()).encode()}
     sources[HEADER] = header().encode()
     digest = hashlib.sha256(xml_bytes(description))
-    for text in (*sources.values(), tables(interface, "", room).encode()):
+    for text in (*sources.values(), interface.words(tables(interface, "", room)).encode()):
         digest.update(text + b"\0")
     guid = f"{{{uuid.UUID(digest.hexdigest()[:32])}}}"
     description.set(of_version.guid, guid)
-    sources["model.c"] = tables(interface, guid, room).encode()
+    sources["model.c"] = interface.words(tables(interface, guid, room)).encode()
     sources |= {name: (_headers() / name).read_bytes() for name in of_version.headers}
     contents = {f"sources/{name}": text for name, text in sources.items()}
     contents["modelDescription.xml"] = xml_bytes(description)
     contents |= companion_files(interface, version, fmi)
     if fmi == 3:
         contents["sources/buildDescription.xml"] = _build_description(model.name, units)
-    for name in names:
+    for name in targets:
         slow = ", the first time about a minute" if compiler.zig and name == "win64" else ""
         progress(f"compiling for {name}{slow}")
         contents |= build(compiler, name, fmi, model.name, sources, units)
