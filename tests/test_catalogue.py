@@ -426,6 +426,7 @@ def test_wrong_values_of_a_toml_catalogue_have_their_own_lines(tmp_path):
         ("a.csv", f"{','.join(ROW)}\nx\n", f"a.csv:2: has 1 cells; must have {len(ROW)}"),
         ("a.csv", 'designation\n"x\n', "a.csv:2: no valid CSV"),
         ("a.toml", "x = ", "a.toml:1: no valid TOML"),
+        ("a.toml", '[[motor]]\nsource = "a\\u0007"', 'a.toml:2: motor.1.source: "a\\u0007" has U+0007'),
         ("a.toml", "x = 1", '"x": unknown; each thing is a table [[motor]] or [[gear]] or [[coupling]]'),
         ("a.toml", "", "is empty; each thing is a table [[motor]]"),
         ("a.toml", "motor = 1", "motor = 1: each motor must be a table"),

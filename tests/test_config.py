@@ -11,7 +11,7 @@ from chainunit.core.errors import InputError
 from chainunit.machines.chain_unit import Parameters
 from chainunit.models import MODELS
 from chainunit.reading.tables import to_number
-from chainunit.study.config import load, parse
+from chainunit.study.config import load, of_tables, parse
 from chainunit.study.event import TYPES
 from chainunit.study.events import Jam
 from chainunit.study.parts import example
@@ -186,6 +186,13 @@ def test_refusals(text, line):
         parse(text)
     assert str(caught.value).startswith(line)
     assert "\n" not in str(caught.value)
+
+
+def test_texts_of_a_dictionary_are_checked_as_those_of_a_file():
+    """Lines and tabs are signs of a text; a character that no XML has is refused, as in a description of an FMU."""
+    assert of_tables({"title": "press\tÄ €\n\U0001f600"}, "x").title
+    with pytest.raises(InputError, match=r"title: .* has U\+0000, which is no sign of a text; take it out"):
+        of_tables({"title": "a\0b"}, "x")
 
 
 def test_every_refusal_names_the_file(tmp_path):

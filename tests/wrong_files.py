@@ -46,7 +46,7 @@ FILES = [
     ),
     ("[feed]\nleft.processing_force = '1,500 N'", [(2, "feed.left.processing_force", "must be a number in N")]),
     ("[feed]\nleft.processing_force = '2*1000 N'", [(2, "feed.left.processing_force", "must be a number in N")]),
-    ('catalogue = "a\\u0000b"\n[sizing]', [(1, "catalogue", "must be the name of a file")]),
+    ('catalogue = "a\\u0000b"\n[sizing]', [(1, "catalogue", "has U+0000")]),
     (f"[system]\nmotor = '{5000 * 'x'}.fmu'", [(2, "system.motor", "must be the name of a file")]),
     (
         "[machine]\ncrank.m = '30 mg'\n[run]\nturns = 2.5",
@@ -185,6 +185,12 @@ FILES = [
     ("title =\n", [(1, "no valid TOML", "its value is missing")]),
     ("[machine\nr = 1", [(1, "no valid TOML: [machine", "']'")]),
     (f"[machine]\nr = 1{5000 * '0'}", [(2, "no valid TOML", "more than 4300 digits")]),
+    # characters that no XML has, in a text, a list, a name and a raw text
+    (
+        'title = "a\\u0007b"\n[report]\nauthor = "Ann\\u001b[2J"\n[[event]]\ntype = "jam"\nname = "x\\uFFFE"',
+        [(1, "title", "U+0007"), (3, "report.author", "U+001B"), (6, "event.1.name", "U+FFFE")],
+    ),
+    ('title = "a\ufffeb"\n"na\\u0085me" = 1', [(1, "title", "U+FFFE"), (2, "na", "its name has U+0085")]),
     ('{"a": 1}', [(1, "no valid TOML", "it is JSON")]),
     ("PK\x03\x04", [(0, "", "is a ZIP archive, such as an FMU")]),
     (

@@ -328,6 +328,8 @@ FILES = [
     ("", [(0, "links", "give at least the link that the driver turns")]),
     (STUDY, [(1, "machine", "run a study file with chainunit study")]),
     ("hello world", [(1, "no valid TOML", "expected '='")]),
+    (PRESS.replace('"press"', '"pre\\u0001ss"'), [(1, "title", "has U+0001, which is no sign")]),
+    (PRESS + '[about]\nauthor = "a\\uFFFFb"\n', [(39, "about.author", "U+FFFF")]),
     ('{"a": 1}', [(1, "no valid TOML", "it is JSON")]),
     (PRESS + "[links.rod]\nmass = 3\n", [(38, "no valid TOML", "first in line 21")]),
 ]  # fmt: skip

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -376,14 +377,51 @@ def toml(text: str) -> dict[str, Any]:
     Raises
     ------
     InputError
-        where the text is no TOML; each fault has its line.
+        where the text is no TOML, each fault with its line, and for `text_faults`.
     """
     try:
-        return tomllib.loads(text)
+        data = tomllib.loads(text)
+        faults = text_faults(data)
     except ValueError as error:  # TOMLDecodeError, and numbers that are too long
         raise InputError.joined(syntax_faults(text, error)) from error
     except RecursionError as error:
         raise InputError("no valid TOML: tables or lists are nested too deeply") from error
+    if faults:
+        raise InputError.joined(faults)
+    return data
+
+
+_NO_SIGNS = re.compile(
+    "[\\x00-\\x08\\x0b\\x0c\\x0e-\\x1f\\x7f-\\x9f\\ud800-\\udfff\\ufdd0-\\ufdef"
+    + "".join(f"{chr(plane + 0xFFFE)}{chr(plane + 0xFFFF)}" for plane in range(0, 0x110000, 0x10000))
+    + "]"
+)
+"""Characters that are no signs of a text: control characters except tab and ends of lines, surrogates, and those that
+Unicode assigns to nothing. XML, and with it an FMU, an SVG and a page, has no place for them."""
+
+
+def text_faults(data: Any) -> list[InputError]:
+    """The faults of all texts and names in the tables of a file that have a character that is no sign."""
+    return list(_wrong_texts(data, ""))
+
+
+def _wrong_texts(data: Any, key: str) -> Iterator[InputError]:
+    if isinstance(data, Mapping):
+        for name, value in data.items():
+            inner = f"{key}.{name}" if key else str(name)
+            yield from _wrong_text(str(name), inner, "its name")
+            yield from _wrong_texts(value, inner)
+    elif isinstance(data, list | tuple):
+        for k, value in enumerate(data, 1):
+            yield from _wrong_texts(value, f"{key}.{k}" if isinstance(value, Mapping) else key)
+    elif isinstance(data, str):
+        yield from _wrong_text(data, key, shown(data))
+
+
+def _wrong_text(text: str, key: str, subject: str) -> Iterator[InputError]:
+    if wrong := _NO_SIGNS.search(text):
+        words = f"has U+{ord(wrong[0]):04X}, which is no sign of a text; take it out"
+        yield InputError(f"{printable(key)}: {subject} {words}", key)
 
 
 def read(file: Path | None, example: Callable[[], str], parse: Callable[[str, str], T]) -> T:

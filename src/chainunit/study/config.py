@@ -24,6 +24,7 @@ from ..reading.tables import (
     read,
     read_table,
     slips_of,
+    text_faults,
     toml,
     unusual_values,
 )
@@ -212,6 +213,8 @@ def of_tables(data: Mapping[str, Any], source: str) -> Config:
     InputError
         with a line for each fault.
     """
+    if faults := text_faults(data):
+        raise InputError.joined(faults)
     if isinstance(data.get("motor"), list):
         raise InputError(
             "motor: tables [[motor]] make a catalogue; name this file in a study file by catalogue", "motor"
