@@ -2,7 +2,8 @@
 
 The limits are typical of standard units, and belong to no maker. A helical stage makes up to about 6.3, so that two
 stages make up to 40 and three up to 250; two-stage units of makers end between 30 and 60, three-stage units between
-200 and 350. A worm gear makes up to about 100, a V-belt up to about 6.3; few makers go up to 10 with a belt.
+200 and 350. A worm gear makes up to about 100, a V-belt up to about 6.3; few makers go up to 10 with a belt. Beyond
+that the belt stands before a helical gear.
 """
 
 from __future__ import annotations
@@ -42,13 +43,18 @@ STAGE = 0.98
 
 @dataclass(frozen=True)
 class GearUnit:
-    """A gear in one housing, or one belt: the ratio up to which it is usual, the largest that a maker has, and its
-    typical efficiency."""
+    """A gear in one housing, one belt, or a belt before one gear: the ratio up to which it is usual, the largest that
+    a maker has, its typical efficiency, and its parts in a noun."""
 
     title: str
     largest: float
     made: float
     efficiency: float
+    noun: str = "gear"
+
+
+DIRECT = GearUnit("no gear: on the motor's shaft or a coupling", 1.0, 1.0, 1.0, "coupling")
+"""A machine that turns with the motor."""
 
 
 UNITS: Mapping[str, tuple[GearUnit, ...]] = MappingProxyType(
@@ -59,7 +65,8 @@ UNITS: Mapping[str, tuple[GearUnit, ...]] = MappingProxyType(
             GearUnit("three-stage helical gear", 250.0, 350.0, STAGE**3),
         ),
         "worm": (GearUnit("worm gear", 100.0, 100.0, KINDS["worm"].efficiency),),
-        "belt": (GearUnit("V-belt", 6.3, 10.0, KINDS["belt"].efficiency),),
+        "belt": (GearUnit("V-belt", 6.3, 10.0, KINDS["belt"].efficiency, "belt"),),
+        "none": (DIRECT,),
     }
 )
 """The units of each kind of gear, by rising ratio; bevel-helical gears count as helical ones."""
@@ -67,16 +74,44 @@ UNITS: Mapping[str, tuple[GearUnit, ...]] = MappingProxyType(
 
 def gear_unit(kind: str, ratio: float, is_given: bool = False) -> GearUnit | None:
     """The smallest unit of the `kind` that has the `ratio`; None where one unit does not suffice. A ratio that
-    `is_given` may be one that only some makers have in one unit."""
+    `is_given` may be one that only some makers have in one unit. Nobody takes a gear for a ratio of 1. Beyond its
+    largest ratio a belt stands before a helical gear."""
+    if ratio == 1.0 and kind != "belt":
+        return DIRECT
     usual = (unit for unit in UNITS[kind] if ratio <= unit.largest)
     last = UNITS[kind][-1]
-    return next(usual, last if is_given and ratio <= last.made else None)
+    unit = next(usual, last if is_given and ratio <= last.made else None)
+    if unit is None and kind == "belt" and (split := belt_before_gear(ratio)) is not None:
+        belt, gear, behind = split
+        title = f"V-belt of {belt:.3g} before a {behind.title} of {gear:g}"
+        return GearUnit(title, ratio, ratio, last.efficiency * behind.efficiency, "belt and gear")
+    return unit
+
+
+def belt_before_gear(ratio: float) -> tuple[float, float, GearUnit] | None:
+    """The split of a `ratio` over a V-belt and a helical gear behind it: both ratios, and the gear. It has as few
+    stages as the belt permits and a preferred number of R20, and the belt is near to its usual ratio; None where one
+    gear does not suffice."""
+    belt = UNITS["belt"][0].largest
+    for unit in UNITS["helical"]:
+        gears = [
+            10.0**decade * numeral
+            for decade in range(3)
+            for numeral in SERIES["R20"]
+            if ratio / belt <= 10.0**decade * numeral <= unit.largest
+        ]
+        if gears:
+            gear = float(f"{nearest(ratio / KINDS['belt'].ratio, gears):.4g}")
+            return ratio / gear, gear, unit
+    return None
 
 
 def typical_efficiency(kind: str, ratio: float, is_given: bool = False) -> float:
     """Typical efficiency of the unit of that `kind` and `ratio`, or of as many units one behind the other as it
     takes; for `is_given` see `gear_unit`. A stage of helical wheels has `STAGE`, a V-belt 0.95. That of a worm gear
     falls from 0.9 at a ratio of 5 to 0.65 at 80; the number is that of 50."""
+    if kind == "none":
+        return 1.0
     efficiency, last = 1.0, UNITS[kind][-1]
     while (unit := gear_unit(kind, ratio, is_given)) is None:
         efficiency, ratio = efficiency * last.efficiency, ratio / last.largest

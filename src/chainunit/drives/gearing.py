@@ -58,12 +58,11 @@ KINDS: Mapping[str, Transmission] = MappingProxyType(
 """Typical start values by kind: a coupling, a two-stage helical gear, a V-belt, a worm gear."""
 
 
-def ordered_torque(least: float, margin: float) -> float:
-    """Rated output torque [N m] with which a gear is ordered that needs at `least` such a one [N m]: it leaves the
-    `margin` free above it, and is rounded up to three digits, as it is printed."""
-    torque = least / (1.0 - margin)
-    step = 10.0 ** (math.floor(math.log10(torque)) - 2) if torque > 0.0 else 1.0
-    return float(f"{math.ceil(torque / step * (1.0 - 1e-9)) * step:.6g}")
+def ordered_torque(least: float) -> float:
+    """Rated output torque [N m] with which a gear is ordered that needs at `least` such a one [N m]: rounded up to
+    three digits, as it is printed."""
+    step = 10.0 ** (math.floor(math.log10(least)) - 2) if least > 0.0 else 1.0
+    return float(f"{math.ceil(least / step * (1.0 - 1e-9)) * step:.6g}")
 
 
 def motor_side(xp: Any, t: Transmission, torque: Any, w: Any) -> Any:

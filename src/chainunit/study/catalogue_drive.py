@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core.engines import numpy_
 from ..drives.catalogue import CatalogueMotor
-from ..drives.gear_ratios import typical_efficiency
+from ..drives.gear_ratios import GearUnit, gear_unit, typical_efficiency
 from ..drives.gearing import Transmission, motor_side
 from ..drives.induction_motor import Inverter
 from ..drives.nameplate import Nameplate
@@ -22,6 +22,10 @@ from .drive_tables import DriveTables
 
 SLIP = "starter.inverter.slip"
 """Key of the slip compensation."""
+
+
+_NO_GEAR = 0.05
+"""Relative difference of a ratio to 1 up to which the machine turns with the motor: nobody makes such a gear."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +50,8 @@ def catalogue_drive(
     gear_ratio: float | None = None,
     offer: GearOffer = HELICAL,
 ) -> Drive:
-    """The motor with the gear ratio at which the crank has its speed, or with the ratio that the file gives.
+    """The motor with the gear ratio at which the crank has its speed, or with the ratio that the file gives; without
+    a gear where that ratio is about 1.
 
     Parameters
     ----------
@@ -77,6 +82,8 @@ def catalogue_drive(
         if gear_ratio is None:
             ratio = speed / w
         drag = (mean - float(np.mean(crank_torque)) / ratio) / speed
+    if gear_ratio is None and offer.kind != "belt" and abs(ratio - 1.0) <= _NO_GEAR:
+        return catalogue_drive(tables, machine, turn, motor, ambient, 1.0, offer)
     p = with_starter(tables, p, plate)
     if ambient is not None:
         p = replace(p, ambient=replace(p.ambient, T=ambient))
@@ -88,6 +95,7 @@ def catalogue_drive(
         rated_current=plate.rated_current,
         gear_inertia=tables.gear.J,
         gear_friction=drag,
+        transmission=transmission_of(tables, ratio, offer),
         star_delta=tables.starter.star_delta if tables.start == "star-delta" else None,
     )
 
@@ -98,8 +106,19 @@ def gear_with(tables: DriveTables, ratio: float, offer: GearOffer = HELICAL) -> 
     gear, given = tables.gear, tables.given
     if "gear.efficiency" in given:
         return replace(gear, ratio=ratio)
-    is_made = "gear.ratio" in given or offer.is_made
-    return replace(gear, ratio=ratio, efficiency=typical_efficiency(offer.kind, ratio, is_made))
+    return replace(
+        gear, ratio=ratio, efficiency=typical_efficiency(offer.kind, ratio, _is_made(tables, offer))
+    )
+
+
+def transmission_of(tables: DriveTables, ratio: float, offer: GearOffer) -> str:
+    """The parts between motor and machine in a noun, see `Drive.transmission`."""
+    unit = gear_unit(offer.kind, ratio, _is_made(tables, offer))
+    return GearUnit.noun if unit is None else unit.noun
+
+
+def _is_made(tables: DriveTables, offer: GearOffer) -> bool:
+    return "gear.ratio" in tables.given or offer.is_made
 
 
 def with_starter(tables: DriveTables, p: Any, plate: Nameplate) -> Any:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
+
+import numpy as np
 
 from ..core.errors import InputError
 from ..core.quantities import Layout
@@ -70,6 +73,9 @@ class Drive:
     gear_friction: float = 0.0
     """inertia [kg m2] and friction [N m s/rad] of the gear of a catalogue motor, at the motor's shaft"""
 
+    transmission: str = "gear"
+    """its parts in a noun: "gear", "belt", "belt and gear", or "coupling" of a machine that turns with the motor"""
+
     gear_name: str = ""
     """designation of the gear, if it is one of a catalogue"""
 
@@ -87,6 +93,11 @@ class Drive:
     foreign: FmuComponent | None = None
     """the motor, if it is a foreign FMU; then `motor` is `Motor` itself, of which only the terminals are
     known, and there are no `parameters`"""
+
+    @property
+    def is_geared(self) -> bool:
+        """Whether a gear is between motor and machine."""
+        return "gear" in self.transmission
 
     @property
     def ratio(self) -> float:
@@ -234,6 +245,16 @@ class Drive:
         """Time in a start from rest from which the motor is in delta [s]; 0 without star."""
         starter = self.star_delta
         return 0.0 if starter is None else float(starter.time + starter.pause + CONTACTOR_EDGE)
+
+    def relay_current(self, time: Any, current: Any) -> Any:
+        """The current of the windings [A], times sqrt(3), for the `current` of the line [A] over the `time` of a run
+        from rest [s], all of shape (n,): in star the whole current of the line is in the windings, in delta 1/sqrt(3)
+        of it. A relay in the phases of the delta is set by it; see `chainunit.study.relay`."""
+        if self.star_delta is None:
+            return current
+        return current * np.where(
+            time < self.star_delta.time + 0.5 * self.star_delta.pause, math.sqrt(3.0), 1.0
+        )
 
     def switching(self) -> dict[str, Any]:
         """The signals of the contactor and of the connection in a start from rest."""

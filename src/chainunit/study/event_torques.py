@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from .event import Role
 from .record import StudyRecord
-from .torques import DutyPeak, PeakOf, duty_peak, on_coupling
+from .torques import DutyPeak, PeakOf, at_gear, duty_peak, on_coupling, quasi_static_peak
 from .verdict import STEADY
 
 if TYPE_CHECKING:
@@ -26,6 +26,19 @@ def peaks_in_events(study: StudyRecord, *roles: Role, of: PeakOf = on_coupling) 
         for name in study.event
         if name in study.runs and (not roles or events[name].role in roles)
     }
+
+
+def gear_peaks(study: StudyRecord) -> dict[str, float]:
+    """Peak torque at the output of the gear in the start-up and in each event [N m], by the name of the run. Where
+    the supply is switched, in starts and in disturbances, it is the one by load and acceleration."""
+    events = study.config.events
+    peaks = {"start_up": quasi_static_peak(study.drive, study.runs["start_up"])}
+    for name in study.event:
+        if name in study.runs:
+            is_switched = events[name].from_rest or events[name].role is Role.DISTURBANCE
+            of = quasi_static_peak if is_switched else at_gear
+            peaks[name] = of(study.drive, from_event_on(study, name))
+    return peaks
 
 
 def running_peak(study: StudyRecord, of: PeakOf = on_coupling) -> DutyPeak:

@@ -43,7 +43,7 @@ class GearFindings(Findings):
     def remark(self, study: StudyRecord) -> None:
         """The loss beside the power of the machine, and its parts."""
         loss = self.loss
-        text = "The gear takes {total} in steady running"
+        text = f"The {study.drive.transmission} takes {{total}} in steady running"
         if loss.share is not None:
             text += ", {share} of the {net_power} that the machine takes in the mean"
         text += (
@@ -51,8 +51,8 @@ class GearFindings(Findings):
         )
         if loss.passed_power > SWINGS * loss.net_power:
             text += (
-                " The machine swings energy to and fro, {passed_power} in the mean of both ways, and the teeth lose "
-                "their share of each way."
+                " The machine swings energy to and fro, {passed_power} in the mean of both ways, and each way "
+                "costs its share."
             )
         study.note(
             "gear loss",

@@ -92,7 +92,7 @@ def _relay(w: Window) -> float | None:
     if setting is None or w.trip is not None:
         return None
     assert w.steady is not None
-    current = w.value(w.current)
+    current = w.drive.relay_current(w.run["time"].values, w.value(w.current))
     before, lasts = w.steady.rms(w.current), lasting_current(current)
     return relay_trip(w.since, current, setting, before, lasts, w.relay_class, TRIPS_AT)
 

@@ -262,7 +262,7 @@ class Runner:
         if time is None or rated is None or drive.follows:
             return
         rise = run.sel(time=slice(None, time))
-        current = rise[f"motor.{drive.motor.current}"].values
+        current = drive.relay_current(rise["time"].values, rise[f"motor.{drive.motor.current}"].values)
         study.relay_class = start_class(rise["time"].values, current, rated)
         if study.proposal is not None:
             study.relay_class = max(study.relay_class, study.proposal.start_class)

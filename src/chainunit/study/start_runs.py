@@ -20,7 +20,7 @@ from .event import Event
 from .measures import STARTED, time_to_start
 from .relay import start_class
 from .rig import Rig, join
-from .torques import PeakOf, at_gear, on_coupling
+from .torques import CURVE, PeakOf, at_gear, on_coupling, quasi_static_peak
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,7 +40,10 @@ class StartNumbers:
     """A start from rest."""
 
     angle: Value = quantity("rad", "{driver} angle from which it starts")
-    gear_torque: Value = quantity("N.m", "largest torque at the output of the gear")
+    quasi_static: Value = quantity("N.m", "largest torque at the output of the gear by load and acceleration")
+    gear_torque: Value = quantity(
+        "N.m", "the same with the electromagnetic transient of the motor, for some milliseconds"
+    )
     coupling_torque: Value = quantity(
         "N.m", "largest torque on a coupling on the motor's shaft, at the {driver}"
     )
@@ -107,7 +110,7 @@ def _read(rig: Rig) -> list[str]:
     """The outputs that the numbers of a start and the peak of any torque of `PeakOf` follow from."""
     drive = rig.drive
     motor = [f"motor.{name}" for name in ("tau", "w", "a", "heat", drive.motor.current)]
-    names = dict.fromkeys([drive.crank_output("w")[0], *motor, *torque_names(drive.machine_bond)])
+    names = dict.fromkeys([drive.crank_output("w")[0], *motor, *CURVE, *torque_names(drive.machine_bond)])
     return [full for full in names if rig.gives(full)]
 
 
@@ -117,9 +120,10 @@ def _numbers(drive: Drive, angle: float, run: xr.Dataset, reached: float | None,
     relay, rated = None, drive.rated_current
     if reached is not None and rated is not None and not drive.follows:
         starting = time <= max(reached, drive.switched_until)
-        relay = start_class(time[starting], current[starting], rated)
+        relay = start_class(time[starting], drive.relay_current(time, current)[starting], rated)
     return StartNumbers(
         angle=angle,
+        quasi_static=quasi_static_peak(drive, run),
         gear_torque=at_gear(drive, run),
         coupling_torque=of(drive, run),
         start_time=reached,

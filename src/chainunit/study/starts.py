@@ -31,8 +31,13 @@ class StartFindings(Findings):
 
     @derived()
     def worst(self) -> StartNumbers:
-        """The start with the largest torque at the output of the gear."""
-        return max(self.starts, key=lambda start: start.gear_torque)
+        """The start with the largest torque at the output of the gear by load and acceleration."""
+        return max(self.starts, key=lambda start: start.quasi_static)
+
+    @derived("N.m")
+    def transient(self) -> float:
+        """The largest torque of all starts at the output of the gear, with the electromagnetic transient."""
+        return float(max(start.gear_torque for start in self.starts))
 
     @property
     def start_class(self) -> int:
@@ -58,36 +63,42 @@ class StartFindings(Findings):
     @derived("1")
     def over_running(self) -> float:
         """The largest torque of a start over that of running."""
-        return float(self.worst.gear_torque / self.running)
+        return float(self.worst.quasi_static / self.running)
 
     def remark(self, study: StudyRecord) -> None:
         """Warn of a start that the gear does not carry, or that puts much more on it than running does, and of angles
         from which the motor does not start."""
         worst, start = self.worst, _STARTERS[study.config.drive.start]
         numbers: dict[str, Any] = {
-            "torque": (worst.gear_torque, "N.m"),
+            "torque": (worst.quasi_static, "N.m"),
             "running": (self.running, "N.m"),
             "over": (self.over_running, "1"),
             "angle": (worst.angle, "rad"),
+            "transient": f"{transient_words(study)}: {number(self.transient, 'N.m')}",
         }
-        if worst.gear_torque > self.limit:
+        if worst.quasi_static > self.limit:
             study.warn(
                 "start at gear",
-                "{start} from {a driver} angle of {angle} puts {torque} on the output of the gear; the gear permits "
-                "{limit} in a start (gear.torque_limit x gear.start_factor): {remedy}.",
+                "{start} from {a driver} angle of {angle} puts {torque} on the output of the gear by load and "
+                "acceleration; the gear permits {limit} in a start (gear.torque_limit x gear.start_factor): "
+                "{remedy}. The {transient}.",
                 "start_up",
                 start=start,
                 limit=(self.limit, "N.m"),
                 remedy=SOFTER[study.config.drive.start],
                 **numbers,
             )
-        elif math.isinf(self.limit) and worst.gear_torque > START_FACTOR * self.running:
+        elif (
+            study.drive.is_geared
+            and math.isinf(self.limit)
+            and worst.quasi_static > START_FACTOR * self.running
+        ):
             study.warn(
                 "start at gear",
-                "{start} from {a driver} angle of {angle} puts {torque} on the output of the gear, {over} times the "
-                "{running} of {running_in}. Gears of catalogues commonly permit about {large} times their rated "
-                "torque in a start: choose the gear by this torque (gear.torque_limit, gear.start_factor), or "
-                "{remedy}.",
+                "{start} from {a driver} angle of {angle} puts {torque} on the output of the gear by load and "
+                "acceleration, {over} times the {running} of {running_in}. Gears of catalogues commonly permit about "
+                "{large} times their rated torque in a start: choose the gear by this torque (gear.torque_limit, "
+                "gear.start_factor), or {remedy}. The {transient}.",
                 "start_up",
                 start=start,
                 large=f"{START_FACTOR:g}",
@@ -105,6 +116,16 @@ class StartFindings(Findings):
                 if study.config.drive.start == "soft"
                 else "",
             )
+
+
+def transient_words(study: StudyRecord) -> str:
+    """The title of the largest torque of a start at the output of the gear, with the electromagnetic transient."""
+    line = (
+        "with the stiffness of the driveline"
+        if study.drive.line
+        else "an upper bound, as the shafts are rigid"
+    )
+    return f"electromagnetic transient of the motor puts more on it for some milliseconds ({line})"
 
 
 _STARTERS = {

@@ -7,9 +7,13 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from ..core.engines import numpy_
+from ..drives.induction_steady import steady
 from .arrays import peak
 from .drive import Drive
-from .readings import crank_torque
+from .readings import crank_torque, load_inertia
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,6 +38,35 @@ def gear_torque(drive: Drive, run: xr.Dataset) -> Any:
 def at_gear(drive: Drive, run: xr.Dataset) -> float:
     """Peak torque in a run at the output of the gear [N m], see `gear_torque`."""
     return peak(gear_torque(drive, run))
+
+
+CURVE = ("motor.v", "motor.supply.frequency", "machine.tau_bias", "machine.J")
+"""The outputs of a run, beside the speed, that `quasi_static_torque` follows from."""
+
+
+def quasi_static_torque(drive: Drive, run: xr.Dataset) -> Any:
+    """Torque in a run at the output of the gear [N m], shape (time,), by load and acceleration: the motor gives the
+    torque of its curve at the present speed, voltage and frequency, and accelerates rotor and machine as one body.
+
+    It lacks the electromagnetic transient of a motor that is switched on, some periods of the line long: play and
+    stiffness of a real line change its peaks. The speed of the run overshoots by this transient; the curve brakes no
+    more there than the load drives. An inverter switches nothing: its torque is that of the run, as is that of a
+    machine that gives no load port."""
+    if drive.follows or any(name not in run for name in CURVE):
+        return gear_torque(drive, run)
+    p, ratio = drive.fmu_parameters, drive.ratio
+    voltage, frequency = run["motor.v"].values / p.supply.V, run["motor.supply.frequency"].values
+    motor = steady(numpy_(), p, run["motor.w"].values, voltage, frequency, p.ambient.T).tau
+    inertia = load_inertia(drive, run)
+    load = run["machine.tau_bias"].values * drive.ratio_at_machine / ratio
+    motor = np.maximum(motor, np.minimum(load, 0.0))
+    return ratio * (load + inertia * (motor - load) / (p.rotor.J + inertia))
+
+
+def quasi_static_peak(drive: Drive, run: xr.Dataset) -> float:
+    """Peak torque in a run at the output of the gear by load and acceleration [N m], see `quasi_static_torque`; at
+    most that of the run, whose motor may speed up faster than its field follows the curve."""
+    return min(peak(quasi_static_torque(drive, run)), at_gear(drive, run))
 
 
 @dataclass(frozen=True)

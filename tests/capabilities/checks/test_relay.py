@@ -15,6 +15,7 @@ from command import chainunit
 from chainunit.capabilities.checks.relay import RelaySetting, relay_findings, relay_rows
 from chainunit.core.errors import InputError
 from chainunit.report.blocks import at
+from chainunit.study.choice import drive_of
 from chainunit.study.config import parse
 from chainunit.study.relay import CLASSES, protecting_class, stall_trip, start_seconds
 
@@ -171,6 +172,21 @@ def test_the_numbers_of_a_study_follow_from_its_run(done):
         assert all(at(result, place)["value"] is not None for place in row["numbers"].values())
     page = (done / "report.html").read_text("utf-8")
     assert "Classes of the thermal relay" in page
+
+
+def test_a_relay_in_the_phases_of_a_delta_carries_the_whole_current_of_star():
+    """Twice the rated current of the line for 6 s in star is 2 sqrt(3) times that of a winding: 6 s (3.46/7.2)^2 =
+    1.39 s at 7.2 times the setting, three times as much as in the line; in delta both places see the same."""
+    motor = '[system]\nmotor = "IE3 4-pole 4 kW, 112M"\n[starter]\nstar_delta = { time = 6 }'
+    drive = drive_of(parse(f'start = "star-delta"\n{motor}'))
+    time = np.linspace(0.0, 8.0, 8001)
+    current = np.where(time < 6.0, 2.0, 0.0)
+    in_line, in_phases = (start_seconds(time, i, 1.0) for i in (current, drive.relay_current(time, current)))
+    assert in_phases == pytest.approx(6.0 * 12.0 / 7.2**2, rel=1e-3)
+    assert in_phases == pytest.approx(3.0 * in_line)
+    late = np.where(time > 7.0, 5.0, 0.0)
+    assert np.array_equal(drive.relay_current(time, late), late)
+    assert parse('[relay]\nplace = "line"').plans["checks"].relay.is_in_phases is False
 
 
 def test_a_relay_of_an_unknown_class_and_of_an_fmu_are_refused():

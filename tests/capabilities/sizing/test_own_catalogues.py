@@ -153,7 +153,7 @@ def test_the_smallest_gear_that_carries_is_chosen_and_the_others_are_rejected_wi
     (small,) = rejected
     assert small.sold.designation == "small" and small.verdict is Standing.REJECTED
     over = {name for name, check in small.checks.items() if check.over}
-    assert over and over <= {"gear", "gear_start"}
+    assert over and over <= {"gear", "gear_start", "gear_service"}
     # the data of the reason: value, limit and utilisation of each check
     data = as_data(small)["checks"]["gear"]
     assert data["utilisation"]["value"] == pytest.approx(data["value"]["value"] / data["limit"]["value"])
@@ -186,7 +186,7 @@ def test_a_gear_that_just_carries_an_overload_is_not_too_weak(sized, monkeypatch
     """The torque to order is rounded up, to 501 N m here; the gear is judged by the one that it has to carry."""
     _, found = sized
     load = GearLoad(1000.4, "an overload", 2.0)
-    order = GearOrder(ordered_torque(load.rated, 0.0), {"overload": load}, ())
+    order = GearOrder(ordered_torque(load.rated), {"overload": load}, ())
     monkeypatch.setattr(findings, "gear_order", lambda *of: order)
     data = dataclasses.replace(found.best.sold.data, rated_torque=rated)
     best = dataclasses.replace(found.best, sold=dataclasses.replace(found.best.sold, data=data))
@@ -390,7 +390,7 @@ def test_a_gear_that_an_overload_breaks_is_told_with_a_stronger_one(tmp_path):
         target = tmp_path / "catalogue" / f"{name}.csv"
         target.parent.mkdir(exist_ok=True)
         target.write_text((EXAMPLE.parent / "catalogue" / f"{name}.csv").read_text("utf-8"), encoding="utf-8")
-    text = 'static_inertia_runs = "never"\n' + text.replace(line, "")
+    text = 'static_inertia_runs = "never"\n' + text.replace(line, "service_factor = 1")
     (tmp_path / "weak.toml").write_text(text, encoding="utf-8")
     chainunit("study", "weak.toml", "-o", "out", cwd=tmp_path)
     result = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))

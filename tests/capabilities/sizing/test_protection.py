@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -24,8 +25,9 @@ from chainunit.capabilities.sizing.alternatives import (
 )
 from chainunit.capabilities.sizing.coupling import effects, recommended_setting
 from chainunit.capabilities.sizing.coupling_words import coupling_sentence, way_words
-from chainunit.capabilities.sizing.page import _best, _starter
+from chainunit.capabilities.sizing.page import _best, _relay, _starter
 from chainunit.capabilities.sizing.protection import CouplingEffect, Obstacle, Setting, Way
+from chainunit.capabilities.sizing.result import _relay as _relay_of
 from chainunit.core.engines import MATH
 from chainunit.core.errors import InputError
 from chainunit.drives.induction_motor import InductionMotor
@@ -33,6 +35,7 @@ from chainunit.drives.induction_steady import steady
 from chainunit.drives.motor import T_RATED
 from chainunit.drives.slip_clutch import SlipClutch
 from chainunit.machines.chain_unit import SIDES
+from chainunit.reading.results import as_data
 from chainunit.reading.text import entry, number
 from chainunit.report import blocks, terminal
 from chainunit.study import config, run
@@ -332,9 +335,11 @@ def test_a_drive_whose_start_is_harder_than_its_shocks_has_no_coupling(on_line):
     assert "With a soft starter" in said and "slip clutch" in said
     # what has to be ordered, with the reason where nothing is
     plate, gear = sizing_of(on_line).best.motor.nameplate, as_dict(on_line)["sizing"]["gear"]
-    start = on_line.findings["starts"].worst.gear_torque
-    assert gear["rated_torque"]["value"] == pytest.approx(start / 2.0 / 0.9, rel=0.01)
-    assert gear["rated_torque"]["value"] >= max(gear["running"]["value"], start / 2.0) / 0.9
+    start, fB = on_line.findings["starts"].worst.quasi_static, gear["service_factor"]["value"]
+    loads = gear["running"]["value"] / 0.9, start * fB / 2.0, gear["overload"]["value"] / 2.0 / 0.9
+    rated = plate.torque * on_line.drive.ratio * on_line.config.drive.gear.efficiency
+    assert gear["rated_torque"]["value"] == pytest.approx(max(*loads, fB * rated), rel=0.01)
+    assert gear["transient"]["value"] == on_line.findings["starts"].transient > 1.3 * start
     ordered = f"gear with a rated output torque of at least {gear['rated_torque']['value']:.0f} N m"
     assert f"{ordered}, decided by a start, in which" in said
     # without a coupling the gear carries the whole overload, with one what passes it; a gear for it is ordered
@@ -342,7 +347,7 @@ def test_a_drive_whose_start_is_harder_than_its_shocks_has_no_coupling(on_line):
     assert gear["overload"]["value"] == pytest.approx(block, rel=1e-3)
     quick = dataclasses.replace(on_line.config.drive.gear, start_factor=1.0)
     given = on_line.config.file.given | {"gear.start_factor"}
-    light = dataclasses.replace(on_line.findings["starts"].worst, gear_torque=1.0)
+    light = dataclasses.replace(on_line.findings["starts"].worst, quasi_static=1.0)
     gentle = dataclasses.replace(on_line.findings["starts"], starts=(light,))
     own = dataclasses.replace(
         on_line,
@@ -715,12 +720,27 @@ def test_the_protection_of_a_chosen_motor_is_told_once(protection, ending):
     assert terminal.plain_line(sentence.line).endswith(ending)
 
 
+def test_a_relay_of_a_star_delta_starter_has_its_place():
+    """It sits in the phases of the delta, where 8.04 A of the line are 4.64 A; that of the line stood alone."""
+    started = SimpleNamespace(drive=SimpleNamespace(follows=False, star_delta=True), relay_class=10)
+    relay = as_data(_relay_of(started, 8.04), titled=True)
+    assert relay["relay_current"]["value"] == pytest.approx(4.642, abs=1e-3)
+    assert "in the phases of the delta" in relay["relay_current"]["title"]
+    assert relay["line_current"]["value"] == 8.04 and "in the supply line" in relay["line_current"]["title"]
+    source = blocks.Source({"sizing": {"protection": {"trip_torque": entry(None, "N.m")} | relay}})
+    (words,) = map(terminal.plain_line, _relay(source))
+    assert words == "relay in the phases of the delta at 4.64 A (in the supply line 8.04 A), class 10"
+    started.drive.star_delta = None
+    assert "line_current" not in as_data(_relay_of(started, 8.04), titled=True)
+
+
 def test_the_order_names_the_starter():
     """The least rated current of an inverter stood in a note only, and a soft starter nowhere."""
     starter = {
         "inverter.boost": entry(0.05, "1", "percent"),
         "soft_start.voltage": entry(0.5, "1", "percent"),
         "soft_start.time": entry(1.0, "s"),
+        "star_delta.time": entry(3.0, "s"),
     }
     numbers = {
         "inverter_current": entry(45.4, "A"),
@@ -738,6 +758,13 @@ def test_the_order_names_the_starter():
         return "; ".join(map(terminal.plain_line, lines))
 
     assert said("soft") == "soft starter, 50 % voltage, 1 s"
+    # delta is for the voltage of the supply; the order did not name the winding
+    for voltage, winding, other in ((400.0, "400/690 V", "230/400 V"), (480.0, "480/830 V", "280/480 V")):
+        result["motor"] = {"rated_voltage": entry(voltage, "V")}
+        assert said("star-delta").startswith(
+            f"star-delta starter, 3 s in star; motor winding {winding}, in delta at the {voltage:g} V of the supply "
+            f"(one of {other}, "
+        )
     inverter = (
         "inverter of at least 45.4 A, boost 5 %, ramp 2 s; in running 50.3 Hz, 157 rad/s (1497 rev/min)"
     )

@@ -42,7 +42,7 @@ class CheckCapability(Capability):
             title="Thermal overload relay",
             follows={
                 "trip_class": "10, a heavier one if the start needs it, or 5 if 10 trips too late in a stall",
-                "setting": "the rated current of the motor",
+                "setting": "the rated current of the motor, in the phases of a delta 1/sqrt(3) of it",
                 "stall_time": "that of the nameplate",
                 "stall_current": "that of the nameplate",
             },

@@ -21,7 +21,7 @@ from ...drives.gearing import Transmission
 from ...reading.results import part, result
 from ...study.arrays import peak
 from ...study.bearings import driver_bearing, largest_load, mean_load, pin_force
-from ...study.event_torques import running_peak
+from ...study.event_torques import gear_peaks, running_peak
 from ...study.readings import crank_angle, shaft_power
 from ...study.record import StudyRecord
 from ...study.starts import StartFindings
@@ -50,7 +50,9 @@ class GearDuty:
     running: Value = quantity(
         "N.m", "torque of running beside the rating: Teq, or the largest torque without an exponent"
     )
-    largest: Value = quantity("N.m", "largest torque at the output, of all runs")
+    largest: Value = quantity(
+        "N.m", "largest torque at the output, of all runs, of starts by load and acceleration"
+    )
     power: Value = quantity("W", "mean of the size of the power in steady running")
     radial: Value = quantity("N", "largest reaction of the {driver}'s bearing in steady running")
     largest_radial: Value = quantity("N", "largest reaction of the {driver}'s bearing, of all runs")
@@ -200,10 +202,10 @@ def find(
         return None, [NotChecked("gear", "the motor is an FMU, whose torque is not known")]
     turns = study.steady
     torque = gear_torque(drive, turns)
-    most, run = largest(study, lambda run: gear_torque(drive, run))
+    most, run = max((peak, name) for name, peak in gear_peaks(study).items())
     starts = StartFindings.found_in(study)
-    if starts is not None and starts.worst.gear_torque > most:
-        most, run = starts.worst.gear_torque, "start_up"
+    if starts is not None and starts.worst.quasi_static > most:
+        most, run = starts.worst.quasi_static, "start_up"
     title, radial, largest_radial = ("", None, None) if separate else bearing_force(study, turns)
     equivalent = equivalent_torque(torque, crank_angle(drive, turns), table.exponent)
     load = GearDuty(

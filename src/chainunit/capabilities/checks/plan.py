@@ -17,6 +17,7 @@ from .pins import no_pin, pins_named, turning_pins
 from .section_plan import SectionPlan, read_sections
 from .tables import (
     BEARINGS,
+    IN_PHASES,
     KINDS,
     NEEDED,
     OF_PLAIN,
@@ -42,10 +43,12 @@ class BearingPlan:
 
 @dataclass(frozen=True)
 class RelayPlan:
-    """The values of the table [relay], and the name of the trip class; empty where the file gives none."""
+    """The values of the table [relay], the name of the trip class, empty where the file gives none, and whether the
+    relay of a star-delta starter is in the phases of the delta."""
 
     table: RelayTable = field(default_factory=RelayTable)
     trip_class: str = ""
+    is_in_phases: bool = True
 
 
 @dataclass(frozen=True)
@@ -106,7 +109,8 @@ def read_plan(reading: FileReading) -> CheckPlan:
 def _relay(reading: FileReading) -> RelayPlan:
     if "relay" not in reading.data:
         return RelayPlan()
-    return RelayPlan(reading.values["relay"], reading.form.relay.trip_class or "")
+    form = reading.form.relay
+    return RelayPlan(reading.values["relay"], form.trip_class or "", form.place == IN_PHASES)
 
 
 def _coupling(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -32,6 +32,9 @@ from ...study.relay import (
 from ...study.verdict import STEADY
 from .plan import RelayPlan
 from .row import CheckRow, NotChecked
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _CLAUSE = "IEC 60947-4-1, trip classes"
 _WHAT = "thermal overload relay"
@@ -139,19 +142,29 @@ def find(study: StudyRecord, plan: RelayPlan) -> tuple[RelayFindings | None, lis
         return None, [NotChecked(what, "the motor is controlled; its converter limits and protects it")]
     if why := _why_none(study):
         return None, [NotChecked(_WHAT, why)]
-    plate = None if study.plate is None else study.plate.nameplate
+    plate, drive = None if study.plate is None else study.plate.nameplate, study.drive
+    # a relay in the phases of a delta carries the current of a winding
+    in_phases = drive.star_delta is not None and plan.is_in_phases
+    share = 1.0 / math.sqrt(3.0) if in_phases else 1.0
     given = {
-        "setting": plan.table.setting or study.drive.rated_current or 0.0,
+        "setting": plan.table.setting or share * (drive.rated_current or 0.0),
         "stall_time": plan.table.stall_time or (plate.locked_time if plate else 0.0),
         "stall_current": plan.table.stall_current
-        or (plate.rated_current * plate.locked_current_ratio if plate else 0.0),
+        or (share * plate.rated_current * plate.locked_current_ratio if plate else 0.0),
     }
     if missing := [name for name, value in given.items() if not value]:
         return None, [NotChecked(_WHAT, f"the motor has no nameplate; add [relay] with {', '.join(missing)}")]
     assert study.start is not None
-    name, before = f"motor.{study.drive.motor.current}", study.answers[STEADY].current_rms
-    rise = study.runs["start_up"].sel(time=slice(None, study.start_end))
-    seconds = start_seconds(rise["time"].values, np.abs(rise[name].values), given["setting"])
+    before = share * study.answers[STEADY].current_rms
+
+    def current_of(run: xr.Dataset) -> Any:
+        current = np.abs(run[f"motor.{drive.motor.current}"].values)
+        return share * (drive.relay_current(run["time"].values, current) if in_phases else current)
+
+    # the change from star to delta is a part of the start
+    until = max(study.start_end or 0.0, drive.switched_until)
+    rise = study.runs["start_up"].sel(time=slice(None, until))
+    seconds = start_seconds(rise["time"].values, current_of(rise), given["setting"])
     runs: dict[str, tuple[Any, Any, float]] = {}
     for event in study.overloads:
         # behind a coupling that opens no load is left that could trip the relay
@@ -159,7 +172,7 @@ def find(study: StudyRecord, plan: RelayPlan) -> tuple[RelayFindings | None, lis
             run = from_event_on(study, event)
             from_rest = study.config.events[event].from_rest
             time = run["time"].values - study.event[event]
-            runs[event] = time, np.abs(run[name].values), 0.0 if from_rest else before
+            runs[event] = time, current_of(run), 0.0 if from_rest else before
     numbers = RelaySetting(before=before, start_seconds=seconds, **given)
     found = relay_findings(plan.trip_class, numbers, runs, study.relay_class)
     return found, list(relay_rows(found, {event: study.title_of(event) for event in found.events}))

@@ -90,7 +90,10 @@ class RelayTable:
     """A thermal overload relay, and the stall of the motor that it protects."""
 
     setting: Value = quantity(
-        "A", "setting of the relay; 0: the rated current of the motor", default=0.0, min=0.0
+        "A",
+        "setting of the relay; 0: the rated current of the motor, in the phases of a delta 1/sqrt(3) of it",
+        default=0.0,
+        min=0.0,
     )
     stall_time: Value = quantity(
         "s",
@@ -104,10 +107,22 @@ class RelayTable:
     )
 
 
+IN_PHASES = "phases"
+RELAY_PLACES = (IN_PHASES, "line")
+"""The places of the relay of a star-delta starter."""
+
 RELAY_KEYS = {
     "trip_class": (
         Literal[tuple(each.name for each in CLASSES)],
         Field(None, description="trip class of IEC 60947-4-1"),
+    ),
+    "place": (
+        Literal[RELAY_PLACES],
+        Field(
+            IN_PHASES,
+            description="place of the relay of a star-delta starter: in the phases of the delta, set to 1/sqrt(3) of "
+            "the rated current, or in the supply line",
+        ),
     ),
 }
 """Keys of [relay] that are no quantities, as pydantic fields."""

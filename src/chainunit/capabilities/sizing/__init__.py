@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from ...core.errors import InputError
@@ -39,7 +40,11 @@ class SizingCapability(Capability):
             before="gear",
             title="Demands on the motor",
             apart=True,
-            follows={"inertia_ratio": "none"},
+            follows={
+                "inertia_ratio": "none",
+                "hours": "usage.hours, if the file has it, else 16",
+                "load_class": "by the inertia of the machine over that of the motor",
+            },
             order=(("poles_least", ">=", "poles_most"), ("ambient", ">", "temperature")),
         )
     }
@@ -53,21 +58,29 @@ class SizingCapability(Capability):
         yield Rule("motor", is_sized, another, has_entries("motor"))
         yield Rule("feed_forward", is_sized, another, is_one_of("feed_forward", True))
         yield Rule("run.winding_temperature", is_sized, "is sizing.temperature with [sizing]; leave it out")
+        without_gear = is_one_of("sizing.gear_kind", "none")
+        for key in ("gear", "sizing.ratios"):
+            words = 'is of a gear, and sizing.gear_kind = "none"; leave out one of the two'
+            yield Rule(key, without_gear, words, has_entries(key))
         yield Rule("machine.ratio", is_sized, "[sizing] finds it; to have it kept, give gear.ratio")
 
     def plan(self, reading: FileReading) -> SizingPlan | None:
         """The plan of the table."""
         if "sizing" not in reading.data:
             return None
-        form = reading.form.sizing
+        form, demands = reading.form.sizing, reading.values["sizing"]
+        # the table of another capability, if the program has it
+        if "hours" in reading.data.get("usage", {}) and "hours" not in reading.data["sizing"]:
+            demands = replace(demands, hours=reading.values["usage"].hours)
         return SizingPlan(
-            reading.values["sizing"],
+            demands,
             form.gear_kind,
             form.ratio_series,
             form.ratios,
             form.objective,
             form.own_only,
             form.separate_bearing,
+            form.load_class,
         )
 
     def faults(self, config: Config) -> Iterable[InputError]:

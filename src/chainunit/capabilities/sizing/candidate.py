@@ -23,8 +23,9 @@ TOLERANCES = ("crank_speed", "gear_speed")
 """Checks of a speed, which a drive may use wholly: the gear's ratio takes it, and no load does."""
 _HARD = ("gear_start",)
 """Checks of a limit that leaves room by itself, which a drive may use wholly, too: a gear permits a multiple of its
-rated torque in a start. A margin on top would prefer two gear units, or a flywheel, to a shock of 91 % of it."""
-_WHOLLY = (*TOLERANCES, *_HARD)
+rated torque in a start. A margin on top would prefer two gear units, or a flywheel, to a shock of 91 % of it. The
+service factor of a gear is a margin, too."""
+_WHOLLY = (*TOLERANCES, *_HARD, "gear_service")
 
 
 FIELD_WEAKENING = 1.1
@@ -106,6 +107,8 @@ class TrialResult:
     """the largest torque at the crank in steady running, and while all feed moves to either side and stays there;
     None where the run failed"""
     fluctuation: float = math.nan
+    inertia_factor: float = math.nan
+    """inertia of the machine over that of the motor with its flywheel, both at the motor's shaft"""
     stall_angle: float | None = None
     """crank angle at which the load stalls the motor [rad]; None for a motor that starts"""
 

@@ -29,7 +29,7 @@ from .gear_tables import with_gear
 from .parts import OrderedPart, PartsList, parts_list
 from .preference import order_words, poles_rank
 from .protection import Alternative, Obstacle, Setting
-from .result import drive_protection, ordered_gear
+from .result import drive_protection, ordered_belt, ordered_gear
 from .table import Sizing, SizingPlan
 
 INSUFFICIENT = "No motor of the catalogue fits; all runs are with the nearest, which is insufficient."
@@ -175,7 +175,8 @@ class SizingFindings(Findings):
         listed = parts_list(items, unknown, flywheel, wanted)
         if (needed := self._gear_needed(study, setting)) is not None:
             order, remedy = needed
-            words = f"{order.decides.words} takes one that permits {number(order.rated, 'N.m')} in running"
+            decides = order.decides
+            words = f"{decides.words}{decides.rule} takes one that permits {number(order.rated, 'N.m')} in running"
             listed = replace(listed, open=[f"The gear is too weak: {words}; {remedy}.", *listed.open])
         if best.motor.is_packaged:
             words = "The motor is one of the packaged table, which is typical data: nobody sells it."
@@ -186,12 +187,11 @@ class SizingFindings(Findings):
         """Its declared parts, with the gear to order and the protection."""
         setting, rated = self.coupling(study), self.best.motor.nameplate.rated_current
         ordered: dict[str, Any] = {
-            "gear": ordered_gear(study, setting, self.plan.demands.margin),
+            "gear": ordered_gear(study, setting, self.plan, self.best.trial.inertia_factor),
             "protection": drive_protection(study, setting, self.alternatives, rated),
         }
-        parts = self.parts(study, setting)
-        if parts is not None:
-            ordered["parts"] = parts
+        parts, belt = self.parts(study, setting), ordered_belt(study, self.plan, self.best.trial)
+        ordered |= {name: each for name, each in (("belt", belt), ("parts", parts)) if each is not None}
         return super().data(study) | {
             name: {} if each is None else as_data(each, titled=True, driver=study.driver_noun)
             for name, each in ordered.items()
@@ -218,7 +218,8 @@ class SizingFindings(Findings):
         """The gear to order and the remedy in words, where it has to carry more than the chosen one of the catalogue;
         else None."""
         sold = self.best.sold
-        order = None if sold is None else gear_order(study, setting, 0.0)
+        service = self.plan.gear_factor(self.best.trial.inertia_factor)
+        order = None if sold is None else gear_order(study, setting, 0.0, service)
         if sold is None or order is None:
             return None
         # the torque to order is rounded up

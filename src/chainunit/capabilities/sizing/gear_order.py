@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ...drives.gearing import ordered_torque
 from ...study.event import Role
-from ...study.event_torques import peaks_in_events, running_peak, running_words
+from ...study.event_torques import gear_peaks, running_peak, running_words
 from ...study.judgement import wrong_runs
 from ...study.record import StudyRecord
 from ...study.starts import StartFindings
@@ -17,12 +18,13 @@ from .protection import Setting
 
 @dataclass(frozen=True)
 class GearLoad:
-    """The largest torque on the output of the gear in one kind of duty [N m], its case in `words`, and how many times
-    its rated torque a gear may carry in it."""
+    """The largest torque on the output of the gear in one kind of duty [N m], its case in `words`, how many times
+    its rated torque a gear may carry in it, and the `rule` behind that in words, to follow the case."""
 
     torque: float
     words: str
     times: float = 1.0
+    rule: str = ""
 
     @property
     def rated(self) -> float:
@@ -32,12 +34,14 @@ class GearLoad:
 
 @dataclass(frozen=True)
 class GearOrder:
-    """The rated output torque to order [N m]; the loads by name ("running", and "start" and "overload" where there
-    are); and the overloads that were `left_out`, as their energy balance is not kept."""
+    """The rated output torque to order [N m]; the loads by name ("running" and "service", and "start" and "overload"
+    where there are); the overloads that were `left_out`, as their energy balance is not kept; and the largest torque
+    of a start with the electromagnetic transient [N m], None without starts."""
 
     rated: float
     loads: dict[str, GearLoad]
     left_out: tuple[str, ...]
+    transient: float | None = None
 
     @property
     def decides(self) -> GearLoad:
@@ -45,31 +49,56 @@ class GearOrder:
         return max(self.loads.values(), key=lambda load: load.rated)
 
 
-def gear_order(study: StudyRecord, setting: Setting | None, margin: float) -> GearOrder | None:
-    """The gear to order, which leaves the `margin` free, with a coupling of that `setting`; None without steady
-    running, and for an insufficient motor. A start and an overload may put `gear.start_factor` times the rated torque
-    on it."""
+def gear_order(
+    study: StudyRecord, setting: Setting | None, margin: float, service: float
+) -> GearOrder | None:
+    """The gear to order, with a coupling of that `setting`; None without steady running, and for an insufficient
+    motor.
+
+    Running and overloads leave the `margin` free. The rated torque of the motor counts times the `service` factor. A
+    start counts by load and acceleration, times the service factor; a start and an overload may put
+    `gear.start_factor` times the rated torque on the gear."""
     if study.insufficient or STEADY not in study.answers:
         return None
-    running, factor = running_peak(study, at_gear), study.config.drive.gear.start_factor
-    loads = {"running": GearLoad(running.torque, running_words(study, running.run))}
-    if starts := StartFindings.found_in(study):
-        loads["start"] = GearLoad(starts.worst.gear_torque, "a start", factor)
-    peaks, wrong = _overloads(study, setting), wrong_runs(study)
-    if kept := {name: peak for name, peak in peaks.items() if name not in wrong}:
-        name = max(kept, key=lambda each: kept[each])
+    gear, wrong, peaks = study.config.drive.gear, wrong_runs(study), gear_peaks(study)
+    running, factor, kept = running_peak(study, at_gear), gear.start_factor, 1.0 - margin
+    loads = {"running": GearLoad(running.torque, running_words(study, running.run), kept)}
+    times = f" times the service factor {service:.3g}"
+    if study.plate is not None:
+        rated = study.plate.nameplate.torque * study.drive.ratio * gear.efficiency
+        loads["service"] = GearLoad(rated, "the motor at its rating", 1.0 / service, times)
+    found = StartFindings.found_in(study)
+    starts, overloads = _starts(study, found, peaks), _overloads(study, setting, peaks)
+    left_out = tuple(name for name in wrong if name in overloads)
+    if starts := {name: torque for name, torque in starts.items() if name not in wrong}:
+        name = max(starts, key=lambda name: starts[name])
+        words = f"a start ({study.title_of(name)})" if name else "a start"
+        rule = f", in which it may carry {factor:g} times its rated torque,{times}"
+        loads["start"] = GearLoad(starts[name], words, factor / service, rule)
+    if overloads := {name: torque for name, torque in overloads.items() if name not in wrong}:
+        name = max(overloads, key=lambda name: overloads[name])
         with_coupling = setting is not None and setting.torque and name in setting.effects
         words = f"an overload ({study.title_of(name)}{', with the coupling' if with_coupling else ''})"
-        loads["overload"] = GearLoad(kept[name], words, factor)
+        rule = f", in which it may carry {factor:g} times that"
+        loads["overload"] = GearLoad(overloads[name], words, factor * kept, rule)
     least = max(load.rated for load in loads.values())
-    left_out = tuple(name for name in wrong if name in peaks)
-    return GearOrder(ordered_torque(least, margin), loads, left_out)
+    transient = None if found is None else found.transient
+    return GearOrder(ordered_torque(least), loads, left_out, transient)
 
 
-def _overloads(study: StudyRecord, setting: Setting | None) -> dict[str, float]:
-    """Peak torque at the output of the gear in each shock and disturbance [N m], by name: that which passes the
-    coupling where one is recommended."""
-    peaks = peaks_in_events(study, Role.SHOCK, Role.DISTURBANCE, of=at_gear)
+def _starts(study: StudyRecord, found: StartFindings | None, peaks: Mapping[str, float]) -> dict[str, float]:
+    """Peak torque of starts at the output of the gear by load and acceleration [N m], of the `peaks` by the name of
+    their event; that of the starts from all angles has no name."""
+    events = study.config.events
+    own = {name: peak for name, peak in peaks.items() if name in events and events[name].from_rest}
+    return own if found is None else {"": found.worst.quasi_static} | own
+
+
+def _overloads(study: StudyRecord, setting: Setting | None, peaks: Mapping[str, float]) -> dict[str, float]:
+    """Peak torque at the output of the gear in each shock and disturbance [N m], of the `peaks` by name: that which
+    passes the coupling where one is recommended."""
+    events, roles = study.config.events, (Role.SHOCK, Role.DISTURBANCE)
+    own = {name: peak for name, peak in peaks.items() if name in events and events[name].role in roles}
     if setting is not None and setting.torque is not None:
-        peaks |= {name: effect.with_coupling for name, effect in setting.effects.items()}
-    return peaks
+        own |= {name: effect.with_coupling for name, effect in setting.effects.items()}
+    return own

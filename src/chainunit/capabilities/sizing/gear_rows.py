@@ -147,6 +147,7 @@ def spent(c: Candidate, tried: Iterable[Candidate]) -> Candidate | None:
     limits = {
         "gear": transmission.torque_limit,
         "gear_start": transmission.start_limit,
+        "gear_service": transmission.torque_limit,
         "gear_thermal": of.thermal_power,
         "gear_overhung": of.overhung_load,
         "gear_speed": of.largest_speed,

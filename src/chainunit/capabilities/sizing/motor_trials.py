@@ -15,7 +15,7 @@ from pathlib import Path
 from ...core.errors import InterruptedRunError, RunError
 from ...drives.catalogue import CatalogueMotor
 from ...drives.catalogue_gears import CatalogueGear
-from ...drives.gear_ratios import gear_unit, next_ratio, ratio_on_offer
+from ...drives.gear_ratios import DIRECT, gear_unit, next_ratio, ratio_on_offer
 from ...study.catalogue_drive import catalogue_drive, with_inertia
 from ...study.drive import Drive
 from ...study.limits import SPEED_DEVIATION
@@ -92,11 +92,13 @@ class MotorTrials:
                 motor, drive, margin=plan.demands.margin, unit=unit_of(gear), series="catalogue", sold=gear
             )
         if chosen is not None:
-            series = "own list" if plan.ratios else "R80"
+            series = "own list" if plan.offered else "R80"
         elif not self.has_given_ratio:
-            ratio, series = ratio_on_offer(drive.ratio, plan.ratio_series, plan.ratios, _TOLERANCE)
+            ratio, series = ratio_on_offer(drive.ratio, plan.ratio_series, plan.offered, _TOLERANCE)
             drive = with_ratio(gear_ratio=ratio)
         unit = gear_unit(plan.gear_kind, drive.ratio, is_given=self.is_made)
+        if unit is DIRECT and not self.has_given_ratio:
+            series = ""
         return Candidate(motor, drive, margin=plan.demands.margin, unit=unit, series=series)
 
     def judged(self, c: Candidate, *, worst_start: bool = False) -> Candidate:
@@ -182,7 +184,7 @@ class MotorTrials:
         candidate = least_boost(bare, self.with_flywheel, is_given)
         if not bare.drive.follows or self.has_given_ratio or not misses_by_a_hair(candidate):
             return candidate
-        above = next_ratio(bare.drive.ratio, self.plan.ratios)
+        above = next_ratio(bare.drive.ratio, self.plan.offered)
         if above is None:
             return candidate
         other = least_boost(self.candidate(motor, above), self.with_flywheel, is_given)

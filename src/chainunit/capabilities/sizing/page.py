@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -27,7 +28,7 @@ def answer(s: b.Source) -> Iterator[b.Block]:
         return
     motor, ratio = s.words(f"{path}.motor"), s.number(f"{path}.ratio", digits=4, as_given=True)
     also = {"flywheel": _disc, "protection": _protection}
-    gear = (*_gear(s, path), *_gear_torque(s))
+    gear = (*_gear(s, path), *_belt(s), *_gear_torque(s))
     cards = [
         b.Card("Motor", ((motor, str(b.at(s.result, f"{path}.verdict"))),), (*_data(s), *_starter(s, path))),
         b.Card("Gear ratio", ((ratio, f"motor turns per {s.driver} turn"),), gear),
@@ -146,6 +147,17 @@ def _gear_torque(s: b.Source) -> Iterator[Line]:
         yield line(order, ", decided by ", s.words("sizing.gear.decided_by"))
 
 
+def _belt(s: b.Source) -> Iterator[Line]:
+    """The belt to be ordered."""
+    if "belt" in s.result["sizing"]:
+        yield s.line(
+            "V-belt with a design power of {sizing.belt.design_power} (rated power of the motor times the belt "
+            "service factor {sizing.belt.service_factor}), belt speed {sizing.belt.speed}, "
+            "ratio {sizing.belt.ratio}, pulleys of {sizing.belt.small_pulley} and {sizing.belt.large_pulley} "
+            "(pitch diameters)"
+        )
+
+
 def _starter(s: b.Source, path: str) -> Iterator[Line]:
     """The soft starter or inverter to be ordered, with its settings; nothing for a start direct on line."""
     start = s.result["start"] if "starter" in s.result else "direct"
@@ -153,11 +165,24 @@ def _starter(s: b.Source, path: str) -> Iterator[Line]:
         yield s.line("soft starter, {=starter.soft_start.voltage} voltage, {=starter.soft_start.time}")
     elif start == "star-delta":
         yield s.line("star-delta starter, {=starter.star_delta.time} in star")
+        yield _winding(s)
     elif start == "inverter":
         current = s.line(f" of at least {{{path}.numbers.inverter_current}}") if _starts(s, path) else ()
         yield line("inverter", current, s.line(", boost {=starter.inverter.boost}, ramp {=run.ramp}"))
         if _starts(s, path):
             yield s.line(f"in running {{{path}.numbers.frequency}}, {{{path}.numbers.speed}}")
+
+
+def _winding(s: b.Source) -> str:
+    """The winding that a start in star and delta needs: one for the voltage of the supply in delta."""
+    supply = s.value("motor.rated_voltage") or 0.0
+    in_star, other = (
+        10.0 * round(supply * factor / 10.0) for factor in (math.sqrt(3.0), 1.0 / math.sqrt(3.0))
+    )
+    return (
+        f"motor winding {supply:g}/{in_star:g} V, in delta at the {supply:g} V of the supply (one of "
+        f"{other:g}/{supply:g} V, usual up to 3 kW, stays in star there and has no star-delta start)"
+    )
 
 
 def _starts(s: b.Source, path: str) -> bool:
@@ -179,6 +204,8 @@ def _relay(s: b.Source) -> Iterator[Line]:
     protection = s.result["sizing"].get("protection", {})
     if "relay_current" in protection and _leading(protection) != "relay_current":
         setting = s.line(f"{protection.get('device', 'relay')} at {{sizing.protection.relay_current}}")
+        if "line_current" in protection:
+            setting = line(setting, s.line(" (in the supply line {sizing.protection.line_current})"))
         yield line(setting, _class(s))
 
 
@@ -236,12 +263,12 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     if all(_sold(candidate) is None for candidate in candidates or ()):
         # it is a demand on gears of a catalogue
         side_keys = (*side_keys, "gear_torque")
-    for name in ("asked", "cycle", "flywheel", "gear", "protection"):
+    for name in ("asked", "cycle", "flywheel", "belt", "gear", "protection"):
         # the sentences on the coupling are too long for a cell of a narrow table, and stand above with the ways to it
         leaves = [
             leaf
             for key, below in (section.get(name) or {}).items()
-            if not isinstance(below, str) and key not in (*side_keys, "alternatives")
+            if (not isinstance(below, str) or key == "section") and key not in (*side_keys, "alternatives")
             for leaf in _leaves(below, f"sizing.{name}.{key}", spoken(key))
         ]
         rows = tuple(b.TableRow((title, _leaf(s, path))) for title, path in leaves)
@@ -276,7 +303,7 @@ def _best(s: b.Source, path: str, word: str) -> Iterator[b.Block]:
     motor = [line("motor ", s.words(f"{path}.motor"), " of ", each) for each in _data(s)]
     order: list[Line] = [line(each, *_how_to_order(s, 0)) for each in motor]
     if not any(each["part"] == "gear" for each in parts):
-        order += _gear_torque(s)
+        order += (*_belt(s), *_gear_torque(s))
     for k in range(1, len(parts)):
         named = s.words(f"sizing.parts.parts.{k}.designation")
         order.append(line(f"{parts[k]['part']} ", named, *_how_to_order(s, k)))

@@ -118,7 +118,7 @@ def _steps(
         (Criterion.MARGIN, _with_margin),
         (Criterion.PRICE, cheapest) if objective == PRICE else (Criterion.LARGER, most),
         (Criterion.FIELD, partial(_least, value=lambda c: float(c.weakened))),
-        (Criterion.GEAR, partial(_least, value=lambda c: float(c.unit is None))),
+        (Criterion.GEAR, partial(_least, value=_second_unit)),
         (Criterion.START, partial(_least, value=lambda c: c.trial.start_class or 0)),
         (Criterion.FLYWHEEL, partial(_least, value=lambda c: float(c.drive.added_inertia > 0.0))),
         # the better number of poles may cost one step of power
@@ -128,6 +128,11 @@ def _steps(
         (Criterion.COST, _cheaper),
         (Criterion.USE, _less_used),
     )
+
+
+def _second_unit(c: Candidate) -> float:
+    """1 for a ratio that takes two units, such as a belt before a gear; else 0."""
+    return float(c.unit is None or c.unit.noun == "belt and gear")
 
 
 def _least(left: list[Candidate], value: Callable[[Candidate], float]) -> list[Candidate]:
@@ -221,7 +226,7 @@ def _chosen(best: Candidate, ranking: Sequence[Candidate], objective: str) -> st
     if rival.criterion is Criterion.FIELD:
         return f"runs at {number(best.trial.frequency, 'Hz')}, where {name} {_weakened(rival)}"
     if rival.criterion is Criterion.GEAR:
-        return f"takes one gear unit, where {name} takes two"
+        return f"takes one unit, where {name} takes {_units(rival)}"
     if rival.criterion is Criterion.START:
         return f"starts in {_class(best)}, where {name} starts in {_class(rival)}"
     if rival.criterion is Criterion.FLYWHEEL:
@@ -251,11 +256,15 @@ def _behind(c: Candidate, best: Candidate) -> str:
     return {
         Criterion.MARGIN: f"leaves less than the margin of {_margin(c)}",
         Criterion.FIELD: f"{_weakened(c)}",
-        Criterion.GEAR: "its ratio takes two gear units",
+        Criterion.GEAR: f"its ratio takes {_units(c)}",
         Criterion.START: f"its start is of {_class(c)}, that of the chosen one of {_class(best)}",
         Criterion.FLYWHEEL: "needs a flywheel, the chosen one none",
         Criterion.POLES: "{:g} poles, where {:g} are to be had".format(*poles),
     }.get(c.criterion or Criterion.POWER, "larger than needed")
+
+
+def _units(c: Candidate) -> str:
+    return "two gear units" if c.unit is None else f"a {c.unit.title}"
 
 
 def _weakened(c: Candidate) -> str:

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 from ...core.quantities import quantity
+from ...drives.belt import belt_drive
+from ...drives.gear_ratios import belt_before_gear
 from ...reading.results import GIVEN, InUnit, part, result
 from ...reading.text import number
 from ...study.record import StudyRecord
 from ...study.relay import class_words
+from ...study.starts import transient_words
+from .candidate import TrialResult
 from .coupling_words import coupling_sentence, way_words, why_none
 from .gear_order import gear_order
 from .protection import Alternative, CouplingEffect, Obstacle, Setting, WayNumbers
+from .table import SizingPlan
+
+_OF = {"start": "largest torque by load and acceleration"}
 
 
 @result
@@ -22,32 +30,45 @@ class OrderedGear:
     loads: Mapping[str, InUnit] = part(
         "largest torque on the output of the gear, by kind of duty", inline=True
     )
+    service_factor: InUnit = part("service factor fB")
+    transient: InUnit | None = part(
+        "largest torque of a start with the electromagnetic transient", optional=True
+    )
     decided_by: str = part("the load that decides")
 
 
-def ordered_gear(study: StudyRecord, setting: Setting | None, margin: float) -> OrderedGear | None:
-    """The gear to order with this share as `margin`, and the load that decides; None where there is no drive to
-    order."""
-    order = gear_order(study, setting, margin)
-    if order is None:
+def ordered_gear(
+    study: StudyRecord, setting: Setting | None, plan: SizingPlan, inertia_factor: float
+) -> OrderedGear | None:
+    """The gear to order by this `plan`, and the load that decides; None where there is no drive to order. For
+    `inertia_factor` see `chainunit.drives.service_factor`."""
+    margin, service = float(plan.demands.margin), plan.gear_factor(inertia_factor)
+    order = gear_order(study, setting, margin, service)
+    if order is None or not study.drive.is_geared:
         return None
-    decides = order.decides
-    reason = decides.words
-    if decides.times != 1.0:
-        reason += f", in which it may carry {decides.times:g} times that"
+    reason = order.decides.words + order.decides.rule
     if order.left_out:
         names = ", ".join(map(study.title_of, order.left_out))
         reason += (
             f"; a lower bound, as the energy balance is not kept ({names}): shorten run.step before you order"
         )
     free = number(margin, "1", "percent", full=False)
-    title = f"gear, rated output torque at least, with the margin of {free}; decided by {reason}"
+    title = (
+        f"gear, rated output torque at least, with the margin of {free} above running; decided by {reason}"
+    )
+    transient = None
+    if order.transient is not None:
+        transient = _torque(order.transient, transient_words(study))
     return OrderedGear(
         InUnit(order.rated, "N.m", title=title),
         {
-            name: _torque(load.torque, f"largest torque of {load.words} on the output of the gear")
+            name: _torque(
+                load.torque, f"{_OF.get(name, 'largest torque')} of {load.words} on the output of the gear"
+            )
             for name, load in order.loads.items()
         },
+        InUnit(service, "1", title=f"service factor fB of the gear: {plan.service_words(inertia_factor)}"),
+        transient,
         reason,
     )
 
@@ -57,10 +78,51 @@ def _torque(value: float, title: str) -> InUnit:
 
 
 @result
+class OrderedBelt:
+    """The V-belt to order."""
+
+    design_power: InUnit = part("design power")
+    service_factor: InUnit = part("service factor")
+    speed: InUnit = part("belt speed")
+    ratio: InUnit = part("ratio of the belt")
+    small_pulley: InUnit = part("pitch diameter of the pulley of the motor")
+    large_pulley: InUnit = part("pitch diameter of the other pulley")
+    section: str = part("the section")
+
+
+def ordered_belt(study: StudyRecord, plan: SizingPlan, trial: TrialResult) -> OrderedBelt | None:
+    """The belt to order by this `plan`, with the results of the chosen motor's `trial`; None where there is none."""
+    if study.insufficient or "belt" not in study.drive.transmission or study.plate is None:
+        return None
+    plate, ratio = study.plate.nameplate, study.drive.ratio
+    if study.drive.is_geared and (split := belt_before_gear(ratio)) is not None:
+        ratio = split[0]
+    factor = plan.belt_factor(trial.inertia_factor, study.config.drive.start)
+    belt = belt_drive(plate.power, trial.speed or plate.speed, ratio, factor)
+    power, free = (number(x, "W") for x in (plate.power, belt.design_power))
+    return OrderedBelt(
+        InUnit(
+            belt.design_power,
+            "W",
+            title=f"V-belt, design power: rated {power} of the motor times the service factor",
+        ),
+        InUnit(factor, "1", title=f"service factor of the belt: {plan.service_words(trial.inertia_factor)}"),
+        InUnit(belt.speed, "m/s", title="belt speed"),
+        InUnit(ratio, "1", title="ratio of the belt"),
+        InUnit(belt.small, "m", title="pulley of the motor, pitch diameter"),
+        InUnit(belt.large, "m", title="other pulley, pitch diameter; take the nearest standard one"),
+        f"narrow V-belts {belt.section}; number and tension by their maker for {free}",
+    )
+
+
+@result
 class MotorProtection:
     """The device that protects the motor from heat; that of an inverter needs no trip class."""
 
     relay_current: InUnit = part("setting of the device")
+    line_current: InUnit | None = part(
+        "setting of the relay of a star-delta starter in the supply line", optional=True
+    )
     relay_class: Mapping[str, str] | None = part("trip class of IEC 60947-4-1", unit=GIVEN, optional=True)
     device: str = part("the device")
 
@@ -166,7 +228,17 @@ def _effects(study: StudyRecord, effects: Mapping[str, CouplingEffect]) -> dict[
 def _relay(study: StudyRecord, rated: float) -> MotorProtection:
     if study.drive.follows:
         device = "electronic motor protection of the inverter"
-        return MotorProtection(InUnit(rated, "A", title=f"{device}, setting"), None, device)
+        return MotorProtection(InUnit(rated, "A", title=f"{device}, setting"), None, None, device)
     words = class_words(study.relay_class)
     trip_class = {"value": words, "unit": "1", "title": "thermal relay, trip class of IEC 60947-4-1"}
-    return MotorProtection(InUnit(rated, "A", title="thermal relay, setting"), trip_class, "relay")
+    if study.drive.star_delta is None:
+        return MotorProtection(InUnit(rated, "A", title="thermal relay, setting"), None, trip_class, "relay")
+    place = (
+        "in the phases of the delta, behind the main contactor, where it usually sits: 1/sqrt(3) of the rated"
+    )
+    return MotorProtection(
+        InUnit(rated / math.sqrt(3.0), "A", title=f"thermal relay {place} current, setting"),
+        InUnit(rated, "A", title="thermal relay in the supply line in place of that, setting"),
+        trip_class,
+        "relay in the phases of the delta",
+    )

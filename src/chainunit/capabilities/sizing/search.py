@@ -34,7 +34,7 @@ from .preference import choice, poles_rank, rank
 from .table import PRICE
 from .task import SizingTask
 
-_WORSE_WITH_POWER = ("gear_start",)
+_WORSE_WITH_POWER = ("gear_start", "gear_service")
 """Checks that a larger motor makes worse."""
 
 
@@ -66,7 +66,8 @@ def motors_on_offer(task: SizingTask, own: Sequence[CatalogueMotor]) -> list[Cat
         words = "sizing.gear_torque: is of gears of a catalogue; name one by catalogue, or leave it out"
         raise InputError(words, "sizing.gear_torque")
     if tables.start != "inverter" and "gear.ratio" not in tables.given:
-        check_ratios(task.plan.ratios, task.operation.crank_speed, motors)
+        key = "sizing.ratios" if task.plan.ratios else "sizing.gear_kind"
+        check_ratios(task.plan.offered, task.operation.crank_speed, motors, key)
         of_gears = [gear.data.ratio for gear in task.gears]
         check_ratios(of_gears, task.operation.crank_speed, motors, "catalogue")
     return motors
@@ -90,10 +91,7 @@ def size(
     progress, backend : see `chainunit.study.run.run_study`
     """
     numbers = duty.numbers
-    notes = [
-        "Catalogue data are typical; iron losses are not in the motor model.",
-        "The gear's losses act as viscous drag on the motor shaft, with the mean power that its efficiency costs.",
-    ]
+    notes = ["Catalogue data are typical; iron losses are not in the motor model."]
     if task.machine.in_place:
         notes.append(
             f"Peaks of the cycle and the flywheel are those of single turns, {100 * HIGH:g} % quantile over all "
@@ -112,6 +110,11 @@ def size(
     if task.plan.objective == PRICE:
         notes += _without_price(strong, task.gears)
     candidates = _search(_with_files(trials, strong[0], folder, progress, backend), strong, progress)
+    if (best := candidates[0].drive).gear_friction:
+        notes.append(
+            f"The losses of the {best.transmission} act as viscous drag on the motor shaft, with the mean power that "
+            "its efficiency costs."
+        )
     notes += [
         f"{c.motor.designation} would be preferred, but for its start: {c.reason}."
         for c in candidates[1:]
@@ -169,6 +172,13 @@ def check_ratios(
     wanted = sorted((ratio, poles) for poles, ratio in needed.items())
     near, _ = min(wanted, key=lambda each: abs(math.log(each[0] / nearest(each[0], ratios))))
     words = " or ".join(f"{number(ratio, '1', digits=2)} ({poles:g} poles)" for ratio, poles in wanted)
+    if key == "sizing.gear_kind":
+        raise InputError(
+            f'{key} = "none": no motor of the catalogue turns at {number(w, "rad/s", "speed")} on the line: '
+            f"a ratio of about {words} is needed; give another sizing.gear_kind, change run.crank_speed, or take an "
+            "inverter (start)",
+            key,
+        )
     raise InputError(
         f"{key}: no ratio on offer brings the crank to {number(w, 'rad/s', 'speed')} with a motor of the "
         f"catalogue: about {words} is needed, the nearest on offer is {nearest(near, ratios):g}; add such a ratio, "

@@ -11,6 +11,7 @@ from pydantic import Field, StrictBool
 from ...core.quantities import Value, declaration, quantity
 from ...drives.gear_ratios import UNITS
 from ...drives.gearing import Transmission
+from ...drives.service_factor import LOAD_CLASSES, LOAD_WORDS, belt_factor, gear_factor, load_class
 from ...study.catalogue_drive import GearOffer
 from ...study.entry_values import numbers
 
@@ -75,6 +76,17 @@ class Sizing:
         default=0.0,
         min=0.0,
     )
+    service_factor: Value = quantity(
+        "1",
+        "service factor of the gear (fB) or of the belt, by its maker: its rated torque or power over that of the "
+        "motor; 0: by load_class, hours and starts_per_hour",
+        default=0.0,
+        min=0.0,
+        max=10.0,
+    )
+    hours: Value = quantity(
+        "1", "hours of running a day, for the service factor", default=16.0, above=0.0, max=24.0
+    )
     candidates: Value = quantity(
         "1",
         "least number of motors that are tried; more follow until one fits and none behind it can be preferred",
@@ -95,7 +107,19 @@ OBJECTIVES = (PREFERENCE, PRICE)
 SIZING_KEYS: Mapping[str, Any] = {
     "gear_kind": (
         Literal[tuple(UNITS)],
-        Field("helical", description="kind of the gear, by which one unit has a largest ratio"),
+        Field(
+            "helical",
+            description="kind of the gear, by which one unit has a largest ratio; a belt of a larger ratio stands "
+            "before a helical gear; none: the machine is on the motor's shaft or a coupling",
+        ),
+    ),
+    "load_class": (
+        Literal[LOAD_CLASSES],
+        Field(
+            None,
+            description="class of the load for the service factor: uniform, with moderate or with heavy shocks; "
+            "without it, it follows from the inertia of the machine over that of the motor",
+        ),
     ),
     "ratio_series": (
         Literal[RATIO_SERIES],
@@ -142,11 +166,43 @@ class SizingPlan:
     objective: str = PREFERENCE
     own_only: bool = False
     separate_bearing: bool = False
+    load_class: str | None = None
+
+    def load(self, inertia_factor: float) -> str:
+        """The class of the load, by this inertia factor where the file does not give it."""
+        return self.load_class or load_class(inertia_factor)
+
+    def gear_factor(self, inertia_factor: float) -> float:
+        """The service factor of the gear; for `inertia_factor` see `chainunit.drives.service_factor`."""
+        hours, starts = float(self.demands.hours), float(self.demands.starts_per_hour)
+        return float(self.demands.service_factor) or gear_factor(self.load(inertia_factor), hours, starts)
+
+    def belt_factor(self, inertia_factor: float, start: str) -> float:
+        """The service factor of a belt, of a motor with that `start`."""
+        load, hours = self.load(inertia_factor), float(self.demands.hours)
+        own = belt_factor(load, hours, is_on_line=start == "direct")
+        return float(self.demands.service_factor) or own
+
+    def service_words(self, inertia_factor: float) -> str:
+        """The source of the service factor in words; see `gear_factor`."""
+        if self.demands.service_factor:
+            return "of the file"
+        by = "by the file" if self.load_class else f"by an inertia factor of {inertia_factor:.3g}"
+        hours, starts = (f"{float(x):g}" for x in (self.demands.hours, self.demands.starts_per_hour))
+        return (
+            f"{LOAD_WORDS[self.load(inertia_factor)]} {by}, {hours} h a day, {starts} starts an hour; typical of "
+            "makers (sizing.load_class, sizing.hours, sizing.service_factor)"
+        )
 
     @property
     def offer(self) -> GearOffer:
         """The gears on offer."""
         return GearOffer(self.gear_kind, bool(self.ratios))
+
+    @property
+    def offered(self) -> Sequence[float]:
+        """The ratios on offer; empty for a series."""
+        return (1.0,) if self.gear_kind == "none" else self.ratios
 
     @property
     def words(self) -> dict[str, Any]:

@@ -37,7 +37,7 @@ from ...study.start_runs import (
     time_above,
 )
 from ...study.start_up import until_settled
-from ...study.torques import DutyPeak, all_feed_on, at_gear, duty_peak
+from ...study.torques import DutyPeak, all_feed_on, at_gear, duty_peak, quasi_static_peak
 from ...study.transients import follow
 from ...study.verdict import CREEPS, SETTLING, STEADY
 from ...study.window import BURNT
@@ -105,6 +105,7 @@ class Trial:
         names = ("time", f"motor.{self.drive.motor.current}")
         time, current = (np.concatenate([run[name].values for run in runs]) for name in names)
         starting = time <= max(self._first, self.drive.switched_until)
+        current = self.drive.relay_current(time, current)
         first = start_class(time[starting], current[starting], self.motor.nameplate.rated_current)
         return max(first, *(start.start_class for start in self.starts), 0)
 
@@ -159,6 +160,11 @@ class Trial:
         there."""
         sides = [(all_feed_on(side), run) for side, run in self.one_sided.items()]
         return duty_peak(self.drive, [(STEADY, self.steady), *self.shifts, *sides], at_gear)
+
+    @cached_property
+    def inertia_factor(self) -> float:
+        """Mean inertia of the machine over that of the motor with its flywheel, both at the motor's shaft."""
+        return float(np.mean(load_inertia(self.drive, self.steady)) / self.drive.fmu_parameters.rotor.J)
 
     @cached_property
     def frequency(self) -> float:
@@ -269,6 +275,7 @@ class Trial:
             frequency=self.frequency if is_started else None,
             duty=self.duty,
             fluctuation=self.fluctuation,
+            inertia_factor=self.inertia_factor,
             stall_angle=self.stall_angle,
         )
 
@@ -314,11 +321,18 @@ class Trial:
         if "gear.torque_limit" in self.task.tables.given:
             gear = self.task.tables.gear
             checks["gear"] = Check("torque of the gear", self.duty.torque, gear.torque_limit, "N.m")
-            hardest = max([at_gear(self.drive, self.start), *(s.gear_torque for s in self.starts)])
+            first = quasi_static_peak(self.drive, self.start)
+            hardest = max([first, *(s.quasi_static for s in self.starts)])
             title = "torque of the gear in a start"
             checks["gear_start"] = Check(title, hardest, gear.start_limit, "N.m")
-        if (rating := self.drive.gear_rating) is not None:
-            checks |= gear_checks(rating, self.drive, self._running, self._cases)
+            if (rating := self.drive.gear_rating) is not None:
+                factor = self.task.plan.gear_factor(self.inertia_factor)
+                title += ", times the service factor"
+                checks["gear_start"] = Check(title, factor * hardest, gear.start_limit, "N.m")
+                title = "rated torque of the motor at the gear, times the service factor"
+                rated = plate.torque * self.drive.ratio * gear.efficiency
+                checks["gear_service"] = Check(title, factor * rated, gear.torque_limit, "N.m")
+                checks |= gear_checks(rating, self.drive, self._running, self._cases)
         return checks
 
 
