@@ -8,8 +8,8 @@
   let model;
   try {
     if (typeof WebAssembly !== "object") throw new Error("this browser has none");
-    const data = await unpackedData("live-data"), bytes = {};
-    for (const name of Object.keys(data.modules)) bytes[name] = await unpackedBytes(`module-${name}`);
+    const data = unpackedData("live-data"), bytes = {};
+    for (const name of Object.keys(data.modules)) bytes[name] = unpackedBytes(`module-${name}`);
     model = await liveModel(data, bytes);
   } catch (error) {
     none.textContent = `The live machine needs WebAssembly, which is not to be had here (${error.message}); all else on this page is there.`;
