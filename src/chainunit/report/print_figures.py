@@ -42,15 +42,19 @@ _PLACES: dict[str, tuple[tuple[int, int], str, str]] = {
 }
 
 
-_SMALL = 0.62
-"""Size of a figure for a sheet over that of one for a screen; its letters have the same size in both."""
+_SMALL, _NAMED = 0.62, 0.8
+"""Size of a figure for a sheet over that of one for a screen, and its height where an axis has names."""
+_LABELS = 8
+"""Size of the letters of labels in a small figure; the others are as large as in one for a screen."""
 
 
 def write(figures: Iterable[Figure], folder: Path, units: Units, are_small: bool = False) -> list[Path]:
     """Draw every figure that has a file into `folder`; returns the files. If they `are_small`, they have few
     centimetres on paper."""
     size = _SMALL if are_small else 1.0
-    return draw({each.file: partial(_figure, each, units, size) for each in figures if each.file}, folder)
+    plots = {each.file: partial(_figure, each, units, size) for each in figures if each.file}
+    with pyplot().rc_context({"axes.labelsize": _LABELS} if are_small else {}):
+        return draw(plots, folder)
 
 
 def contours(x: Any, y: Any, z: Any, level: float) -> list[Any]:
@@ -70,8 +74,10 @@ def _figure(spec: Figure, units: Units, size: float = 1.0) -> Any:
     has_titles = any(panel.title for _, _, panel in figure.all_panels())
     width = size * 8.2 if columns == 1 else 1.0 + _COLUMN * columns
     tall = 1.2 + (_ROW if rows > 1 else 3.2) * sum(heights) + (0.3 * rows if has_titles else 0.0)
+    is_named = any(panel.y.names for _, _, panel in figure.all_panels())
+    height = tall * (max(size, _NAMED) if is_named else size)
     drawing, axes = pyplot().subplots(
-        rows, columns, figsize=(width, size * tall), squeeze=False, height_ratios=heights, width_ratios=widths
+        rows, columns, figsize=(width, height), squeeze=False, height_ratios=heights, width_ratios=widths
     )
     places = {(r, c) for r, c, _ in figure.all_panels()}
     for place in np.ndindex(rows, columns):
