@@ -95,6 +95,9 @@ def _figure(spec: Figure, units: Units, size: float = 1.0) -> Any:
     for r, c, panel in figure.all_panels():
         sharing = figure.sharing(r, c)
         _dress(axes[r, c], panel, last=r == sharing[-1], first=r == sharing[0])
+        if size < 1.0:
+            # rows are lower than the titles of their axes are long: the unit has a line of its own
+            axes[r, c].set_ylabel(axes[r, c].get_ylabel().replace(" [", "\n["))
     _legend(drawing, axes, columns, 2 if size < 1.0 else 3)
     drawing.suptitle(fill(capital(figure.title), int(_LETTERS * drawing.get_figwidth())))
     return drawing
