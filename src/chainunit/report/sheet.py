@@ -44,9 +44,11 @@ def sheet(study: StudyRecord, report: b.Report) -> Sheet:
         *([_basis(s, study)] if "basis" in given else []),
         b.Section("unchecked", "What was not checked", tuple(_unchecked(study))),
     ]
-    shown = {*_FIRST, *sheets, "basis", "live", "motion"}
+    # what was not checked, and what is assumed, stand on the sheet
+    shown = {*_FIRST, *sheets, "basis", "live", "motion", "not_checked"}
     annex = [each for each in report.sections if each.name not in shown]
-    annex += (each for name in sheets for each in _in_annex(given[name]))
+    annex = [_not_assumed(each, study) if each.name == "given" else each for each in annex]
+    annex += (each for name in sheets for each in _figures_of(given[name]))
     if "basis" in given:
         annex.append(b.Section("software", "Models and software", (software(s),)))
     return Sheet(
@@ -67,13 +69,9 @@ def _on_sheet(section: b.Section) -> b.Section:
     return replace(section, blocks=tuple(texts))
 
 
-def _in_annex(section: b.Section) -> Iterator[b.Section]:
-    """The sections of the annex with the blocks that a section of the sheet leaves out: its long blocks, where it has
-    others for the sheet, and its figures."""
+def _figures_of(section: b.Section) -> Iterator[b.Section]:
+    """The section of the annex with the figures that a section of the sheet leaves out."""
     figures = tuple(each for each in section.blocks if isinstance(each, Figure))
-    if any(each.form == "sheet" for each in section.blocks):
-        blocks = tuple(each for each in section.blocks if each.form == "long" and each not in figures)
-        yield b.Section(f"{section.name}_in_full", f"{section.heading}: in full", blocks)
     if figures:
         yield b.Section(f"{section.name}_figures", f"{section.heading}: figures", figures)
 
@@ -114,22 +112,35 @@ def _title_block(study: StudyRecord, report: b.Report) -> dict[str, str]:
 def _assumed(given: dict[str, b.Section], study: StudyRecord) -> Iterator[b.Block]:
     """The values that the files leave out, but those that were chosen, which are the answer, and those of a motor of
     a catalogue beside its surroundings."""
-    chosen = "" if study.proposal is None else study.proposal.name
     for block in given["given"].blocks if "given" in given else ():
         if isinstance(block, b.Given):
-            kept = (
-                (title, tuple(each for each in values if _is_assumed(each, study, chosen)))
-                for title, values in block.sections
-            )
-            yield b.Given(tuple((title, values) for title, values in kept if values))
+            yield _kept(block, study, are_assumed=True)
     if study.plate is not None:
-        words = 'Values of the motor, and those that were chosen: section "Given values" of the annex.'
+        words = 'Values of the motor, and those that were chosen: section "Other given values" of the annex.'
         yield b.Text(words, "note", "long")
 
 
-def _is_assumed(value: b.GivenValue, study: StudyRecord, chosen: str) -> bool:
-    """Whether the files leave out a number that is neither `chosen` nor of an event; beside a motor of a catalogue,
+def _not_assumed(section: b.Section, study: StudyRecord) -> b.Section:
+    """The section of given values without those that the sheet lists as assumptions."""
+    blocks = (
+        _kept(each, study, are_assumed=False) if isinstance(each, b.Given) else each
+        for each in section.blocks
+    )
+    return replace(section, heading="Other given values", blocks=tuple(blocks))
+
+
+def _kept(block: b.Given, study: StudyRecord, are_assumed: bool) -> b.Given:
+    kept = (
+        (title, tuple(each for each in values if _is_assumed(each, study) == are_assumed))
+        for title, values in block.sections
+    )
+    return b.Given(tuple((title, values) for title, values in kept if values))
+
+
+def _is_assumed(value: b.GivenValue, study: StudyRecord) -> bool:
+    """Whether the files leave out a number that is neither chosen nor of an event; beside a motor of a catalogue,
     neither its own nor of a starter that is not used."""
+    chosen = "" if study.proposal is None else study.proposal.name
     if value.origin in ("", "file", "linkage", chosen) or not isinstance(value.value, Number):
         return False
     of, _, name = value.name.partition(".")
