@@ -161,9 +161,7 @@ def find(study: StudyRecord, plan: RelayPlan) -> tuple[RelayFindings | None, lis
         current = np.abs(run[f"motor.{drive.motor.current}"].values)
         return share * (drive.relay_current(run["time"].values, current) if in_phases else current)
 
-    # the change from star to delta is a part of the start
-    until = max(study.start_end or 0.0, drive.switched_until)
-    rise = study.runs["start_up"].sel(time=slice(None, until))
+    rise = study.runs["start_up"].sel(time=slice(None, study.start_end))
     seconds = start_seconds(rise["time"].values, current_of(rise), given["setting"])
     runs: dict[str, tuple[Any, Any, float]] = {}
     for event in study.overloads:
