@@ -21,7 +21,7 @@ def companion_files(
     sketch = model.sketch(start)
     png, svg = (icon(model, kind, sketch) for kind in ("png", "svg"))
     files = {
-        "documentation/index.html": interface.words(page(interface, version, sketch)).encode(),
+        "documentation/index.html": interface.text(page(interface, version, sketch)).encode(),
         "documentation/licenses/license.txt": licence("chainunit", *libraries).encode(),
     }
     if fmi == 2:

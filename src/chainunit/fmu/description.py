@@ -17,7 +17,7 @@ from ..core.model import About, Model
 from ..core.quantities import DISPLAY_UNITS, TYPES, Type, Variable, base_units, written
 from ..core.symbolic_trace import Trace, trace
 from .recipe import Experiment, script_of
-from .script import Script, name_in_fmu, words_in_fmu
+from .script import Script, name_in_fmu, text_in_fmu
 
 RELEASED = "2026-11-21"
 """The day of this version's release, equal to the one in CITATION.cff."""
@@ -78,9 +78,9 @@ class Interface:
         """The name in the FMU of the variable of the model with that name."""
         return name_in_fmu(variable, self.script.names)
 
-    def words(self, text: str) -> str:
-        """A text with the names in the FMU of the variables that it names."""
-        return words_in_fmu(text, self._variables, self.script.names)
+    def text(self, text: str) -> str:
+        """A text that names variables of the model, with their names in the FMU."""
+        return text_in_fmu(text, self._variables, self.script.names)
 
     @cached_property
     def _variables(self) -> frozenset[str]:
@@ -274,8 +274,8 @@ def model_description_3(
         elements[attributes["name"]] = SubElement(variables, tag, {**attributes, **own, **derivative})
     for signal in interface.signals_of("output"):
         if (one := interface.repeated.get(signal.name)) is not None:
-            words = interface.words(signal.variable.description)
-            SubElement(elements[one.name], "Alias", name=signal.name, description=words)
+            description = interface.text(signal.variable.description)
+            SubElement(elements[one.name], "Alias", name=signal.name, description=description)
     time = {
         "name": "time",
         "valueReference": str(last + 1),
@@ -302,18 +302,18 @@ def _variables(
     for signal in interface.signals:
         model_name, kind = signal.variable.name, signal.variable.type
         events = {"reinit": "true"} if model_name in reinitialized else {}
-        own = _attributes(signal, interface.words(signal.variable.description))
+        attributes = _attributes(signal, interface.text(signal.variable.description))
         if (value := interface.model.constant.get(model_name)) is not None:
             constant = {"variability": "constant", "initial": "exact"}
-            yield own | constant, kind, _typed(replace(signal, start=value)), None
+            yield attributes | constant, kind, _typed(replace(signal, start=value)), None
         else:
-            yield own, kind, _typed(signal) | events, None
+            yield attributes, kind, _typed(signal) | events, None
     first = len(interface.parameters) + len(interface.inputs)
     for i, state in enumerate(interface.states if derivatives else ()):
         attributes = {
             "name": f"der({interface.name(state.name)})",
             "valueReference": str(len(interface.signals) + i),
-            "description": interface.words(f"derivative by time: {state.description}"),
+            "description": interface.text(f"derivative by time: {state.description}"),
             "causality": "local",
             "variability": "continuous",
             "initial": "calculated",

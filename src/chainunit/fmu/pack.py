@@ -41,10 +41,15 @@ def _refuse_same_names(interface: Interface) -> None:
     by_name: dict[str, list[str]] = {}
     for signal in interface.signals:
         by_name.setdefault(signal.name, []).append(signal.variable.name)
-    same = [f"{' and '.join(of)} would both be {name}" for name, of in by_name.items() if len(of) > 1]
-    if same:
+    clashes = [
+        f"{' and '.join(variables)} would be {name}"
+        for name, variables in by_name.items()
+        if len(variables) > 1
+    ]
+    if clashes:
         raise InputError(
-            f"flat names of {interface.model.name}: {'; '.join(same)}: rename one of them, or take structured names"
+            f"{interface.model.name} with flat names: {'; '.join(clashes)}; rename one of them, or take structured "
+            "names"
         )
 
 

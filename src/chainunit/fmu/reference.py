@@ -62,14 +62,15 @@ def experiments_file(name: str, description: str, experiments: Iterable[Referenc
     """A file of experiments in the format MA-HS-Experiments, to which FMI-LS-REF refers. Times are attributes, as its
     text has them; the draft of its schema has them in an element of their own."""
     root = Element("Experiments", name=name, description=description)
-    for each in experiments:
-        times = {"startTime": 0.0, "stopTime": (ROWS - 1) * STEP, "stepSize": each.step}
-        if each.tolerance is not None:
-            times["tolerance"] = each.tolerance
-        numbers = {key: repr(value) for key, value in times.items()}
-        node = SubElement(root, "Experiment", numbers, name=each.name, description=each.description)
-        SubElement(node, "Stimuli", source=each.stimuli, type="text/csv")
-        SubElement(node, "References", source=each.references, type="text/csv")
+    for experiment in experiments:
+        numbers = {"startTime": 0.0, "stopTime": (ROWS - 1) * STEP, "stepSize": experiment.step}
+        if experiment.tolerance is not None:
+            numbers["tolerance"] = experiment.tolerance
+        attributes = {"name": experiment.name, "description": experiment.description}
+        attributes |= {key: repr(value) for key, value in numbers.items()}
+        node = SubElement(root, "Experiment", attributes)
+        SubElement(node, "Stimuli", source=experiment.stimuli, type="text/csv")
+        SubElement(node, "References", source=experiment.references, type="text/csv")
     return xml_bytes(root)
 
 

@@ -18,7 +18,7 @@ def name_in_fmu(name: str, names: Names) -> str:
     return name.replace(".", "_") if names == "flat" else name
 
 
-def words_in_fmu(text: str, variables: Container[str], names: Names) -> str:
+def text_in_fmu(text: str, variables: Container[str], names: Names) -> str:
     """A text with the names in the FMU of the model's `variables` in it."""
     if names == "structured":
         return text

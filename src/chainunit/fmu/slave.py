@@ -25,7 +25,7 @@ from pythonfmu.fmi2slave import Fmi2Slave
 
 from ..core import messages
 from .model_instance import NAN, ModelInstance
-from .script import Script, words_in_fmu
+from .script import Script, text_in_fmu
 
 _NOTHING: dict[str, Any] = {"Real": NAN, "Integer": 0, "Boolean": False, "String": ""}
 """By type of FMI, what stands for a value that cannot be told."""
@@ -79,7 +79,7 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
 
     def _tell(self, line: str) -> None:
         variables = [v.name for v in self._instance.references.settable]
-        self.log(words_in_fmu(line, variables, self.names), Fmi2Status.error)
+        self.log(text_in_fmu(line, variables, self.names), Fmi2Status.error)
 
     # -- life cycle
 

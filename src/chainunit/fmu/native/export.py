@@ -115,14 +115,14 @@ def export(
         description = model_description_3(interface, "", kinds, version)
     functions, room = kernels(interface)
     sources = {name: (recipes() / "native" / name).read_bytes() for name in layer}
-    sources |= {"kernels.c": functions.encode(), "rules.h": interface.words(rules()).encode()}
+    sources |= {"kernels.c": functions.encode(), "rules.h": interface.text(rules()).encode()}
     sources[HEADER] = header().encode()
     digest = hashlib.sha256(xml_bytes(description))
-    for text in (*sources.values(), interface.words(tables(interface, "", room)).encode()):
+    for text in (*sources.values(), interface.text(tables(interface, "", room)).encode()):
         digest.update(text + b"\0")
     guid = f"{{{uuid.UUID(digest.hexdigest()[:32])}}}"
     description.set(of_version.guid, guid)
-    sources["model.c"] = interface.words(tables(interface, guid, room)).encode()
+    sources["model.c"] = interface.text(tables(interface, guid, room)).encode()
     sources |= {name: (_headers() / name).read_bytes() for name in of_version.headers}
     contents = {f"sources/{name}": text for name, text in sources.items()}
     contents["modelDescription.xml"] = xml_bytes(description)
