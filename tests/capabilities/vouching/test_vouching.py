@@ -894,6 +894,29 @@ def test_without_a_key_no_code_of_the_file_runs(made, tmp_path, members, other, 
     assert conclusion(verify(tmp_path / "it.fmu", None, run=False, told=silent))[0] == OPEN
 
 
+def test_experiments_that_cannot_be_computed_again_are_said_at_the_end(
+    tmp_path, data, members, own, monkeypatch
+):
+    """Without casadi those of a motor; the equations are compared at its points all the same."""
+
+    def missing(*args):
+        raise ModuleNotFoundError(name="casadi")
+
+    monkeypatch.setattr(experiments, "by_equations", missing)
+    found = list(checked(tmp_path, data).values())
+    words = "holds, but its experiments were not computed again without the package casadi"
+    assert conclusion(found) == (OPEN, words)
+    wrong = points(lambda at: [halved(each) for each in at])(members)
+    found = checked(tmp_path, signed(wrong, own))
+    assert found["equations"].holds is False and "largest deviation 0.5" in found["equations"].words
+
+
+def test_members_that_no_folder_can_have_are_named(tmp_path, members, own):
+    for name in ("modelDescription.xml/more", "x" * 300):
+        found = checked(tmp_path, signed({**members, name: b"1"}, own))
+        assert "cannot be unpacked" in found["evidence"].words and found["evidence"].holds is False
+
+
 def test_sources_in_place_of_the_library_are_said_at_the_end(tmp_path, members, own):
     if "sources/model.c" not in members:
         pytest.skip("no C compiler")
