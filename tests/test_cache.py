@@ -83,6 +83,20 @@ def test_a_failure_is_not_entry(counting, store):
     assert not store.exists()
 
 
+@pytest.mark.parametrize(
+    "writes", ["echo junk > a.o", ": > a.o", "true"], ids=["another file", "an empty file", "no file"]
+)
+def test_a_compiler_that_writes_no_code_is_refused(store, tmp_path, writes):
+    """Its status is 0; what it wrote does not come into the cache."""
+    if sys.platform == "win32":
+        pytest.skip("a script of the shell")
+    (tmp_path / "cc").write_text(f"#!/bin/sh\n{writes}\n")
+    (tmp_path / "cc").chmod(0o755)
+    with pytest.raises(RunError, match=r"cc ended without an error and wrote no code into a\.o; is it"):
+        compile_code(Compiler((str(tmp_path / "cc"),), zig=False), ARGUMENTS, FILES, "a.o")
+    assert not store.exists()
+
+
 def test_a_second_export_compiles_nothing(counting, tmp_path, monkeypatch):
     """An FMU with other start values does not compile the kernels again, either."""
     compiler, calls = counting

@@ -195,6 +195,11 @@ def test_a_table_of_force_over_way_comes_from_a_file(tmp_path):
         ("way [kg m], force [N]\n0,1\n1,2\n", "unit is not known"),
         ("0,1\n0,2\n", "x must rise"),
         ("0,1\n1,nothing\n", "is no number"),
+        ('0,"1,200"\n1,"2,400"\n', '"1,200" is not clear'),
+        ('0,"1,5"\n1,2\n', '"1,5" is not clear'),
+        ("0;1,200\n1;12,400\n", '"1,200" is not clear'),
+        ("0\t1,200\n0.5\t0,4\n", '"1,200" is not clear'),
+        ("0;2\n1;1,200,000\n", "is no number"),
     ],
 )
 def test_wrong_tables_are_refused_with_the_file(text, words, tmp_path):

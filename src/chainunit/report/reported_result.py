@@ -105,9 +105,9 @@ class ReportedResult(Generic[Question, Outcome]):
 
 def _copy(kept: Path, to: Path) -> None:
     """Copy a file, or a folder with all that is in it."""
-    if kept.is_dir():
-        shutil.copytree(kept, to, dirs_exist_ok=True)
-        return
-    to.parent.mkdir(exist_ok=True)
-    with atomic_file(to) as part:
-        shutil.copyfile(kept, part)
+    files = [kept] if kept.is_file() else [each for each in sorted(kept.rglob("*")) if each.is_file()]
+    for file in files:
+        target = to / file.relative_to(kept)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with atomic_file(target) as part:
+            shutil.copyfile(file, part)

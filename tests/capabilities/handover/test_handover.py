@@ -440,13 +440,22 @@ def test_files_that_are_no_cycle_are_refused(results):
         (rows[:2], "at least two rows of finite numbers"),
         ([*rows[:5], rows[5].replace(";", ";x", 1)], "x"),
         ([*rows[:5], "nan;nan;nan;nan;nan"], "finite"),
+        ([rows[0], *rows[5:1:-1]], r"x\.csv: the time runs backwards, from"),
     ):
         (results / "x.csv").write_text("\n".join(content), "utf-8")
         with pytest.raises(InputError, match=words):
             read_cycle(results / "x.csv")
     with pytest.raises(InputError, match="cannot be read"):
         read_cycle(results / "missing.csv")
-    for content in ("a\n1,2\n", "a\n1,2,3,x\n", "a\n1,2,3,4\n1,2\n", ""):
+    wrong = [
+        "a\n1,2\n",
+        "a\n1,2,3,x\n",
+        "a\n1,2,3,4\n1,2\n",
+        "",
+        "a\n1,2,3,4\n2,3,4,nan\n",
+        "a\n2,2,3,4\n1,2,3,4\n",
+    ]
+    for content in wrong:
         (out / "load_cycle.csv").write_text(content, "utf-8")
         with pytest.raises(InputError, match=r"load_cycle\.csv: must have four columns of numbers"):
             read_cycle(out / "sizing.json")

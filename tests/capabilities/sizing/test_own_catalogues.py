@@ -17,6 +17,7 @@ from event_tables import HEAVY_TABLES
 from sizings import sized_by
 
 from chainunit.capabilities.handover.candidates import candidates_csv
+from chainunit.capabilities.handover.checks import checks_csv
 from chainunit.capabilities.sizing import findings
 from chainunit.capabilities.sizing.candidate import Candidate, Criterion, Standing, TrialResult
 from chainunit.capabilities.sizing.gear_order import GearLoad, GearOrder
@@ -380,6 +381,28 @@ def test_the_example_ends_in_a_list_of_parts(tmp_path):
     assert (
         float(first["gear_overhung.utilisation"]) == best["checks"]["gear_overhung"]["utilisation"]["value"]
     )
+
+
+def test_no_cell_of_a_csv_is_a_formula():
+    """A text of a catalogue that a program for tables would compute is a text there; numbers stay numbers."""
+    formulas = ["=HYPERLINK(1)", "+1+1", "-2+3", "@SUM(A1)", "\t=1", "\r=1", " =1", "\uff1d1"]
+    candidate = {
+        "motor": formulas[0],
+        "reason": formulas[3],
+        "parts": [{"part": "motor", "designation": formulas[1], "order_number": formulas[2]}],
+        "numbers": {"=a": {"value": -1.5, "unit": "N"}, "b": {"value": 2.0, "unit": "1"}},
+    }
+    row = next(csv.DictReader(io.StringIO(candidates_csv([candidate])), delimiter=";"))
+    assert [row["motor"], row["motor.designation"], row["motor.order_number"]] == [
+        f"'{x}" for x in formulas[:3]
+    ]
+    assert (row["'=a [N]"], row["b"], row["rank"]) == ("-1.5", "2.0", "1")
+    text = checks_csv([{"of": each, "title": "a-b", "value": {"value": -3.0}} for each in formulas])
+    rows = list(csv.DictReader(io.StringIO(text, newline=""), delimiter=";"))
+    assert [each["of"] for each in rows] == [
+        f"'{' '.join(each.splitlines())}".replace("\t", " ") for each in formulas
+    ]
+    assert {(each["title"], each["value"]) for each in rows} == {("a-b", "-3.0")}
 
 
 @pytest.mark.second

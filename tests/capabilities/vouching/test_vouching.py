@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import json
 import random
@@ -33,6 +34,7 @@ from chainunit.capabilities.vouching import (
 from chainunit.capabilities.vouching.domain import domain
 from chainunit.capabilities.vouching.integrity import integrity
 from chainunit.capabilities.vouching.verify import FAILS, OPEN, _difference, conclusion, verify
+from chainunit.core.errors import WriteError
 from chainunit.fmu.backends import export
 from chainunit.fmu.native.export import export as native
 from chainunit.fmu.native.platforms import compiles
@@ -892,6 +894,29 @@ def test_without_a_key_no_code_of_the_file_runs(made, tmp_path, members, other, 
     assert conclusion(verify(tmp_path / "it.fmu", None, run=False, told=silent))[0] == OPEN
 
 
+def test_experiments_that_cannot_be_computed_again_are_said_at_the_end(
+    tmp_path, data, members, own, monkeypatch
+):
+    """Without casadi those of a motor; the equations are compared at its points all the same."""
+
+    def missing(*args):
+        raise ModuleNotFoundError(name="casadi")
+
+    monkeypatch.setattr(experiments, "by_equations", missing)
+    found = list(checked(tmp_path, data).values())
+    words = "holds, but its experiments were not computed again without the package casadi"
+    assert conclusion(found) == (OPEN, words)
+    wrong = points(lambda at: [halved(each) for each in at])(members)
+    found = checked(tmp_path, signed(wrong, own))
+    assert found["equations"].holds is False and "largest deviation 0.5" in found["equations"].words
+
+
+def test_members_that_no_folder_can_have_are_named(tmp_path, members, own):
+    for name in ("modelDescription.xml/more", "x" * 300):
+        found = checked(tmp_path, signed({**members, name: b"1"}, own))
+        assert "cannot be unpacked" in found["evidence"].words and found["evidence"].holds is False
+
+
 def test_sources_in_place_of_the_library_are_said_at_the_end(tmp_path, members, own):
     if "sources/model.c" not in members:
         pytest.skip("no C compiler")
@@ -912,6 +937,52 @@ def test_a_key_is_for_its_owner_alone_and_never_written_over(made, tmp_path):
     (tmp_path / "mine.pub").write_text("")
     run = chainunit("key", "-o", "mine", cwd=tmp_path)
     assert run.returncode == 2 and not (tmp_path / "mine").exists()
+
+
+@pytest.mark.parametrize("place", [0, 1], ids=["the private key", "the public key"])
+def test_a_key_on_a_full_disk_leaves_nothing(tmp_path, monkeypatch, place):
+    """An empty file would be taken for a key that is there already."""
+    opened, right = [], keys.os.fdopen
+
+    class Full:
+        def __init__(self, handle):
+            self.stream = right(handle, "wb")
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *at):
+            self.stream.close()
+
+        def write(self, content):
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    def fdopen(handle, mode):
+        opened.append(handle)
+        return Full(handle) if len(opened) > place else right(handle, mode)
+
+    monkeypatch.setattr(keys.os, "fdopen", fdopen)
+    with pytest.raises(WriteError, match=r"mine\S*: cannot be written \(No space left on device\)"):
+        keys.make_key(tmp_path / "mine")
+    assert list(tmp_path.iterdir()) == []
+    monkeypatch.undo()
+    assert keys.make_key(tmp_path / "mine")[0] == tmp_path / "mine.pub"
+
+
+def test_a_certified_file_and_its_meta_data_are_written_together(tmp_path, monkeypatch):
+    """Meta-data of the file before would make the new file fail."""
+    for name in ("it.fmu", "it.srmd"):
+        (tmp_path / name).write_bytes(before := b'<a data="it.fmu"/>')
+    made = certify.Certified(b"new", [], {})
+
+    def full(*args):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(documents, "srmd", full)
+    with pytest.raises(WriteError, match="No space left"):
+        certify.write(made, tmp_path / "it.fmu")
+    names = ("it.fmu", "it.srmd")
+    assert {each.name: each.read_bytes() for each in tmp_path.iterdir()} == dict.fromkeys(names, before)
 
 
 def test_files_that_are_no_keys_are_refused(made, tmp_path):

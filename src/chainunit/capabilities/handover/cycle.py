@@ -119,6 +119,7 @@ def _of_csv(text: str, path: Path) -> ShaftCycle:
     if values.ndim != 2 or len(values) < 2 or not np.all(np.isfinite(values)):
         raise InputError(f"{path}: the motion section must have at least two rows of finite numbers")
     time, angle, speed, acceleration, torque = values.T
+    _check_time(time, f"{path}: ")
     return ShaftCycle(time, angle, speed, acceleration, -torque)
 
 
@@ -128,12 +129,22 @@ def load_cycle(content: bytes) -> np.ndarray:
     Raises
     ------
     ValueError
-        where it has other columns, or fewer than two rows.
+        where it has other columns, fewer than two rows, a number that is not finite, or a time that runs backwards.
     """
     values = np.array(list(csv.reader(content.decode("utf-8").splitlines()[1:])), float).T
-    if values.shape[0] != 4 or values.shape[1] < 2:
+    if values.ndim != 2 or values.shape[0] != 4 or values.shape[1] < 2:
         raise ValueError(f"columns: {values.shape[0]}, rows: {values.shape[-1]}")
+    if not np.all(np.isfinite(values)):
+        raise ValueError("a number is not finite")
+    _check_time(values[0])
     return values
+
+
+def _check_time(time: np.ndarray, place: str = "") -> None:
+    back = np.flatnonzero(np.diff(time) < 0.0)
+    if back.size:
+        before, after = time[back[0]], time[back[0] + 1]
+        raise InputError(f"{place}the time runs backwards, from {before:.9g} s to {after:.9g} s")
 
 
 def _with_inertia(cycle: ShaftCycle, content: bytes, name: str) -> ShaftCycle:

@@ -203,12 +203,11 @@ def located(data: bytes, name: str) -> tuple[int, int, int] | None:
     """Where a stored member stands: the place of its head, of its content, and of the end of that [B]; by its head,
     or where that is damaged by the directory. None where neither is found."""
     raw = name.encode()
-    at = data.rfind(LOCAL)
+    at = data.rfind(raw) - _HEAD.size
     while at >= 0:
-        top = data[at : at + _HEAD.size + len(raw)]
-        if top[_HEAD.size :] == raw and (place := _place(data, at, top, raw)):
+        if data.startswith(LOCAL, at) and (place := _place(data, at, data[at : at + _HEAD.size], raw)):
             return place
-        at = data.rfind(LOCAL, 0, at)
+        at = data.rfind(raw, 0, at + _HEAD.size) - _HEAD.size
     try:
         info = zipfile.ZipFile(io.BytesIO(data)).getinfo(name)
     except _DAMAGED:

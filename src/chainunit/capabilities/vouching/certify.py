@@ -434,8 +434,7 @@ def write(made: Certified, file: Path) -> Path:
         see `atomic_file` and `place_beside`.
     """
     beside = place_beside(file)
-    with atomic_file(file) as part:
+    with atomic_file(file) as part, atomic_file(beside) as other:
         part.write_bytes(made.data)
-    with atomic_file(beside) as part:
-        part.write_bytes(docs.srmd(file.name, made.entries, __version__, (file.name, made.data)))
+        other.write_bytes(docs.srmd(file.name, made.entries, __version__, (file.name, made.data)))
     return beside

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ...core.errors import InputError
+from ...core.errors import InputError, printable
 from ...core.files import ResultKind
 from ...report.console import show_remark, study_file, terminal_console
 
@@ -105,9 +105,9 @@ def verify(
     wide = max(len(each.topic) for each in found)
     for each in found:
         sign = {True: "holds", False: "FAILS", None: "note"}[each.holds]
-        print(f"{sign:5}  {each.topic:{wide}}  {each.words}")
+        print(f"{sign:5}  {each.topic:{wide}}  {printable(each.words, 2000)}")
     code, words = conclusion(found)
-    print(f"{file}: {words}")
+    print(f"{file}: {printable(words, 2000)}")
     if code:
         raise typer.Exit(code)
 

@@ -44,7 +44,7 @@ def make_key(file: Path) -> tuple[Path, str]:
     InputError
         where one of the two files is there already: a key is never written over.
     WriteError
-        where a file cannot be written.
+        where a file cannot be written; then neither is there.
     """
     ed25519, forms = _library()
     public_file = file.with_name(file.name + _PUBLIC)
@@ -55,12 +55,19 @@ def make_key(file: Path) -> tuple[Path, str]:
     text = key.private_bytes(forms.Encoding.PEM, forms.PrivateFormat.PKCS8, forms.NoEncryption())
     public = key.public_key()
     words = public.public_bytes(forms.Encoding.PEM, forms.PublicFormat.SubjectPublicKeyInfo)
-    for path, content, mode in ((file, text, 0o600), (public_file, words, 0o644)):
-        with writing(path):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
-            with os.fdopen(handle, "wb") as stream:
-                stream.write(content)
+    made: list[Path] = []
+    try:
+        for path, content, mode in ((file, text, 0o600), (public_file, words, 0o644)):
+            with writing(path):
+                path.parent.mkdir(parents=True, exist_ok=True)
+                handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
+                made.append(path)
+                with os.fdopen(handle, "wb") as stream:
+                    stream.write(content)
+    except BaseException:
+        for path in made:
+            path.unlink(missing_ok=True)
+        raise
     return public_file, fingerprint(public.public_bytes_raw())
 
 

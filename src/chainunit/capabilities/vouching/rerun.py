@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core.errors import InputError, RunError, printable
+from ...core.files import full
 from ...core.quantities import Type
 from ...core.temporary_folders import scratch
 from ...fmu.loading import fmi2_callbacks, loading
@@ -106,11 +107,15 @@ def unpacked(members: Mapping[str, bytes], name: str) -> Iterator[UnpackedFmu]:
     with scratch() as folder:
         for member, content in members.items():
             place = folder / member
-            if member.endswith("/"):
-                place.mkdir(parents=True, exist_ok=True)
-                continue
-            place.parent.mkdir(parents=True, exist_ok=True)
-            place.write_bytes(content)
+            try:
+                (place if member.endswith("/") else place.parent).mkdir(parents=True, exist_ok=True)
+                if not member.endswith("/"):
+                    place.write_bytes(content)
+            except OSError as error:
+                if full(error):
+                    raise
+                cause = f"cannot be unpacked ({error.strerror or error})"
+                raise InputError(f"{name}: the member {printable(member)!r} {cause}") from error
         try:
             description = read_model_description(str(folder), validate=False)
         except Exception as error:  # fmpy has no class of its own
@@ -166,7 +171,7 @@ def opened(fmu: UnpackedFmu) -> Any:
                 guid=fmu.description.guid if fmu.fmi == 2 else fmu.description.instantiationToken,
                 unzipDirectory=str(fmu.folder),
                 modelIdentifier=fmu.identifier,
-                instanceName="verified",
+                instanceName=fmu.identifier,  # as others call it
             )
     except Exception as error:  # fmpy has no class of its own
         raise NoLibraryError(_no_library(fmu, error)) from error

@@ -111,22 +111,14 @@ def _judge(found: Integrity, name: str, model: type[Model] | None, unrun: str, t
 
 def _version(found: Integrity, manifest: Manifest) -> None:
     own, theirs = _numbers(__version__), _numbers(manifest.version)
+    words = f"certified by chainunit {printable(manifest.version, 40)}"
     if manifest.version == __version__:
-        found.add(True, "version", f"certified by chainunit {__version__}, as is installed here")
+        found.add(True, "version", f"{words}, as is installed here")
     elif theirs < own:
-        found.add(
-            False,
-            "version",
-            f"certified by chainunit {printable(manifest.version, 40)}, older than {__version__} here: its "
-            "equations may have been mended since; export and certify it again",
-        )
+        mended = "its equations may have been mended since; export and certify it again"
+        found.add(False, "version", f"{words}, older than {__version__} here: {mended}")
     else:
-        found.add(
-            False,
-            "version",
-            f"certified by chainunit {printable(manifest.version, 40)}, newer than {__version__} here: install that "
-            "version",
-        )
+        found.add(False, "version", f"{words}, newer than {__version__} here: install that version")
 
 
 def _numbers(version: str) -> tuple[int, ...]:
@@ -160,7 +152,7 @@ def _system(found: Integrity, stated: Mapping[str, Any], name: str, unrun: str, 
         found.add(None, "FMUs", "the package has none", "nothing in it was judged")
     for member, own in inside.items():
         if not own:
-            words = "is no FMU of this version of chainunit; its hash alone is signed"
+            words = "is no FMU of this package; its hash alone is signed"
             found.add(None, printable(member), words, f"{printable(member)} was not judged")
             continue
         inner = integrity(found.members[member], found.public, "the key of the package")

@@ -20,8 +20,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..errors import RunError
+from ..files import regular_bytes
 from ..temporary_folders import scratch
 from .cache import entry
+
+_CODE = (
+    b"\x7fELF", b"MZ", b"\x64\x86", b"\x4c\x01", b"\xcf\xfa\xed\xfe", b"\xca\xfe\xba\xbe", b"\0asm",
+)  # fmt: skip
+"""First bytes of libraries and objects: ELF, Windows (library, objects), macOS (one processor, more), WebAssembly."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +92,7 @@ def compile_code(
     Raises
     ------
     RunError
-        where the compiler fails, with its messages.
+        where the compiler fails, with its messages, or makes no code.
     """
 
     def make() -> bytes:
@@ -102,7 +108,13 @@ def compile_code(
             )
             if process.returncode:
                 raise RunError(f"the C compiler {compiler.name} failed: {process.stderr.strip()}")
-            return (work / product).read_bytes()
+            code = regular_bytes(work / product) or b""
+            if not code.startswith(_CODE):
+                raise RunError(
+                    f"the C compiler {compiler.name} ended without an error and wrote no code into {product}; "
+                    "is it a C compiler?"
+                )
+            return code
 
     key = hashlib.sha256(repr((compiler.identity, list(arguments), product)).encode())
     for name, content in sorted(files.items()):

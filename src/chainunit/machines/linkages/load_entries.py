@@ -31,6 +31,8 @@ _OF_LINK: Known = {"phi": "rad", "w": "rad/s", "angle": "rad", "angle_rate": "ra
 _OF_FORCE: Known = {**_OF_LINK, "x": "m", "y": "m", "vx": "m/s", "vy": "m/s"}
 _AXES = {"x": "m", "y": "m", "angle": "rad"}
 _OWN = re.compile(r"\b(min|max|stroke)\(\s*(x|y|angle)\s*\)")
+_THOUSANDS = re.compile(r"\s*[+-]?[1-9]\d{0,2},\d{3}\s*")
+"""A number whose comma may stand between thousands."""
 _HEADING = re.compile(r"\s*([^\[(]*?)\s*(?:[\[(]\s*(.*?)\s*[\])])?\s*")
 
 
@@ -130,6 +132,13 @@ class LoadReader(EntryReader):
                     scales[k], found[k] = self.with_unit(f"1 {match[2]}", None)
         if len(rows) < 2:
             raise InputError(f"{given}: must have two or more rows of numbers")
+        commas = [cell for row in rows for cell in row if "," in cell]
+        points = any("." in cell for row in rows for cell in row)
+        if commas and (mark == "," or points or all(map(_THOUSANDS.fullmatch, commas))):
+            raise InputError(
+                f"{given}: {shown(commas[0])} is not clear, as its comma may stand between thousands or before "
+                "decimals; write all numbers with a decimal point and without marks between thousands"
+            )
         columns: list[list[tuple[float, str | None]]] = [[], []]
         for row in rows:
             for k, cell in enumerate(row):
