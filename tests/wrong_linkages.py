@@ -308,7 +308,7 @@ FILES = [
     (TRIAD, [(13, "links.leg_s", "slides in both of its joints, rail and slot")]),
     ("", [(0, "links", "give at least the link that the driver turns")]),
     (STUDY, [(1, "machine", "run a study file with chainunit study")]),
-    ("hello world", [(1, "no valid TOML", "expected '='")]),
+    ("hello world", [(1, "no valid TOML", "has no tables and keys")]),
     ('{"a": 1}', [(1, "no valid TOML", "it is JSON")]),
     (PRESS + "[links.rod]\nmass = 3\n", [(38, "no valid TOML", "first in line 21")]),
 ]  # fmt: skip

@@ -18,6 +18,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from ..core.errors import InputError, refusal_prefix
 from ..core.files import atomic_file, folder
+from ..core.inputs import ARCHIVE, file_bytes
 from ..core.model import Model
 from ..core.quantities import written
 from ..core.temporary_folders import scratch
@@ -93,7 +94,7 @@ def export(
                     origins.append(
                         str(export_fmu(part.of, fmu, part.start, backend=backend, progress=progress))
                     )
-                contents[paths[alike]] = fmu.read_bytes()
+                contents[paths[alike]] = file_bytes(fmu, ARCHIVE)
             sources[name_of] = paths[alike]
     for name_of, part in parts.items():
         free = [c for c in part.of_kind("input") if f"{name_of}.{c.name}" not in targets]

@@ -12,7 +12,7 @@ import numpy as np
 
 from ... import __version__
 from ...core.errors import InputError, RunError, printable
-from ...core.files import regular_bytes
+from ...core.inputs import ARCHIVE, TooLargeError, check_archive, file_bytes, json_of, regular_bytes
 from ...core.model import Model
 from . import documents as docs
 from . import experiments as ex
@@ -46,9 +46,13 @@ def verify(
     InputError
         for a file that is not there, or no archive at all.
     """
-    data = regular_bytes(file)
-    if data is None:
-        raise InputError(f"{file}: no such file")
+    data = file_bytes(file, ARCHIVE)
+    try:
+        check_archive(data, str(file))
+    except TooLargeError:
+        raise
+    except InputError:
+        pass  # what is damaged is told line by line
     found = integrity(data, key)
     if not found.is_archive:
         raise InputError(f"{file}: is no FMU and no SSP package: it is not a zip archive")
@@ -66,7 +70,7 @@ def _judge(found: Integrity, name: str, model: type[Model] | None, run: bool, to
         found.add(None, NOT_RUN, "are not run: a file that is not as signed is not loaded")
         return
     try:
-        stated = json.loads(found.members[docs.EVIDENCE])
+        stated = json_of(found.members[docs.EVIDENCE], "evidence")
         if found.manifest.kind == "ssp":
             _system(found, stated, name, run, told)
         else:
@@ -241,7 +245,7 @@ class _Experiments:
 
     def _domain(self) -> None:
         content = self._fmu.file(docs.DOMAIN)
-        stated = json.loads(content or b"null")
+        stated = json_of(content or b"null", docs.DOMAIN)
         # a certificate that was made without the model has no conditions of it
         has_model = "left_out" not in self._stated
         if has_model and self._interface is None:
