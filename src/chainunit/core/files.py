@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import json
 import os
 import re
 import secrets
-import stat
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -16,6 +14,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from .errors import Faults, InputError, WriteError
+from .inputs import JSON, file_bytes, json_of
 from .ledger import Ledger
 
 LOCK = ".chainunit-lock"
@@ -37,8 +36,8 @@ class ResultKind(NamedTuple):
         if not self.key:
             return True
         try:
-            result = json.loads((folder / self.file).read_bytes())
-        except (OSError, ValueError, RecursionError):
+            result = json_of(file_bytes(folder / self.file, JSON), self.file)
+        except InputError:
             return False
         return isinstance(result, dict) and self.key in result
 
@@ -127,17 +126,6 @@ def write_all(writers: Iterable[Callable[[], list[Path]]]) -> tuple[list[Path], 
         except WriteError as error:
             failure = failure or error
     return paths, failure
-
-
-def regular_bytes(file: Path) -> bytes | None:
-    """The content of a regular file; None where there is none, or something else in its place, such as a pipe, for
-    which a reader would wait."""
-    try:
-        if not stat.S_ISREG(file.stat().st_mode):
-            return None
-        return file.read_bytes()
-    except OSError:
-        return None
 
 
 def full(error: OSError) -> bool:

@@ -14,6 +14,7 @@ import stat
 from pathlib import Path
 
 from .errors import InputError
+from .inputs import file_bytes
 
 NAME = ".chainunit-files"
 _LINE = re.compile(r"([0-9a-f]{64})  (\S.*)")
@@ -43,10 +44,10 @@ class Ledger:
             # a pipe would be waited for, and a link may lead anywhere
             if not stat.S_ISREG(self._file.lstat().st_mode):
                 raise self._unreadable
-            text = self._file.read_text("utf-8")
+            text = file_bytes(self._file).decode("utf-8")
         except FileNotFoundError:
             return
-        except (OSError, UnicodeDecodeError) as error:
+        except (OSError, UnicodeDecodeError, InputError) as error:
             raise self._unreadable from error
         # a process that was killed may have left a part of the last line
         self._torn = not text.endswith("\n")

@@ -134,6 +134,8 @@ def with_point(text: str) -> str:
 
 def _ascii(text: str) -> str:
     """The text in one spelling: superscripts, signs and blanks of all kinds become plain characters."""
+    if text.isascii():
+        return " ".join(text.replace("Ohm", "ohm").split())
     # a dash that stands for a minus, and the sign for an ordinal number that looks like a degree
     text = re.sub(r"^(\s*)[–‒]", r"\1-", text).replace("º", "°").replace("’", "'")
     with_carets = re.sub("([⁺⁻]?[⁰¹²³⁴-⁹]+)", r"^\1", text)

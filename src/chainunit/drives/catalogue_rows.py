@@ -23,9 +23,10 @@ from typing import Any
 
 from ..core import units
 from ..core.errors import Faults, InputError, each_refusal, near_name, shown
+from ..core.inputs import TEXT, TOML, file_text, lines_of_table
 from ..core.quantities import DISPLAY_UNITS, Layout, Value, Variable, declaration, quantity
 from ..reading import toml_lines
-from ..reading.tables import file_text, in_file, to_number, toml
+from ..reading.tables import in_file, to_number, toml
 
 TEXTS: Mapping[str, str] = MappingProxyType(
     {
@@ -38,6 +39,8 @@ TEXTS: Mapping[str, str] = MappingProxyType(
 LEFT_OUT: Mapping[str, str] = MappingProxyType({"order_number": "none", "source": "file and line"})
 """What stands for a column of texts that a file leaves out, in words; each file has the others."""
 _LONGEST = 200
+MOST_ROWS, MOST_FAULTS = 10_000, 100
+"""Most rows of a file, and most faults before the rest of a file is left unread."""
 _HEADING = re.compile(r"\s*(\w+)\s*(?:\[\s*(.*?)\s*\])?\s*")
 
 
@@ -115,6 +118,10 @@ class CatalogueKind:
         the `faults`."""
         found, taken = [], set(others)
         for row in rows:
+            if len(faults.errors) >= MOST_FAULTS:
+                words = f"this row and those after it are not checked, as {len(faults.errors)} faults stand before it"
+                faults.add([InputError(f"{row.origin}: {words}", placed=True)])
+                break
             with faults.collected(), each_refusal(row.refusal):
                 if (item := self._item(row, taken)) is not None:
                     found.append(item)
@@ -210,9 +217,9 @@ def items_in(
     found: dict[str, list[CatalogueItem]] = {kind.name: [] for kind in kinds}
     for file in files:
         with faults.collected():
-            text = file_text(file)
-            rows = _toml_rows if file.suffix.lower() == ".toml" else csv_rows
-            for kind, own in rows(text, str(file), kinds, faults):
+            is_toml = file.suffix.lower() == ".toml"
+            text = file_text(file, TOML if is_toml else TEXT)
+            for kind, own in (_toml_rows if is_toml else csv_rows)(text, str(file), kinds, faults):
                 before = {item.designation for item in found[kind.name]} | set(
                     (taken or {}).get(kind.name, ())
                 )
@@ -238,6 +245,10 @@ def csv_rows(
     names = {match[1] for cell in headings if (match := _HEADING.fullmatch(cell))}
     # the kind that knows most of the headings; of equals the one that needs most of them
     kind = max(kinds, key=lambda each: (len(names & {*each.columns}), len(names & {*each.required})))
+    parts = {part.partition("[")[0].strip() for cell in headings for part in re.split("[;\t]", cell)}
+    if not any(part in kind.columns or near_name(part, kind.columns) for part in parts):
+        known = ", ".join(map(kind.heading, kind.columns))
+        raise InputError(f"{file}:{first}: has no heading of a catalogue; known here: {known}", placed=True)
     columns, wrong = _columns(kind, headings, f"{file}:{first}", faults)
     missing = {name for name in kind.required if name not in dict(columns) and name not in wrong}
     if not any(name for name, _ in columns):
@@ -265,6 +276,7 @@ def csv_rows(
 
 def _lines_of_cells(text: str, file: str) -> Iterator[tuple[int, list[str]]]:
     """The rows that are not empty, each with its first line."""
+    lines_of_table(Path(file), text, MOST_ROWS)
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     line = 1
     try:
@@ -287,8 +299,8 @@ def _columns(
         name, unit = (match[1], match[2] or "") if match else ("", "")
         if name not in kind.columns:
             near = near_name(name, kind.columns)
-            parted = "; cells must be parted by commas" if cell.count(";") > 2 or "\t" in cell else ""
             known = ", ".join(map(kind.heading, kind.columns))
+            parted = "; cells must be parted by commas" if cell.count(";") > 2 or "\t" in cell else ""
             words = f"unknown{parted}{near}; known here: {known}"
             faults.add([InputError(f"{place}: heading {shown(cell)}: {words}", placed=True)])
             # the column that was meant is not missing, too

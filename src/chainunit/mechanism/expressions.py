@@ -10,7 +10,7 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import Any, NamedTuple
 
 from ..core.engines import MATH
@@ -44,16 +44,57 @@ _OPERATORS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Div: lambda a, b: a / b,
 }
 MOST_POWER = 12
+MOST_NESTED = 100
+"""Largest number of brackets, functions and signs inside each other; a sum or product of many terms is one."""
+MOST_TERMS = 1000
+"""Largest number of terms of a sum or product."""
+LONGEST = 10_000
+"""Largest number of letters of an expression."""
 _KERNELS: Mapping[str, Callable[..., Any]] = {"step": step, "positive": positive, "ramp": ramp}
 _PLACE = re.compile(r"\w+(\.\w+){0,2}")
 _SWITCH = (
     "there is no if: a value is switched smoothly, over a width: where(vx > 0, 500, 0, 0.01) is 500 where vx is "
     "above 0.005 and 0 where it is below -0.005; step(vx, 0.01) is 1 and 0 there"
 )
+_SPLIT = "; name a part of it as a parameter of its own, or take a table"
 _EXTREME = (
     "min, max and stroke of a place of the motion are written min(LINK.POINT.y), max(LINK.POINT.x), "
     "stroke(LINK.angle), or min(y) at the point of the load"
 )
+
+
+class Term(NamedTuple):
+    """A part of an expression: its `value`, and the names of the quantities, extremes and tables in it."""
+
+    value: Evaluation
+    names: tuple[str, ...] = ()
+    extremes: tuple[str, ...] = ()
+    tables: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, value: Evaluation, *terms: Term) -> Term:
+        """The value of a function of some `terms`, with the names in them."""
+        names, extremes, tables = (
+            tuple(dict.fromkeys(chain.from_iterable(each)))
+            for each in (
+                [term.names for term in terms],
+                [term.extremes for term in terms],
+                [term.tables for term in terms],
+            )
+        )
+        return cls(value, names, extremes, tables)
+
+    @property
+    def is_number(self) -> bool:
+        """Whether it depends on no quantity."""
+        return not (self.names or self.extremes or self.tables)
+
+    def number(self, values: Mapping[str, Any]) -> float:
+        """Its value as a number; NaN where it has none."""
+        try:
+            return float(self.value(MATH, values))
+        except (ArithmeticError, ValueError):
+            return math.nan
 
 
 class Width(NamedTuple):
@@ -61,20 +102,8 @@ class Width(NamedTuple):
     its end less its begin, may be below zero; no width may be zero."""
 
     call: str
-    of: Expression
+    of: Term
     falls: bool
-
-    @property
-    def is_number(self) -> bool:
-        """Whether it depends on no quantity."""
-        return not (self.of.names or self.of.extremes or self.of.tables)
-
-    def value(self, values: Mapping[str, Any]) -> float:
-        """Its value; NaN where it has none."""
-        try:
-            return float(self.of.value(MATH, values))
-        except (ArithmeticError, ValueError):
-            return math.nan
 
     def fault(self, value: float) -> str:
         """Words on a value that no width can have; empty for one that is right."""
@@ -85,158 +114,212 @@ class Width(NamedTuple):
 
 class Expression:
     """An expression: its text, the `names` of the quantities in it, of its `extremes` (such as ``min(ram.C.y)``) and
-    of its `tables`, its value, of the engine and all of these by name, and the `widths` of its smooth functions.
+    of its `tables`, its `value`, of the engine and all of these by name, the `widths` of its smooth functions, and
+    its `tree`.
 
     Raises
     ------
     InputError
-        for a text that is no expression, or has a width that is a number and not above zero, in one line.
+        for a text that is no expression, is too long or too deep, has a part that is a number and not finite, or a
+        width that is a number and not above zero, in one line.
     """
 
     def __init__(self, text: str) -> None:
-        self.text = text
+        self.text, self._depth = text, 0
+        self.widths: list[Width] = []
+        if len(text) > LONGEST:
+            raise InputError(f"{shown(text)}: has {len(text)} letters; must have <= {LONGEST}{_SPLIT}")
         try:
-            tree = ast.parse(text.strip(), mode="eval").body
-        except (SyntaxError, ValueError, RecursionError, MemoryError):
+            self.tree = ast.parse(text.strip(), mode="eval").body
+            whole = self._term(self.tree)
+        except (RecursionError, MemoryError):
+            raise self._too_deep() from None
+        except (SyntaxError, ValueError) as error:
+            if isinstance(error, InputError):
+                raise
             if re.search(r"\bif\b", text):
                 raise InputError(f"{shown(text)}: {_SWITCH}") from None
+            if "nested" in str(error):
+                raise self._too_deep() from None
             raise InputError(
                 f"{shown(text)} is no number with a unit and no expression, such as 2 * r + 0.01"
             ) from None
-        self._names: dict[str, None] = {}
-        self._extremes: dict[str, None] = {}
-        self._tables: dict[str, None] = {}
-        self.widths: list[Width] = []
-        self.value: Evaluation = self._compiled(tree)
-        self.names, self.extremes = tuple(self._names), tuple(self._extremes)
-        self.tables = tuple(self._tables)
-        for width in self.widths:
-            if width.is_number and (wrong := width.fault(width.value({}))):
-                raise InputError(f"{shown(self.text)}: {wrong}")
+        self.value, self.number = whole.value, whole.number
+        self.names, self.extremes, self.tables = whole.names, whole.extremes, whole.tables
 
-    def _compiled(self, node: ast.AST) -> Evaluation:
+    def _too_deep(self) -> InputError:
+        return InputError(f"{shown(self.text)}: is nested more than {MOST_NESTED} times{_SPLIT}")
+
+    def words(self, node: ast.AST) -> str:
+        """The text of a node of its `tree`."""
+        return " ".join((ast.get_source_segment(self.text.strip(), node) or "").split())
+
+    def _term(self, node: ast.AST) -> Term:
+        """The term of a node; a number is computed here, once."""
+        self._depth += 1
+        if self._depth > MOST_NESTED:
+            raise self._too_deep()
+        term = self._compiled(node)
+        self._depth -= 1
+        if not term.is_number:
+            return term
+        number = term.number({})
+        if not math.isfinite(number):
+            raise InputError(f"{shown(self.text)}: {self.words(node)} has no value, or an infinite one")
+        return Term(lambda xp, of: number)
+
+    def _compiled(self, node: ast.AST) -> Term:
         match node:
             case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
-                return lambda xp, of, x=float(number): x  # type: ignore[misc]
+                return Term(lambda xp, of: as_float(number))
             case ast.Name(id=name) if name in CONSTANTS:
-                return lambda xp, of, x=CONSTANTS[name]: x  # type: ignore[misc]
+                return Term(lambda xp, of: CONSTANTS[name])
             case ast.Name(id=name) if name not in WORDS:
-                self._names[name] = None
-                return lambda xp, of: of[name]
+                return Term(lambda xp, of: of[name], (name,))
             case ast.UnaryOp(op=ast.USub(), operand=inner):
-                value = self._compiled(inner)
-                return lambda xp, of: -value(xp, of)
+                term = self._term(inner)
+                return Term.of(lambda xp, of: -term.value(xp, of), term)
             case ast.UnaryOp(op=ast.UAdd(), operand=inner):
-                return self._compiled(inner)
+                return self._term(inner)
             case ast.BinOp(op=ast.Pow(), left=base, right=ast.Constant(value=int(power))) if (
                 0 < power <= MOST_POWER and not isinstance(power, bool)
             ):
-                return self._power(self._compiled(base), power)
-            case ast.BinOp(op=ast.Div(), right=ast.Constant(value=number)) if number == 0:
-                raise InputError(f"{shown(self.text)}: {ast.unparse(node)} divides by zero")
+                return self._power(self._term(base), power)
             case ast.BinOp(op=ast.Pow(), left=base, right=ast.Constant(value=float(power))):
                 # of a positive number, such as the pressure of a gas
-                value, exponent = self._compiled(base), float(power)
-                return lambda xp, of: xp.exp(exponent * xp.log(value(xp, of)))
-            case ast.BinOp(op=op, left=left, right=right) if type(op) in _OPERATORS:
-                a, b, apply = self._compiled(left), self._compiled(right), _OPERATORS[type(op)]
-                return lambda xp, of: apply(a(xp, of), b(xp, of))
+                term, exponent = self._term(base), float(power)
+                return Term.of(lambda xp, of: xp.exp(exponent * xp.log(term.value(xp, of))), term)
+            case ast.BinOp(op=op) if type(op) in _OPERATORS:
+                return self._chain(node)
             case ast.Call(func=ast.Name(id=name), args=[place], keywords=[]) if name in EXTREMES:
                 return self._extreme(name, place)
             case ast.Call(func=ast.Name(id="table"), args=[x, *rest], keywords=[]) if rest:
-                return self._table(self._compiled(x), rest)
+                return self._table(self._term(x), rest)
             case ast.Call(func=ast.Name(id="where"), args=[condition, *rest], keywords=[]) if len(rest) == 3:
-                value = self._where(condition, [self._compiled(each) for each in rest])
-                self._keep_width(node, ast.unparse(rest[2]))
-                return value
+                terms = [self._term(each) for each in rest]
+                term = self._where(condition, terms)
+                self._keep_width(node, terms[2])
+                return term
             case ast.Call(func=ast.Name(id=("where" | "table") as name)):
                 raise self._written(name)
             case ast.Call(func=ast.Name(id=name), args=args, keywords=[]):
-                value = self._call(name, [self._compiled(each) for each in args])
-                match name, args:
+                terms = [self._term(each) for each in args]
+                term = self._call(name, terms)
+                match name, terms:
                     case (("step" | "positive"), [_, width]):
-                        self._keep_width(node, ast.unparse(width))
+                        self._keep_width(node, width)
                     case "ramp", [_, begin, end]:
-                        self._keep_width(node, f"({ast.unparse(end)}) - ({ast.unparse(begin)})", falls=True)
-                return value
+                        width = Term.of(lambda xp, of: end.value(xp, of) - begin.value(xp, of), begin, end)
+                        self._keep_width(node, width, falls=True)
+                return term
             case ast.Compare() | ast.IfExp() | ast.BoolOp():
                 raise InputError(f"{shown(self.text)}: {_SWITCH}")
             case ast.Attribute():
                 raise InputError(
-                    f"{shown(self.text)}: {ast.unparse(node)} is known as an extreme alone: {_EXTREME}"
+                    f"{shown(self.text)}: {self.words(node)} is known as an extreme alone: {_EXTREME}"
                 )
         raise InputError(
-            f"{shown(self.text)}: {ast.unparse(node)} cannot be computed; an expression has numbers, names, "
+            f"{shown(self.text)}: {self.words(node)} cannot be computed; an expression has numbers, names, "
             f"+ - * /, powers (whole ones up to {MOST_POWER}), brackets, and {', '.join(FUNCTIONS)}"
         )
 
-    def _keep_width(self, call: ast.AST, text: str, falls: bool = False) -> None:
-        self.widths.append(Width(ast.unparse(call), Expression(text), falls))
+    def _chain(self, node: ast.AST) -> Term:
+        """A sum or a product of any number of terms, from left to right."""
+        first, steps = parts_of_chain(node)
+        if len(steps) >= MOST_TERMS:
+            raise InputError(
+                f"{shown(self.text)}: has {len(steps) + 1} terms; must have <= {MOST_TERMS}{_SPLIT}"
+            )
+        terms = [self._term(first), *(self._term(right) for _, _, right in steps)]
+        for (whole, op, _), divisor in zip(steps, terms[1:], strict=True):
+            if isinstance(op, ast.Div) and divisor.is_number and divisor.number({}) == 0.0:
+                raise InputError(f"{shown(self.text)}: {self.words(whole)} divides by zero")
+        rest = [(_OPERATORS[type(op)], term.value) for (_, op, _), term in zip(steps, terms[1:], strict=True)]
+        begin = terms[0].value
+
+        def value(xp: Any, of: Mapping[str, Any]) -> Any:
+            result = begin(xp, of)
+            for apply, right in rest:
+                result = apply(result, right(xp, of))
+            return result
+
+        return Term.of(value, *terms)
+
+    def _keep_width(self, call: ast.AST, width: Term, falls: bool = False) -> None:
+        kept = Width(self.words(call), width, falls)
+        if width.is_number and (wrong := kept.fault(width.number({}))):
+            raise InputError(f"{shown(self.text)}: {wrong}")
+        self.widths.append(kept)
 
     @staticmethod
-    def _power(base: Evaluation, power: int) -> Evaluation:
+    def _power(base: Term, power: int) -> Term:
         def value(xp: Any, of: Mapping[str, Any]) -> Any:
-            x = result = base(xp, of)
+            x = result = base.value(xp, of)
             for _ in range(power - 1):
                 result = result * x
             return result
 
-        return value
+        return Term.of(value, base)
 
-    def _extreme(self, name: str, place: ast.AST) -> Evaluation:
-        text = ast.unparse(place)
+    def _extreme(self, name: str, place: ast.AST) -> Term:
+        words = self.words(place)
+        text = words.replace(" ", "")
         if not _PLACE.fullmatch(text):
             raise InputError(
-                f"{shown(self.text)}: {name} of {text}: {name} has two arguments, or is an extreme: {_EXTREME}"
+                f"{shown(self.text)}: {name} of {words}: {name} has two arguments, or is an extreme: {_EXTREME}"
                 if name in _TWO
-                else f"{shown(self.text)}: {name} of {text}: {_EXTREME}"
+                else f"{shown(self.text)}: {name} of {words}: {_EXTREME}"
             )
         if name == "stroke":
-            self._extremes |= dict.fromkeys((f"max({text})", f"min({text})"))
-            return lambda xp, of: of[f"max({text})"] - of[f"min({text})"]
-        self._extremes[f"{name}({text})"] = None
-        return lambda xp, of: of[f"{name}({text})"]
+            return Term(
+                lambda xp, of: of[f"max({text})"] - of[f"min({text})"],
+                extremes=(f"max({text})", f"min({text})"),
+            )
+        return Term(lambda xp, of: of[f"{name}({text})"], extremes=(f"{name}({text})",))
 
-    def _where(self, condition: ast.AST, rest: Sequence[Evaluation]) -> Evaluation:
+    def _where(self, condition: ast.AST, rest: Sequence[Term]) -> Term:
         match condition:
             case ast.Compare(left=left, ops=[ast.Gt() | ast.GtE()], comparators=[right]):
-                above, below = self._compiled(left), self._compiled(right)
+                above, below = self._term(left), self._term(right)
             case ast.Compare(left=left, ops=[ast.Lt() | ast.LtE()], comparators=[right]):
-                above, below = self._compiled(right), self._compiled(left)
+                above, below = self._term(right), self._term(left)
             case _:
                 raise InputError(
-                    f"{shown(self.text)}: {ast.unparse(condition)}: the first argument of where is one comparison, "
+                    f"{shown(self.text)}: {self.words(condition)}: the first argument of where is one comparison, "
                     "such as vx > 0"
                 )
         then, other, width = rest
 
         def value(xp: Any, of: Mapping[str, Any]) -> Any:
-            no = other(xp, of)
-            share = step(xp, above(xp, of) - below(xp, of), width(xp, of))
-            return no + share * (then(xp, of) - no)
+            no = other.value(xp, of)
+            share = step(xp, above.value(xp, of) - below.value(xp, of), width.value(xp, of))
+            return no + share * (then.value(xp, of) - no)
 
-        return value
+        return Term.of(value, above, below, then, other, width)
 
-    def _table(self, x: Evaluation, rest: Sequence[ast.AST]) -> Evaluation:
+    def _table(self, x: Term, rest: Sequence[ast.AST]) -> Term:
         if len(rest) == 1 and isinstance(rest[0], ast.Name):
             name = rest[0].id
-            self._tables[name] = None
-            return lambda xp, of: of[f"table {name}"].value(xp, x(xp, of))
-        names = dict(self._names)
-        numbers = [self._compiled(each) for each in rest]
-        if self._names != names or len(numbers) < 4 or len(numbers) % 2:
+            return Term(
+                lambda xp, of: of[f"table {name}"].value(xp, x.value(xp, of)),
+                x.names,
+                x.extremes,
+                (*x.tables, name),
+            )
+        numbers = [self._term(each) for each in rest]
+        if not all(each.is_number for each in numbers) or len(numbers) < 4 or len(numbers) % 2:
             raise InputError(
                 f"{shown(self.text)}: table has x, then the name of a table, or two or more pairs of numbers: "
                 "table(x, x1, y1, x2, y2)"
             )
-        values = [float(each(MATH, {})) for each in numbers]
+        values = [each.number({}) for each in numbers]
         places = values[::2]
         if any(b <= a for a, b in pairwise(places)):
             raise InputError(f"{shown(self.text)}: the places x1, x2, ... of the table must rise")
         curve = TableCurve(places, values[1::2], turns=False)
-        return lambda xp, of: curve.value(xp, x(xp, of))
+        return Term.of(lambda xp, of: curve.value(xp, x.value(xp, of)), x)
 
-    def _call(self, name: str, args: list[Evaluation]) -> Evaluation:
+    def _call(self, name: str, args: list[Term]) -> Term:
         if name not in FUNCTIONS:
             raise InputError(
                 f"{shown(self.text)}: no function {name}{meant(name, FUNCTIONS)} known here: "
@@ -246,21 +329,40 @@ class Expression:
             kernel = _KERNELS.get(name)
             if kernel is None or len(args) != len(SMOOTH[name]):
                 raise self._written(name)
-            return lambda xp, of: kernel(xp, *(each(xp, of) for each in args))
+            return Term.of(lambda xp, of: kernel(xp, *(each.value(xp, of) for each in args)), *args)
         wanted = 2 if name in _TWO else 1
         if len(args) != wanted:
             raise InputError(
                 f"{shown(self.text)}: {name} has {wanted} argument{'s' * (wanted > 1)}, not {len(args)}"
             )
+        first = args[0].value
         if name == "tan":
-            return lambda xp, of: (lambda x: xp.sin(x) / xp.cos(x))(args[0](xp, of))
+            return Term.of(lambda xp, of: (lambda x: xp.sin(x) / xp.cos(x))(first(xp, of)), *args)
         if name in _TWO:
-            return lambda xp, of: getattr(xp, _TWO[name])(args[0](xp, of), args[1](xp, of))
-        return lambda xp, of: getattr(xp, name)(args[0](xp, of))
+            second = args[1].value
+            return Term.of(lambda xp, of: getattr(xp, _TWO[name])(first(xp, of), second(xp, of)), *args)
+        return Term.of(lambda xp, of: getattr(xp, name)(first(xp, of)), *args)
 
     def _written(self, name: str) -> InputError:
         wanted = ", ".join(SMOOTH.get(name, ("LINK.POINT.y",)))
         return InputError(f"{shown(self.text)}: {name} is written {name}({wanted})")
+
+
+def parts_of_chain(node: ast.AST) -> tuple[ast.AST, list[tuple[ast.AST, ast.operator, ast.AST]]]:
+    """The first term of a sum or product, and by each further one the node that it ends, its sign, and itself."""
+    steps: list[tuple[ast.AST, ast.operator, ast.AST]] = []
+    while isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:
+        steps.append((node, node.op, node.right))
+        node = node.left
+    return node, steps[::-1]
+
+
+def as_float(number: float) -> float:
+    """A number as a float; infinite where it is too large."""
+    try:
+        return float(number)
+    except OverflowError:
+        return math.inf
 
 
 @cache

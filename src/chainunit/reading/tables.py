@@ -30,6 +30,7 @@ from pydantic_core import ErrorDetails
 
 from ..core import units
 from ..core.errors import InputError, near_name, printable, shown
+from ..core.inputs import TOML, file_text
 from ..core.messages import unit_behind
 from ..core.quantities import Layout, Quantity, Variable, complaint, variables
 from . import toml_lines
@@ -90,9 +91,9 @@ def _converted(variable: Variable, text: str) -> float:
     raise ValueError(f"{variable.name} = {shown(text)}: must be {_kind(variable)}{other}{hint}")
 
 
-def option_value(name: str, text: str, unit: str, description: str) -> float:
-    """The positive value of an option of the command line in `unit`. A number without a unit is refused, as a reader
-    may take another unit for granted.
+def option_value(name: str, text: str, unit: str, description: str, most: float = math.inf) -> float:
+    """The positive value of an option of the command line in `unit`, at most `most`. A number without a unit is
+    refused, as a reader may take another unit for granted.
 
     Raises
     ------
@@ -104,7 +105,7 @@ def option_value(name: str, text: str, unit: str, description: str) -> float:
         others = {"rad/s": ("rev/min", "rad/s"), "m/s": ("m/s", "mm/s")}.get(unit, (unit.replace(".", " "),))
         examples = " or ".join(f'"{parts[0]:g} {other}"' for other in others)
         raise InputError(f"{name} {printable(text)}: has no unit; give it as {examples}")
-    quantity = Quantity(unit, description, low=0.0, open_low=True)
+    quantity = Quantity(unit, description, low=0.0, open_low=True, high=most)
     if parts is not None and parts[1] and not units.converts(parts[1], unit):
         kind = units.of_other_kind(parts[1], unit) or f"{printable(parts[1])} is no known unit"
         raise InputError(
@@ -381,12 +382,13 @@ def toml(text: str) -> dict[str, Any]:
     """
     try:
         data = tomllib.loads(text)
-        faults = text_faults(data)
     except ValueError as error:  # TOMLDecodeError, and numbers that are too long
         raise InputError.joined(syntax_faults(text, error)) from error
     except RecursionError as error:
-        raise InputError("no valid TOML: tables or lists are nested too deeply") from error
-    if faults:
+        raise InputError(_TOO_DEEP) from error
+    if nested_deeply(data):
+        raise InputError(_TOO_DEEP)
+    if faults := text_faults(data):
         raise InputError.joined(faults)
     return data
 
@@ -424,6 +426,20 @@ def _wrong_text(text: str, key: str, subject: str) -> Iterator[InputError]:
         yield InputError(f"{printable(key)}: {subject} {words}", key)
 
 
+_DEEPEST = 30
+"""Most tables and lists inside each other: no key of a file has as many."""
+_TOO_DEEP = f"no valid TOML here: tables or lists are nested more than {_DEEPEST} times"
+
+
+def nested_deeply(data: Any) -> bool:
+    """Whether tables and lists are nested more than any file needs."""
+    level = [data]
+    for _ in range(_DEEPEST + 1):
+        inner = (each.values() if isinstance(each, Mapping) else each for each in level)
+        level = [x for each in inner for x in each if isinstance(x, Mapping | list | tuple)]
+    return bool(level)
+
+
 def read(file: Path | None, example: Callable[[], str], parse: Callable[[str, str], T]) -> T:
     """The result of `parse` for the text of a file and the file's name; without a file, for the packaged
     `example`.
@@ -434,7 +450,7 @@ def read(file: Path | None, example: Callable[[], str], parse: Callable[[str, st
         in one line that begins with the name of the file.
     """
     source = str(file) if file else "packaged example"
-    text = file_text(file) if file else example()
+    text = file_text(file, TOML) if file else example()
     with in_file(source, lambda: toml_lines.lines_of(text)):
         return parse(text, source)
 
@@ -470,66 +486,3 @@ def _line_of(key: str, lines: Mapping[str, int]) -> int:
     while key and key not in lines:
         key = key.rpartition(".")[0]
     return lines.get(key, 0)
-
-
-_OTHER_KINDS = {
-    b"PK\x03\x04": "a ZIP archive, such as an FMU or an SSP package",
-    b"\x89HDF": "a NetCDF or HDF5 file, such as result.nc",
-    b"CDF": "a NetCDF file",
-    b"%PDF": "a PDF file",
-    b"\x89PNG": "a picture",
-    b"\xff\xd8\xff": "a picture",
-    b"\x1f\x8b": "a compressed file",
-    b"\x7fELF": "a program",
-    b"MZ": "a program",
-    b"<": "HTML or XML",
-}
-"""By first bytes, the kinds of files that are no text."""
-
-
-def file_text(file: Path) -> str:
-    """The text of a file in UTF-8, with or without a byte order mark.
-
-    Raises
-    ------
-    InputError
-        in one line that begins with the name of the file.
-    """
-    return decoded(file, file_bytes(file))
-
-
-def file_bytes(file: Path) -> bytes:
-    """The content of a file.
-
-    Raises
-    ------
-    InputError
-        in one line that begins with the name of the file.
-    """
-    try:
-        return file.read_bytes()
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read ({error.strerror or error})") from error
-
-
-def decoded(file: Path, data: bytes) -> str:
-    """The text in the content of a file, see `file_text`.
-
-    Raises
-    ------
-    InputError
-        in one line that begins with the name of the file.
-    """
-    for begin, kind in _OTHER_KINDS.items():
-        if data.startswith(begin):
-            raise InputError(f"{file}: is {kind}; must be a text file")
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-            raise InputError(f"{file}: is not UTF-8 text but UTF-16; save it as UTF-8") from error
-        line = 1 + data[: error.start].count(b"\n")
-        raise InputError(f"{file}:{line}: is not UTF-8 text; save it as UTF-8", placed=True) from error
-    if "\0" in text:
-        raise InputError(f"{file}: is not UTF-8 text; save it as UTF-8")
-    return text

@@ -14,6 +14,7 @@ _COMMA = re.compile(r"([+-−]?\d+),(\d+)(?!\d*,)(.*)")
 _NUMBER = re.compile(r"([+-]?)0*(\d*)\.?(\d*)")
 _QUOTES = "“”„«»‘’′″`"
 _BARE = re.compile(_NAMED + r"([^\s\"'\[{#=][^\"#=]*?)\s*(?:#.*)?")
+_BEGIN = re.compile(r"\[|[\w.\"' -]+=")
 _HEADING = re.compile(r"\s*(\[\[?)\s*([^]\[]+?)\s*\]")
 _DIGITS = re.compile(r"\d{4301,}")
 _SWITCHES = {"true": "true", "yes": "true", "on": "true", "false": "false", "no": "false", "off": "false"}
@@ -86,6 +87,9 @@ def _is_value(text: str) -> bool:
 def _words(lines: list[str], line: int, error: Exception) -> str:
     """Words on a fault that is not one of a value."""
     said = _PLACE.sub("", str(error))
+    first = next((each for each in map(str.strip, lines) if each and not each.startswith("#")), "")
+    if not _BEGIN.match(first) and not _kind(first):
+        return "the file has no tables and keys, as a file in TOML has: [name], and below it key = value"
     own = lines[line - 1] if line else ""
     twice = any(word in said for word in ("Cannot", "Duplicate"))
     if twice and (heading := _HEADING.match(own)):
@@ -99,7 +103,6 @@ def _words(lines: list[str], line: int, error: Exception) -> str:
         return f"{printable(own.strip(), 80)}: a quotation mark is missing"
     if own.rstrip().endswith("="):
         return f"{printable(own.strip(), 80)}: its value is missing"
-    first = next(filter(None, (each.strip() for each in lines)), "")
     kind = _kind(first)
     cited = f"{printable(own.strip(), 80)}: " if own.strip() and not kind else ""
     return f"{cited}{printable(said[:1].lower() + said[1:])}{kind}"

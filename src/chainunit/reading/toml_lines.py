@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,24 +24,43 @@ class Statement:
     """full names of all keys that it sets, also in inner tables; empty for a heading"""
 
 
+_SIGNS = re.compile(
+    r'"""(?:\\.|[^\\])*?"{3,5}'
+    r"|'''.*?'{3,5}"
+    r'|"(?:\\.|[^"\\\n])*"'
+    r"|'[^'\n]*'|#[^\n]*|[\[\]{}\n]",
+    re.DOTALL,
+)
+"""Texts, comments, brackets and ends of lines of a TOML text."""
+
+
 def statements(text: str) -> Iterator[Statement]:
     """The statements of a valid TOML text, in the order of the text.
 
-    A statement ends with the first line up to which it is valid TOML by itself.
+    A statement ends with the line in which its brackets are closed.
     """
-    lines = text.replace("\r\n", "\n").split("\n")
-    table, numbers, first = "", dict[str, int](), 0
-    while first < len(lines):
-        last = first + 1
-        while (data := _loaded(lines, first, last)) is None and last < len(lines):
-            last += 1
-        opens = lines[first].lstrip().startswith("[")
-        if opens:
-            table = _heading(data or {}, numbers)
+    text = text.replace("\r\n", "\n")
+    lines = text.split("\n")
+    table, numbers = "", dict[str, int]()
+    for first, last in _blocks(text):
+        data = _loaded("\n".join(lines[first:last]))
+        if lines[first].lstrip().startswith("["):
+            table = _heading(data, numbers)
             yield Statement(first + 1, last, table)
         elif data:
             yield Statement(first + 1, last, table, tuple(_names(data, f"{table}." if table else "")))
-        first = last
+
+
+def _blocks(text: str) -> Iterator[tuple[int, int]]:
+    """The first line of each statement, counted from 0, and the line behind it."""
+    depth = first = line = 0
+    for sign in (match[0] for match in _SIGNS.finditer(text)):
+        line += sign.count("\n")
+        depth += (sign in "[{") - (sign in "]}")
+        if sign == "\n" and depth <= 0:
+            yield first, line
+            depth, first = 0, line
+    yield first, line + 1
 
 
 def lines_of(text: str) -> dict[str, int]:
@@ -56,21 +76,12 @@ def lines_of(text: str) -> dict[str, int]:
     return found
 
 
-def _loaded(lines: Sequence[str], first: int, last: int) -> dict[str, Any] | None:
-    """The data in these lines; None where the lines are no complete statement."""
-    end = lines[last - 1].strip()
-    # a list of many lines is parsed only at lines where it may end, not at each line
-    if (
-        last - first > 1
-        and last < len(lines)
-        and not end.endswith(("]", "}", '"""', "'''"))
-        and "#" not in end
-    ):
-        return None
+def _loaded(statement: str) -> dict[str, Any]:
+    """The data in a statement; none where it is no TOML."""
     try:
-        return tomllib.loads("\n".join(lines[first:last]))
-    except tomllib.TOMLDecodeError:
-        return None
+        return tomllib.loads(statement)
+    except ValueError:
+        return {}
 
 
 def _heading(data: Mapping[str, Any], numbers: dict[str, int]) -> str:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import gzip
 import math
-import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import Faults, InputError, meant, near_name, printable
+from ..core.inputs import decoded, file_bytes, lines_of_table, unzipped
 from ..core.units import must_be, of_other_kind, scale
-from ..reading.tables import decoded, file_bytes
 from .measurands import MEASURANDS, SIGNALS, Measurand
 
 FEWEST = 100
@@ -75,7 +73,7 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
         with a line for each fault: the file that cannot be read, a column without unit or with a unit that does not
         fit, a cell that is no finite number, times that do not rise.
     """
-    lines = _text(file).splitlines()
+    lines = lines_of_table(file, _text(file))
     if not lines:
         raise InputError(f"{file}: is empty; must have a head and >= {FEWEST} rows")
     rows = [(number, line) for number, line in enumerate(lines[1:], 2) if line.partition("#")[0].strip()]
@@ -83,6 +81,12 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
         raise InputError(f"{file}: has {len(rows)} rows behind its head; must have >= {FEWEST}")
     mark = ";" if lines[0].count(";") > lines[0].count(",") else ","
     heads = [head.strip().strip('"') for head in lines[0].split(mark)]
+    first = [_is_number(cell) for cell in rows[0][1].split(mark)]
+    if len(first) != len(heads) or not any(first):
+        raise InputError(
+            f"{file}: is no table: its first line must be the heads of the columns, such as time [s],motor.i [A], "
+            f"and the next one (line {rows[0][0]}) has to have a number for each of the {len(heads)}"
+        )
     faults, units = Faults(), dict[str, tuple[int, float, float]]()
     known = dict(_places(file, heads, names or {}, faults))
     for name, (place, unit) in known.items():
@@ -114,6 +118,14 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
         {name: heads[place] for name, (place, _) in known.items()},
         [head for place, head in enumerate(heads) if place not in used],
     )
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell.replace(",", "."))
+    except ValueError:
+        return False
+    return True
 
 
 def name_and_unit(head: str) -> tuple[str, str]:
@@ -187,10 +199,7 @@ def read_signal(file: Path, names: Mapping[str, str], begin: float, end: float) 
 def _text(file: Path) -> str:
     content = file_bytes(file)
     if file.suffix == ".gz":
-        try:
-            content = gzip.decompress(content)
-        except (OSError, EOFError, zlib.error) as error:
-            raise InputError(f"{file}: cannot be unpacked ({printable(str(error))})") from error
+        content = unzipped(file, content)
     return decoded(file, content)
 
 

@@ -29,6 +29,8 @@ WIDTH, HEIGHT, MARGIN, COLUMN = 620.0, 450.0, 60.0, 345.0
 """Width and height of the room for the machine, its margin, and the width of the column of dimensions [px]."""
 _LETTER, _LINE = 7.2, 15.0
 """Width of a letter and height of a line of text [px]."""
+_DISC = 60.0
+"""Radius of a driver that has one point [px]."""
 _LOOKS = {"crank": ("#c1440e", 7), "heavy": ("#3d3d3d", 7), "light": ("#0b6fa4", 5)}
 
 Point = tuple[float, float]
@@ -166,7 +168,8 @@ def drawing(machine: Machine, phi: float | None = None) -> str:
         _rail(canvas, *map(to_page, way))
     if isinstance(crank, Crank):
         # the circle of the crank pin, or its arc
-        radius = math.dist(at[crank.bar.pin], at[crank.end])
+        # a link with its bearing alone, such as a drum or a fan, is a disc of any size
+        radius = math.dist(at[crank.bar.pin], at[crank.end]) or _DISC
         x, y = at[crank.bar.pin]
         look = {"fill": "none", "stroke": "#999999", "stroke_dasharray": "4 4"}
         if machine.model.turns:
@@ -230,8 +233,8 @@ def _curve(place: tuple[Any, Any]) -> Iterator[Point]:
 def _scale(points: list[Point]) -> Any:
     """The function from places in the machine [m] to places in the picture [px], y down."""
     xs, ys = [x for x, _ in points], [y for _, y in points]
-    room = (WIDTH - 2.0 * MARGIN, HEIGHT - 2.0 * MARGIN)
-    factor = min(room[0] / (max(xs) - min(xs)), room[1] / (max(ys) - min(ys)))
+    sizes = ((WIDTH, max(xs) - min(xs)), (HEIGHT, max(ys) - min(ys)))
+    factor = min(((room - 2.0 * MARGIN) / size for room, size in sizes if size), default=1.0)
     left = 0.5 * (WIDTH - factor * (max(xs) - min(xs)))
     top = 0.5 * (HEIGHT - factor * (max(ys) - min(ys)))
     return lambda p: (left + factor * (p[0] - min(xs)), top + factor * (max(ys) - p[1]))

@@ -25,6 +25,8 @@ from ..reading.tables import option_value
 PLACES = 361
 USUAL_SPEEDS = {"rad/s": "60 rpm", "m/s": "0.1 m/s"}
 """Speed of the driver of a linkage where nobody gives one, by its unit."""
+FASTEST = {"rad/s": 1e5, "m/s": 1e4}
+"""Largest speed of the driver, by its unit: no machine comes near."""
 _LOSSLESS = 1e-9
 """Part of the mean size of a torque below which its mean is that of a machine without losses."""
 STANDS = 1e-9
@@ -171,12 +173,22 @@ def speed_of_driver(machine: Machine, given: str | None) -> float:
         for a text that is no speed.
     """
     unit = "m/s" if machine.model.slides else "rad/s"
-    return option_value("--speed", given or USUAL_SPEEDS[unit], unit, "speed of the driver")
+    most = FASTEST[unit]
+    return option_value("--speed", given or USUAL_SPEEDS[unit], unit, "speed of the driver", most)
 
 
 def linkage_findings(machine: Machine, speed: float) -> LinkageFindings:
     """The linkage over its way at a constant `speed` of the driver [rad/s, m/s], with the loads of normal running; of
-    a driver with a range there and, as `back`, at the opposite speed."""
+    a driver with a range there and, as `back`, at the opposite speed.
+
+    Raises
+    ------
+    InputError
+        for a load that has no finite value.
+    """
+    description: LinkageDescription = machine.model.described_by  # type: ignore[attr-defined]
+    for each in {speed} if machine.model.turns else {abs(speed), -abs(speed)}:
+        description.check_loads(machine.p, each)
     rest = machine.equilibria()
     if machine.model.turns:
         return _findings(machine, speed, rest)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..core.errors import InputError, RunError, printable
+from ..core.inputs import TOML, file_text
 from ..core.model import About, Model
 from ..core.quantities import Layout
 from ..core.temporary_folders import scratch
@@ -19,7 +20,7 @@ from ..machines.flexible import ChainedModel, with_rods
 from ..machines.machine import Machine
 from ..mechanism.models import DirectMachine
 from ..models import model_named
-from ..reading.tables import file_text, toml
+from ..reading.tables import toml
 from ..system import ModelComponent, System, compiled
 from ..system.compiled import input_starts
 from ..system.ssp import export
@@ -75,7 +76,7 @@ def is_study_file(name: str) -> bool:
     if not name.lower().endswith(".toml"):
         return False
     try:
-        data = toml(file_text(Path(name)))
+        data = toml(file_text(Path(name), TOML))
     except InputError:
         return False  # whoever reads the file says what is wrong
     return not {"links", "ground", "driver", "joints"} & set(data)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ..core.errors import InputError, printable
+from ..core.inputs import JSON, file_bytes, json_of
 
 FILE = "result.json"
 _TITLES = {"steady": "steady running", "start_up": "start-up", "settling": "settling"}
@@ -47,17 +47,9 @@ def read_result(path: Path) -> StoredResult:
     """
     file = path / FILE if path.is_dir() else path
     try:
-        data = json.loads(file.read_bytes(), parse_constant=_refuse)
-    except OSError as error:
-        raise InputError(
-            f"{path}: has no result ({error.strerror or error}); make it by chainunit study -o {path}"
-        ) from error
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{file}: is no result of a study ({printable(str(error))})") from error
+        data = json_of(file_bytes(file, JSON), str(file))
+    except InputError as error:
+        raise InputError(f"{error}; chainunit study -o {path} makes a result of a study") from error
     if not isinstance(data, dict) or not isinstance(data.get("answers"), dict) or "chainunit" not in data:
         raise InputError(f"{file}: is no result of a study; chainunit study writes {FILE}")
     return StoredResult(file, data)
-
-
-def _refuse(constant: str) -> None:
-    raise ValueError(f"{constant} is no number of JSON")

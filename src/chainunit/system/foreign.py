@@ -13,14 +13,12 @@ names of an FMU with other names. A variable without unit counts as one in the u
 from __future__ import annotations
 
 import math
-import zipfile
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
-from xml.etree import ElementTree
 
-from ..core.errors import InputError, printable
+from ..core.errors import InputError, printable, shown
 from ..core.model import Terminal
 from ..core.ports import FLANGE, LOAD, LoadPort, flange, load_terminal
 from ..core.quantities import Layout, base_units
@@ -92,17 +90,17 @@ def fmu_component(
                 v.causality,
                 v.unit or "",
                 _dimension(v.unit, units) if v.type == "Real" else {},
-                float({"true": 1, "false": 0}.get(v.start, v.start) or 0.0),
+                _number(file, v, "start", 0.0),
                 printable(v.description or ""),
-                float(-math.inf if v.min is None else v.min),
-                float(math.inf if v.max is None else v.max),
+                _number(file, v, "min", -math.inf),
+                _number(file, v, "max", math.inf),
                 v.type,
             )
             for v in variables
             if v.causality in ("parameter", "input", "output")
             for name in [ours.get(v.name, v.name)]
         }
-        terminals = _declared(file, ours) or _by_names(connectors)
+        terminals = _declared(fmu, ours) or _by_names(connectors)
         description = printable(fmu.description.description or "")
     finally:
         fmu.close()
@@ -212,14 +210,27 @@ def _of(ends: Iterable[str], known: Terminal, name: str, prefix: str) -> Termina
     return Terminal(name, known.kind, known.description, members)
 
 
-def _declared(file: Path, ours: Mapping[str, str]) -> list[Terminal]:
+def _number(file: Path, variable: Any, name: str, usual: float) -> float:
+    """The number of an attribute of a variable; `usual` where it states none."""
+    given = getattr(variable, name)
+    if given in (None, ""):
+        return usual
+    try:
+        number = float({"true": 1, "false": 0}.get(given, given))
+    except (TypeError, ValueError):
+        number = math.nan
+    if not math.isfinite(number) and number != usual:
+        raise InputError(
+            f"{file}: {printable(variable.name)} has {name} = {shown(given)}; must be a finite number"
+        )
+    return number
+
+
+def _declared(fmu: Fmu, ours: Mapping[str, str]) -> list[Terminal]:
     """The terminals of the kinds flange and load in the FMU's own declaration; none where it has no declaration."""
-    with zipfile.ZipFile(file) as archive:
-        if _TERMINALS not in archive.namelist():
-            return []
-        root = ElementTree.fromstring(archive.read(_TERMINALS))
+    root = fmu.document(_TERMINALS)
     terminals = []
-    for node in root.iter("Terminal"):
+    for node in () if root is None else root.iter("Terminal"):
         kind, name = node.get("terminalKind", ""), node.get("name", "")
         if kind in (FLANGE, LOAD):
             members = {

@@ -10,8 +10,10 @@ import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Literal
+from xml.etree.ElementTree import Element
 
 from ..core.errors import InputError, RunError, printable, shown
+from ..core.inputs import ON_DISK, XML, check_archive, file_bytes, regular, xml_of
 from ..core.temporary_folders import remove_folder, temporary_folder
 from ..fmu.loading import fmi2_callbacks, loading
 
@@ -52,11 +54,14 @@ class Fmu:
         from fmpy import extract, read_model_description
 
         self.file, self.kind = file, kind
-        if not Path(file).is_file():
+        if not Path(file).exists():
             raise InputError(f"{file}: no such FMU")
+        check_archive(regular(Path(file)), str(file), ON_DISK, "FMU")
         self.folder = temporary_folder("chainunit_fmu")
         try:
             extract(str(file), unzipdir=self.folder)
+            if self.document("modelDescription.xml") is None:
+                raise InputError(f"{file}: is no FMU (it has no modelDescription.xml)")
             self.description = read_model_description(self.folder, validate=False)
             self.interface = self._interface()
         except BaseException as error:
@@ -68,6 +73,17 @@ class Fmu:
         for variable in self.description.modelVariables:
             variable.name = ours.get(variable.name, variable.name)
         self.variables = {v.name: v for v in self.description.modelVariables}
+
+    def document(self, path: str) -> Element | None:
+        """A document of the FMU in XML; None where it has none.
+
+        Raises
+        ------
+        InputError
+            for one that cannot be read.
+        """
+        place = Path(self.folder) / path
+        return xml_of(file_bytes(place, XML), f"{self.file}: {path}") if place.is_file() else None
 
     @property
     def identifier(self) -> str:

@@ -20,6 +20,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from ..core.errors import InputError, refusal_prefix
 from ..core.files import atomic_file, folder
+from ..core.inputs import ARCHIVE, file_bytes
 from ..core.model import Model
 from ..core.quantities import written
 from ..core.temporary_folders import scratch
@@ -104,7 +105,7 @@ def export(
                             )
                         )
                     )
-                contents[paths[alike]] = fmu.read_bytes()
+                contents[paths[alike]] = file_bytes(fmu, ARCHIVE)
             sources[name_of] = paths[alike]
     for name_of, part in parts.items():
         set_here = [c for c in part.of_kind("parameter") if c.name in part.start]

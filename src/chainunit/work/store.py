@@ -20,7 +20,8 @@ import numpy as np
 
 from .. import __version__
 from ..core.errors import RunError
-from ..core.files import atomic_file, regular_bytes, writing
+from ..core.files import atomic_file, writing
+from ..core.inputs import regular_bytes
 from .job import BATCH, CHECKS, Job, ResultVariable, text_array
 
 if TYPE_CHECKING:

@@ -8,7 +8,6 @@ inertia over the turn is a column of load_cycle.csv."""
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ...core.errors import InputError, printable
-from ...reading.tables import decoded, file_text
+from ...core.inputs import cells_of, decoded, file_text, lines_of_table
 from .rows import as_rows
 from .shell import environment_of
 from .template import ROOT, elements
@@ -109,13 +108,13 @@ def _at(submodel: Mapping[str, Any], names: Sequence[str]) -> list[dict[str, Any
 
 
 def _of_csv(text: str, path: Path) -> ShaftCycle:
-    rows = list(csv.reader(text.splitlines(), delimiter=";"))
+    rows = cells_of(path, lines_of_table(path, text), ";")
     if not rows or rows[0] != headings():
         raise InputError(f"{path}: the first line of the motion section must be {';'.join(headings())}")
     try:
         values = np.array(rows[1:], float)
     except ValueError as error:
-        raise InputError(f"{path}: {printable(str(error))}") from error
+        raise InputError(f"{path}: a row of the motion section is not {len(COLUMNS)} numbers") from error
     if values.ndim != 2 or len(values) < 2 or not np.all(np.isfinite(values)):
         raise InputError(f"{path}: the motion section must have at least two rows of finite numbers")
     time, angle, speed, acceleration, torque = values.T
@@ -131,13 +130,16 @@ def load_cycle(content: bytes) -> np.ndarray:
     ValueError
         where it has other columns, fewer than two rows, a number that is not finite, or a time that runs backwards.
     """
-    values = np.array(list(csv.reader(content.decode("utf-8").splitlines()[1:])), float).T
-    if values.ndim != 2 or values.shape[0] != 4 or values.shape[1] < 2:
-        raise ValueError(f"columns: {values.shape[0]}, rows: {values.shape[-1]}")
+    try:
+        values = np.array([line.split(",") for line in content.decode("utf-8").splitlines()[1:]], float)
+    except ValueError:
+        raise ValueError("a row is not four numbers") from None
+    if values.ndim != 2 or values.shape[1] != 4 or len(values) < 2:
+        raise ValueError(f"its shape is {values.shape}")
     if not np.all(np.isfinite(values)):
         raise ValueError("a number is not finite")
-    _check_time(values[0])
-    return values
+    _check_time(values[:, 0])
+    return values.T
 
 
 def _check_time(time: np.ndarray, place: str = "") -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ...core.errors import InputError, printable
-from ...reading.tables import file_bytes
+from ...core.inputs import JSON, check_archive, file_bytes, json_of, regular
 from .template import ROOT, TEMPLATE_ID, TemplateElement, elements, numbered
 
 EXACT = "ExactValue"
@@ -195,11 +195,7 @@ def environment_of(path: Path) -> tuple[Mapping[str, Any], Callable[[str], bytes
     """
     if path.suffix.lower() == ".aasx":
         return _of_aasx(path)
-    content = file_bytes(path)
-    try:
-        data = json.loads(content)
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{path}: is no JSON ({printable(str(error))})") from error
+    data = json_of(file_bytes(path, JSON), str(path))
     if not isinstance(data, dict):
         raise InputError(f"{path}: is no asset administration shell")
 
@@ -218,6 +214,7 @@ def _of_aasx(path: Path) -> tuple[Mapping[str, Any], Callable[[str], bytes]]:
     aasx, json_adapter = needs_basyx(f"{path}: reading an AASX")
     from basyx.aas import model
 
+    check_archive(regular(path), str(path), kind="AASX")
     store: Any = model.DictIdentifiableStore()
     files = aasx.DictSupplementaryFileContainer()
     try:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...core.errors import InputError, printable
-from ...reading.tables import file_bytes
+from ...core.inputs import dataset, file_bytes
 from ...report.series import SERIES, STEADY_BEGIN
 from ...study.record import LOAD_CYCLE
 from ...study.stored_result import StoredResult, as_mapping, read_result
@@ -127,7 +127,6 @@ def read_study(folder: Path) -> StudiedDrive:
     InputError
         where the folder has no complete result, or no steady turn of the motor's shaft.
     """
-    import xarray as xr
 
     result = read_result(folder)
     if not folder.is_dir():
@@ -147,11 +146,9 @@ def read_study(folder: Path) -> StudiedDrive:
             "study again"
         ) from error
     try:
-        start = xr.load_dataset(folder / SERIES, group="start_up")
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"{folder / SERIES}: cannot be read ({printable(str(error))}); run the study again"
-        ) from error
+        start = dataset(folder / SERIES, "start_up")
+    except InputError as error:
+        raise InputError(f"{error}; run the study again") from error
     if STEADY_BEGIN not in start.attrs:
         raise InputError(
             f"{folder / SERIES}: does not say when the steady turns begin, as an earlier version wrote it; run the "

@@ -15,6 +15,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from ...core.errors import InputError, shown
+from ...core.inputs import ARCHIVE_ERRORS, UNPACKED, TooLargeError, check_archive
 
 LOCAL, CENTRAL, END = b"PK\x03\x04", b"PK\x01\x02", b"PK\x05\x06"
 _HEAD = struct.Struct("<4sHHHHHIIIHH")
@@ -24,8 +25,6 @@ _VERSION, _UNIX, _DAY = 20, 3, 0x21  # 2.0, the system of the file modes, 1 Janu
 _UTF8 = 0x800
 _MODE = 0o644 << 16
 _LIMIT = 2**32 - 1
-_MOST = 2**30
-"""Largest size of a member that is read [B]: a few bytes of an archive may stand for many."""
 
 
 @dataclass(frozen=True)
@@ -126,20 +125,17 @@ class ArchiveContents:
     is_archive: bool = True
 
 
-_DAMAGED = (
-    zipfile.BadZipFile, zlib.error, struct.error, NotImplementedError, RuntimeError, EOFError, OSError,
-    ValueError, LookupError, OverflowError, MemoryError,
-)  # fmt: skip
-"""Errors of the library for archives with damage: it has no common one."""
-
-
 def contents(data: bytes) -> ArchiveContents:
     """The members of an archive; never an error, whatever the bytes are."""
     found = ArchiveContents()
     try:
+        check_archive(data, "the archive")
         opened = zipfile.ZipFile(io.BytesIO(data))
         listed = opened.infolist()
-    except _DAMAGED as error:
+    except TooLargeError as error:
+        found.faults[""] = str(error)
+        return found
+    except ARCHIVE_ERRORS as error:
         found.is_archive = data.startswith(LOCAL)
         found.faults[""] = (
             f"the directory at the end of the archive cannot be read, it is damaged or cut off ({_words(error)})"
@@ -152,10 +148,8 @@ def contents(data: bytes) -> ArchiveContents:
             continue
         try:
             with opened.open(info) as stream:
-                content = stream.read(_MOST + 1)
-            if len(content) > _MOST:
-                raise ValueError(f"has more than {_MOST >> 20} MiB")
-        except _DAMAGED as error:
+                content = stream.read()
+        except ARCHIVE_ERRORS as error:
             found.faults[name] = f"cannot be read ({_words(error)})"
         else:
             found.members[name] = content
@@ -183,7 +177,7 @@ def content_of(entry: bytes, size: int) -> bytes | None:
         return data
     squeeze = zlib.decompressobj(-15)
     try:
-        return squeeze.decompress(data, size + 1)
+        return squeeze.decompress(data, min(size, UNPACKED) + 1)
     except zlib.error:
         return None
 
@@ -210,7 +204,7 @@ def located(data: bytes, name: str) -> tuple[int, int, int] | None:
         at = data.rfind(raw, 0, at + _HEAD.size) - _HEAD.size
     try:
         info = zipfile.ZipFile(io.BytesIO(data)).getinfo(name)
-    except _DAMAGED:
+    except ARCHIVE_ERRORS:
         return None
     begin = info.header_offset + _HEAD.size + len(raw)
     place = info.header_offset, begin, begin + info.file_size

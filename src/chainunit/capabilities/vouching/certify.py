@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ... import __version__
 from ...core.errors import InputError, RunError, printable
-from ...core.files import atomic_file, regular_bytes
+from ...core.files import atomic_file
+from ...core.inputs import ARCHIVE, file_bytes, regular_bytes
 from ...core.model import Model
 from ...fmu.description import Interface, Signal, generation_time
 from ...fmu.pack import interface_of
@@ -60,10 +61,7 @@ def members_of(file: Path) -> dict[str, bytes]:
     InputError
         where the file is no sound archive.
     """
-    data = regular_bytes(file)
-    if data is None:
-        raise InputError(f"{file}: no such file")
-    read = contents(data)
+    read = contents(file_bytes(file, ARCHIVE))
     for name, fault in read.faults.items():
         raise InputError(f"{file}: {printable(name) + ': ' if name else ''}{fault}; it is not certified")
     if bad := unsafe(read.members):

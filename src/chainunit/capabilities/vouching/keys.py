@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...core.errors import InputError
-from ...core.files import regular_bytes, writing
+from ...core.files import writing
+from ...core.inputs import MIB, file_bytes
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
@@ -124,10 +125,10 @@ def public_key(file: Path) -> bytes:
 
 
 def _text(file: Path) -> bytes:
-    text = regular_bytes(file)
-    if text is None:
-        raise InputError(f"{file}: no such file of a key; chainunit key makes one")
-    return text
+    try:
+        return file_bytes(file, MIB)
+    except InputError as error:
+        raise InputError(f"{error}; chainunit key makes a file with a key") from error
 
 
 def fingerprint(public: bytes) -> str:

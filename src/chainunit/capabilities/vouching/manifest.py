@@ -14,7 +14,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ...core.errors import InputError, printable
+from ...core.errors import InputError
+from ...core.inputs import json_of
 from ...fmu.reference import REFERENCE
 from . import archive
 from .keys import fingerprint, is_signed
@@ -48,16 +49,9 @@ def json_value(content: bytes | None, name: str) -> Any:
     InputError
         where there is no such file, or it is none.
     """
-
-    def refuse(text: str) -> Any:
-        raise ValueError(f"{text} is no number")
-
-    try:
-        if content is None:
-            raise ValueError("is missing")
-        return json.loads(content, parse_constant=refuse)
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{name}: cannot be read ({printable(str(error), 100)})") from error
+    if content is None:
+        raise InputError(f"{name}: is missing")
+    return json_of(content, name)
 
 
 class SignedMember(NamedTuple):

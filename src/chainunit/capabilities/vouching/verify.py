@@ -14,7 +14,7 @@ import numpy as np
 
 from ... import __version__
 from ...core.errors import InputError, RunError, printable, shown
-from ...core.files import regular_bytes
+from ...core.inputs import ARCHIVE, TooLargeError, check_archive, file_bytes, regular_bytes
 from ...core.model import Model
 from ...models import MODELS
 from . import certify
@@ -57,9 +57,13 @@ def verify(
     InputError
         for a file that is not there, or no archive at all.
     """
-    data = regular_bytes(file)
-    if data is None:
-        raise InputError(f"{file}: no such file")
+    data = file_bytes(file, ARCHIVE)
+    try:
+        check_archive(data, str(file))
+    except TooLargeError:
+        raise
+    except InputError:
+        pass  # what is damaged is told line by line
     found = integrity(data, key)
     if not found.is_archive:
         raise InputError(f"{file}: is no FMU and no SSP package: it is not a zip archive")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -13,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ...core.errors import Faults, InputError
+from ...core.inputs import JSON, file_bytes, json_of
 from ...core.quantities import Layout
 from ...core.temporary_folders import scratch
 from ...drives.terminal_signals import terminal_signals
@@ -365,12 +365,11 @@ def _uncertainty(
 def _read_errors(file: Path) -> MachineErrors:
     """The errors of the machine by the result of an identification."""
     try:
-        result = json.loads(file.read_text("utf-8"))
+        result = json_of(file_bytes(file, JSON), str(file))
         table, failed = result["covariance"], not result["is_described"]
         names, matrix = list(table["names"]), np.array(table["matrix"], float)
-    except OSError as error:
-        words = f"cannot be read ({error.strerror or error})"
-        raise InputError(f"watch.identification = {file}: {words}", "watch.identification") from error
+    except InputError as error:
+        raise InputError(f"watch.identification = {error}", "watch.identification") from error
     except (ValueError, KeyError, TypeError) as error:
         raise InputError(
             f"watch.identification = {file}: is no result.json of chainunit identify", "watch.identification"

@@ -4,70 +4,77 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Mapping
+from functools import cache
 
 from ...core.errors import InputError, shown
 from ...core.quantities import base_units
-from ...mechanism.expressions import CONSTANTS, EXTREMES
+from ...mechanism.expressions import CONSTANTS, EXTREMES, Expression, expression, parts_of_chain
 
 Dimension = tuple[tuple[str, float], ...]
 """Exponents of the base units, angles apart; None stands for a number that takes any dimension."""
 
 
+@cache
 def dimension_of_unit(unit: str) -> Dimension:
     """The dimension of a unit."""
     return tuple((name, float(power)) for name, power in base_units(unit).items() if name != "rad" and power)
 
 
-def checked_dimension(text: str, units: Mapping[str, str | None], unit: str | None) -> None:
-    """Refuse an expression that is not of the dimension of `unit`, or, without it, adds what does not fit together;
-    `units` has the units of the names, extremes and tables in it, None for one that is not known yet.
+Dimensions = Mapping[str, Dimension | None]
+
+
+def checked_dimension(text: str, known: Dimensions, unit: str | None) -> Dimension | None:
+    """The dimension of an expression; `known` has those of the names, extremes and tables in it, None for one that
+    is not known yet.
 
     Raises
     ------
     InputError
-        in one line.
+        in one line, for an expression that adds what does not fit together, or is not of the dimension of `unit`.
     """
-    known = {name: None if each is None else dimension_of_unit(each) for name, each in units.items()}
-    result = _dimension(ast.parse(text.strip(), mode="eval").body, known, text)
+    of = expression(text)
+    result = _dimension(of.tree, known, of)
     if unit is not None and result is not None and result != dimension_of_unit(unit):
         raise InputError(f"is {shown(text)}, in {_unit(result)}; must be in {unit.replace('.', ' ')}")
+    return result
 
 
-def _dimension(node: ast.AST, known: Mapping[str, Dimension | None], text: str) -> Dimension | None:
+def _dimension(node: ast.AST, known: Dimensions, of: Expression) -> Dimension | None:
     match node:
         case ast.Constant():
             return None
         case ast.Name(id=name):
             return () if name in CONSTANTS else known[name]
         case ast.UnaryOp(operand=inner):
-            return _dimension(inner, known, text)
+            return _dimension(inner, known, of)
         case ast.BinOp(op=ast.Pow(), left=base, right=ast.Constant(value=int() | float() as power)):
-            inside = _dimension(base, known, text)
+            inside = _dimension(base, known, of)
             return None if inside is None else tuple((name, k * power) for name, k in inside)
-        case ast.BinOp(op=op, left=left, right=right):
-            a, b = _dimension(left, known, text), _dimension(right, known, text)
-            if isinstance(op, ast.Add | ast.Sub):
-                return _same(a, b, node, text)
-            # a number in a product is a pure one
-            return (
-                _product(a or (), b or (), 1.0 if isinstance(op, ast.Mult) else -1.0)
-                if (a is not None or b is not None)
-                else None
-            )
+        case ast.BinOp():
+            first, steps = parts_of_chain(node)
+            a = _dimension(first, known, of)
+            for whole, op, right in steps:
+                b = _dimension(right, known, of)
+                if isinstance(op, ast.Add | ast.Sub):
+                    a = _same(a, b, whole, of)
+                # a number in a product is a pure one
+                elif a is not None or b is not None:
+                    a = _product(a or (), b or (), 1.0 if isinstance(op, ast.Mult) else -1.0)
+            return a
         case ast.Call(func=ast.Name(id=name), args=[place]) if name in EXTREMES:
             return known[f"{'max' if name == 'stroke' else name}({ast.unparse(place)})"]
         case ast.Compare(left=left, comparators=[right]):
-            return _same(_dimension(left, known, text), _dimension(right, known, text), node, text)
+            return _same(_dimension(left, known, of), _dimension(right, known, of), node, of)
         case ast.Call(func=ast.Name(id="table"), args=[x, ast.Name(id=name)]):
-            _same(_dimension(x, known, text), known[f"x of {name}"], node, text)
+            _same(_dimension(x, known, of), known[f"x of {name}"], node, of)
             return known[f"table {name}"]
         case ast.Call(func=ast.Name(id=name), args=args):
-            inside_all = [_dimension(each, known, text) for each in args]
-            return _of_function(name, inside_all, node, text)
+            inside_all = [_dimension(each, known, of) for each in args]
+            return _of_function(name, inside_all, node, of)
     return None
 
 
-def _of_function(name: str, args: list[Dimension | None], node: ast.AST, text: str) -> Dimension | None:
+def _of_function(name: str, args: list[Dimension | None], node: ast.AST, of: Expression) -> Dimension | None:
     first = args[0]
     if name == "sqrt":
         return None if first is None else tuple((unit, 0.5 * k) for unit, k in first)
@@ -77,27 +84,27 @@ def _of_function(name: str, args: list[Dimension | None], node: ast.AST, text: s
         return None
     if name in ("step", "positive", "ramp"):
         for each in args[1:]:
-            first = _same(first, each, node, text)
+            first = _same(first, each, node, of)
         return first if name == "positive" else ()
     if name == "where":
-        _same(first, args[3], node, text)
-        return _same(args[1], args[2], node, text)
+        _same(first, args[3], node, of)
+        return _same(args[1], args[2], node, of)
     if name in ("min", "max"):
-        return _same(first, args[1], node, text)
+        return _same(first, args[1], node, of)
     if name == "atan2":
-        _same(first, args[1], node, text)
+        _same(first, args[1], node, of)
         return ()
     if first:
-        raise InputError(f"is {shown(text)}; {name} takes an angle or a ratio, not {_unit(first)}")
+        raise InputError(f"is {shown(of.text)}; {name} takes an angle or a ratio, not {_unit(first)}")
     return ()
 
 
-def _same(a: Dimension | None, b: Dimension | None, node: ast.AST, text: str) -> Dimension | None:
+def _same(a: Dimension | None, b: Dimension | None, node: ast.AST, of: Expression) -> Dimension | None:
     if a is None or b is None:
         return b if a is None else a
     if a != b:
         raise InputError(
-            f"is {shown(text)}; in {ast.unparse(node)} the one is in {_unit(a)}, the other in {_unit(b)}"
+            f"is {shown(of.text)}; in {of.words(node)} the one is in {_unit(a)}, the other in {_unit(b)}"
         )
     return a
 

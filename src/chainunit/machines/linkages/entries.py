@@ -3,22 +3,24 @@ its key, with all faults collected."""
 
 from __future__ import annotations
 
+import contextlib
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import fields, replace
+from graphlib import CycleError, TopologicalSorter
 from typing import Any
 
 from ...core import units
 from ...core.errors import InputError, near_name, printable, shown
 from ...core.model import About
 from ...core.quantities import USUAL, Layout, Quantity, Variable, base_units
-from ...mechanism.expressions import CONSTANTS, WORDS, Expression, expression
+from ...mechanism.expressions import CONSTANTS, WORDS, Expression, as_float, expression
 from ...reading.lists import Entry
 from ...reading.tables import UnusualValue
 from .checks import name_fault, words
 from .declarations import CommonParameters
-from .dimensions import checked_dimension
+from .dimensions import Dimensions, checked_dimension, dimension_of_unit
 from .loads import MOTION, OF_POINT
 from .way import WHOLE
 
@@ -32,6 +34,8 @@ UNITS = (
 _USUAL = USUAL | {"m": (0.0, USUAL["m"][1]), "m2": (1e-8, 10.0), "kg/m3": (10.0, 3e4)}
 """Usual sizes by unit; a length may be a coordinate, of any small size."""
 
+LARGEST = 1e30
+"""Largest size of a value in SI units."""
 Known = Mapping[str, str | None]
 
 
@@ -44,6 +48,10 @@ class EntryReader(Entry):
         self.inputs = self.table("inputs")
         self.units: dict[str, str | None] = {}
         self.derived: dict[str, str] = {}
+        """parameters that are expressions of others, each after those in it"""
+        self.derived_dimensions: Dimensions | None = None
+        self.expressed: dict[tuple[str, str], None] = {}
+        """keys and texts of all expressions that do not depend on the motion"""
         self.used: set[str] = set()
         self.refused: set[str] = set()
         self.points: dict[str, dict[str, list[Any]]] = {}
@@ -122,9 +130,8 @@ class EntryReader(Entry):
                     f"is {shown(given)}; the unit does not fit, write it as {_like(unit)}"
                 ) from None
         else:
-            value = float(given)
-        if not math.isfinite(value):
-            raise InputError(f"is {shown(given)}; must be finite")
+            value = as_float(given)
+        within(value, given)
         if unit == "rad" and abs(value) > WHOLE * (1.0 + 1e-12) and not units.has_unit(given):
             raise InputError(
                 f'is {shown(given)}, more than a turn; {units.IN_RADIANS}, write degrees as "{value:g} deg"'
@@ -156,12 +163,10 @@ class EntryReader(Entry):
             if self.refused & words(given):  # the name itself is faulted where it is given
                 return 0.0
             known = {**self.units, **(motion or {})}
-            self.used |= words(given) & {*self.derived}
-            given = self.expanded(given)
             each = expression(given)
             known |= self.further_units(each, motion is not None)
             for name in each.names:
-                if name not in known:
+                if name not in known and name not in self.derived:
                     raise InputError(f"is {shown(given)}; {name} is no parameter{self.note(name, known)}")
                 if name in self.inputs and not inputs:
                     raise InputError(
@@ -169,8 +174,9 @@ class EntryReader(Entry):
                     )
             self.used |= {*each.names}
             if each.names == (given.strip(),) and self.units.get(given.strip(), "") is None:
-                self.units[given.strip()] = unit
-            checked_dimension(each.text, known, unit)
+                self.units[given.strip()] = known[given.strip()] = unit
+                self.derived_dimensions = None
+            checked_dimension(each.text, self.dimensions(known), unit)
             for width in each.widths:
                 if moving := {*width.of.names} & ({*self.inputs} | {*(motion or {})}) or {*width.of.tables}:
                     raise InputError(
@@ -178,8 +184,46 @@ class EntryReader(Entry):
                         "must be a number or an expression of parameters; a ramp that begins at such a value a is "
                         "ramp(x - a, 0, width)"
                     )
+            if motion is None:
+                self.expressed[key, given] = None
             return given
         return 0.0
+
+    def dimensions(self, units: Known) -> Dimensions:
+        """The dimensions of names with these `units`, and of the parameters that are expressions of others."""
+
+        def of_units(units: Known) -> Dimensions:
+            return {name: None if each is None else dimension_of_unit(each) for name, each in units.items()}
+
+        if self.derived_dimensions is None:
+            known = dict(of_units(self.units))
+            self.derived_dimensions = {}
+            for name, text in self.derived.items():
+                known[name] = None
+                if name not in self.refused:
+                    with self.at(f"parameters.{name}"):
+                        known[name] = checked_dimension(text, known, None)
+                self.derived_dimensions[name] = known[name]
+        return {**self.derived_dimensions, **of_units(units)}
+
+    def start_values(self, parameters: Iterable[Mapping[str, Any]]) -> dict[str, float]:
+        """The start values of parameters by name, also of those that are expressions of others. Entries that have no
+        finite value with them are faulted."""
+        values = {each["name"]: float(each["value"]) for each in parameters}
+
+        def number(key: str, text: str) -> float:
+            x = expression(text).number(values)
+            if not math.isfinite(x):
+                names = ", ".join(f"{name} = {values[name]:.6g}" for name in expression(text).names)
+                self.fault(key, f"is {shown(text)}, which has no value, or an infinite one, with {names}")
+            return x
+
+        for name, text in self.derived.items():
+            values[name] = number(f"parameters.{name}", text)
+        for key, text in self.expressed:
+            if all(math.isfinite(values.get(name, 0.0)) for name in expression(text).names):
+                number(key, text)
+        return values
 
     def further_units(self, given: Expression, in_load: bool) -> dict[str, str | None]:
         """The units of extremes and tables of an expression, by name.
@@ -247,53 +291,49 @@ class EntryReader(Entry):
         self.keys("about", table, names)
         return {key: printable(self.text(f"about.{key}", "", table), 1000) for key in table if key in names}
 
-    def expanded(self, text: str) -> str:
-        """An expression without parameters that are expressions of others: these stand in it in brackets."""
-        for name in words(text) & {*self.derived}:
-            # no function, and no link or point, of the same name
-            text = re.sub(rf"(?<![\w.]){name}\b(?!\s*[.(])", f"({self.derived[name]})", text)
-        return text
+    def check_parameter(self, key: str, given: Any, text: str) -> None:
+        """Fault a parameter that is a wrong expression of other parameters.
 
-    def checked_parameter(self, key: str, given: Any, text: str) -> str:
-        """A parameter that is an expression, in parameters that are numbers; empty where it is wrong."""
-        if self.refused & words(text):
-            return ""
-        with self.at(key):
-            if isinstance(given, Mapping):
-                self.keys(key, given, ("value", "description"))
-            self.used |= words(text) & {*self.derived}
-            whole = self.expanded(text)
-            self.further_units(expression(whole), False)
-            for each in expression(whole).names:
-                if each not in self.units or each in self.inputs:
-                    raise InputError(f"is {shown(text)}; {each} is no parameter{near_name(each, self.units)}")
-            self.used |= {*expression(whole).names}
-            checked_dimension(whole, self.units, None)
-            return whole
-        return ""
+        Raises
+        ------
+        InputError
+            in one line.
+        """
+        if isinstance(given, Mapping):
+            self.keys(key, given, ("value", "description"))
+        of = expression(text)
+        self.further_units(of, False)
+        for each in of.names:
+            if (each not in self.units and each not in self.derived) or each in self.inputs:
+                raise InputError(f"is {shown(text)}; {each} is no parameter{near_name(each, self.units)}")
+        self.used |= {*of.names}
 
     def expressions(self, table: Mapping[str, Any]) -> None:
         """Take up the parameters that are expressions of others, in any order, and check each."""
-        waiting = {
+        texts = {
             name: str(given["value"] if isinstance(given, Mapping) else given)
             for name, given in table.items()
             if is_expression(given)
         }
-        while waiting:
-            ready = [name for name, text in waiting.items() if not words(text) & {*waiting}]
+        order = TopologicalSorter({name: words(text) & {*texts} for name, text in texts.items()})
+        with contextlib.suppress(CycleError):
+            order.prepare()
+        while ready := order.get_ready():
             for name in ready:
-                self.derived[name] = self.checked_parameter(
-                    f"parameters.{name}", table[name], waiting.pop(name)
-                )
-                self.refused |= {name} if not self.derived[name] else set()
-            if not ready:
-                names = ", ".join(waiting)
-                for name in waiting:
-                    self.fault(
-                        f"parameters.{name}", f"refers to itself by way of {names}; give one of them a number"
-                    )
-                    self.derived[name] = "0"
-                return
+                key, is_right = f"parameters.{name}", False
+                if not self.refused & words(texts[name]):
+                    with self.at(key):
+                        self.check_parameter(key, table[name], texts[name])
+                        is_right = True
+                self.derived[name] = texts[name] if is_right else "0"
+                self.refused |= set() if is_right else {name}
+            order.done(*ready)
+        waiting = [name for name in texts if name not in self.derived]
+        for name in waiting:
+            words_on_loop = f"refers to itself by way of {', '.join(waiting)}; give one of them a number"
+            self.fault(f"parameters.{name}", words_on_loop)
+            self.derived[name] = "0"
+        self.dimensions({})
 
     def quantities(self, kind: str) -> list[dict[str, Any]]:
         """Parameters or inputs; parameters that are expressions of others are taken up apart."""
@@ -347,10 +387,8 @@ class EntryReader(Entry):
             )
         if isinstance(given, str) and (parts := units.split(given)) and parts[1]:
             for each in UNITS:
-                try:
-                    return units.convert(*parts, each), each
-                except ValueError:
-                    continue
+                if units.converts(parts[1], each):
+                    return within(units.convert(*parts, each), given), each
             raise InputError(f"is {shown(given)}; the unit is not known; write it as in {_like('m')}")
         return self.number("", given, "1"), None
 
@@ -395,6 +433,24 @@ def _is_quantity(text: str) -> bool:
 def _is_unit(text: str) -> bool:
     """Whether a text is a unit of a linkage, such as kg*m2 or N/(m s)."""
     return any(units.converts(text, each) for each in UNITS)
+
+
+def within(value: float, given: Any) -> float:
+    """A value in SI units, by the text or number that is `given`.
+
+    Raises
+    ------
+    InputError
+        for one that is not finite, or so large that products of such values are not.
+    """
+    if not abs(value) <= LARGEST:
+        raise InputError(f"is {shown(given)}; must be finite, and <= {LARGEST:g} in size")
+    return value
+
+
+def is_among(given: Any, names: Collection[str]) -> bool:
+    """Whether an entry is one of some names; it may be a list or a table."""
+    return isinstance(given, str) and given in names
 
 
 def is_given(value: Any) -> str:

@@ -15,11 +15,12 @@ from typing import Any
 
 from ...core.engines import MATH
 from ...core.errors import InputError, RemarkWarning, each_refusal, meant, near_name, printable, shown
+from ...core.inputs import TOML, file_text
 from ...mechanism.assur import DYADS, GROUND, PRISMATIC, REVOLUTE
-from ...mechanism.expressions import expression
+from ...mechanism.expressions import value_of
 from ...mechanism.models import InverseMachine
 from ...reading import toml_lines
-from ...reading.tables import UnusualValue, file_text, in_file, slips_of, toml
+from ...reading.tables import UnusualValue, in_file, slips_of, toml
 from .checks import (
     POINT_NAMES,
     alike_points,
@@ -36,7 +37,7 @@ from .checks import (
     words,
 )
 from .declarations import RESERVED
-from .entries import is_given, sized
+from .entries import is_among, is_given, sized
 from .load_entries import LoadReader
 from .model import machine_of
 from .shared_pins import shared_pins
@@ -50,6 +51,8 @@ TABLES = (
 )  # fmt: skip
 _LINK_KEYS = ("points", "mass", "inertia", "centroid", "masses", "bar")
 _JOINT_KEYS = ("type", "on", "by", "toward", "angle", "length")
+_LARGEST_START = 1e4
+"""Largest place of the driver at the start [rad, m]."""
 _DRIVER_KEYS = ("link", "joint", "zero", "positive", "range")
 
 
@@ -80,7 +83,7 @@ def linkage_in(file: Path) -> tuple[type[InverseMachine], tuple[UnusualValue, ..
     InputError
         as `read_linkage`.
     """
-    text = file_text(file)
+    text = file_text(file, TOML)
     with in_file(str(file), lambda: toml_lines.lines_of(text)):
         reader = _LinkageReader(toml(text), file.stem, file.parent)
         try:
@@ -130,12 +133,20 @@ class _LinkageReader(LoadReader):
         loads = [self.load(name, given) for name, given in self.table("loads").items()]
         common, groups, about = self.common(), self.groups(), self.about()
         self.fault_unused(parameters, inputs, tables)
-        self.all(quantity_names(parameters, inputs, self.table("tables"), RESERVED, links))
+        derived = [{"name": name} for name in self.derived]
+        self.all(quantity_names([*parameters, *derived], inputs, self.table("tables"), RESERVED, links))
         self.all([*spring_faults(loads, joints), *guide_faults(data, joints)])
         self.refuse()
         alike = alike_points(self.points, self.named_points(links, loads))
         self.all(freedom_faults(links, joints, driver, alike))
-        start = self.start(parameters, links, joints, driver, span)
+        owned = [
+            {"name": f"{name}_of_{link['name']}", "value": x}
+            for link in links
+            for name, x in link["own"].items()
+        ]
+        values = self.start_values([*parameters, *inputs, *owned])
+        self.refuse()
+        start = self.start(values, links, joints, driver, span)
         self.refuse()
         described = {
             "name": name,
@@ -154,6 +165,8 @@ class _LinkageReader(LoadReader):
             "groups": groups,
             "start": start,
         }
+        if self.derived:
+            described["derived"] = [*self.derived.items()]
         return json.dumps(described, sort_keys=True)
 
     def named_points(self, links: list[dict[str, Any]], loads: list[dict[str, Any]]) -> set[tuple[str, ...]]:
@@ -275,7 +288,7 @@ class _LinkageReader(LoadReader):
                 self.fault(f"{key}.{each}", "follows from bar; take one of both out")
         ends = [bar.get(each) for each in ("from", "to")]
         for end in ends:
-            if end not in points:
+            if not is_among(end, points):
                 self.fault(f"{key}.bar", f"from and to must be two points of the link: {', '.join(points)}")
                 return {}
         if ends[0] == ends[1]:
@@ -331,7 +344,7 @@ class _LinkageReader(LoadReader):
         toward = given.get("toward")
         if isinstance(toward, str):
             toward = toward.rpartition(".")[2]
-        if toward not in self.points[by[0]] or toward == by[1]:
+        if not is_among(toward, self.points[by[0]]) or toward == by[1]:
             others = [name for name in self.points[by[0]] if name != by[1]]
             self.fault(
                 f"{key}.toward",
@@ -351,8 +364,8 @@ class _LinkageReader(LoadReader):
         if "joint" in table:
             return self.slide(table, joints)
         link = table.get("link")
-        if link not in self.points or link == GROUND:
-            known = [name for name in self.points if name != GROUND]
+        known = [name for name in self.points if name != GROUND]
+        if not is_among(link, known):
             if known:
                 self.fault(
                     "driver.link" if table else "driver",
@@ -423,21 +436,19 @@ class _LinkageReader(LoadReader):
 
     def start(
         self,
-        parameters: list[dict[str, Any]],
+        values: Mapping[str, float],
         links: list[dict[str, Any]],
         joints: list[dict[str, Any]],
         driver: dict[str, Any],
         span: Sequence[float] | None,
     ) -> dict[str, Any]:
-        """The value of the driver at the start, and the poses of all links there."""
+        """The value of the driver at the start, and the poses of all links there; `values` are those of the
+        parameters."""
         table = self.table("start")
         self.keys("start", table, ("phi", "points", "angles", "poses"))
-        values = {each["name"]: each["value"] for each in parameters}
-        values |= dict.fromkeys(self.inputs, 0.0)
-        values |= {f"{name}_of_{each['name']}": x for each in links for name, x in each["own"].items()}
 
         def number(entry: Any) -> float:
-            return float(expression(entry).value(MATH, values)) if isinstance(entry, str) else float(entry)
+            return float(value_of(MATH, entry, values))
 
         points = {
             link: {name: (number(x), number(y)) for name, (x, y) in those.items()}
@@ -456,6 +467,8 @@ class _LinkageReader(LoadReader):
         value = 0.0
         with self.at("start.phi"):
             value = self.number("start.phi", table.get("phi", 0.0), "m" if driver["linear"] else "rad")
+            if abs(value) > _LARGEST_START:
+                raise InputError(f"is {shown(table['phi'])}; must be <= {_LARGEST_START:g} in size")
             if span and not driver["linear"] and not span[0] <= value <= span[1]:
                 given = f"is {shown(table['phi'])}" if "phi" in table else "is 0 where it is not given"
                 low, high = (f"{math.degrees(end):g} deg" for end in span)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import re
 from collections.abc import Mapping
@@ -13,13 +11,16 @@ from typing import Any
 
 from ...core import units
 from ...core.errors import InputError, meant, near_name, shown
+from ...core.inputs import cells_of, file_text, lines_of_table
 from ...mechanism.assur import GROUND
 from ...mechanism.expressions import Expression
-from ...reading.tables import file_text
 from .checks import name_fault
-from .entries import EntryReader, Known, is_given
+from .entries import EntryReader, Known, is_among, is_given, within
 from .loads import parts_of_extreme
 
+MOST_POINTS = 1000
+"""Largest number of points of a table: each of them costs time at each step of a run."""
+_FEWER = f"must have at most {MOST_POINTS}: keep those between which the curve is nearly straight"
 LOADS = {
     "force": ("type", "on", "force"),
     "follower": ("type", "on", "force"),
@@ -88,6 +89,8 @@ class LoadReader(EntryReader):
             raise InputError(
                 f"must have {over} and value, two lists of one length, of {least} or more, or file, a CSV file"
             )
+        if len(places) > MOST_POINTS:
+            raise InputError(f"has {len(places)} points; {_FEWER}")
         linear = "joint" in self.table("driver")
         if over == "phi":
             unit = "m" if linear else "rad"
@@ -109,8 +112,11 @@ class LoadReader(EntryReader):
         """The two columns of a CSV file beside the linkage file, with units in a heading ("way [mm], force [kN]")."""
         if not isinstance(given, str):
             raise InputError(f"file is {shown(given)}; must be the name of a CSV file with two columns")
-        text = file_text(self.folder / given)
-        lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
+        file = self.folder / given
+        text = lines_of_table(file, file_text(file))
+        lines = [line for line in text if line.strip() and not line.lstrip().startswith("#")]
+        if len(lines) > MOST_POINTS + 1:
+            raise InputError(f"{given}: has {len(lines)} rows; {_FEWER}")
         mark = (
             ";"
             if any(";" in line for line in lines)
@@ -118,10 +124,11 @@ class LoadReader(EntryReader):
             if any("\t" in line for line in lines)
             else ","
         )
-        rows = list(csv.reader(io.StringIO("\n".join(lines)), delimiter=mark))
-        if wrong := next((row for row in rows if len(row) != 2), None):
+        rows = cells_of(given, lines, mark)
+        if wrong := next((k for k, row in enumerate(rows, 1) if len(row) != 2), None):
             raise InputError(
-                f"{given}: {shown(mark.join(wrong))}: each row must have two columns, x and value"
+                f"{given}: row {wrong} has {len(rows[wrong - 1])} columns; each row must have two columns, x "
+                "and value"
             )
         found: list[str | None] = [None, None]
         scales = [1.0, 1.0]
@@ -140,12 +147,14 @@ class LoadReader(EntryReader):
                 "decimals; write all numbers with a decimal point and without marks between thousands"
             )
         columns: list[list[tuple[float, str | None]]] = [[], []]
-        for row in rows:
+        for place, row in enumerate(rows, 1):
             for k, cell in enumerate(row):
                 value = _number(cell)
-                if value is None or not math.isfinite(value):
-                    raise InputError(f"{given}: {shown(cell)} is no number")
-                columns[k].append((value * scales[k], found[k]))
+                if value is None or math.isnan(value):
+                    # what begins as no number may be of a file that is no table
+                    cited = f" {shown(cell)}" if cell.lstrip()[:1] in (*"+-.0123456789",) else ""
+                    raise InputError(f"{given}: row {place} of numbers, column {k + 1}:{cited} is no number")
+                columns[k].append((within(value * scales[k], cell), found[k]))
         return columns[0], columns[1]
 
     # extremes of the motion
@@ -205,14 +214,14 @@ class LoadReader(EntryReader):
         key = f"loads.{name}"
         table = self.table(key, self.table("loads"))
         kind = table.get("type", "force")
-        if kind not in LOADS:
+        if not is_among(kind, LOADS):
             self.fault(f"{key}.type", f"is {shown(kind)}{meant(str(kind), LOADS)} must be {', '.join(LOADS)}")
             return {}
         self.keys(key, table, LOADS[kind])
         load: dict[str, Any] = {"name": name, "type": kind}
         if kind == "torque":
             on = table.get("on")
-            if on not in self.points or on == GROUND:
+            if not is_among(on, self.points) or on == GROUND:
                 self.fault(f"{key}.on", f"{is_given(on)}; must be a link{near_name(str(on), self.points)}")
             torque = _placed(table.get("torque"), [str(on)])
             return load | {

@@ -39,7 +39,7 @@ def widths_of(loads: Sequence[Mapping[str, Any]]) -> tuple[tuple[str, Width], ..
         (key, width)
         for key, text in _texts(loads)
         for width in expression(text).widths
-        if not width.is_number
+        if not width.of.is_number
     )
 
 
@@ -55,7 +55,7 @@ def checked_widths(
     """
     checked = []
     for key, width in widths_of(loads):
-        value = width.value(values)
+        value = width.of.number(values)
         if wrong := width.fault(value):
             given = ", ".join(f"{name} = {values[name]:.6g}" for name in width.of.names)
             raise InputError(f"{wrong}{f' ({given})' * bool(given)}", key=key)

@@ -105,13 +105,16 @@ class LinkageDescription(LinkageOutputs):
             self.port, inputs = port._replace(start=start), [self._in_range(motion, "phi"), *inputs]
         self.Inputs = declared_class("Inputs", (motion,), inputs)
         p, u = self.Parameters(), self.Inputs()
-        self.sides = dict(LinkageParts(LinkGeometry(MATH, self.structure, self.values(p, u))).sides)
+        self.sides = dict(LinkageParts(LinkGeometry(MATH, self.structure, self.values(MATH, p, u))).sides)
         self.sides |= turns_of_triads(self.linkage(MATH, p, u))
         self.link_turns = self._turns(p)
         self._check_extremes()
         self.widths = (
-            checked_widths(data["loads"], self.values(self._ready(), u)) if widths_of(data["loads"]) else ()
+            checked_widths(data["loads"], self.values(MATH, self._ready(), u))
+            if widths_of(data["loads"])
+            else ()
         )
+        self.check_loads(self._ready(), 1.0)
 
     # declarations
 
@@ -142,7 +145,7 @@ class LinkageDescription(LinkageOutputs):
         words = q.template if self.way.linear else f"{q.template}; range of the driver: {ends}"
         return name, Value, quantity(q.unit, words, default=0.5 * (low + high), min=low, max=high)
 
-    def values(self, p: Any, u: Any) -> dict[str, Any]:
+    def values(self, xp: Any, p: Any, u: Any) -> dict[str, Any]:
         """The quantities that expressions may name."""
         values = {each["name"]: getattr(p, each["name"]) for each in self.data.get("parameters", ())}
         values |= {each["name"]: getattr(u, each["name"]) for each in self.data.get("inputs", ())}
@@ -154,13 +157,16 @@ class LinkageDescription(LinkageOutputs):
         derived = getattr(p, "derived", ())
         values |= zip(self.extremes, derived[-len(self.extremes) :], strict=False) if self.extremes else ()
         values |= {f"table {name}": curve for name, curve in self.curves.items()}
-        return values | {"g": p.g, "ratio": p.ratio}
+        values |= {"g": p.g, "ratio": p.ratio}
+        for name, text in self.data.get("derived", ()):
+            values[name] = value_of(xp, text, values)
+        return values
 
     # the linkage
 
     def parts(self, xp: Any, p: Any, u: Any) -> LinkageParts:
         """The groups with the values of parameters and inputs."""
-        return LinkageParts(LinkGeometry(xp, self.structure, self.values(p, u)), self.sides)
+        return LinkageParts(LinkGeometry(xp, self.structure, self.values(xp, p, u)), self.sides)
 
     def linkage(self, xp: Any, p: Any, u: Any) -> DescribedLinkage:
         """The linkage with the values of parameters and inputs."""
@@ -232,6 +238,40 @@ class LinkageDescription(LinkageOutputs):
         angle = self._angle_for([fx, fy], link, parts)
         return ForceLaw(link, pin, (fx, fy), axis, parts.geometry.values, self.tables, angle)
 
+    def check_loads(self, p: Any, speed: float) -> None:
+        """Refuse a force or a torque that has no value, or an infinite one, at a place of the way.
+
+        Parameters
+        ----------
+        p : the parameters, with the numbers that are derived from them
+        speed : of the driver [rad/s, m/s]
+
+        Raises
+        ------
+        InputError
+            in one line, for the first such load.
+        """
+        linkage = self.linkage(MATH, p, self.Inputs())
+        loads = {each["name"]: linkage.loads[name_of_load(each)] for each in self.data["loads"]}
+        laws = {name: law for name, law in loads.items() if isinstance(law, ForceLaw | TorqueLaw)}
+        for q in self.places() if laws else ():
+            m = Mechanism(MATH, linkage, q, getattr(p, "derived", ()))
+            for name, law in laws.items():
+                try:
+                    effect = law.effect(MATH, m, speed, {})
+                    numbers = [
+                        x for each in effect.wrenches for x in (each.force.x, each.force.y, each.moment)
+                    ]
+                except (ArithmeticError, ValueError):
+                    numbers = [math.nan]
+                if not all(map(math.isfinite, numbers)):
+                    unit = "m/s" if self.way.linear else "rad/s"
+                    key = f"loads.{name}.{'torque' if isinstance(law, TorqueLaw) else 'force'}"
+                    raise InputError(
+                        f"has no value, or an infinite one, at {self.way.words(q)} and a speed of {speed:.6g} {unit}",
+                        key=key,
+                    )
+
     def _angle_for(self, entries: Sequence[float | str], link: str, parts: LinkageParts) -> LinkAngle | None:
         """The angle of a link for a load; None where the load does not depend on it."""
         if not any(isinstance(each, str) and "angle" in expression(each).names for each in entries):
@@ -250,7 +290,7 @@ class LinkageDescription(LinkageOutputs):
     def angle_counts(self) -> str:
         """How the angle of the driver counts, in words."""
         driver = self.structure.driver
-        zero = value_of(MATH, driver.zero, self.values(self.Parameters(), self.Inputs()))
+        zero = value_of(MATH, driver.zero, self.values(MATH, self.Parameters(), self.Inputs()))
         return driver.angle_counts(zero)
 
     def places(self) -> list[float]:
@@ -410,7 +450,7 @@ class LinkageDescription(LinkageOutputs):
             last += each.derived_count
             if each.derived_count:
                 yield derived[last - 2], -math.inf, MOST_MISFIT
-        values = self.values(p, u)
+        values = self.values(xp, p, u)
         for _, width, sign in self.widths:
             yield sign * width.of.value(xp, values), 0.0, math.inf
 
