@@ -136,11 +136,16 @@ def speeds_up(rig: Rig, run: xr.Dataset, before: float = 0.0) -> bool:
 
 
 def until_settled(
-    rig: Rig, simulation: Simulation, stop: float, length: float, most: float = math.inf
+    rig: Rig,
+    simulation: Simulation,
+    stop: float,
+    length: float,
+    most: float = math.inf,
+    late: float = math.inf,
 ) -> list[xr.Dataset]:
     """Runs of a turning drive, the first to the time `stop` [s], each further one of the `length` [turns], until the
     whole turns of a run, at most `most`, close, it makes none, or `PATIENCE` has passed; a start that has not ended
-    is awaited."""
+    is awaited up to the time `late` [s]."""
     turn, drive = rig.operation.turn, rig.drive
     runs = [simulation.run(stop, rig.step)]
     longest = stop + PATIENCE * turn
@@ -149,6 +154,8 @@ def until_settled(
         if turns is None or is_settled(drive, turns):
             break
         if speeds_up(rig, runs[-1]):
+            if simulation.time > late:
+                break
             longest = simulation.time + max(PATIENCE * turn, 2.0 * simulation.time)
         runs.append(simulation.run(simulation.time + length * turn, rig.step))
     return runs

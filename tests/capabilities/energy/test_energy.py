@@ -124,7 +124,7 @@ def test_a_year_is_the_integral_over_a_simulated_day(study):
     power = run["motor.supply_power"].values
     if drive.follows:
         plate = study.plate.nameplate
-        losses = inverter.reference_losses(plate.power)
+        losses = inverter.typical_losses(plate.power)
         f = run["motor.supply.frequency"].values / plate.frequency
         power = power + inverter.loss(losses, f, run["motor.air_gap_tau"].values / plate.torque)
     day = np.trapezoid(power, run["time"].values) / (end - begin) * 10.0 * 3600.0
@@ -164,10 +164,11 @@ def test_an_inverter_has_losses_and_a_line_has_none(study):
 
 
 def test_the_interpolation_meets_its_points_and_its_borders():
-    losses = inverter.reference_losses(4000.0)
+    losses = inverter.typical_losses(4000.0)
     f, i = np.array(inverter.POINTS).T
     assert inverter.loss(losses, f, i) == pytest.approx(losses)
-    assert losses[-1] == 374.0 and inverter.apparent_power(4000.0) == 5440.0
+    # a quarter less than the reference drive of class IE1, 374 W
+    assert losses[-1] == 280.5 and inverter.apparent_power(4000.0) == 5440.0
     # between two points the mean; on the plane at the corner without a point; beyond the border that of the border
     assert inverter.loss(losses, 0.25, 1.0) == pytest.approx(0.5 * (losses[2] + losses[5]))
     corner = losses[3] + losses[6] - losses[4]
@@ -175,7 +176,7 @@ def test_the_interpolation_meets_its_points_and_its_borders():
     assert inverter.loss(losses, [1.0, 0.9, -0.9], [-1.0, 3.0, 1.0]) == pytest.approx([losses[-1]] * 3)
     assert inverter.loss(losses, 0.0, 0.0) == pytest.approx(losses[0])
     assert inverter.apparent_power(4000.0) < inverter.apparent_power(4500.0) < inverter.apparent_power(5500.0)
-    assert inverter.reference_losses(400e3)[-1] == pytest.approx(2.0 * inverter.reference_losses(200e3)[-1])
+    assert inverter.typical_losses(400e3)[-1] == pytest.approx(2.0 * inverter.typical_losses(200e3)[-1])
 
 
 @pytest.mark.second

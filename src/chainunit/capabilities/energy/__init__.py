@@ -30,7 +30,7 @@ class EnergyCapability(Capability):
             follows={
                 "load": "the feed of the study all the time",
                 "other": "the same motor in the next efficiency class",
-                "inverter_losses": "the losses of the reference drive",
+                "inverter_losses": "the losses at the limit of class IE2",
             },
         )
     }

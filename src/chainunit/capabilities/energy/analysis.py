@@ -15,7 +15,7 @@ from ...study.drive import Drive
 from ...study.record import StudyRecord
 from ...study.verdict import STEADY
 from .duty import LoadDuty, duty_of
-from .inverter import apparent_power, reference_losses
+from .inverter import apparent_power, typical_losses
 from .other_motor import other_motor, with_motor
 from .running import InverterRating, Losses
 from .table import Usage, UsagePlan
@@ -221,16 +221,16 @@ class _Task:
             return None
         power = motor.nameplate.power
         given = self.plan.inverter_losses
-        losses = tuple(apparent_power(power) * x for x in given) if given else reference_losses(power)
+        losses = tuple(apparent_power(power) * x for x in given) if given else typical_losses(power)
         return InverterRating(losses, motor.nameplate)
 
     def _inverter_words(self) -> str:
         if self.plan.inverter_losses:
             return "interpolated between the eight operating points of IEC 61800-9-2 that usage.inverter_losses gives"
         return (
-            "interpolated between the eight operating points of IEC 61800-9-2 of a reference drive of this size; "
-            "they are typical values, and a drive of class IE2 loses at least a quarter less at full load. The data "
-            "sheet of the inverter has its own (usage.inverter_losses)"
+            "interpolated between the eight operating points of IEC 61800-9-2 of a drive of this size at the limit "
+            "of class IE2, which every drive on the market has to keep (three quarters of the losses of the "
+            "reference drive). The data sheet of the inverter has its own (usage.inverter_losses)"
         )
 
     def _other(

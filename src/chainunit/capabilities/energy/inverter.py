@@ -4,8 +4,8 @@ The eight points are pairs of relative motor frequency and relative torque-produ
 of the reference drive is that by which the regulation EU 2019/1781 defines the classes of drives (IE1: within 25 % of
 it, IE2: less). Its distribution over the other seven points is typical of inverters with a diode bridge: a constant
 part for the electronics, conduction that grows with the current, switching and the bridge, which grow with the power.
-A drive on the market has to be IE2, so that its losses are below those of the reference drive by a quarter or more;
-the data sheet of its maker has the eight values.
+A drive on the market has to be IE2, so that its losses are below those of the reference drive by a quarter or more:
+that quarter is taken off here. The data sheet of its maker has the eight values.
 """
 
 from __future__ import annotations
@@ -31,6 +31,9 @@ _REFERENCE = (
 )  # fmt: skip
 """Rated power of the motor [kW], apparent power [kVA] and loss at (90; 100) [kW] of the reference drive, by size."""
 
+IE2 = 0.75
+"""Loss at (90; 100) up to which a drive is of class IE2, over that of the reference drive (EU 2019/1781)."""
+
 
 @declaration
 class InverterTable:
@@ -45,9 +48,9 @@ def apparent_power(motor_power: float) -> float:
     return _by_size(motor_power, 1)
 
 
-def reference_losses(motor_power: float) -> tuple[float, ...]:
-    """Losses of the reference drive at `POINTS` [W], for a motor of that rated power [W]."""
-    return tuple(share * _by_size(motor_power, 2) for share in _SHAPE)
+def typical_losses(motor_power: float) -> tuple[float, ...]:
+    """Largest losses of a drive of class IE2 at `POINTS` [W], for a motor of that rated power [W]."""
+    return tuple(IE2 * share * _by_size(motor_power, 2) for share in _SHAPE)
 
 
 def _by_size(motor_power: float, column: int) -> float:

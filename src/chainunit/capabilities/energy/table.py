@@ -89,7 +89,7 @@ FIELDS: Mapping[str, Any] = {
             description="losses of the inverter by its maker over its rated apparent power, at the eight operating "
             "points of IEC 61800-9-2 (frequency %; current %): "
             + ", ".join(f"({100 * f:g}; {100 * i:g})" for f, i in POINTS)
-            + "; without them the losses of the reference drive",
+            + "; without them three quarters of the losses of the reference drive, the limit of class IE2",
         ),
     ),
     "load": LOADS.field,
@@ -103,7 +103,7 @@ _WHOLE = 5e-3
 @dataclass(frozen=True)
 class UsagePlan:
     """The values of the table, the loads by name, the designation of the `other` motor (empty for the next class),
-    and the losses of the inverter at `POINTS` over its apparent power, none to take the reference drive."""
+    and the losses of the inverter at `POINTS` over its apparent power, none to take those of class IE2."""
 
     table: Usage
     loads: Mapping[str, LoadShare]

@@ -33,14 +33,16 @@ class SizingCapability(Capability):
     tables = {  # noqa: RUF012
         "sizing": FileSection(
             Sizing,
-            # a rule for servo drives: time, current and heat of its start limit the inertia of an induction motor
-            default=Sizing(inertia_ratio=math.inf),
+            # wishes that not every machine has; the ratio of inertias is a rule for servo drives: time, current and
+            # heat of its start limit the inertia of an induction motor
+            default=Sizing(fluctuation=math.inf, inertia_ratio=math.inf),
             optional=True,
             keys=SIZING_KEYS,
             before="gear",
             title="Demands on the motor",
             apart=True,
             follows={
+                "fluctuation": "none",
                 "inertia_ratio": "none",
                 "hours": "usage.hours, if the file has it, else 16",
                 "load_class": "by the inertia of the machine over that of the motor",

@@ -106,6 +106,8 @@ class TrialResult:
     duty: DutyPeak | None = None
     """the largest torque at the crank in steady running, and while all feed moves to either side and stays there;
     None where the run failed"""
+    torque_mean: float = math.nan
+    """mean air-gap torque of the duty [N m]"""
     fluctuation: float = math.nan
     inertia_factor: float = math.nan
     """inertia of the machine over that of the motor with its flywheel, both at the motor's shaft"""
@@ -130,8 +132,8 @@ class Candidate:
     )
     heaviest: float = 0.0
     """the heaviest flywheel that was tried with the motor [kg m2]"""
-    bound: float | None = None
-    """the value of `sizing.inertia_ratio`, where it ended the trials of flywheels"""
+    stop: str = ""
+    """what ended the trials of flywheels: a check, or a key of `chainunit.capabilities.sizing.preference.STOPS`"""
     worst_start: bool = False
     """whether time, class and heat of its start belong to the worst crank angle, not to the angle 0 alone"""
     verdict: Standing | None = part("its standing; None until it is judged or ranked", default=None)

@@ -43,7 +43,8 @@ class CycleNumbers:
     inertia_largest: Value = quantity("kg.m2", "reflected inertia, largest")
     inertia_wanted: Value = quantity(
         "kg.m2",
-        "inertia at the {driver} that the wanted fluctuation takes by hand: machine, rotor, gear and flywheel",
+        "inertia at the {driver} that the wanted fluctuation takes by hand: machine, rotor, gear and flywheel; none "
+        "where no fluctuation is wanted",
     )
 
 
@@ -104,7 +105,10 @@ def cycle_numbers(
     """The numbers of a duty at that speed of the crank [rad/s], with the `ratio` of the gear. With all feed on one
     side the RMS torque is that of the heavier side, and the peak the larger of both sides."""
     w, share = crank_speed, demands.one_sided_share
-    inertia = normal.outputs.J * ratio**2
+    inertia, wanted = normal.outputs.J * ratio**2, None
+    if math.isfinite(demands.fluctuation):
+        swings = [energy_swing(turn) for turn in np.atleast_2d(normal.crank_torque)]
+        wanted = needed_inertia(float(np.quantile(swings, HIGH)), w, demands.fluctuation)
     mean = float(np.mean(normal.crank_torque))
     cases = [(1.0, normal.crank_torque)]
     if heavier is not None:
@@ -118,9 +122,5 @@ def cycle_numbers(
         inertia_least=float(np.min(inertia)),
         inertia_mean=float(np.mean(inertia)),
         inertia_largest=float(np.max(inertia)),
-        inertia_wanted=needed_inertia(
-            float(np.quantile([energy_swing(turn) for turn in np.atleast_2d(normal.crank_torque)], HIGH)),
-            w,
-            demands.fluctuation,
-        ),
+        inertia_wanted=wanted,
     )

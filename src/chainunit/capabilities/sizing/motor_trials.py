@@ -1,12 +1,8 @@
-"""Trials of candidates: each gets its ratio, the least boost of an inverter, and the least flywheel that it needs.
-
-The hand formulas for flywheels are here; all else is read from the runs.
-"""
+"""Trials of candidates: each gets its ratio, the least boost of an inverter, and the least flywheel that it needs."""
 
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -21,19 +17,23 @@ from ...study.drive import Drive
 from ...study.limits import SPEED_DEVIATION
 from ...study.proposal import Judged
 from .candidate import Candidate, TrialResult
-from .duty import CycleNumbers, Duty
+from .duty import Duty
 from .gear_rows import helps, rows_for, spent, unit_of
 from .inverter import least_boost, misses_by_a_hair
+from .preference import EVEN, FAILED, MEAN, UNSTARTED
 from .table import SizingPlan
 from .task import SizingTask
 from .trial import try_motor
 
-_EVENED = ("speed", "rms_torque", "peak_torque", "temperature")
+EVENED = ("speed", "rms_torque", "peak_torque", "temperature")
 """Checks that a flywheel improves: it evens the speed, and with it the torque of a varying load."""
-_WORSE_WITH_INERTIA = ("start", "inertia")
+WORSE_WITH_INERTIA = ("start", "inertia")
 """Checks that a flywheel makes worse."""
-_SMALL = 0.1
-"""Inertia of a flywheel, relative to all other inertia, below which it hardly evens the speed."""
+_SMALL, _LARGER = 0.1, 3.0
+"""Inertia of the first flywheel that is tried, relative to all other inertia, as a smaller one hardly evens the
+speed, and the ratio of each further one to the one before."""
+_ALMOST = 1.02
+"""RMS torque over mean torque up to which the torque counts as even."""
 _TOLERANCE = SPEED_DEVIATION - 0.005
 """Relative deviation of the crank speed up to which a ratio of a series is taken; the rest of the permitted
 deviation is for the slip in the run."""
@@ -191,14 +191,14 @@ class MotorTrials:
         return other if other.keeps_margin else candidate
 
     def with_flywheel(self, bare: Candidate) -> Candidate:
-        """The candidate with the least flywheel, to about a tenth, that keeps the permitted fluctuation and the
-        limits of torque and temperature. It has no flywheel where none is needed, or where it exceeds a limit
-        that no flywheel improves. If such a flywheel exceeds another limit, it is the flywheel that comes nearest
-        to all limits. A motor that stalls in the peak of the cycle may run with a flywheel, which carries it through.
+        """The candidate with the least flywheel, to about a tenth, that keeps the limits that a flywheel improves.
+        It has no flywheel where none is needed, or where it exceeds a limit that no flywheel improves. If such a
+        flywheel exceeds another limit, it is the flywheel that comes nearest to all limits. A motor that stalls in
+        the peak of the cycle may run with a flywheel, which carries it through.
 
-        The largest flywheel that is tried is that of the hand formulas for speed and torque. It is on the safe
-        side for the speed, as the formula leaves out that a motor's torque falls with speed, which evens the
-        speed, too. None is tried where this flywheel is a small part of the other inertia."""
+        The first flywheel has the share `_SMALL` of all other inertia, and each further one `_LARGER` times as much,
+        until one suffices, a limit that inertia makes worse is exceeded, or the torque is even. Only runs tell: where
+        a load changes faster than the cage of the motor follows, a small flywheel may make its torque less even."""
         numbers = self.duty.numbers
         there = bare.drive.rotor_inertia + numbers.inertia_mean / bare.drive.ratio**2
         trials: list[Candidate] = []
@@ -215,67 +215,61 @@ class MotorTrials:
             return too_heavy(candidate) or is_even(candidate)
 
         first = trial_with(0.0)
-        mean = numbers.torque_mean / bare.drive.ratio
-        if heavy_enough(first) or mean > bare.motor.nameplate.torque:
+        if heavy_enough(first):
             return first
-        inertia = numbers.inertia_wanted / bare.drive.ratio**2 / (1.0 - bare.margin)
-        whole = max(inertia, torque_evening_inertia(first, numbers, self.task.operation.crank_speed)) - there
-        if whole < _SMALL * there:
+        if numbers.torque_mean / bare.drive.ratio > (1.0 - bare.margin) * bare.motor.nameplate.torque:
+            first.stop = MEAN
             return first
-        below = 0.0
-        for share in (0.03, 0.1, 0.3, 1.0):
-            if heavy_enough(trial_with(share * whole)):
-                break
-            below = share
-        else:
-            return _nearest(trials)
-        for _ in range(3):
-            middle = 0.5 * (below + share)
-            if heavy_enough(trial_with(middle * whole)):
-                share = middle
-            else:
-                below = middle
+        heaviest = heaviest_started(first)
+        below, flywheel = 0.0, min(_SMALL * there, heaviest)
+        last = trial_with(flywheel)
+        while flywheel < heaviest and not (heavy_enough(last) or _has_even_torque(last)):
+            below, flywheel = flywheel, min(_LARGER * flywheel, heaviest)
+            last = trial_with(flywheel)
+        if below and heavy_enough(last):
+            for _ in range(3):
+                middle = 0.5 * (below + flywheel)
+                if heavy_enough(trial_with(middle)):
+                    flywheel = middle
+                else:
+                    below = middle
         solutions = [c for c in trials if is_even(c) and not too_heavy(c)]
         return min(solutions, key=lambda c: c.drive.added_inertia) if solutions else _nearest(trials)
 
 
 def _nearest(trials: list[Candidate]) -> Candidate:
     """The trial that comes nearest to all limits; where none starts, the one without a flywheel."""
-    best = min(trials, key=lambda c: c.violation)
-    best.heaviest = max(c.drive.added_inertia for c in trials)
-    best.bound = next((c.checks["inertia"].limit for c in trials if c.exceeds("inertia")), None)
+    best, last = (
+        min(trials, key=lambda c: c.violation),
+        max(trials, key=lambda c: c.drive.added_inertia),
+    )
+    best.heaviest = last.drive.added_inertia
+    if not last.checks:
+        best.stop = FAILED
+    elif last.starts:
+        worse = (name for name in (*WORSE_WITH_INERTIA, "starts") if last.exceeds(name))
+        best.stop = next(worse, EVEN if _has_even_torque(last) else "start")
+    else:
+        best.stop = UNSTARTED if any(c.starts for c in trials) else "start"
     return best
 
 
-def torque_evening_inertia(c: Candidate, numbers: CycleNumbers, crank_speed: float) -> float:
-    """Inertia on the motor's shaft [kg m2] that brings the RMS and peak torque of a candidate down to their
-    limits, by hand; 0 where it exceeds neither limit, or where the mean torque alone exceeds one.
+def heaviest_started(c: Candidate) -> float:
+    """The inertia [kg m2] that the largest torque of the motor alone brings up to speed in the permitted time."""
+    plate = c.motor.nameplate
+    largest = max(plate.breakdown_ratio, plate.locked_torque_ratio) * plate.torque
+    return float(largest * c.checks["start"].limit / plate.speed)
 
-    A motor whose torque falls by D [N m s/rad] with speed gives 1/sqrt(1 + (n w J/D)^2) of the n-th harmonic
-    of the load, with the crank speed w [rad/s]. The factor of the first harmonic is taken for all, which is
-    on the safe side."""
-    plate, ratio = c.motor.nameplate, c.drive.ratio
-    mean, rms = numbers.torque_mean / ratio, numbers.torque_rms / ratio
-    peak = max(numbers.torque_peak, numbers.torque_peak_one_sided or 0.0) / ratio
-    limits = {
-        name: (1.0 - c.margin) * c.checks[name].limit
-        for name in ("rms_torque", "peak_torque")
-        if c.exceeds(name)
-    }
-    # the parts of load and limit above the mean
-    beyond = []
-    if "rms_torque" in limits:
-        beyond.append((rms**2 - mean**2, limits["rms_torque"] ** 2 - mean**2))
-    if "peak_torque" in limits:
-        beyond.append(((peak - mean) ** 2, max(0.0, limits["peak_torque"] - mean) ** 2))
-    square = max((load / bound for load, bound in beyond if bound > 0.0), default=0.0)
-    slope = plate.torque / (plate.synchronous - plate.speed)
-    return float(slope / crank_speed * math.sqrt(max(0.0, square - 1.0)))
+
+def _has_even_torque(c: Candidate) -> bool:
+    """Whether the torque of the motor is so even that a heavier flywheel makes no difference to its load."""
+    rms = c.checks["rms_torque"].value if c.starts and "rms_torque" in c.checks else None
+    return rms is not None and not c.exceeds("speed") and rms <= _ALMOST * abs(c.trial.torque_mean)
 
 
 def is_even(c: Candidate) -> bool:
     """Whether the candidate keeps every limit that a flywheel improves, with the margin."""
-    return not any(map(c.exceeds, _EVENED))
+    return not any(map(c.exceeds, EVENED))
 
 
 def too_heavy(c: Candidate) -> bool:
@@ -283,6 +277,6 @@ def too_heavy(c: Candidate) -> bool:
     # a winding that is too hot from running alone permits no starts, too
     return (
         not c.checks
-        or any(map(c.exceeds, _WORSE_WITH_INERTIA))
+        or any(map(c.exceeds, WORSE_WITH_INERTIA))
         or (c.exceeds("starts") and not c.exceeds("temperature"))
     )

@@ -17,6 +17,20 @@ a flywheel ends near a limit."""
 STEP = 1.5
 """Ratio of the powers of neighbouring standard motors, at most."""
 
+EVEN, MEAN, UNSTARTED, FAILED = "even", "mean", "unstarted", "failed"
+"""What ends the trials of flywheels, beside a check that more inertia makes worse: the torque is even, the mean
+torque alone is too much, the heaviest does not start, or its run fails."""
+STOPS: Mapping[str, str] = {
+    "start": "of up to {J} were tried; with a heavier one its start takes too long",
+    "starts": "of up to {J} were tried, with which too few starts are permitted",
+    "inertia": "that sizing.inertia_ratio = {limit:g} permits suffices",
+    EVEN: "of up to {J} were tried, with which its torque is even",
+    MEAN: "helps, as the mean torque alone is more than the margin leaves of the rated one",
+    UNSTARTED: "of up to {J} were tried; with a heavier one it does not start",
+    FAILED: "of up to {J} were tried, with which its run failed",
+}
+"""By what ended them, the words on the trials of flywheels."""
+
 ORDER: Mapping[Criterion, str] = {
     Criterion.MARGIN: "each limit is kept with the margin",
     Criterion.LARGER: "the power is at most {larger} times (sizing.larger) that of the smallest motor that fits so",
@@ -172,7 +186,7 @@ def _less_used(left: list[Candidate]) -> list[Candidate]:
 
 def _judge(c: Candidate) -> None:
     """Set verdict and reason of a candidate by its own checks."""
-    c.criterion = None
+    c.criterion, rest = None, ""
     if c.fits:
         loads = [check for name, check in c.checks.items() if name not in TOLERANCES]
         most = max(loads, key=lambda check: check.utilisation or 0.0)
@@ -183,26 +197,34 @@ def _judge(c: Candidate) -> None:
         c.verdict = Standing.REJECTED
     elif not c.starts:
         c.verdict, c.reason = Standing.REJECTED, _unstarted(c)
+        rest = _flywheels(c)
     else:
         over = [check for name, check in c.checks.items() if c.sizes[name] > 1.0]
         c.verdict, c.reason = Standing.REJECTED, "; ".join(check.excess for check in over)
-        c.reason += f"; {c.remedy}" if c.remedy else ""
+        rest = _flywheels(c) + (f"; {c.remedy}" if c.remedy else "")
     if c.disc:
         c.reason += f", with a flywheel of {c.flywheel_words}"
+    c.reason += rest
+
+
+def _flywheels(c: Candidate) -> str:
+    """The flywheels that were tried with a candidate that does not fit, in words that follow others."""
+    if not c.stop:
+        return ""
+    limit = c.checks["inertia"].limit if "inertia" in c.checks else math.inf
+    words = STOPS[c.stop].format(J=number(c.heaviest, "kg.m2"), limit=limit)
+    return f"; {'no flywheel' if c.stop in ('inertia', MEAN) else 'flywheels'} {words}"
 
 
 def _unstarted(c: Candidate) -> str:
     """The reason of a candidate that does not bring the machine up to speed."""
     if c.trial.stall_angle is None:
-        return "it does not bring the machine up to speed"
-    reason = (
+        start = c.checks.get("start")
+        late = f" in the permitted {number(start.limit, 's')}" if start else ""
+        return f"it does not bring the machine up to speed{late}"
+    return (
         f"without a flywheel it stalls at {number(c.trial.stall_angle, 'rad')} of the {c.drive.driver_noun}"
     )
-    if c.bound:
-        reason += f", and no flywheel that sizing.inertia_ratio = {c.bound:g} permits carries it through"
-    elif c.heaviest:
-        reason += f", and no flywheel of up to {number(c.heaviest, 'kg.m2')} carries it through"
-    return reason
 
 
 def _chosen(best: Candidate, ranking: Sequence[Candidate], objective: str) -> str:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from ...batch.transients import can_run
@@ -29,11 +29,13 @@ from .candidate import Candidate
 from .duty import Duty
 from .findings import SizingFindings
 from .inverter import inverter_needs
-from .motor_trials import MotorTrials
-from .preference import choice, poles_rank, rank
-from .table import PRICE
+from .motor_trials import EVENED, WORSE_WITH_INERTIA, MotorTrials
+from .preference import STEP, choice, poles_rank, rank
+from .table import PRICE, Sizing
 from .task import SizingTask
 
+_WISHES: Mapping[str, str] = {"speed": "fluctuation", "inertia": "inertia_ratio"}
+"""By check, the demand that only a wish of the file makes."""
 _WORSE_WITH_POWER = ("gear_start", "gear_service")
 """Checks that a larger motor makes worse."""
 
@@ -110,11 +112,14 @@ def size(
     if task.plan.objective == PRICE:
         notes += _without_price(strong, task.gears)
     candidates = _search(_with_files(trials, strong[0], folder, progress, backend), strong, progress)
-    if (best := candidates[0].drive).gear_friction:
+    best = candidates[0]
+    if best.drive.gear_friction:
         notes.append(
-            f"The losses of the {best.transmission} act as viscous drag on the motor shaft, with the mean power that "
+            f"The losses of the {best.drive.transmission} act as viscous drag on the motor shaft, with the mean power that "
             "its efficiency costs."
         )
+    ends = _end_of_catalogue(best, motors), _cost_of_wishes(trials, strong, candidates, progress)
+    best.reason += "".join(f"; {words}" for words in ends if words)
     notes += [
         f"{c.motor.designation} would be preferred, but for its start: {c.reason}."
         for c in candidates[1:]
@@ -237,6 +242,65 @@ def _search(trials: MotorTrials, motors: list[CatalogueMotor], progress: TaskPro
         best.remedy = _remedy(trials, best)
         rank(candidates, demands.larger, objective)
     return candidates
+
+
+def _cost_of_wishes(
+    trials: MotorTrials, motors: list[CatalogueMotor], candidates: list[Candidate], progress: TaskProgress
+) -> str:
+    """The wishes of the file that decide the choice, beside the choice without them, in words; empty where none
+    decides."""
+    best, demands = candidates[0], trials.plan.demands
+    rivals = [c for c in candidates if not best.fits or c.power <= best.power]
+    deciding = {name for c in rivals for name in _wishes_of(c)}
+    wishes = [key for name, key in _WISHES.items() if name in deciding]
+    if not wishes:
+        return ""
+    names = " and ".join(f"sizing.{key} = {_value(demands, key)}" for key in wishes)
+    progress(f"the choice without {names}", 0.0, 1.0)
+    free = dataclasses.replace(demands, candidates=1, **dict.fromkeys(wishes, math.inf))
+    plan = dataclasses.replace(trials.plan, demands=free)
+    without = dataclasses.replace(trials, task=dataclasses.replace(trials.task, plan=plan))
+    powers = {c.power for c in rivals}
+    other = _search(without, [m for m in motors if m.nameplate.power in powers], progress)[0]
+    is_same = (other.motor, other.gear) == (best.motor, best.gear)
+    if not other.fits or (best.fits and is_same and other.drive.added_inertia >= best.drive.added_inertia):
+        return ""
+    wheel = f"a flywheel of {other.flywheel_words}" if other.disc else "no flywheel"
+    verb = "decide" if len(wishes) > 1 else "decides"
+    words = f"{names} {verb}: else {other.motor.designation} with {wheel} would do"
+    if not best.fits:
+        return words
+    starts = [c.checks["gear_start"].value for c in (best, other) if "gear_start" in c.checks]
+    if len(starts) == 2:
+        here, there = (number(torque, "N.m") for torque in starts)
+        words += f", and its start would put {there} on the gear in place of {here}"
+    if best.price is not None and other.price is not None:
+        words += f", at a price of {other.price:g} in place of {best.price:g}"
+    return words
+
+
+def _wishes_of(c: Candidate) -> set[str]:
+    """The checks of wishes that alone reject a candidate, or for which it has its flywheel."""
+    over = {name for name in c.checks if c.exceeds(name)}
+    sized = {max((c.sizes.get(name, 0.0), name) for name in EVENED)[1]} if c.drive.added_inertia else set()
+    rest = over - set(_WISHES) - (set(WORSE_WITH_INERTIA) if c.drive.added_inertia else set())
+    return set() if rest else (over | sized) & set(_WISHES)
+
+
+def _value(demands: Sizing, key: str) -> str:
+    """The value of a wish in words."""
+    return number(getattr(demands, key), "1", "percent" if key == "fluctuation" else "", full=False)
+
+
+def _end_of_catalogue(best: Candidate, motors: Sequence[CatalogueMotor]) -> str:
+    """Words on the end of the catalogue, where it decides: its `motors`, the smallest first, have none that is small
+    enough, or large enough."""
+    least, most = motors[0].nameplate.power, motors[-1].nameplate.power
+    if not best.fits:
+        return f"the catalogue ends at {number(most, 'W')}" if best.power == most else ""
+    if best.power > least or STEP * best.use > 1.0 - best.margin:
+        return ""
+    return f"the catalogue begins at {number(least, 'W')}, else a smaller motor would do"
 
 
 def _remedy(trials: MotorTrials, c: Candidate) -> str:

@@ -31,7 +31,7 @@ class Sizing:
     starts_per_hour: Value = quantity("1", "starts per hour", default=2.0, min=0.0, max=1000.0)
     fluctuation: Value = quantity(
         "1",
-        "permitted fluctuation of the {driver} speed, (largest - least)/mean",
+        "permitted fluctuation of the {driver} speed, (largest - least)/mean; checked only where it is given",
         default=0.05,
         above=0.0,
         max=1.0,

@@ -36,7 +36,7 @@ from ...study.start_runs import (
     starts_from_all,
     time_above,
 )
-from ...study.start_up import until_settled
+from ...study.start_up import speeds_up, until_settled
 from ...study.torques import DutyPeak, all_feed_on, at_gear, duty_peak, quasi_static_peak
 from ...study.transients import follow
 from ...study.verdict import CREEPS, SETTLING, STEADY
@@ -51,6 +51,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _GAP = "motor.air_gap_tau"
+_LATE = 1.5
+"""Time after which the start of a trial is not awaited any more, in parts of the permitted one."""
 _STANDS = 0.25
 """Turns that a crank which stands, and swings against its load, makes in a run at most."""
 
@@ -86,7 +88,11 @@ class Trial:
         runs = (self.start, self.steady)
         speed, time = (np.concatenate([run[name].values for run in runs]) for name in ("motor.w", "time"))
         requested = self.task.operation.crank_speed * self.drive.ratio
-        return time_to_start(time, speed, self.speed, requested) if self.speed > CREEPS * requested else None
+        if self.speed <= CREEPS * requested or speeds_up(
+            Rig(self.task.operation, self.drive, None), self.steady
+        ):
+            return None
+        return time_to_start(time, speed, self.speed, requested)
 
     @cached_property
     def stall_angle(self) -> float | None:
@@ -274,6 +280,7 @@ class Trial:
             speed=self.speed if is_started else None,
             frequency=self.frequency if is_started else None,
             duty=self.duty,
+            torque_mean=sum(share * float(np.mean(run[_GAP])) for share, run in self._cases),
             fluctuation=self.fluctuation,
             inertia_factor=self.inertia_factor,
             stall_angle=self.stall_angle,
@@ -284,9 +291,7 @@ class Trial:
         speed."""
         demands, plate, p = self._demands, self.motor.nameplate, self.drive.fmu_parameters
 
-        start = start_on_line(self.start_time, plate)
-        if self.drive.follows:
-            start = dataclasses.replace(start, limit=1.0 + 1.2 * self.task.operation.run.ramp)
+        start = start_check(self.task, self.motor, self.drive, self.start_time)
         weaker = min(1.0, plate.frequency / self.frequency)
         # a motor that does not start has the limits that it has at its speed
         cooling = (
@@ -310,8 +315,11 @@ class Trial:
                 "starts per hour", demands.starts_per_hour, self.permitted_starts, "1", forbidden=too_hot
             ),
             "crank_speed": keeping_speed(self.speed, requested_speed, self.drive.driver_noun),
-            "speed": Check("speed fluctuation", self.fluctuation, demands.fluctuation, "1", "percent"),
         }
+        if math.isfinite(demands.fluctuation):
+            checks["speed"] = Check(
+                "speed fluctuation", self.fluctuation, demands.fluctuation, "1", "percent"
+            )
         if self.start_time is None:
             checks = {name: dataclasses.replace(check, value=None) for name, check in checks.items()}
         if math.isfinite(demands.inertia_ratio):
@@ -334,6 +342,14 @@ class Trial:
                 checks["gear_service"] = Check(title, factor * rated, gear.torque_limit, "N.m")
                 checks |= gear_checks(rating, self.drive, self._running, self._cases)
         return checks
+
+
+def start_check(
+    task: SizingTask, motor: CatalogueMotor, drive: Drive, start_time: float | None = None
+) -> Check:
+    """The time of a start [s] beside the permitted one."""
+    check = start_on_line(start_time, motor.nameplate)
+    return dataclasses.replace(check, limit=1.0 + 1.2 * task.operation.run.ramp) if drive.follows else check
 
 
 def try_motor(
@@ -359,7 +375,9 @@ def try_motor(
     # the start
     inertia = drive.fmu_parameters.rotor.J + duty.numbers.inertia_mean / drive.ratio**2
     rise = ramp if drive.star_delta else task.tables.starter_time or ramp
+    late = drive.switched_until + max(1.0, _LATE * start_check(task, motor, drive).limit, 1.5 * rise)
     window = drive.switched_until + max(1.0, 3.0 * inertia * plate.speed / plate.torque, 1.5 * rise)
+    window = min(window, late)
     if operation.empty_start:
         # the run ends with a turn without feed
         window += turn
@@ -372,7 +390,8 @@ def try_motor(
             simulation.signals = rig.signals(ramp=True)
             window += max(1.0, operation.run.settle_turns) * turn
             shifts.append((SETTLING, simulation.run(window, rig.step)))
-        *settling, steady = until_settled(rig, simulation, window + 2.0 * turn, 2.0)
+            late = max(late, window)
+        *settling, steady = until_settled(rig, simulation, window + 2.0 * turn, 2.0, late=late)
         shifts += [(SETTLING, run) for run in settling]
         event = simulation.save()
         for side in duty.one_sided:
