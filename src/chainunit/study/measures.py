@@ -86,8 +86,8 @@ def _recovery(w: Window) -> float | None:
 
 
 def _relay(w: Window) -> float | None:
-    """Time after the event at which the slowest thermal relay trips, set to the rated current of the motor, of the class
-    of the study. None after the coupling opened, as no load is left that could trip the relay."""
+    """Time after the event at which the slowest thermal relay of the class of the study trips, set to the rated
+    current of the motor. None after the coupling opened, as no load is left that could trip the relay."""
     setting = w.drive.rated_current
     if setting is None or w.trip is not None:
         return None
