@@ -24,15 +24,18 @@ from chainunit.report import study as study_report
 from chainunit.report.live.formulas import event_signals, varied_names
 from chainunit.report.live.linkage import of_linkage
 from chainunit.report.live.page import live_page
+from chainunit.report.live.study import of_study
 from chainunit.study import config as study_files
 from chainunit.study.block_runs import BlockRuns, RunPoint
 from chainunit.study.choice import choose
 from chainunit.study.cycle_quantities import cycle_quantity, evaluate
 from chainunit.study.event import TYPES
+from chainunit.study.limits import SPEED_DEVIATION
 from chainunit.study.measures import read_measure
 from chainunit.study.parts import example
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
+from chainunit.study.verdict import two_bars
 from chainunit.study.window import Phase, Trip, Window
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -204,6 +207,16 @@ def test_an_empty_start_is_made_once(ratio, tmp_path):
     twice = 2.0 if ratio == 30.0 else 2.0 + float(config.run.settle_turns)
     assert found["spent"] < found["last"] + twice * found["turn"]
     assert max(*found["off"], found["ends"]) < 1e-5
+
+
+def test_the_page_has_the_verdict_of_its_study(packaged):
+    """With the values of the study the page says the sentence of the study; without a run there is none."""
+    config, live, choice = packaged
+    judged = two_bars(3.0, 4.9, 7.5, {}, {})
+    of_run = of_study(config, choice.drive, choice.tables, choice.proposal, judged)
+    assert of_run.data["verdict"] == {"holds": judged.holds, "text": judged.text} and judged.holds == "false"
+    assert live.data["verdict"] is None
+    assert live.data["runs"]["speed_deviation"] == SPEED_DEVIATION
 
 
 def test_pulls_below_zero_are_judged_as_in_a_study(packaged):

@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -79,8 +80,10 @@ def exit_status(error: BaseException) -> int:
 
 @contextmanager
 def progress_bar(console: Console) -> Iterator[Callable[[str, float, float], None]]:
-    """A progress bar that begins with the first report, so that a fault of the input is shown without a bar.
-    Yields the function that reports the current task, the complete amount of work, and the total amount."""
+    """A progress bar that begins with the first report, so that a fault of the input is shown without a bar. Work
+    that takes longer than a minute is told with its forecast, once for each amount of work; also where the console is
+    no terminal and shows no bar. Yields the function that reports the current task, the complete amount of work, and
+    the total amount."""
     bar = Progress(
         TextColumn("{task.description}"),
         BarColumn(),
@@ -89,16 +92,44 @@ def progress_bar(console: Console) -> Iterator[Callable[[str, float, float], Non
         console=console,
     )
     task = bar.add_task("", total=1.0)
+    forecast = Forecast()
 
     def report(what: str, done: float, todo: float) -> None:
         bar.start()
         bar.update(task, description=what, completed=done, total=todo)
+        if words := forecast.words(monotonic(), what, done, todo):
+            console.print(printable(words, 500), soft_wrap=True)
 
     try:
         yield report
     finally:
         if bar.live.is_started:
             bar.stop()
+
+
+class Forecast:
+    """The time that work will take, from the reports of its progress."""
+
+    def __init__(self) -> None:
+        self._todo, self._begin, self._first, self._is_told = -1.0, 0.0, 0.0, False
+
+    def words(self, now: float, what: str, done: float, todo: float) -> str:
+        """The forecast at the time `now` [s] in a sentence, the first time that it is sure enough and above a minute
+        for this amount of work; else empty."""
+        if todo != self._todo:
+            self._todo, self._begin, self._first, self._is_told = todo, now, done, False
+        spent, made = now - self._begin, done - self._first
+        if self._is_told or spent < _SURE or made <= 0.0:
+            return ""
+        left = spent * (todo - done) / made
+        if left < _LONG:
+            return ""
+        self._is_told = True
+        return f"About {left / 60.0:.0f} min more: {what}."
+
+
+_SURE, _LONG = 5.0, 60.0
+"""Time [s] after which a forecast is made, and from which on it is told."""
 
 
 def show_only_remarks() -> None:

@@ -1,5 +1,5 @@
 "use strict";
-(async () => {
+(() => {
   const byId = (name) => document.getElementById(name);
 
   /* plots */
@@ -7,11 +7,11 @@
   const plots = [];
   // the page holds the library compressed: it would otherwise be most of the page
   let figures = {};
-  const loadPlotly = async () => {
+  const loadPlotly = () => {
     const script = document.createElement("script");
-    script.textContent = new TextDecoder().decode(await unpackedBytes("plotly"));
+    script.textContent = new TextDecoder().decode(unpackedBytes("plotly"));
     document.head.appendChild(script);
-    figures = await unpackedData("figures");
+    figures = unpackedData("figures");
   };
   // panels that are too narrow beside each other stand below each other
   const isNarrow = (figure, width) => figure.narrow && width < figure.below;
@@ -39,11 +39,11 @@
     }
   };
   window.addEventListener("resize", fit);
-  const boxes = document.querySelectorAll(".plot");
-  if (boxes.length)
-    loadPlotly().then(drawPlots, () => {
-      for (const box of boxes) box.textContent = "This browser cannot unpack the plots; open the page in one of 2023 or later.";
-    });
+  // before the page counts as loaded: it may be printed at once
+  if (document.querySelector(".plot")) {
+    loadPlotly();
+    drawPlots();
+  }
   // paper is narrower than a screen: a plot is laid out anew for it, so that its letters keep their size
   const PAPER = { width: 690, most: 900, two: 415, rows: 500, letters: 10, titles: 9.5, as: 900 };
   const resize = (box, figure, width, height, letters, titles, across) => {
@@ -89,7 +89,7 @@
   /* the machine in motion */
   const stage = byId("stage");
   if (!stage) return;
-  const motion = await unpackedData("pictures");
+  const motion = unpackedData("pictures");
   const select = byId("run"), factor = byId("factor"), arrows = byId("arrows"), slider = byId("slider");
   let run, frame, playTime, playing = false, last = null;
   motion.runs.forEach((r, i) => select.add(new Option(r.title, i)));

@@ -160,7 +160,9 @@ def _live(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     if study.drive.foreign_machine:
         return
     config = study.config
-    yield Live(lambda: of_study(config, study.drive, config.drive, study.proposal), "the study")
+    yield Live(
+        lambda: of_study(config, study.drive, config.drive, study.proposal, study.verdict), "the study"
+    )
 
 
 # -- the basis of the results

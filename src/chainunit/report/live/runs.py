@@ -14,6 +14,7 @@ from ...reading.text import Units
 from ...study.block_runs import names_read
 from ...study.drive import Drive
 from ...study.event import Event
+from ...study.limits import SPEED_DEVIATION
 from ...study.measures import STARTED, Answers
 from ...study.operation import OperatingConditions
 from ...study.rig import FEED_RISE, Rig
@@ -115,6 +116,7 @@ def live_runs(
         "patience": PATIENCE,
         "closed": CLOSED,
         "drift": DRIFT,
+        "speed_deviation": SPEED_DEVIATION,
         "trip": None if operation.coupling is None else float(operation.coupling.trip_torque),
         "rotor": {
             "name": "motor.rotor.J",

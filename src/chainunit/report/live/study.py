@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from ...study.parts import LENGTHS
 from ...study.proposal import DriveProposal
 from ...study.registry import parts_of_line, registered
 from ...study.study_file import changed_tables
+from ...study.verdict import Verdict
 from ..capability import capabilities
 from ..live_block import LiveMachine
 from .machine import assembled, speed_of_crank
@@ -33,6 +35,7 @@ def of_study(
     drive: Drive,
     tables: DriveTables,
     proposal: DriveProposal | None = None,
+    verdict: Verdict | None = None,
 ) -> LiveMachine:
     """The live machine of a study.
 
@@ -40,6 +43,7 @@ def of_study(
     ----------
     drive, tables : the drive with the values that follow from it
     proposal : the choice of the drive, where a capability made it
+    verdict : the verdict on the model with the values of the study, if it was judged
 
     Raises
     ------
@@ -65,7 +69,9 @@ def of_study(
     folder = Path(config.file.source).parent
     copied = changed_tables(config, _settled_values(machine, drive, tables, plate), _TITLE, folder)
     copied = _without_dates(_with_drive(copied, drive, tables.start, proposal, config.events))
-    return assembled(turn, runs, why, chosen, copied, units)
+    live = assembled(turn, runs, why, chosen, copied, units)
+    judged = None if verdict is None else {"holds": verdict.holds, "text": verdict.text}
+    return replace(live, data={**live.data, "verdict": judged})
 
 
 def without_drive(config: Config, why: str) -> LiveMachine:
