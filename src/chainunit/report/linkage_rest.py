@@ -63,6 +63,12 @@ def at_rest(s: b.Source, f: LinkageFindings, file: str) -> Iterator[b.Block]:
     if found.indifferent:
         yield b.Text(f"No load has a {effort} at the driver: at rest the machine stays wherever it is.")
         return
+    if bool(np.all(np.abs(found.rest.holding) <= found.rest.friction)):
+        text = "At rest the machine stays wherever it is: friction of pins and guides holds more, at most {most}, "
+        text += f"than the holding {effort}, at most {{holding}}."
+        most = {"most": s.number("rest.summary.friction"), "holding": s.number("rest.summary.peak")}
+        yield b.Text(s.line(text, **most))
+        return
     yield b.Text(
         f"Where the holding {effort} is zero, the machine is in equilibrium. It is stable where the potential has a "
         "minimum; about it a small swing has the natural frequency, at the driver and undamped.",

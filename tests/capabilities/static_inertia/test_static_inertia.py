@@ -321,6 +321,19 @@ def test_the_page_says_what_differs(given):
     assert "A sizing program with one inertia" in said[: said.index("## What a static inertia gets wrong")]
 
 
+def test_nothing_is_said_where_nothing_differs(given):
+    """A machine whose inertia hardly changes: the numbers stand in the data, and no sentence and no section."""
+    findings = StaticInertiaFindings.of_study(given)
+    alike = {model: dict.fromkeys(shares, 0.009) for model, shares in findings.deviations.items()}
+    for deviations, differs in ((alike, False), ({**alike, "static": {"current_rms": -0.011}}, True)):
+        changed = dataclasses.replace(findings, deviations=deviations)
+        study = dataclasses.replace(given, findings={**given.findings, "static_inertia": changed})
+        said = markdown(report(study, as_dict(study)), {})
+        assert changed.differs == differs
+        assert ("What a static inertia gets wrong" in said) == ("A sizing program with" in said) == differs
+        assert "static_inertia" in as_dict(study)
+
+
 # -- the choice
 
 SHAPER = """

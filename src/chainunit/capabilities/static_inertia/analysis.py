@@ -30,6 +30,9 @@ from .runs import (
 from .twin import twin
 from .words import KIND, remark_on
 
+_ALIKE = 0.01
+"""Relative deviation up to which two numbers are alike."""
+
 
 @declaration
 class Inertia:
@@ -91,6 +94,16 @@ class StaticInertiaFindings(Findings):
     )
     no_choice: str = part("why there is no other choice, where the search or its trial failed; else empty")
     runs: TwinRuns
+
+    @property
+    def differs(self) -> bool:
+        """Whether one inertia gives other numbers, or another drive."""
+        shares = [*self.deviations["static"].values()]
+        for peaks in self.events.values():
+            own, its = (Layout(EventNumbers).values(each) for each in (peaks.machine, peaks.static))
+            shares += [x / y - 1.0 for x, y in zip(its, own, strict=True) if y]
+        is_other = self.choice is not None and self.choice.differs
+        return is_other or any(abs(share) > _ALIKE for share in shares)
 
     def remark(self, study: StudyRecord) -> None:
         """The warning where another drive would have been chosen."""

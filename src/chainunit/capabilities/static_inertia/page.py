@@ -37,9 +37,12 @@ _SHORT = (
 
 
 def answer(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
-    """A line where the same drive is chosen, or where the file gives the motor; else the warning says it."""
+    """A line where the same drive is chosen, or where the file gives the motor; else the warning says it. Nothing
+    where nothing differs."""
     findings = StaticInertiaFindings.found_in(study)
-    if findings is None or (findings.choice is not None and findings.choice.differs):
+    if findings is None or not findings.differs:
+        return
+    if findings.choice is not None and findings.choice.differs:
         return
     same = "" if findings.choice is None else " would have chosen the same drive; it"
     yield b.Text(
@@ -52,8 +55,10 @@ def answer(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
-    """Lead, tables and figure."""
+    """Lead, tables and figure; nothing where nothing differs."""
     findings = StaticInertiaFindings.of_study(study)
+    if not findings.differs:
+        return
     yield b.Text(
         s.line(
             "Sizing programs of drive makers know no crank: they take a torque over the turn and the inertia of the "
