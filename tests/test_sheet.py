@@ -16,7 +16,7 @@ import pytest
 from chainunit import InputError
 from chainunit.capabilities.checks.pins import turning_pins
 from chainunit.report import blocks as b
-from chainunit.report import pdf
+from chainunit.report import pdf, print_figures
 from chainunit.report import study as study_report
 from chainunit.report.figure import Figure
 from chainunit.report.lines import Number
@@ -70,7 +70,8 @@ def test_the_sheet_has_each_section_once(study, made):
         names
     )
     whole = {each.name for each in study_report.report(study).sections}
-    assert whole - set(names) == {"live", "motion"}, "what moves is not on paper, all else is"
+    apart = {"live", "motion", "not_checked"}
+    assert whole - set(names) == apart, "what moves is not on paper, and what was not checked has its section"
     assert made.block["Project"] == "Quarry 7" and made.block["Revision"] == "B"
 
 
@@ -95,8 +96,11 @@ def test_values_that_were_chosen_and_those_of_a_motor_of_a_catalogue_are_no_assu
     (section,) = (each for each in made.sections if each.name == "assumptions")
     lists, _ = section.blocks
     assert [each.name for each in lists.sections[0][1]] == ["sizing.margin", "motor.ambient.T"]
-    assert "Given values" in pdf.page_text(replace(made, sections=(section,), annex=()), {})
-    assert given in made.annex, "the annex lists all"
+    assert "Other given values" in pdf.page_text(replace(made, sections=(section,), annex=()), {})
+    (others,) = (each for each in made.annex if each.name == "given")
+    (left,) = others.blocks
+    names = [each.name for _, values in left.sections for each in values]
+    assert names == ["machine.ratio", "motor.rotor.J", "gear.J", "starter.inverter.lag"], "each stands once"
 
 
 def test_it_says_up_to_which_speed_it_holds(study, made):
@@ -139,7 +143,8 @@ def test_figures_of_its_sections_and_the_versions_are_in_the_annex(study):
     on_sheet = {each.name: each for each in made.sections}
     in_annex = {each.name: each for each in made.annex}
     assert on_sheet["energy"].blocks == energy.blocks[:1]
-    assert in_annex["energy_figures"].blocks == (picture,)
+    assert in_annex["plots"].blocks.count(picture) == 2, "all figures stand together"
+    assert not any(isinstance(x, Figure) for each in made.annex if each.name != "plots" for x in each.blocks)
     assert len(in_annex["software"].blocks) == 1
     assert not set(in_annex["software"].blocks) & set(on_sheet["basis"].blocks)
 
@@ -147,7 +152,7 @@ def test_figures_of_its_sections_and_the_versions_are_in_the_annex(study):
 def test_its_text_escapes_the_file_and_numbers_its_sections(made):
     text = pdf.page_text(made, {})
     assert "<b>& more" not in text and "A mill &lt;b&gt;&amp; more&lt;/b&gt;" in text
-    places = re.findall(r'<section(?: class="annex")? id="section-(\w+)"', text)
+    places = re.findall(r'<section id="section-(\w+)"', text)
     links = re.findall(r'<a href="#section-(\w+)"', text)
     assert places == links and places[0] == "1" and "A1" in places
     # WeasyPrint nests a first letter again at each layout: the text itself has the capitals
@@ -182,16 +187,15 @@ def test_a_study_clears_the_sheet_of_an_earlier_one():
     assert pdf.NAME in TASK.files and pdf.NAME in SHEET_TASK.files
 
 
-def test_blocks_for_the_sheet_stand_in_place_of_the_long_ones_which_are_in_the_annex(study):
+def test_blocks_for_the_sheet_stand_in_place_of_the_long_ones(study):
     long, own, both = (b.Text("long", form="long"), b.Text("own", form="sheet"), b.Text("both"))
     whole = study_report.report(study)
     checks = b.Section("checks", "Checks by clause", (long, own, both))
     others = (each for each in whole.sections if each.name != "checks")
     made = sheet(study, replace(whole, sections=(*others, checks)))
     on_sheet = {each.name: each for each in made.sections}
-    in_annex = {each.name: each for each in made.annex}
     assert [each.line for each in on_sheet["checks"].blocks] == ["own", "both"]
-    assert in_annex["checks_in_full"].blocks == (long,)
+    assert not any(long in each.blocks for each in made.annex)
     # neither the page nor the terminal has the block of the sheet
     assert b.of_form(checks.blocks, "long") == [long, both] and b.of_form(checks.blocks, "short") == [both]
 
@@ -207,9 +211,6 @@ def test_each_check_of_the_sheet_names_its_clause_and_formula(study, made):
         assert not row.note
         (law,) = (each for each in laws if each.startswith(f"{row.cells[-1]} "))
         assert law == f"{row.cells[-1]} {check['clause']}. {check['formula']}"
-    (full,) = (each for each in made.annex if each.name == "checks_in_full")
-    assert [len(each.rows) for each in full.blocks if isinstance(each, b.Table)] == [len(rows)]
-    assert all(row.note for each in full.blocks if isinstance(each, b.Table) for row in each.rows)
 
 
 def test_things_that_were_not_checked_for_one_reason_share_a_line(study, made):
@@ -217,6 +218,22 @@ def test_things_that_were_not_checked_for_one_reason_share_a_line(study, made):
     text = re.sub(r"<[^>]+>", "", pdf.page_text(replace(made, sections=(section,), annex=()), {}))
     missing = [each for each in study.findings["checks"].not_checked if not each.table]
     assert missing and all(each.what in text and text.count(each.why) == 1 for each in missing)
+
+
+MOST_PAGES = 8
+
+
+def depth_of(page):
+    """The share of the height of a page down to its lowest text above the foot, or its lowest picture."""
+    lowest = [1.0]
+
+    def note(text, transform, lines, font, size):
+        y = (lines[5] * transform[3] + transform[5]) / float(page.mediabox.height)
+        if text.strip() and y > 0.06:
+            lowest.append(y)
+
+    page.extract_text(visitor_text=note)
+    return 1.0 if len(page.images) else 1.0 - min(lowest)
 
 
 def pages_of(file):
@@ -228,17 +245,21 @@ def pages_of(file):
 @pytest.mark.filterwarnings(
     "ignore::pytest.PytestUnraisableExceptionWarning"
 )  # the library leaves a file open
-def test_the_pdf_is_two_to_four_pages_and_an_annex(study, made, tmp_path):
+def test_the_pdf_is_two_to_four_pages_and_an_annex_and_has_eight_at_most(study, made, tmp_path):
     try:
         pdf.check_library()
     except InputError as missing:
         pytest.skip(str(missing))
-    file = pdf.write(made, {}, tmp_path / pdf.NAME)
+    pictures = print_figures.write(study_report.report(study).figures, tmp_path, made.units, are_small=True)
+    file = pdf.write(made, {each.name: each for each in pictures}, tmp_path / pdf.NAME)
     reader, pages = pages_of(file)
+    assert len(pages) <= MOST_PAGES and len(pictures) > 5
+    # no page but the last is half empty
+    assert all(depth_of(page) > 0.5 for page in reader.pages[:-1])
     assert reader.metadata.title == "A mill <b>& more</b>"
     heading = rf"A1\s+{made.annex[0].heading}"
     annex = next(n for n, text in enumerate(pages) if n and re.search(heading, text))
-    assert 2 <= annex <= 4 < len(pages)
+    assert 1 <= annex <= 3 < len(pages)
     assert f"Page 2 of {len(pages)}" in pages[1]
     box = reader.pages[0].mediabox
     assert (round(float(box.width)), round(float(box.height))) == (595, 842)
@@ -246,7 +267,7 @@ def test_the_pdf_is_two_to_four_pages_and_an_annex(study, made, tmp_path):
         "/XMP_Metadata" if "/XMP_Metadata" in reader.trailer["/Root"] else "/Metadata"
     ]
     assert re.search(rb"pdfaid:part>3<|pdfaid:part=.3", packet.get_data())
-    first = " ".join(pages[:annex])
+    first = " ".join(pages[: annex + 1])
     for words in ("Quarry 7", "Prepared", "What was not checked", "Basis and validity", "The question"):
         assert words in first
 
@@ -294,10 +315,13 @@ def test_the_sheet_of_each_machine_has_at_most_four_pages_with_readable_letters(
     made = sheet(study, study_report.report(study))
     drawn = "".join(x.svg for each in made.sections for x in each.blocks if isinstance(x, b.Drawing))
     drawn = unescape(re.sub(r"<[^>]+>|\s", "", drawn))
-    reader, pages = pages_of(pdf.write(made, {}, tmp_path / pdf.NAME))
+    pictures = print_figures.write(study_report.report(study).figures, tmp_path, made.units, are_small=True)
+    pictured = {each.name: each for each in pictures}
+    reader, pages = pages_of(pdf.write(made, pictured, tmp_path / pdf.NAME))
+    assert len(pages) <= MOST_PAGES
     heading = rf"A1\s+{re.escape(made.annex[0].heading)}"
     annex = next(n for n, text in enumerate(pages) if n and re.search(heading, text))
-    assert 2 <= annex <= 4
+    assert 1 <= annex <= 3
     small = []
 
     def note(text, page, lines, font, size):
@@ -309,5 +333,5 @@ def test_the_sheet_of_each_machine_has_at_most_four_pages_with_readable_letters(
     assert small and all(each in drawn for each in small)
     if name in ("heavy_mill", "knife"):
         pins = turning_pins(study.drive.machine.model)
-        words = " ".join(" ".join(pages[:annex]).split())
+        words = " ".join(" ".join(pages[: annex + 1]).split())
         assert len(pins) > 8 and all(f"{pin}:" in words for pin in pins)

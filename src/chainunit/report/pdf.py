@@ -56,20 +56,37 @@ class _PrintedPage(Page):
         self._pictures = pictures
 
     def block(self, block: b.Block) -> str:
-        """One block; nothing for one that moves, and for a figure that has no file."""
+        """One block; nothing for one that moves, and for a figure that has no file. Given values run on."""
         if isinstance(block, Animation | Live) or (isinstance(block, b.Text) and block.role == "hint"):
             return ""
+        if isinstance(block, b.Given):
+            groups = "".join(
+                f"<p><strong>{escape(title)}:</strong> {'; '.join(map(self._value, values))}.</p>"
+                for title, values in block.sections
+                if values
+            )
+            return f'{marks(block)}<div class="run-on">{groups}</div>'
         if isinstance(block, Figure):
             return self._printed(block)
         return super().block(block)
 
     def blocks(self, blocks: Sequence[b.Block]) -> str:
-        """Blocks in order, with capitals where a line begins; consecutive warnings form one list."""
+        """Blocks in order, with capitals where a line begins; consecutive warnings form one list, and of consecutive
+        figures the narrow ones stand in two columns after the others."""
         parts = []
-        for warns, together in groupby(blocks, lambda each: getattr(each, "severity", "") == "warning"):
-            texts = list(filter(None, map(self.block, together)))
-            parts += [f'<ul class="verdicts">{"".join(texts)}</ul>'] if warns and texts else texts
+        for kind, together in groupby(blocks, _group):
+            group = list(together)
+            wide = [each for each in group if kind != _FIGURES or _is_wide(each)]
+            texts = list(filter(None, map(self.block, wide)))
+            parts += [f'<ul class="verdicts">{"".join(texts)}</ul>'] if kind == _WARNINGS and texts else texts
+            if narrow := "".join(self.block(each) for each in group if each not in wide):
+                parts.append(f'<div class="prints">{narrow}</div>')
         return _BEGIN.sub(lambda found: found[1] + found[2].upper(), "\n".join(parts))
+
+    def _value(self, value: b.GivenValue) -> str:
+        """A given value in running text."""
+        name = escape(value.description)
+        return f'<span title="{escape(value.name)}">{name}</span> {self.line((value.value,))}{self.origin(value)}'
 
     def _table(self, table: b.Table) -> str:
         """A table; one with many shares has the numbers alone, as paper has no room for their bars."""
@@ -88,26 +105,19 @@ class _PrintedPage(Page):
         )
 
 
-class _SheetPage(_PrintedPage):
-    """The blocks of the sheet itself, which has few pages: given values run on."""
+_WARNINGS, _FIGURES = "warnings", "figures"
 
-    def block(self, block: b.Block) -> str:
-        """One block; see `_PrintedPage.block`."""
-        if not isinstance(block, b.Given):
-            return super().block(block)
-        groups = "".join(
-            f"<p><strong>{escape(title)}:</strong> {'; '.join(map(self._value, values))}.</p>"
-            for title, values in block.sections
-            if values
-        )
-        return f'{marks(block)}<div class="run-on">{groups}</div>'
 
-    def _value(self, value: b.GivenValue) -> str:
-        """A given value in running text."""
-        name = escape(value.description)
-        return (
-            f'<span title="{escape(value.name)}">{name}</span> {self.line(value.value)}{self.origin(value)}'
-        )
+def _group(block: b.Block) -> str:
+    """The name of the group that a block forms with its neighbours; empty for a block that stands alone."""
+    if isinstance(block, Figure):
+        return _FIGURES
+    return _WARNINGS if getattr(block, "severity", "") == "warning" else ""
+
+
+def _is_wide(block: b.Block) -> bool:
+    """Whether a figure has panels beside each other."""
+    return isinstance(block, Figure) and len(block.panels[0]) > 1
 
 
 def _without_bars(row: b.TableRow) -> b.TableRow:
@@ -150,14 +160,16 @@ def write(sheet: Sheet, pictures: Mapping[str, Path], file: Path) -> Path:
 
 def page_text(sheet: Sheet, pictures: Mapping[str, Path]) -> str:
     """The sheet as a page of HTML, from which the PDF is made."""
-    own = [*_numbered(_SheetPage(sheet.units, pictures), sheet.sections, ("both", "long", "sheet"))]
-    annex = [*_numbered(_PrintedPage(sheet.units, pictures), sheet.annex, ("both", "long"), "A")]
+    page = _PrintedPage(sheet.units, pictures)
+    own = [*_numbered(page, sheet.sections, ("both", "long", "sheet"))]
+    annex = [*_numbered(page, sheet.annex, ("both", "long"), "A")]
     contents = "".join(
         f'<li><a href="#{_place(number)}"><span>{number}</span> {escape(each.heading)}</a></li>'
         for number, each, _ in (*own, *annex)
     )
     sections = (
-        f'<div class="on-sheet">{"".join(starmap(_section, own))}</div>{"".join(starmap(_section, annex))}'
+        f'<div class="on-sheet">{"".join(starmap(_section, own))}</div>'
+        f'<div class="annex">{"".join(starmap(_section, annex))}</div>'
     )
     labels = [f"<th>{escape(name)}</th><td>{escape(value)}</td>" for name, value in sheet.block.items()]
     half = (len(labels) + 1) // 2
@@ -187,8 +199,7 @@ def _place(number: str) -> str:
 
 
 def _section(number: str, section: b.Section, text: str) -> str:
-    css = ' class="annex"' if number == "A1" else ""
     return (
-        f'<section{css} id="{_place(number)}"><h2><span class="no">{number}</span> {escape(section.heading)}</h2>'
+        f'<section id="{_place(number)}"><h2><span class="no">{number}</span> {escape(section.heading)}</h2>'
         f"{text}</section>"
     )

@@ -42,9 +42,19 @@ _PLACES: dict[str, tuple[tuple[int, int], str, str]] = {
 }
 
 
-def write(figures: Iterable[Figure], folder: Path, units: Units) -> list[Path]:
-    """Draw every figure that has a file into `folder`; returns the files."""
-    return draw({each.file: partial(_figure, each, units) for each in figures if each.file}, folder)
+_SMALL, _NAMED = 0.62, 0.8
+"""Size of a figure for a sheet over that of one for a screen, and its height where an axis has names."""
+_LABELS = 8
+"""Size of the letters of labels in a small figure; the others are as large as in one for a screen."""
+
+
+def write(figures: Iterable[Figure], folder: Path, units: Units, are_small: bool = False) -> list[Path]:
+    """Draw every figure that has a file into `folder`; returns the files. If they `are_small`, they have few
+    centimetres on paper."""
+    size = _SMALL if are_small else 1.0
+    plots = {each.file: partial(_figure, each, units, size) for each in figures if each.file}
+    with pyplot().rc_context({"axes.labelsize": _LABELS} if are_small else {}):
+        return draw(plots, folder)
 
 
 def contours(x: Any, y: Any, z: Any, level: float) -> list[Any]:
@@ -57,15 +67,17 @@ def contours(x: Any, y: Any, z: Any, level: float) -> list[Any]:
     return sorted(lines, key=len, reverse=True)
 
 
-def _figure(spec: Figure, units: Units) -> Any:
+def _figure(spec: Figure, units: Units, size: float = 1.0) -> Any:
     figure = in_units(spec, units)
     rows, columns = len(figure.panels), len(figure.panels[0])
     heights, widths = figure.heights or (1.0,) * rows, figure.widths or (1.0,) * columns
     has_titles = any(panel.title for _, _, panel in figure.all_panels())
-    width = 8.2 if columns == 1 else 1.0 + _COLUMN * columns
+    width = size * 8.2 if columns == 1 else 1.0 + _COLUMN * columns
     tall = 1.2 + (_ROW if rows > 1 else 3.2) * sum(heights) + (0.3 * rows if has_titles else 0.0)
+    is_named = any(panel.y.names for _, _, panel in figure.all_panels())
+    height = tall * (max(size, _NAMED) if is_named else size)
     drawing, axes = pyplot().subplots(
-        rows, columns, figsize=(width, tall), squeeze=False, height_ratios=heights, width_ratios=widths
+        rows, columns, figsize=(width, height), squeeze=False, height_ratios=heights, width_ratios=widths
     )
     places = {(r, c) for r, c, _ in figure.all_panels()}
     for place in np.ndindex(rows, columns):
@@ -83,13 +95,16 @@ def _figure(spec: Figure, units: Units) -> Any:
     for r, c, panel in figure.all_panels():
         sharing = figure.sharing(r, c)
         _dress(axes[r, c], panel, last=r == sharing[-1], first=r == sharing[0])
-    _legend(drawing, axes, columns)
+        if size < 1.0:
+            # rows are lower than the titles of their axes are long: the unit has a line of its own
+            axes[r, c].set_ylabel(axes[r, c].get_ylabel().replace(" [", "\n["))
+    _legend(drawing, axes, columns, 2 if size < 1.0 else 3)
     drawing.suptitle(fill(capital(figure.title), int(_LETTERS * drawing.get_figwidth())))
     return drawing
 
 
-def _legend(drawing: Any, axes: Any, columns: int) -> None:
-    """One legend below all panels, each name once."""
+def _legend(drawing: Any, axes: Any, columns: int, most: int) -> None:
+    """One legend below all panels, each name once; beside each other `most` below one column of panels."""
     entries: dict[str, Any] = {}
     for axis in axes.flat:
         if axis.figure is not None:
@@ -97,7 +112,7 @@ def _legend(drawing: Any, axes: Any, columns: int) -> None:
             for handle, label in zip(handles, labels, strict=True):
                 entries.setdefault(label, handle)
     if entries:
-        count = min(len(entries), 3 if columns == 1 else 2 + columns)
+        count = min(len(entries), most if columns == 1 else 2 + columns)
         drawing.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=count, fontsize=9)
 
 

@@ -44,9 +44,12 @@ def sheet(study: StudyRecord, report: b.Report) -> Sheet:
         *([_basis(s, study)] if "basis" in given else []),
         b.Section("unchecked", "What was not checked", tuple(_unchecked(study))),
     ]
-    shown = {*_FIRST, *sheets, "basis", "live", "motion"}
-    annex = [each for each in report.sections if each.name not in shown]
-    annex += (each for name in sheets for each in _in_annex(given[name]))
+    # what was not checked, and what is assumed, stand on the sheet
+    shown = {*_FIRST, *sheets, "basis", "live", "motion", "not_checked", "plots", "given"}
+    annex = [_without_figures(each) for each in report.sections if each.name not in shown]
+    annex.append(b.Section("plots", "Plots", tuple(report.figures)))
+    if "given" in given:
+        annex.append(_not_assumed(given["given"], study))
     if "basis" in given:
         annex.append(b.Section("software", "Models and software", (software(s),)))
     return Sheet(
@@ -61,21 +64,15 @@ def sheet(study: StudyRecord, report: b.Report) -> Sheet:
 def _on_sheet(section: b.Section) -> b.Section:
     """A section for the sheet: without its figures, which repeat numbers of its tables, and with its blocks of the
     form ``sheet``, if it has some, in place of its long ones."""
-    texts: list[b.Block] = [each for each in section.blocks if not isinstance(each, Figure)]
+    texts = _without_figures(section).blocks
     if any(each.form == "sheet" for each in texts):
-        texts = b.of_form(texts, "sheet")
-    return replace(section, blocks=tuple(texts))
+        texts = tuple(b.of_form(texts, "sheet"))
+    return replace(section, blocks=texts)
 
 
-def _in_annex(section: b.Section) -> Iterator[b.Section]:
-    """The sections of the annex with the blocks that a section of the sheet leaves out: its long blocks, where it has
-    others for the sheet, and its figures."""
-    figures = tuple(each for each in section.blocks if isinstance(each, Figure))
-    if any(each.form == "sheet" for each in section.blocks):
-        blocks = tuple(each for each in section.blocks if each.form == "long" and each not in figures)
-        yield b.Section(f"{section.name}_in_full", f"{section.heading}: in full", blocks)
-    if figures:
-        yield b.Section(f"{section.name}_figures", f"{section.heading}: figures", figures)
+def _without_figures(section: b.Section) -> b.Section:
+    """A section without its figures, which stand together."""
+    return replace(section, blocks=tuple(each for each in section.blocks if not isinstance(each, Figure)))
 
 
 def _basis(s: b.Source, study: StudyRecord) -> b.Section:
@@ -114,22 +111,35 @@ def _title_block(study: StudyRecord, report: b.Report) -> dict[str, str]:
 def _assumed(given: dict[str, b.Section], study: StudyRecord) -> Iterator[b.Block]:
     """The values that the files leave out, but those that were chosen, which are the answer, and those of a motor of
     a catalogue beside its surroundings."""
-    chosen = "" if study.proposal is None else study.proposal.name
     for block in given["given"].blocks if "given" in given else ():
         if isinstance(block, b.Given):
-            kept = (
-                (title, tuple(each for each in values if _is_assumed(each, study, chosen)))
-                for title, values in block.sections
-            )
-            yield b.Given(tuple((title, values) for title, values in kept if values))
+            yield _kept(block, study, are_assumed=True)
     if study.plate is not None:
-        words = 'Values of the motor, and those that were chosen: section "Given values" of the annex.'
+        words = 'Values of the motor, and those that were chosen: section "Other given values" of the annex.'
         yield b.Text(words, "note", "long")
 
 
-def _is_assumed(value: b.GivenValue, study: StudyRecord, chosen: str) -> bool:
-    """Whether the files leave out a number that is neither `chosen` nor of an event; beside a motor of a catalogue,
+def _not_assumed(section: b.Section, study: StudyRecord) -> b.Section:
+    """The section of given values without those that the sheet lists as assumptions."""
+    blocks = (
+        _kept(each, study, are_assumed=False) if isinstance(each, b.Given) else each
+        for each in section.blocks
+    )
+    return replace(section, heading="Other given values", blocks=tuple(blocks))
+
+
+def _kept(block: b.Given, study: StudyRecord, are_assumed: bool) -> b.Given:
+    kept = (
+        (title, tuple(each for each in values if _is_assumed(each, study) == are_assumed))
+        for title, values in block.sections
+    )
+    return b.Given(tuple((title, values) for title, values in kept if values))
+
+
+def _is_assumed(value: b.GivenValue, study: StudyRecord) -> bool:
+    """Whether the files leave out a number that is neither chosen nor of an event; beside a motor of a catalogue,
     neither its own nor of a starter that is not used."""
+    chosen = "" if study.proposal is None else study.proposal.name
     if value.origin in ("", "file", "linkage", chosen) or not isinstance(value.value, Number):
         return False
     of, _, name = value.name.partition(".")

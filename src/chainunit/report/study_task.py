@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from ..core.files import atomic_file
@@ -16,7 +17,7 @@ from ..study.registry import registered
 from ..study.result import StudyData
 from ..study.run import run_study
 from ..work.progress import TaskProgress
-from . import pdf, series
+from . import pdf, print_figures, series
 from . import study as contents
 from .blocks import Report
 from .sheet import sheet
@@ -45,13 +46,12 @@ def _writers(record: StudyRecord, report: Report, folder: Path, of_report: list[
 
 
 def _with_sheet(record: StudyRecord, report: Report, folder: Path, of_report: list[Writer]) -> list[Writer]:
-    """The files of a study, and behind its page the sheet, with the pictures of the folder."""
+    """The files of a study, and after its page the sheet, with its own pictures."""
 
     def sheet_file() -> list[Path]:
-        pictures = {each.file: folder / each.file for each in report.figures if each.file}
-        there = {name: file for name, file in pictures.items() if file.exists()}
-        with atomic_file(folder / pdf.NAME) as part:
-            pdf.write(sheet(record, report), there, part)
+        with TemporaryDirectory() as small, atomic_file(folder / pdf.NAME) as part:
+            drawn = print_figures.write(report.figures, Path(small), report.units, are_small=True)
+            pdf.write(sheet(record, report), {each.name: each for each in drawn}, part)
         return [folder / pdf.NAME]
 
     return [*_writers(record, report, folder, of_report), sheet_file]
