@@ -60,6 +60,9 @@ machine = "scotch_yoke_pump.toml"
 crank_speed = "150 rev/min"
 [sizing]
 starts_per_hour = 2
+poles_least = 4
+poles_most = 4
+candidates = 1
 [starting]
 permitted = 900
 [bearing.O1]

@@ -45,10 +45,11 @@ def sheet(study: StudyRecord, report: b.Report) -> Sheet:
         b.Section("unchecked", "What was not checked", tuple(_unchecked(study))),
     ]
     # what was not checked, and what is assumed, stand on the sheet
-    shown = {*_FIRST, *sheets, "basis", "live", "motion", "not_checked"}
-    annex = [each for each in report.sections if each.name not in shown]
-    annex = [_not_assumed(each, study) if each.name == "given" else each for each in annex]
-    annex += (each for name in sheets for each in _figures_of(given[name]))
+    shown = {*_FIRST, *sheets, "basis", "live", "motion", "not_checked", "plots", "given"}
+    annex = [_without_figures(each) for each in report.sections if each.name not in shown]
+    annex.append(b.Section("plots", "Plots", tuple(report.figures)))
+    if "given" in given:
+        annex.append(_not_assumed(given["given"], study))
     if "basis" in given:
         annex.append(b.Section("software", "Models and software", (software(s),)))
     return Sheet(
@@ -63,17 +64,15 @@ def sheet(study: StudyRecord, report: b.Report) -> Sheet:
 def _on_sheet(section: b.Section) -> b.Section:
     """A section for the sheet: without its figures, which repeat numbers of its tables, and with its blocks of the
     form ``sheet``, if it has some, in place of its long ones."""
-    texts: list[b.Block] = [each for each in section.blocks if not isinstance(each, Figure)]
+    texts = _without_figures(section).blocks
     if any(each.form == "sheet" for each in texts):
-        texts = b.of_form(texts, "sheet")
-    return replace(section, blocks=tuple(texts))
+        texts = tuple(b.of_form(texts, "sheet"))
+    return replace(section, blocks=texts)
 
 
-def _figures_of(section: b.Section) -> Iterator[b.Section]:
-    """The section of the annex with the figures that a section of the sheet leaves out."""
-    figures = tuple(each for each in section.blocks if isinstance(each, Figure))
-    if figures:
-        yield b.Section(f"{section.name}_figures", f"{section.heading}: figures", figures)
+def _without_figures(section: b.Section) -> b.Section:
+    """A section without its figures, which stand together."""
+    return replace(section, blocks=tuple(each for each in section.blocks if not isinstance(each, Figure)))
 
 
 def _basis(s: b.Source, study: StudyRecord) -> b.Section:

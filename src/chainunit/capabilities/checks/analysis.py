@@ -10,6 +10,7 @@ from ...reading.results import part, result
 from ...reading.text import number
 from ...study.analysis import Analysis, Findings, Work
 from ...study.bearings import largest_load, pin_force
+from ...study.permitted_starts import Starting
 from ...study.readings import has_turn, less_than_a_turn, machine_series, turns_made
 from ...study.record import StudyRecord
 from . import coupling, gear, plain, relay, rigid, rolling, section, starting
@@ -22,7 +23,6 @@ from .relay import RelayFindings
 from .rolling import RollingBearing
 from .row import CheckRow, NotChecked
 from .section import ShaftSection
-from .starting import Starting
 from .tables import PLAIN
 
 T = TypeVar("T")

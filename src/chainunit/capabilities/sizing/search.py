@@ -115,8 +115,8 @@ def size(
     best = candidates[0]
     if best.drive.gear_friction:
         notes.append(
-            f"The losses of the {best.drive.transmission} act as viscous drag on the motor shaft, with the mean power that "
-            "its efficiency costs."
+            f"The losses of the {best.drive.transmission} act as viscous drag on the motor shaft, with the mean "
+            "power that its efficiency costs."
         )
     ends = _end_of_catalogue(best, motors), _cost_of_wishes(trials, strong, candidates, progress)
     best.reason += "".join(f"; {words}" for words in ends if words)

@@ -213,16 +213,16 @@ class Trial:
         rise = self.start.sel(time=slice(None, self._first))
         inertia = float(p.rotor.J + np.mean(load_inertia(self.drive, self.steady)))
         time, torque, speed = (rise[name].values for name in ("time", _GAP, "motor.w"))
-        torques = start_torques(time, torque, speed, inertia)
-        current = self._rms(f"motor.{self.drive.motor.current}")
+        motor, counter = start_torques(time, torque, speed, inertia)
         of = StartingData(
-            self._demands.starts_per_hour,
-            plate.starts,
-            plate.J,
-            inertia,
-            *torques,
-            current,
-            plate.rated_current,
+            per_hour=self._demands.starts_per_hour,
+            bare=plate.starts,
+            rotor_inertia=plate.J,
+            inertia=inertia,
+            motor_torque=motor,
+            counter_torque=counter,
+            current=self._rms(f"motor.{self.drive.motor.current}"),
+            rated_current=plate.rated_current,
         )
         return starting(of, starts).permitted
 
