@@ -161,6 +161,8 @@ class Expression:
                 return value
             case ast.Compare() | ast.IfExp() | ast.BoolOp():
                 raise InputError(f"{shown(self.text)}: {_SWITCH}")
+            case ast.Tuple():
+                raise InputError(f"{shown(self.text)}: numbers have a decimal point, no comma")
             case ast.Attribute():
                 raise InputError(
                     f"{shown(self.text)}: {ast.unparse(node)} is known as an extreme alone: {_EXTREME}"
@@ -260,7 +262,8 @@ class Expression:
 
     def _written(self, name: str) -> InputError:
         wanted = ", ".join(SMOOTH.get(name, ("LINK.POINT.y",)))
-        return InputError(f"{shown(self.text)}: {name} is written {name}({wanted})")
+        comma = "; numbers have a decimal point" * bool(re.search(r"\d,\d", self.text))
+        return InputError(f"{shown(self.text)}: {name} is written {name}({wanted}){comma}")
 
 
 @cache
