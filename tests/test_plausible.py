@@ -16,7 +16,7 @@ from chainunit.core.quantities import Layout
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.machines.chain_unit import ChamberForces, Feed
 from chainunit.models import MODELS
-from chainunit.reading.tables import unusual_values
+from chainunit.reading.tables import option_value, unusual_values
 from chainunit.study import config
 
 MM = {"r": 150, "l": 1500, "h": 1000, "c": 1492.48, "hy": 1000, "e": 810, "l1": 1350, "l2": 540, "z": 853.815}
@@ -231,3 +231,40 @@ def test_the_usual_speed_is_that_of_the_machine():
     assert config.parse(fast.format(150)).file.unusual == ()
     (slip,) = config.parse(fast.format('"90 rev/min"')).file.unusual
     assert slip.variable.name == "run.crank_speed" and "usual: 10 to 1000 rad/s" in str(slip)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (
+            '[motor]\ntype = "induction"',
+            'the kind of the motor stands in [system]: motor = "DcMotor", "Induction',
+        ),
+        (
+            '[motor]\nkind = "DC"',
+            'the kind of the motor stands in [system]: motor = "DcMotor", "InductionMotor"',
+        ),
+        ('[sizing]\nfrequency = "60 Hz"', 'a catalogue of your own, catalogue = "FILE.csv"'),
+        ('[sizing]\nvoltage = "480 V"', 'a catalogue of your own, catalogue = "FILE.csv"'),
+        ('[run]\ncrank_speed = "-30 rpm"', 'positive = "clockwise" in [driver] of its file'),
+    ],
+)
+def test_a_refusal_names_the_place_of_what_was_sought(text, told):
+    with pytest.raises(InputError) as refusal:
+        config.parse(text)
+    assert told in str(refusal.value)
+
+
+def test_the_sense_of_a_linkage_is_in_its_file():
+    """A speed of an option has no sign, of any command."""
+    with pytest.raises(InputError, match=r'^--speed = .*: must be > 0 rad/s .*positive = "clockwise"'):
+        option_value("--speed", "-120 rpm", "rad/s", "speed of the driver")
+
+
+def test_a_fault_is_told_once():
+    """The place of a start that two links share, or a table that several keys ask for."""
+    fault = InputError("start.points.B: is wrong", "start.points.B")
+    again = InputError("start.points.B: is wrong", "start.points.B")
+    other = InputError("start.points.C: is wrong", "start.points.C")
+    assert str(InputError.joined([fault, again])) == "start.points.B: is wrong"
+    assert len(InputError.joined([fault, other, again]).faults) == 2

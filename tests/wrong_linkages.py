@@ -1,5 +1,7 @@
 """Wrong linkage files, as people write them: what is changed in a right one, and what the reader tells."""
 
+from chainunit.mechanism.assur import ONE_DRIVER
+
 PRESS = """\
 title = "press"
 [parameters]
@@ -82,6 +84,17 @@ CHANGES = [
     # units
     ([('"14 kg"', '"14 mm"')], [(19, "links.crank.mass", 'write it as "2 kg"')]),
     ([('"0.09 kg m2"', '"0.09 kg"')], [(20, "links.crank.inertia", 'write it as "2 kg m2"')]),
+    (crank('"50,5 mm"'),
+     [(18, "links.crank.points.A", 'numbers have a decimal point; was "50.5 mm" meant?')]),
+    ([('"360 mm"', '"36,5 cm"')], [(4, "parameters.l", 'numbers have a decimal point; was "36.5 cm" meant?')]),
+    ([('"360 mm"', '"14\\""')], [(4, "parameters.l", 'was "14 in" meant?')]),
+    ([(ROUGH, 'points = { C = ["1\'", 0] }')], [(37, "start.points.C", 'was "1 ft" meant?')]),
+    ([("[0, 1, 0.5]", '[0, 1, "0,5"]')], [(7, "tables.share", 'numbers have a decimal point; was "0.5" meant?')]),
+    (crank('"0,5 * r"'), [(18, "links.crank.points.A", "numbers have a decimal point")]),
+    (crank('"r * 0,5"'), [(18, "links.crank.points.A", "numbers have a decimal point")]),
+    (crank('"r * step(r, 0,5)"'), [(18, "links.crank.points.A", "numbers have a decimal point")]),
+    (crank('"press_force * 3"'), [(18, "links.crank.points.A", "lengths cannot change in a run")]),
+    ([('mass = "14 kg"', 'mass = "press_force / 9.81"')], [(19, "links.crank.mass", "in N; must be in kg")]),
     ([('zero = "0 deg"', 'zero = "5 mm"')], [(16, "driver.zero", 'write it as "2 deg"')]),
     ([('"360 mm"', '"360 furlong"')], [(4, "parameters.l", "the unit is not known")]),
     ([('"80 mm", min', '"80 mm", unit = "furlong", min')], [(3, "parameters.r", "known: 1, m, rad")]),
@@ -118,7 +131,7 @@ CHANGES = [
           ("step(min(r) - y, 0.01)", "r is no place of the motion"),
           ("step(min(2 * r) - y, 0.01)", "min has two arguments, or is an extreme"),
           ("step(ram.T.y - y, 0.01)", "ram.T.y is known as an extreme alone"),
-          ("step(min(y) - y, press_force)", "the one is in m, the other in kg m s-2"),
+          ("step(min(y) - y, press_force)", "the one is in m, the other in N"),
           ("stroke(y, 2)", "stroke is written stroke(LINK.POINT.y)"),
           ("table(y, shore)", 'shore is no table; was "share" meant?'),
           ("table(y, share)", "the one is in m, the other in no unit"),
@@ -133,7 +146,16 @@ CHANGES = [
     (crank('"press_force"'), [(18, "links.crank.points.A", "lengths cannot change in a run")]),
     (crank('"r + phi"'), [(18, "links.crank.points.A", "phi is known in a load alone")]),
     ([("press_force * share", "press_force * shore")],
-     [(7, "tables.share", "no load uses it"), (34, "loads.pressing.force", 'was "share" meant?')]),
+     [(34, "loads.pressing.force", 'was "share" meant?')]),
+    # what follows from the first fault of an expression is not told
+    ([("press_force * share", "pres_force * shore")],
+     [(34, "loads.pressing.force", 'was "press_force" meant?')]),
+    ([('"ram.T"', '"ram.S"'), ("press_force * share", "press_force * share * step(max(y) - y, 0.01)")],
+     [(33, "loads.pressing.on", "S is no point of ram")]),
+    ([('mass = "9.5 kg"', 'bar = { from = "A", to = "C", area = "2 * q", density = "7850 kg/m3" }')],
+     [(23, "links.rod.bar.area", "q is no parameter")]),
+    ([('points = { A = [0, 0], C = ["l"', 'ponts = { A = [0, 0], C = ["l"')],
+     [(22, "links.rod.ponts", 'was "points" meant?')]),
     ([('"360 mm"', '"2 * l"')], [(4, "parameters.l", "refers to itself")]),
     ([('"360 mm"', '"2 * q"')], [(4, "parameters.l", "q is no parameter")]),
     ([('"360 mm"', '"r + 2 * kilo"'), ("[parameters]", '[parameters]\nkilo = "2 kg"')],
@@ -199,6 +221,19 @@ CHANGES = [
      [(36, "start.phi", 'is "20 deg"; must be an angle in driver.range, from 30 deg to 90 deg')]),
     ([('zero = "0 deg"', 'range = ["30 deg", "90 deg"]'), ('phi = "20 deg"\n', "")],
      [(35, "start.phi", "is 0 where it is not given; must be an angle in driver.range")]),
+    # drivers of other programs
+    ([("[driver]", "[[driver]]"), ("[links.crank]", '[[driver]]\nlink = "rod"\n[links.crank]')],
+     [(14, "driver", "stands there 2 times: a linkage has one driver, and a second one is not possible yet")]),
+    ([("[driver]", "[[driver]]")], [(14, "driver", "is a list; write [driver]")]),
+    ([("[driver]\nlink = \"crank\"\nzero = \"0 deg\"", "[driver]"), ("[driver]", "")],
+     [(0, "driver", "the link that the motor turns")]),
+    (added('[joints.mesh]\ntype = "gear"\non = "ram.C"\nby = "crank.A"\nratio = 3'),
+     [(36, "joints.mesh.type", "a gear, a belt or a cam between links is not possible yet")]),
+    (added('[joints.A]\non = "rod.A"\nby = "crank.A"\nfriction = 0.2\ndiameter = "30 mm"'),
+     [(38, "joints.A.friction", "is not possible for one joint yet; give it in [pins]"),
+      (39, "joints.A.diameter", "is not possible for one joint yet; give it in [pins]")]),
+    ([('toward = "G2"', 'toward = "G2"\nfriction = 0.2')],
+     [(32, "joints.guide.friction", "is not possible for one joint yet; give it in [guides]")]),
     # degrees of freedom and assembly
     ([("A = [0, 0], C", "Q = [0, 0], C")], [(21, "links.rod", "rod has one joint; add a joint")]),
     ([(GUIDE, "")], [(24, "links.ram", "too many degrees of freedom: 3")]),
@@ -219,6 +254,7 @@ CHANGES = [
     ([(ROUGH, "")], [(35, "start", "does not place the links rod, ram: give the angle of rod")]),
     ([(ROUGH, "points = { Z = [0, 0] }")], [(37, "start.points.Z", "is no point of a link")]),
     ([(ROUGH, "points = { C = [0] }")], [(37, "start.points.C", "a list of two")]),
+    ([(ROUGH, 'points = { A = ["q", 0], C = [0, "-356 mm"] }')], [(37, "start.points.A", "must be a number")]),
     ([(ROUGH, 'angles = { rode = "3 deg" }')], [(37, "start.angles.rode", 'was "rod" meant?')]),
     ([(ROUGH, "poses = { rod = [0, 0] }")], [(37, "start.poses.rod", "a list of three")]),
     # springs
@@ -317,6 +353,68 @@ leg_s = { points = { P = [0, 0], Q = [0.1, 0] } }
 rail = { on = "leg_s.P", by = "ground.G", toward = "G2" }
 slot = { on = "leg_s.Q", by = "plate.S", toward = "S2", angle = "30 deg" }
 """
+FIVE_BAR = """\
+[ground]
+A = [0, 0]
+E = [12, 0]
+[driver]
+link = "left"
+[links]
+left = { points = { A = [0, 0], B = [4, 0] } }
+lower = { points = { B = [0, 0], C = [10, 0] } }
+right = { points = { E = [0, 0], D = [4, 0] } }
+upper = { points = { D = [0, 0], C = [10, 0] } }
+"""
+EXCAVATOR = """\
+[ground]
+O = [0, 0]
+F = [0.2, -0.3]
+[driver]
+joint = "boom_cylinder"
+range = ["1.2 m", "1.9 m"]
+[links]
+boom = { points = { O = [0, 0], G = [1.6, 0.4], S = [3.2, 0], H = [1.8, 0.6] } }
+stick = { points = { S = [0, 0], K = [-0.5, 0.2], B = [1.6, 0] } }
+barrel1 = { points = { F = [0, 0], X = [1, 0] } }
+rod1 = { points = { G = [0, 0] } }
+barrel2 = { points = { H = [0, 0], Y = [1, 0] } }
+rod2 = { points = { K = [0, 0] } }
+[joints]
+boom_cylinder = { on = "rod1.G", by = "barrel1.F", toward = "X" }
+stick_cylinder = { on = "rod2.K", by = "barrel2.H", toward = "Y" }
+[start]
+phi = "1.5 m"
+"""
+BRANCHES = """\
+[ground]
+O1 = [0, 0]
+O2 = ["600 mm", "400 mm"]
+[driver]
+link = "crank"
+[links]
+crank = { points = { O1 = [0, 0], A = ["50 mm", 0] } }
+coupler = { points = { A = [0, 0], B = ["600 mm", 0] } }
+rocker = { points = { O2 = [0, 0], B = ["400 mm", 0] } }
+[start]
+points = { B = ["300 mm", "200 mm"] }
+"""
+SLOT = """\
+[ground]
+O1 = [0, "300 mm"]
+O2 = [0, 0]
+[driver]
+link = "crank"
+[links]
+crank = { points = { O1 = [0, 0], A = ["100 mm", 0] } }
+block = { points = { A = [0, 0] } }
+arm = { points = { O2 = [0, 0], E = ["600 mm", 0] } }
+[joints.slot]
+on = "block.A"
+by = "arm.O2"
+toward = "E"
+[start]
+angles = { arm = "-10 deg" }
+"""
 STUDY = '[machine]\nr = "150 mm"\n[run]\nturns = 3\n'
 
 # whole files
@@ -325,6 +423,10 @@ FILES = [
      [(10, "links.one", "the links one, two, leg_b, leg_c, leg_d, leg_e form one group with 6 links")]),
     (SLIDES, [(9, "links.block", "three sliding joints, one, two and three")]),
     (TRIAD, [(13, "links.leg_s", "slides in both of its joints, rail and slot")]),
+    (FIVE_BAR, [(8, "links.lower", f"if two motors or cylinders move the machine: {ONE_DRIVER}; else add a joint")]),
+    (EXCAVATOR, [(9, "links.stick", f"if two motors or cylinders move the machine: {ONE_DRIVER}; else add")]),
+    (BRANCHES, [(11, "start.points.B", '["237.8 mm", "569.8 mm"] or ["650 mm", "3.136 mm"]')]),
+    (SLOT, [(15, "start.angles.arm", '"71.57 deg" or "-108.4 deg"')]),
     ("", [(0, "links", "give at least the link that the driver turns")]),
     (STUDY, [(1, "machine", "run a study file with chainunit study")]),
     ("hello world", [(1, "no valid TOML", "has no tables and keys")]),

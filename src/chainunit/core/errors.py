@@ -38,7 +38,8 @@ class InputError(ValueError):
 
     @classmethod
     def joined(cls, faults: Sequence[InputError]) -> InputError:
-        """One error that stands for several."""
+        """One error that stands for several, each told once."""
+        faults = list({(fault.key, str(fault)): fault for fault in faults}.values())
         return faults[0] if len(faults) == 1 else InputError("\n".join(map(str, faults)), faults=faults)
 
 
@@ -115,9 +116,11 @@ class Faults:
 
 
 def near_name(given: str, known: Iterable[str]) -> str:
-    """Words to add to the refusal of a name that is similar to one of the `known` names; else empty."""
+    """Words to add to the refusal of a name that is similar to one of the `known` names, or of several words one of
+    which is such a name; else empty."""
     names = {name.lower(): name for name in known}
     near = difflib.get_close_matches(given.lower(), names, n=1, cutoff=0.75)
+    near = near or [word for word in given.lower().split() if word in names and " " in given]
     return f'; was "{names[near[0]]}" meant?' if near else ""
 
 

@@ -101,6 +101,8 @@ def fitting(unit: str, kind: str = "") -> tuple[str, ...]:
     first."""
     if unit == "1":
         return ("%",) if kind == "percent" else ()
+    if kind == "hours":
+        return ("h", "s")
     return FITTING.get(unit, (unit.replace(".", " "),))
 
 
@@ -261,6 +263,22 @@ _OF_OPTIONS = {"rad/s": ("rev/min", "rad/s", "deg/s", "Hz")}
 """By declared unit, the units that a refusal lists, where they are others than those in which people write it."""
 
 
+_DECIMAL_COMMA = re.compile(r"\d,\d")
+COMMA = "numbers have a decimal point"
+
+
+def has_comma(text: str) -> bool:
+    """Whether a comma stands between two digits."""
+    return bool(_DECIMAL_COMMA.search(text))
+
+
+def spelling(text: str, unit: str, kind: str = "") -> str:
+    """Words on how a refused text was probably meant, to follow its refusal; empty where nothing is near."""
+    probable = probable_text(text, unit, kind)
+    comma = f"; {COMMA}" * has_comma(text)
+    return comma + (f'; was "{probable}" meant?' if probable else "")
+
+
 def probable_text(text: str, unit: str, kind: str = "") -> str:
     """The text that the user probably meant, for a quantity of this `unit` and `kind`: with a point in place
     of a comma, or with the right case of letters. Empty where there is none; two texts where a comma may be
@@ -273,6 +291,8 @@ def probable_text(text: str, unit: str, kind: str = "") -> str:
             else ""
         )
     text = with_point(text) or text
+    if parts := split(text):
+        text = f"{parts[0]:.15g} {_INCHES[parts[1]]}" if parts[1] in _INCHES else text
     if _reads(text, unit, kind):
         return text.strip()
     parts = split(text)
@@ -284,6 +304,10 @@ def probable_text(text: str, unit: str, kind: str = "") -> str:
         if same and _reads(f"{number:.15g} {usual}", unit, kind):
             return f"{number:.15g} {usual}".strip()
     return ""
+
+
+_INCHES = {'"': "in", "''": "in", "\u2033": "in", "'": "ft", "\u2032": "ft"}
+"""Signs for inches and feet."""
 
 
 def _reads(text: str, unit: str, kind: str) -> bool:

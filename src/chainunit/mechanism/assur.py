@@ -21,6 +21,9 @@ GROUND = "ground"
 REVOLUTE, PRISMATIC = "revolute", "prismatic"
 
 
+ONE_DRIVER = "a linkage has one driver, and a second one is not possible yet"
+
+
 class FreeLinksError(InputError):
     """Links of a linkage can move by themselves."""
 
@@ -177,14 +180,14 @@ def _freedoms(
         loose |= more
     names = [link for link in unknown if link in loose]
     lone = [link for link in names if sum(link in (j.on, j.by) for j in joints) < 2]
-    hint = ""
+    hint = f"; if two motors or cylinders move the machine: {ONE_DRIVER}; else"
     if lone:
         joined = any(lone[0] in (j.on, j.by) for j in joints)
-        hint = f"; {lone[0]} has {'one joint' if joined else 'no joint'}"
+        hint = f"; {lone[0]} has {'one joint' if joined else 'no joint'};"
     many = len(names) > 1
     return FreeLinksError(
         f"too many degrees of freedom: {number + 1} where the driver gives one; the link{'s' * many} "
-        f"{', '.join(names)} {'are' if many else 'is'} free to move{hint}; add a joint, or take out a link",
+        f"{', '.join(names)} {'are' if many else 'is'} free to move{hint} add a joint, or take out a link",
         key=(lone or names)[0],
     )
 

@@ -214,6 +214,8 @@ class Expression:
                 return term
             case ast.Compare() | ast.IfExp() | ast.BoolOp():
                 raise InputError(f"{shown(self.text)}: {_SWITCH}")
+            case ast.Tuple():
+                raise InputError(f"{shown(self.text)}: numbers have a decimal point, no comma")
             case ast.Attribute():
                 raise InputError(
                     f"{shown(self.text)}: {self.words(node)} is known as an extreme alone: {_EXTREME}"
@@ -345,7 +347,8 @@ class Expression:
 
     def _written(self, name: str) -> InputError:
         wanted = ", ".join(SMOOTH.get(name, ("LINK.POINT.y",)))
-        return InputError(f"{shown(self.text)}: {name} is written {name}({wanted})")
+        comma = "; numbers have a decimal point" * bool(re.search(r"\d,\d", self.text))
+        return InputError(f"{shown(self.text)}: {name} is written {name}({wanted}){comma}")
 
 
 def parts_of_chain(node: ast.AST) -> tuple[ast.AST, list[tuple[ast.AST, ast.operator, ast.AST]]]:

@@ -60,9 +60,16 @@ def to_number(variable: Variable, given: Any) -> float:
         raise ValueError(f"{variable.name}: the number is too large; must be {_kind(variable)}") from None
     if not variable.quantity.admits(value):
         meant = _meant(variable, given)
-        radians = f"; {units.IN_RADIANS}" * (variable.unit == "rad" and not units.has_unit(given))
-        raise ValueError(complaint(variable, value) + radians + (f'; was "{meant}" meant?' if meant else ""))
+        hints = [
+            f"; {units.IN_RADIANS}" * (variable.unit == "rad" and not units.has_unit(given)),
+            _SENSE * (variable.unit == "rad/s" and bool(variable.quantity.admits(-value))),
+            f'; was "{meant}" meant?' if meant else "",
+        ]
+        raise ValueError(complaint(variable, value) + "".join(hints))
     return variable.quantity.within_bounds(value)
+
+
+_SENSE = '; the sense of a linkage is that of its driver: positive = "clockwise" in [driver] of its file'
 
 
 def may_be_share(variable: Variable) -> bool:
@@ -84,8 +91,7 @@ def _converted(variable: Variable, text: str) -> float:
     except ValueError:
         pass
     counted = variable.type != "Real"
-    meant = "" if counted else units.probable_text(text, variable.unit, variable.kind)
-    hint = f'; was "{meant}" meant?' if meant else ""
+    hint = "" if counted else units.spelling(text, variable.unit, variable.kind)
     other = units.of_other_kind(parts[1], variable.unit) if parts is not None and parts[1] else ""
     other = f"; {printable(other)}" if other else ""
     raise ValueError(f"{variable.name} = {shown(text)}: must be {_kind(variable)}{other}{hint}")

@@ -70,6 +70,8 @@ class FileSection:
     """lists and tables in it whose faults say nothing of its other keys"""
     deciders: Mapping[str, str] = field(default_factory=dict)
     """by a key of entries, the key of the table that decides whether it has a meaning"""
+    places: Mapping[str, str] = field(default_factory=dict)
+    """by a key that people look for in the table, where the file has it"""
     named: TableList | None = None
     """where the file chooses the names in the table, the declaration of the tables [table.NAME]"""
 

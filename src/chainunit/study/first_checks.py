@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from ..core.errors import Faults, InputError, refusal_prefix, shown
+from ..core.errors import Faults, InputError, each_refusal, refusal_prefix, shown
 from ..drives.catalogue import CatalogueMotor, motor_of_catalogue, offer
 from ..drives.motors import MOTORS
 from ..models import MACHINES
@@ -34,7 +34,14 @@ def check_values(data: Mapping[str, Any], source: str) -> tuple[Parts | None, li
         parts = parts_of(data, source)
     known = parts or Parts(MACHINES["ChamberForces"], MOTORS["DcMotor"])
     readable = data if parts else {name: x for name, x in data.items() if name not in _OF_MACHINE}
-    with faults.collected():
+    places = {f"{table}.{key}": x for table, each in known.sections.items() for key, x in each.places.items()}
+
+    def placed(fault: InputError) -> InputError:
+        """The refusal of an unknown key, with the place at which the file has it."""
+        words = places.get(fault.key)
+        return InputError(f"{fault}; {words}", fault.key) if words else fault
+
+    with faults.collected(), each_refusal(placed):
         read_table(known.form, readable)
     with faults.collected():
         if isinstance(data.get("event", []), list):
@@ -53,12 +60,7 @@ def check_values(data: Mapping[str, Any], source: str) -> tuple[Parts | None, li
             chosen_units(units)
     if parts is not None:
         faults.add(refusals(data, parts))
-    return parts, _without_repeated(faults.errors)
-
-
-def _without_repeated(faults: Sequence[InputError]) -> list[InputError]:
-    """The faults without repetitions of the same key and words."""
-    return list({(fault.key, str(fault)): fault for fault in faults}.values())
+    return parts, faults.errors
 
 
 def _check_catalogue(data: Mapping[str, Any], source: str) -> None:

@@ -232,7 +232,16 @@ def all_sections() -> dict[str, FileSection]:
     return tables | own
 
 
+_KIND_OF_MOTOR = (
+    'the kind of the motor stands in [system]: motor = "DcMotor", "InductionMotor", or a designation of the '
+    "catalogue"
+)
+
+
 def sections_of(machine: type[MachineModel], motor: type[Motor]) -> dict[str, FileSection]:
     """The tables of a study with this machine and this kind of motor."""
     own = {"machine": machine.Parameters, "ratios": Ratios, "feed": machine.Feed, "motor": motor.Parameters}
-    return {name: FileSection(declaration) for name, declaration in own.items()} | all_sections()
+    places = {"motor": dict.fromkeys(("type", "kind", "model", "name"), _KIND_OF_MOTOR)}
+    return {
+        name: FileSection(declaration, places=places.get(name, {})) for name, declaration in own.items()
+    } | all_sections()

@@ -63,6 +63,21 @@ def table(**values):
     return instance(BearingTable, values)
 
 
+@pytest.mark.parametrize(
+    ("changed", "told"),
+    [
+        (('kind = "roller"', 'kind = "spherical roller"'), 'was "roller" meant?'),
+        (('kind = "ball"', 'kind = "deep groove ball"'), 'was "ball" meant?'),
+        (('life = "30000 h"', "life = 30000"), 'was "30000 h" meant?'),
+    ],
+)
+def test_bearings_of_a_catalogue_are_understood(changed, told):
+    """A kind by its full name, and a life in hours."""
+    with pytest.raises(InputError) as refusal:
+        parse(STUDY.replace(*changed))
+    assert told in str(refusal.value) and len(refusal.value.faults) == 1
+
+
 def triangle(swing, cycles=3, points=200):
     """Time [s] and angle [rad] of a pin that swings there and back once a second at an even speed."""
     time = np.linspace(0.0, cycles, 2 * cycles * points + 1)

@@ -25,7 +25,7 @@ class BearingTable:
     C: Value = quantity("N", "dynamic load rating of a rolling bearing", above=0.0, max=1e9)
     C0: Value = quantity("N", "static load rating of a rolling bearing", above=0.0, max=1e9)
     life: Value = quantity(
-        "s", "rating life that is asked for", default=7.2e7, min=0.0, max=1e11, kind="hours"
+        "s", "rating life that is asked for", default=7.2e7, min=3.6e5, max=1e11, kind="hours"
     )
     life_factor: Value = quantity(
         "1",

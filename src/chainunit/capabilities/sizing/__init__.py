@@ -24,6 +24,11 @@ from ...study.rules import BESIDE_MOTOR, Rule, has_sides
 from ...work.progress import TaskProgress
 from .table import SIZING_KEYS, Sizing, SizingPlan
 
+_SUPPLY = (
+    "the supply has the rated voltage and frequency of the motor; motors for another supply stand in a catalogue of "
+    'your own, catalogue = "FILE.csv"'
+)
+
 
 class SizingCapability(Capability):
     """The capability, with the table [sizing]."""
@@ -47,6 +52,7 @@ class SizingCapability(Capability):
                 "hours": "usage.hours, if the file has it, else 16",
                 "load_class": "by the inertia of the machine over that of the motor",
             },
+            places=dict.fromkeys(("frequency", "voltage", "supply"), _SUPPLY),
             order=(("poles_least", ">=", "poles_most"), ("ambient", ">", "temperature")),
         )
     }

@@ -117,5 +117,11 @@ def _product(a: Dimension, b: Dimension, sign: float) -> Dimension:
     return tuple((name, powers[name]) for name in order if powers.get(name))
 
 
+_NAMED = ("N", "N.m", "N/m", "N.s/m", "N/m2", "W")
+
+
 def _unit(dimension: Dimension) -> str:
+    for unit in _NAMED:
+        if sorted(dimension) == sorted(dimension_of_unit(unit)):
+            return unit.replace(".", " ")
     return " ".join(f"{name}{'' if power == 1.0 else f'{power:g}'}" for name, power in dimension) or "no unit"

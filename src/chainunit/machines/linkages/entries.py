@@ -88,14 +88,15 @@ class EntryReader(Entry):
             self.fault(key, f"is {shown(given)}; must be >= 0")
         return value
 
-    def tables(self, kind: str, known: tuple[str, ...]) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
-        """The tables in a table, each behind its name and its full key; their keys are `known`."""
+    def tables(self, kind: str, known: tuple[str, ...] = ()) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
+        """The tables in a table, each behind its name and its full key; their keys are `known`, if any are given."""
         given = self.table(kind)
         self.fault_reserved_names(kind, given)
         for name in given:
             key = f"{kind}.{name}"
             table = self.table(key, given)
-            self.keys(key, table, known)
+            if known:
+                self.keys(key, table, known)
             yield name, key, table
 
     def fault_reserved_names(self, key: str, names: Mapping[str, Any]) -> None:
@@ -122,12 +123,14 @@ class EntryReader(Entry):
             if parts is None:
                 raise InputError(
                     f"is {shown(given)}; must be a number or a text with a unit, such as {_like(unit)}"
+                    f"{units.spelling(given, unit)}"
                 )
             try:
                 value = units.convert(*parts, unit) if parts[1] else parts[0]
             except ValueError:
+                hint = units.spelling(given, unit)
                 raise InputError(
-                    f"is {shown(given)}; the unit does not fit, write it as {_like(unit)}"
+                    f"is {shown(given)}{hint or f'; the unit does not fit, write it as {_like(unit)}'}"
                 ) from None
         else:
             value = as_float(given)
@@ -155,13 +158,13 @@ class EntryReader(Entry):
     def entry(
         self, key: str, given: Any, unit: str, motion: Known | None = None, inputs: bool = False
     ) -> Any:
-        """A number in SI units, or the text of an expression, with its unit checked; 0 where it is wrong. `motion`
+        """A number in SI units, or the text of an expression, with its unit checked; NaN where it is wrong. `motion`
         are the units of the names that a load knows beside parameters and inputs."""
         with self.at(key):
             if not isinstance(given, str) or _is_quantity(given):
                 return self.number(key, given, unit)
             if self.refused & words(given):  # the name itself is faulted where it is given
-                return 0.0
+                return math.nan
             known = {**self.units, **(motion or {})}
             each = expression(given)
             known |= self.further_units(each, motion is not None)
@@ -187,7 +190,7 @@ class EntryReader(Entry):
             if motion is None:
                 self.expressed[key, given] = None
             return given
-        return 0.0
+        return math.nan
 
     def dimensions(self, units: Known) -> Dimensions:
         """The dimensions of names with these `units`, and of the parameters that are expressions of others."""
@@ -389,7 +392,9 @@ class EntryReader(Entry):
             for each in UNITS:
                 if units.converts(parts[1], each):
                     return within(units.convert(*parts, each), given), each
-            raise InputError(f"is {shown(given)}; the unit is not known; write it as in {_like('m')}")
+            hints = [units.spelling(given, each) for each in UNITS]
+            unknown = f"; the unit is not known; write it as in {_like('m')}"
+            raise InputError(f"is {shown(given)}{next((hint for hint in hints if 'meant' in hint), unknown)}")
         return self.number("", given, "1"), None
 
 
@@ -422,6 +427,8 @@ def _is_quantity(text: str) -> bool:
     parts = units.split(text)
     if parts is None or parts[1][:1] in ("+", "-", "*", "/"):
         return False
+    if parts[1].startswith(",") and re.search(r"[+*/()]", parts[1]):
+        raise InputError(f"is {shown(text)}; {units.COMMA}")
     if re.search(r"[+*()]|\s[-/]\s", parts[1]) and not _is_unit(parts[1]):
         raise InputError(
             f"is {shown(text)}; an expression has no units inside: write its numbers in SI units, such as "

@@ -15,9 +15,14 @@ from typing import Any
 
 from ...core.engines import MATH
 from ...core.errors import InputError, RemarkWarning, each_refusal, meant, near_name, printable, shown
+<<<<<<< HEAD
 from ...core.inputs import TOML, file_text
 from ...mechanism.assur import DYADS, GROUND, PRISMATIC, REVOLUTE
 from ...mechanism.expressions import value_of
+=======
+from ...mechanism.assur import DYADS, GROUND, ONE_DRIVER, PRISMATIC, REVOLUTE
+from ...mechanism.expressions import expression
+>>>>>>> m-h
 from ...mechanism.models import InverseMachine
 from ...reading import toml_lines
 from ...reading.tables import UnusualValue, in_file, slips_of, toml
@@ -42,6 +47,7 @@ from .load_entries import LoadReader
 from .model import machine_of
 from .shared_pins import shared_pins
 from .start import StartPose
+from .start_branches import check_start
 from .structure import CYLINDER, JointEntry
 from .way import WHOLE
 
@@ -51,8 +57,14 @@ TABLES = (
 )  # fmt: skip
 _LINK_KEYS = ("points", "mass", "inertia", "centroid", "masses", "bar")
 _JOINT_KEYS = ("type", "on", "by", "toward", "angle", "length")
+<<<<<<< HEAD
 _LARGEST_START = 1e4
 """Largest place of the driver at the start [rad, m]."""
+=======
+_OF_PIN, _OF_GUIDE = ("friction", "diameter", "damping"), ("friction", "damping")
+_DRIVES = ("gear", "belt", "chain", "cam", "rack", "rolling")
+"""Kinds of joints of other programs."""
+>>>>>>> m-h
 _DRIVER_KEYS = ("link", "joint", "zero", "positive", "range")
 
 
@@ -92,7 +104,9 @@ def linkage_in(file: Path) -> tuple[type[InverseMachine], tuple[UnusualValue, ..
             with each_refusal(
                 lambda fault: InputError(f"{fault.key or 'links'}: {fault}", fault.key or "links")
             ):
-                return machine_of(description), tuple(reader.unusual)
+                machine = machine_of(description)
+                check_start(machine.described_by)  # type: ignore[attr-defined]
+            return machine, tuple(reader.unusual)
         except InputError as error:
             # where lengths do not fit together, one may be a slip of the unit
             slips = [InputError(str(value), value.name) for value in reader.unusual if value.meant]
@@ -116,8 +130,9 @@ class _LinkageReader(LoadReader):
 
     def description(self) -> str:
         """The description."""
+        study_fault(self.data)
+        self.fault_drivers()
         data = self.data
-        study_fault(data)
         self.keys("", data, TABLES)
         name, title = self.text("name", model_name(self.name)), printable(self.text("title", ""))
         if "name" in data and (wrong := name_fault(name)):
@@ -169,6 +184,14 @@ class _LinkageReader(LoadReader):
             described["derived"] = [*self.derived.items()]
         return json.dumps(described, sort_keys=True)
 
+    def fault_drivers(self) -> None:
+        """Fault a list of drivers; the reader goes on with the first one."""
+        drivers = self.data.get("driver")
+        if isinstance(drivers, list) and drivers and isinstance(drivers[0], Mapping):
+            several = f"stands there {len(drivers)} times: {ONE_DRIVER}; take all but one out, and"
+            self.fault("driver", f"{several if len(drivers) > 1 else 'is a list;'} write [driver]")
+            self.data = {**self.data, "driver": drivers[0]}
+
     def named_points(self, links: list[dict[str, Any]], loads: list[dict[str, Any]]) -> set[tuple[str, ...]]:
         """The points that joints of the file, loads and masses name, by link."""
         given = [each for each in self.table("joints").values() if isinstance(each, Mapping)]
@@ -204,21 +227,22 @@ class _LinkageReader(LoadReader):
         self, parameters: list[dict[str, Any]], inputs: list[dict[str, Any]], tables: Mapping[str, Any]
     ) -> None:
         """Fault parameters, inputs and tables that nothing uses; a name in a faulty entry may be meant to be used."""
-        spoilt = bool(self.errors)
-        mentioned = words([self.data[key] for key in self.data if key not in ("parameters", "inputs")])
+        texts = words([self.data[key] for key in self.data if key not in ("parameters", "inputs")])
+        names = (*self.derived, *tables, *(each["name"] for each in (*parameters, *inputs)))
+        mentioned = {name for name in names if self.errors and (name in texts or near_name(name, texts))}
         for kind, entries in (("parameters", parameters), ("inputs", inputs)):
             for each in entries:
                 name = each["name"]
-                if name not in self.used | self.refused and not (spoilt and name in mentioned):
+                if name not in self.used | self.refused | mentioned:
                     self.fault(f"{kind}.{name}", "nothing uses it; use it, or take it out")
                 each["unit"] = each["unit"] or self.units[name] or "1"
                 with self.at(f"{kind}.{name}"):
                     self.in_its_unit(f"{kind}.{name}", self.table(kind)[name], each)
         for name in self.derived:
-            if name not in self.used and not (spoilt and name in mentioned):
+            if name not in self.used | mentioned:
                 self.fault(f"parameters.{name}", "nothing uses it; use it, or take it out")
         for name in tables:
-            if name not in self.used | self.refused and not (spoilt and name in mentioned):
+            if name not in self.used | self.refused | mentioned:
                 self.fault(f"tables.{name}", "no load uses it; use it, or take it out")
 
     def in_its_unit(self, key: str, given: Any, entry: Mapping[str, Any]) -> None:
@@ -250,7 +274,9 @@ class _LinkageReader(LoadReader):
         for point in points:
             if point in POINT_NAMES:
                 self.fault(f"{key}.points.{point}", "is a variable of every link; choose another name")
-        if not points and isinstance(given, Mapping) and isinstance(given.get("points", {}), Mapping):
+        is_misspelled = any(near_name(each, ("points",)) for each in table if each not in _LINK_KEYS)
+        has_table = isinstance(given, Mapping) and isinstance(given.get("points", {}), Mapping)
+        if not points and has_table and not is_misspelled:
             self.fault(key, "has no points; give points = { A = [0, 0], ... } in the frame of the link")
         self.points[name] = points
         link: dict[str, Any] = {"name": name, "points": points, "own": {}}
@@ -307,11 +333,19 @@ class _LinkageReader(LoadReader):
     def joints(self) -> list[dict[str, Any]]:
         """The joints: the named ones, and a revolute one for each further link in a point of the same name."""
         joints = []
-        for name, key, given in self.tables("joints", _JOINT_KEYS):
+        for name, key, given in self.tables("joints"):
             kind = given.get("type", PRISMATIC if "toward" in given else REVOLUTE)
             if kind not in (REVOLUTE, PRISMATIC):
-                self.fault(f"{key}.type", f'is {shown(kind)}; must be "revolute" or "prismatic"')
+                drive = "; a gear, a belt or a cam between links is not possible yet" * (kind in _DRIVES)
+                self.fault(f"{key}.type", f'is {shown(kind)}; must be "revolute" or "prismatic"{drive}')
                 continue
+            losses = ("pins", _OF_PIN) if kind == REVOLUTE else ("guides", _OF_GUIDE)
+            for each in {*losses[1]} & {*given}:
+                self.fault(
+                    f"{key}.{each}",
+                    f"is not possible for one joint yet; give it in [{losses[0]}], for all of them",
+                )
+            self.keys(key, {each: x for each, x in given.items() if each not in losses[1]}, _JOINT_KEYS)
             ends = []
             for each in ("on", "by"):
                 with self.at(f"{key}.{each}"):
@@ -364,9 +398,15 @@ class _LinkageReader(LoadReader):
         if "joint" in table:
             return self.slide(table, joints)
         link = table.get("link")
+<<<<<<< HEAD
         known = [name for name in self.points if name != GROUND]
         if not is_among(link, known):
             if known:
+=======
+        if link not in self.points or link == GROUND:
+            known = [name for name in self.points if name != GROUND]
+            if known and isinstance(self.data.get("driver", {}), Mapping):
+>>>>>>> m-h
                 self.fault(
                     "driver.link" if table else "driver",
                     f"{is_given(link)}; must be the link that the motor turns{meant(str(link), known)} links: "

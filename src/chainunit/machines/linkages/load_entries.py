@@ -223,6 +223,7 @@ class LoadReader(EntryReader):
             on = table.get("on")
             if not is_among(on, self.points) or on == GROUND:
                 self.fault(f"{key}.on", f"{is_given(on)}; must be a link{near_name(str(on), self.points)}")
+                return load
             torque = _placed(table.get("torque"), [str(on)])
             return load | {
                 "on": [on],
@@ -245,8 +246,10 @@ class LoadReader(EntryReader):
             for each, unit in (("stiffness", "N/m"), ("length", "m"), ("damping", "N.s/m")):
                 load[each] = self.positive(f"{key}.{each}", table.get(each, 0.0), unit)
             return load
+        if "on" not in load:
+            return load
         force = table.get("force")
-        if isinstance(force, list) and "on" in load:
+        if isinstance(force, list):
             force = [_placed(each, load["on"]) for each in force]
         load["force"] = self.vector(f"{key}.force", force, "N", self.known(_OF_FORCE), True)
         return load

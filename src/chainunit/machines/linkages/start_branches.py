@@ -1,0 +1,78 @@
+"""Whether the start pose of a linkage tells in which of its two ways each dyad is assembled."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from ...core.engines import MATH
+from ...core.errors import InputError
+from ...mechanism.assur import AssurGroup
+from ...mechanism.linkage import Linkage
+from ...mechanism.machine import Mechanism, derived_numbers
+from .geometry import LinkGeometry
+from .model import LinkageDescription
+from .parts import LinkageParts
+from .probes import description_axis
+from .structure import CYLINDER
+
+_TWO_WAYS = ("RRR", "RRP", "RPR", CYLINDER)
+_AS_FAR = 0.8
+"""Share of its distance from the other way that a start may be away from the way that is taken."""
+_SAME = 1e-6
+"""Angle [rad] by which a link has the same angle in both ways."""
+
+
+def check_start(described: LinkageDescription) -> None:
+    """Refuse a start that lies nearly as far from one way of assembling a dyad as from the other, measured by the
+    angles of its links.
+
+    Raises
+    ------
+    InputError
+        in one line, with both places of the pin, or both angles of the link, that the start may give.
+    """
+    p, u = described.Parameters(), described.Inputs()
+    derived = derived_numbers(MATH, described.linkage(MATH, p, u))
+    geometry = LinkGeometry(MATH, described.structure, described.values(p, u))
+    for group in described.structure.groups:
+        if group.kind in _TWO_WAYS:
+            _check(described, geometry, derived, group)
+
+
+def _check(
+    described: LinkageDescription, geometry: LinkGeometry, derived: Sequence[float], group: AssurGroup
+) -> None:
+    structure, first = described.structure, group.links[0]
+    angles, pins, joint = [], [], structure.joints[group.joints[1].name]
+    for sense in (1.0, -1.0):
+        parts = LinkageParts(geometry, described.sides | {first: sense * described.sides[first]})
+        # a cylinder is the driver, and no group of the linkage
+        number = structure.groups.index(group) + 1 - (len(structure.groups) - len(parts.groups))
+        linkage = Linkage(parts.ground, parts.driver, parts.groups, {}).before(number)
+        m = Mechanism(MATH, linkage, structure.start, derived[: linkage.derived_count])
+        axes = (description_axis(m.links[link].u, parts.frames[link]) for link in group.links)
+        angles.append([math.atan2(axis.y, axis.x) for axis in axes])
+        pins.append(m.pins.get(parts.pin(*joint.by)))
+    rough = [structure.poses[link][2] for link in group.links]
+    near, far = (
+        sum(
+            abs(math.remainder(angle - start, 2.0 * math.pi))
+            for angle, other, start in zip(own, angles[k - 1], rough, strict=True)
+            if abs(math.remainder(angle - other, 2.0 * math.pi)) > _SAME
+        )
+        for k, own in enumerate(angles)
+    )
+    if near <= _AS_FAR * far:
+        return
+    number = group.links.index(joint.by[0]) if joint.by[0] in group.links else 0
+    key = f"start.angles.{group.links[number]}"
+    ways = [f'"{math.degrees(own[number]):.4g} deg"' for own in angles]
+    if group.kind != "RPR" and None not in pins:
+        key = f"start.points.{joint.by[1]}"
+        ways = [f'["{1e3 * pin.p.x:.4g} mm", "{1e3 * pin.p.y:.4g} mm"]' for pin in pins if pin is not None]
+    raise InputError(
+        f"the start does not tell in which of two ways {' and '.join(group.links)} are assembled, as it lies nearly "
+        f"as far from the one as from the other; give a value near to one of both: {' or '.join(ways)}",
+        key,
+    )
