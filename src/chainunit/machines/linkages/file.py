@@ -15,14 +15,9 @@ from typing import Any
 
 from ...core.engines import MATH
 from ...core.errors import InputError, RemarkWarning, each_refusal, meant, near_name, printable, shown
-<<<<<<< HEAD
 from ...core.inputs import TOML, file_text
-from ...mechanism.assur import DYADS, GROUND, PRISMATIC, REVOLUTE
-from ...mechanism.expressions import value_of
-=======
 from ...mechanism.assur import DYADS, GROUND, ONE_DRIVER, PRISMATIC, REVOLUTE
-from ...mechanism.expressions import expression
->>>>>>> m-h
+from ...mechanism.expressions import value_of
 from ...mechanism.models import InverseMachine
 from ...reading import toml_lines
 from ...reading.tables import UnusualValue, in_file, slips_of, toml
@@ -57,14 +52,11 @@ TABLES = (
 )  # fmt: skip
 _LINK_KEYS = ("points", "mass", "inertia", "centroid", "masses", "bar")
 _JOINT_KEYS = ("type", "on", "by", "toward", "angle", "length")
-<<<<<<< HEAD
 _LARGEST_START = 1e4
 """Largest place of the driver at the start [rad, m]."""
-=======
 _OF_PIN, _OF_GUIDE = ("friction", "diameter", "damping"), ("friction", "damping")
 _DRIVES = ("gear", "belt", "chain", "cam", "rack", "rolling")
 """Kinds of joints of other programs."""
->>>>>>> m-h
 _DRIVER_KEYS = ("link", "joint", "zero", "positive", "range")
 
 
@@ -398,15 +390,9 @@ class _LinkageReader(LoadReader):
         if "joint" in table:
             return self.slide(table, joints)
         link = table.get("link")
-<<<<<<< HEAD
         known = [name for name in self.points if name != GROUND]
         if not is_among(link, known):
-            if known:
-=======
-        if link not in self.points or link == GROUND:
-            known = [name for name in self.points if name != GROUND]
             if known and isinstance(self.data.get("driver", {}), Mapping):
->>>>>>> m-h
                 self.fault(
                     "driver.link" if table else "driver",
                     f"{is_given(link)}; must be the link that the motor turns{meant(str(link), known)} links: "
