@@ -14,6 +14,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from ..core.errors import Faults, InputError, near_name, refusal_prefix, shown
+from ..core.inputs import TOML, file_text
 from ..drives.motor import Motor
 from ..drives.motors import MOTORS
 from ..machines.linkages.file import linkage_in
@@ -23,7 +24,6 @@ from ..reading.tables import (
     Title,
     UnusualValue,
     file_form,
-    file_text,
     given_values,
     merged,
     packaged,
@@ -215,7 +215,7 @@ def linkage_lines(data: Mapping[str, Any], source: str) -> tuple[str, Mapping[st
     if not name.lower().endswith(LINKAGE):
         return "", {}
     file = beside(name, source)
-    return file.name, lines_of(file_text(file))
+    return file.name, lines_of(file_text(file, TOML))
 
 
 def with_linkage(data: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -200,7 +200,8 @@ def test_flywheels_are_enlarged_until_a_limit_stops_them(monkeypatch):
     assert max(trials) == 2.0 == best.heaviest and best.stop == "start" and not best.drive.added_inertia
     rank([best], 2.0)
     assert best.reason.endswith(
-        "150 % of the permitted 1; flywheels of up to 2.00 kg m² were tried; with a heavier one its start takes too long"
+        "150 % of the permitted 1; flywheels of up to 2.00 kg m² were tried; "
+        "with a heavier one its start takes too long"
     )
     # a flywheel that makes the torque even is the last
     best, trials = wheel_of(monkeypatch, 75.0, lambda J: {"rms_torque": 1.5}, torque_mean=1.48)

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..errors import RunError
-from ..files import regular_bytes
+from ..inputs import regular_bytes
 from ..temporary_folders import scratch
 from .cache import entry
 

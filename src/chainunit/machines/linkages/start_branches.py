@@ -34,7 +34,7 @@ def check_start(described: LinkageDescription) -> None:
     """
     p, u = described.Parameters(), described.Inputs()
     derived = derived_numbers(MATH, described.linkage(MATH, p, u))
-    geometry = LinkGeometry(MATH, described.structure, described.values(p, u))
+    geometry = LinkGeometry(MATH, described.structure, described.values(MATH, p, u))
     for group in described.structure.groups:
         if group.kind in _TWO_WAYS:
             _check(described, geometry, derived, group)
