@@ -25,8 +25,8 @@ _FIGURE = (
 )
 _NOT_CONNECTED = "An input that is not connected keeps its start value."
 _FOLLOWS = (
-    " In Co-Simulation {pairs} inside a step, so that the outputs after it are those of its end. Derivatives of these "
-    "inputs that the importer sets (FMI 2.0) hold instead."
+    " In Co-Simulation {pairs} inside a step, so that the outputs after it are those of its end. Derivatives of "
+    "these inputs that the importer sets (FMI 2.0) hold instead."
 )
 _MOTION = (
     " Inputs phi, w and a belong together: give all of them. As declared, the {what} stands at phi = {at:g}."
