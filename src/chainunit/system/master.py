@@ -2,17 +2,18 @@
 
 With a load port the driver sees the linearised load inside its step, and the coupling is of second order (through a
 driveline near rest of first order, see `chainunit.drives.driveline`). An external signal that varies within a step
-acts with its value at the middle of the step, which is of second order, too. Angle and speed of a shaft that is an
-input act with their values at the begin of the step, as the FMU may let them run on inside it.
+acts with its value at the middle of the step, which is of second order, too. Inputs that a model lets run on inside a
+step, `Model.input_rates`, act from their values at its begin on.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from .graph import ModelComponent
 from .instance import Instance
 from .simulation import FmuSimulation, Guarded
 
@@ -54,10 +55,10 @@ class CoSimulation(FmuSimulation):
             self._transfer()
             yield
 
-    def _run_on(self, name: str) -> set[str]:
-        """Angle and speed, or way and speed, at each terminal of a component that has their acceleration, too."""
-        members = [terminal.members for terminal in self.system.components[name].terminals.values()]
-        return {own[n] for own in members if {"phi", "w", "a"} <= set(own) for n in ("phi", "w")}
+    def _run_on(self, name: str) -> Mapping[str, str]:
+        """The inputs of a component that run on inside a step; none of an FMU whose model is not known."""
+        component = self.system.components[name]
+        return component.model.input_rates if isinstance(component, ModelComponent) else {}
 
 
 def _apply(signals: _Table, row: int) -> None:

@@ -176,8 +176,8 @@ def _run(file: Path, machine: Machine, wishes: Wishes, q: Any, columns: set[str]
             instance.finish_initialization()
             rows = []
             for k, angle in enumerate(q):
-                instance.set(["phi"], [float(angle) * machine.ratio])
                 instance.step(k * _STEP, _STEP)
+                instance.set(["phi"], [float(angle) * machine.ratio])
                 rows.append(instance.get(outputs))
         finally:
             instance.close()
