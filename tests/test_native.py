@@ -912,7 +912,7 @@ def test_a_machine_that_turns_by_itself_has_reference_results(ratio):
     """Behind a gear its shaft is light: the torque of the reference results is of its size."""
     interface = Interface(MODELS["KnifeDrive"].direct(), {"ratio": ratio})
     files = reference_results_of(interface)
-    assert len(files) == 4, files
+    assert len(files) == 5, files
     stepped = next(text for name, text in files.items() if name.endswith(f"_{STEPPED}.csv"))
     head, *rows = stepped.decode().splitlines()
     w = [float(row.split(",")[head.split(",").index("w")]) for row in rows]
