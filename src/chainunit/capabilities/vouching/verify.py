@@ -12,7 +12,7 @@ import numpy as np
 
 from ... import __version__
 from ...core.errors import InputError, RunError, printable
-from ...core.inputs import ARCHIVE, TooLargeError, check_archive, file_bytes, json_of, regular_bytes
+from ...core.inputs import ARCHIVE, file_bytes, json_of, refuse_large_archive, regular_bytes
 from ...core.model import Model
 from . import documents as docs
 from . import experiments as ex
@@ -47,12 +47,7 @@ def verify(
         for a file that is not there, or no archive at all.
     """
     data = file_bytes(file, ARCHIVE)
-    try:
-        check_archive(data, str(file))
-    except TooLargeError:
-        raise
-    except InputError:
-        pass  # what is damaged is told line by line
+    refuse_large_archive(data, str(file))
     found = integrity(data, key)
     if not found.is_archive:
         raise InputError(f"{file}: is no FMU and no SSP package: it is not a zip archive")
