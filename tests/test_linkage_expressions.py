@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
+import re
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
 from chainunit.core.engines import MATH, Dual, casadi_, dual, numpy_, slope
 from chainunit.core.errors import InputError
-from chainunit.machines.linkages.file import description_of
+from chainunit.machines.linkages.file import description_of, read_linkage
 from chainunit.machines.linkages.model import machine_of
 from chainunit.machines.machine import Machine
 from chainunit.mechanism.expressions import expression
 from chainunit.reading.tables import toml
+from chainunit.report.drawing import drawing
 
 PRESS = (Path(__file__).parents[1] / "examples" / "linkages" / "slider_crank_press.toml").read_text("utf-8")
 
@@ -89,6 +93,137 @@ GROUPS = """
 kind = "RRP"
 links = ["ram", "rod"]
 """
+
+
+FAULTS = {
+    "1/(1-1)": "1/(1-1) divides by zero",
+    "table(y, sqrt(-1), 1, 2, 3)": "sqrt(-1) has no value, or an infinite one",
+    "table(y, 0, 1, 2, 1e400)": "1e400 has no value, or an infinite one",
+    "press_force * log(0)": "log(0) has no value, or an infinite one",
+    "press_force * exp(1000)": "exp(1000) has no value, or an infinite one",
+    "press_force * asin(2)": "asin(2) has no value, or an infinite one",
+    "press_force * asin(50 * y / pressing_way)": "has no value, or an infinite one, at ",
+    "press_force * exp(1e6 * abs(y / pressing_way))": "has no value, or an infinite one, at ",
+    " + ".join(["press_force"] * 1500): "has letters",
+    "+".join(["y"] * 1500): "has 1500 terms; must have <= 1000",
+    "-" * 300 + "press_force": "is nested more than 100 times",
+    "abs(" * 150 + "press_force" + ")" * 150: "is nested more than 100 times",
+    "(" * 250 + "press_force" + ")" * 250: "is nested more than 100 times",
+}
+
+
+@pytest.mark.parametrize(("text", "words"), FAULTS.items(), ids=range(len(FAULTS)))
+def test_an_expression_without_a_value_is_refused_at_its_key(text, words, tmp_path):
+    words = words.replace("has letters", f"has {len(text)} letters; must have <= 10000")
+    file = tmp_path / "press.toml"
+    load = f'[loads.tool]\non = "ram.T"\nforce = [0, "{text}"]\n'
+    file.write_text(PRESS.replace("[start]", f"{load}[start]"), "utf-8")
+    with pytest.raises(InputError) as caught:
+        read_linkage(file)
+    (told,) = str(caught.value).splitlines()
+    assert re.match(rf"{re.escape(str(file))}:\d+: loads\.tool\.force: ", told)
+    assert words in told and len(told) < 600
+
+
+def test_an_expression_is_read_once_whatever_is_in_its_widths():
+    """The width of each step is a step: two ways down at each would never end."""
+    text = "x"
+    for _ in range(40):
+        text = f"step(x, {text} + 1)"
+    of = expression(text)
+    assert len(of.widths) == 40 and of.names == ("x",)
+    assert of.value(MATH, {"x": 0.0}) == 0.5
+
+
+def test_parameters_that_double_are_read_once():
+    """Each is the sum of the one before with itself, 60 times."""
+    more = "".join(f'p{k} = "p{k - 1} + p{k - 1}"\n' for k in range(1, 61))
+    text = PRESS.replace("[inputs]", f'p0 = "1 mm"\n{more}q = "p60 / 2 ** 12"\n[inputs]')
+    line = next(line for line in PRESS.splitlines() if line.startswith("l = "))
+    made = machine(text.replace(line, f'l = "{0.36 / 2.0**48 / 1e-3} * q"'))
+    length = 0.36
+    assert "p0" in made.model.parameter_layout.names
+    values = made.model.described_by.values(MATH, made.p, made.model.Inputs())
+    assert values["p60"] == pytest.approx(1e-3 * 2.0**60, rel=1e-14)
+    assert values["l"] == pytest.approx(length, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("r * r / (r - r)", 'is "r * r / (r - r)", which has no value, or an infinite one, with r = 0.08'),
+        ("sqrt(r * (r - 2 * r))", "has no value, or an infinite one, with r = 0.08"),
+    ],
+)  # fmt: skip
+def test_a_parameter_without_a_value_is_refused_at_its_key(text, words):
+    line = next(line for line in PRESS.splitlines() if line.startswith("l = "))
+    with pytest.raises(InputError) as caught:
+        machine(PRESS.replace(line, f'l = "{text}"'))
+    assert str(caught.value).startswith("parameters.l: ") and words in str(caught.value)
+
+
+DRUM = """
+[parameters]
+drag = "2 kN"
+radius = "250 mm"
+[ground]
+O = [0, 0]
+[driver]
+link = "drum"
+[links.drum]
+points = { O = [0, 0] }
+mass = "80 kg"
+inertia = "3.2 kg m2"
+[loads.belt]
+type = "torque"
+on = "drum"
+torque = "-drag * radius * step(angle_rate, 0.1)"
+"""
+
+
+def test_a_driver_with_its_bearing_alone_is_drawn_as_a_disc():
+    drum = machine(DRUM)
+    assert float(drum.outputs(0.3, 6.283).tau) == pytest.approx(2000.0 * 0.25, rel=1e-12)
+    picture = ElementTree.fromstring(drawing(drum))
+    assert any(float(each.get("r")) > 20.0 for each in picture.iter("{http://www.w3.org/2000/svg}circle"))
+
+
+WRONG = [
+    [],
+    {},
+    ["crank", "rod"],
+    [["a"]],
+    {"a": ["b"]},
+    10**400,
+    math.nan,
+    math.inf,
+    "1e400 m",
+    "1 / 0",
+    True,
+    "",
+]
+
+
+def places(table, path=()):
+    for key, value in table.items() if isinstance(table, dict) else enumerate(table):
+        yield *path, key
+        if isinstance(value, dict | list):
+            yield from places(value, (*path, key))
+
+
+PLACES = list(places(toml(PRESS)))
+
+
+@pytest.mark.parametrize("path", PLACES, ids=[".".join(map(str, each)) for each in PLACES])
+def test_any_entry_of_another_kind_is_read_or_refused_in_lines(path):
+    for wrong in WRONG:
+        tables = toml(PRESS)
+        inner = tables
+        for key in path[:-1]:
+            inner = inner[key]
+        inner[path[-1]] = wrong
+        with contextlib.suppress(InputError):
+            description_of(tables, "press")
 
 
 def test_groups_may_be_listed_and_are_checked():

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MIB = 2**20
-TEXT, TOML, JSON, XML, ARCHIVE = 64 * MIB, 4 * MIB, 16 * MIB, 8 * MIB, 128 * MIB
+TEXT, TOML, JSON, XML, ARCHIVE = 64 * MIB, 4 * MIB, 8 * MIB, 8 * MIB, 128 * MIB
 """Largest files of a kind that are read [B]: the memory that they take is some 5 to 25 times of it."""
 UNPACKED = 256 * MIB
 """Largest sum of the members of an archive, and of the series of a NetCDF file, in memory [B]."""
@@ -202,8 +202,8 @@ def cells_of(file: Path | str, lines: Iterable[str], mark: str) -> list[list[str
         raise InputError(f"{file}: line {reader.line_num}: no valid CSV ({error})") from error
 
 
-def json_of(data: bytes, name: str) -> Any:
-    """What the content of a file in JSON says.
+def json_of(data: bytes, name: str, kind: str = "JSON") -> Any:
+    """What the content of a file in JSON says; `kind` is what it must be, in words.
 
     Raises
     ------
@@ -215,9 +215,9 @@ def json_of(data: bytes, name: str) -> Any:
     try:
         return json.loads(data, parse_constant=_no_number, parse_float=_finite)
     except RecursionError as error:
-        raise InputError(f"{name}: is no JSON that can be read (it is nested too deeply)") from error
+        raise InputError(f"{name}: is no {kind} (it is nested too deeply)") from error
     except ValueError as error:
-        raise InputError(f"{name}: is no JSON ({printable(str(error))})") from error
+        raise InputError(f"{name}: is no {kind} ({printable(str(error))})") from error
 
 
 def _no_number(constant: str) -> Any:
@@ -281,6 +281,22 @@ def check_archive(source: Path | bytes, name: str, most: int = UNPACKED, kind: s
         raise InputError(f"{name}: is no {kind} ({printable(str(error))})") from error
     if sum(info.file_size for info in infos) > most:
         raise _too_large(name, most, "its content")
+
+
+def refuse_large_archive(data: bytes, name: str) -> None:
+    """Refuse an archive as `check_archive` does, but for its size alone: what is damaged, a caller tells by itself.
+
+    Raises
+    ------
+    TooLargeError
+        in one line that begins with the `name` of the archive.
+    """
+    try:
+        check_archive(data, name)
+    except TooLargeError:
+        raise
+    except InputError:
+        pass
 
 
 _END = 22

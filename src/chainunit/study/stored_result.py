@@ -46,10 +46,11 @@ def read_result(path: Path) -> StoredResult:
         where there is none.
     """
     file = path / FILE if path.is_dir() else path
-    try:
-        data = json_of(file_bytes(file, JSON), str(file))
-    except InputError as error:
-        raise InputError(f"{error}; chainunit study -o {path} makes a result of a study") from error
+    if not file.exists():
+        raise InputError(
+            f"{path}: has no result (No such file or directory); make it by chainunit study -o {path}"
+        )
+    data = json_of(file_bytes(file, JSON), str(file), "result of a study")
     if not isinstance(data, dict) or not isinstance(data.get("answers"), dict) or "chainunit" not in data:
         raise InputError(f"{file}: is no result of a study; chainunit study writes {FILE}")
     return StoredResult(file, data)

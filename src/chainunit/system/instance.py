@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Literal
 from xml.etree.ElementTree import Element
 
 from ..core.errors import InputError, RunError, printable, shown
-from ..core.inputs import ON_DISK, XML, check_archive, file_bytes, regular, xml_of
+from ..core.inputs import ON_DISK, XML, check_archive, regular, xml_of
 from ..core.temporary_folders import remove_folder, temporary_folder
 from ..fmu.loading import fmi2_callbacks, loading
 
@@ -83,7 +83,10 @@ class Fmu:
             for one that cannot be read.
         """
         place = Path(self.folder) / path
-        return xml_of(file_bytes(place, XML), f"{self.file}: {path}") if place.is_file() else None
+        if not place.is_file():
+            return None
+        with place.open("rb") as stream:
+            return xml_of(stream.read(XML + 1), f"{self.file}: {path}")
 
     @property
     def identifier(self) -> str:

@@ -15,7 +15,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from ...core.errors import InputError, shown
-from ...core.inputs import ARCHIVE_ERRORS, UNPACKED, TooLargeError, check_archive
+from ...core.inputs import ARCHIVE_ERRORS, UNPACKED, TooLargeError, refuse_large_archive
 
 LOCAL, CENTRAL, END = b"PK\x03\x04", b"PK\x01\x02", b"PK\x05\x06"
 _HEAD = struct.Struct("<4sHHHHHIIIHH")
@@ -129,7 +129,7 @@ def contents(data: bytes) -> ArchiveContents:
     """The members of an archive; never an error, whatever the bytes are."""
     found = ArchiveContents()
     try:
-        check_archive(data, "the archive")
+        refuse_large_archive(data, "the archive")
         opened = zipfile.ZipFile(io.BytesIO(data))
         listed = opened.infolist()
     except TooLargeError as error:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ... import __version__
 from ...core.errors import InputError, RunError, printable, shown
-from ...core.inputs import ARCHIVE, TooLargeError, check_archive, file_bytes, regular_bytes
+from ...core.inputs import ARCHIVE, file_bytes, refuse_large_archive, regular_bytes
 from ...core.model import Model
 from ...models import MODELS
 from . import certify
@@ -58,12 +58,7 @@ def verify(
         for a file that is not there, or no archive at all.
     """
     data = file_bytes(file, ARCHIVE)
-    try:
-        check_archive(data, str(file))
-    except TooLargeError:
-        raise
-    except InputError:
-        pass  # what is damaged is told line by line
+    refuse_large_archive(data, str(file))
     found = integrity(data, key)
     if not found.is_archive:
         raise InputError(f"{file}: is no FMU and no SSP package: it is not a zip archive")

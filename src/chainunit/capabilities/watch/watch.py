@@ -365,7 +365,7 @@ def _uncertainty(
 def _read_errors(file: Path) -> MachineErrors:
     """The errors of the machine by the result of an identification."""
     try:
-        result = json_of(file_bytes(file, JSON), str(file))
+        result = json_of(file_bytes(file, JSON), str(file), "result.json of chainunit identify")
         table, failed = result["covariance"], not result["is_described"]
         names, matrix = list(table["names"]), np.array(table["matrix"], float)
     except InputError as error:
