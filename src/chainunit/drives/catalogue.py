@@ -1,6 +1,6 @@
 """Standard motors: the packaged table, and the rows of the user's file.
 
-The packaged table has cage motors for 400 V, 50 Hz, 0.55 to 75 kW, with 2, 4 and 6 poles, in the frames of
+The packaged table has cage motors for 400 V, 50 Hz, 0.12 to 75 kW, with 2, 4 and 6 poles, in the frames of
 EN 50347. Their efficiencies are the limits in IEC 60034-30-1 of the class that the regulation EU 2019/1781 asks of
 motors on the market: IE3, and IE4 from 75 kW on (since July 2023, up to 200 kW, with 2 to 6 poles). All other values
 are typical of such motors but belong to no maker: they vary smoothly with size, and take the place of a supplier's

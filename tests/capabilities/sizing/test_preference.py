@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from event_tables import HEAVY_MACHINE, demanding
-from sizings import duty_by, sized_by, trials_of
+from sizings import duty_by, sized_by, task_of, trials_of
 
 from chainunit.capabilities.sizing import search as sizing
 from chainunit.capabilities.sizing.candidate import Candidate, Criterion, Standing, TrialResult
@@ -18,6 +18,7 @@ from chainunit.capabilities.sizing.inverter import inverter_needs, least_boost, 
 from chainunit.capabilities.sizing.motor_trials import MotorTrials
 from chainunit.capabilities.sizing.preference import ORDER, poles_rank, rank
 from chainunit.capabilities.sizing.result import ordered_belt
+from chainunit.capabilities.sizing.trial import try_motor
 from chainunit.core.errors import InputError
 from chainunit.drives.belt import belt_drive
 from chainunit.drives.catalogue import catalogue
@@ -328,6 +329,60 @@ def ranked(*candidates, larger=2.0):
     candidates = [*candidates]
     rank(candidates, larger)
     return candidates
+
+
+def test_no_fluctuation_is_a_limit_unless_it_is_given(tmp_path):
+    """A limit of 5 % that nobody asked for doubled the motor."""
+    assert parse("[sizing]\n").plans["sizing"].demands.fluctuation == math.inf
+    config, bare = proposed("[sizing]\n")
+    trial = try_motor(task_of(config), bare.motor, bare.drive, duty_by(config, tmp_path), None)
+    assert "speed" not in trial.checks() and trial.fluctuation > 0.0
+
+
+def wished(*names, used=1.2):
+    """The result of checks of that name, each used so far."""
+    return TrialResult(
+        {name: Check(name, used, 1.0, "1") for name in names} | {"start": Check("", 1.0, 9.0, "s")}
+    )
+
+
+def test_a_wish_that_decides_is_named_with_the_choice_without_it(monkeypatch):
+    config, _ = proposed('[sizing]\nfluctuation = "5 %"\n')
+    best, small, wheeled = made("large", 1100.0), made("small", 550.0), made("small", 550.0, flywheel=0.2)
+    searched = []
+
+    def search(trials, motors, progress):
+        searched.append((trials.plan.demands, [m.nameplate.power for m in motors]))
+        return [small]
+
+    def cost(*candidates):
+        trials = trials_of(config, SimpleNamespace())
+        return sizing._cost_of_wishes(trials, catalogue(), list(candidates), lambda *said: None)
+
+    monkeypatch.setattr(sizing, "_search", search)
+    rejected = dataclasses.replace(small, trial=wished("speed"))
+    assert cost(best, rejected) == "sizing.fluctuation = 5 % decides: else small with no flywheel would do"
+    ((demands, powers),) = searched
+    assert demands.fluctuation == math.inf and set(powers) == {550.0, 1100.0}
+    # a motor that misses another limit, too, or that is larger, is not rejected by the wish
+    assert not cost(best, dataclasses.replace(small, trial=wished("speed", "rms_torque")))
+    assert not cost(best, dataclasses.replace(made("larger", 2200.0), trial=wished("speed")))
+    # a flywheel that is there for the wish
+    wheeled.trial = wished("speed", used=0.88)
+    assert cost(wheeled) == "sizing.fluctuation = 5 % decides: else small with no flywheel would do"
+    wheeled.trial.checks["rms_torque"] = Check("", 0.89, 1.0, "1")
+    assert not cost(wheeled)
+
+
+def test_the_end_of_the_catalogue_is_told_where_it_decides():
+    motors = catalogue()
+    motors.sort(key=lambda m: m.nameplate.power)
+    words = "the catalogue begins at 0.120 kW, else a smaller motor would do"
+    assert sizing._end_of_catalogue(made("small", 120.0, used=0.13), motors) == words
+    # the next smaller motor would not do; it is not the smallest
+    assert not sizing._end_of_catalogue(made("small", 120.0, used=0.7), motors)
+    assert not sizing._end_of_catalogue(made("small", 180.0, used=0.13), motors)
+    assert sizing._end_of_catalogue(made("large", 75e3, used=1.2), motors) == "the catalogue ends at 75.0 kW"
 
 
 PLAIN = {"name": "b, plain"}
@@ -722,7 +777,7 @@ def test_a_motor_that_fails_from_the_worst_angle_makes_room_for_the_next(monkeyp
 @pytest.mark.second
 def test_the_next_motor_without_a_flywheel_is_sought_beyond_the_candidates(tmp_path, monkeypatch):
     """With `larger` = 1 the smallest motor is chosen, with its flywheel; beside it stands the one that needs none."""
-    four = [m.designation for m in catalogue() if m.nameplate.poles == 4.0][:6]
+    four = [m.designation for m in catalogue() if m.nameplate.poles == 4.0][4:10]
     more = "fluctuation = 0.05\n"
     _, result = sized("heavy_mill", tmp_path, monkeypatch, *four, more=more, candidates=1.0, larger=1.0)
     small, large = result.trade
@@ -806,7 +861,7 @@ def test_the_next_motor_without_a_flywheel_is_found_below_a_gear_that_the_larges
 ):
     """The torque of the gear in a start grows with the motor: the largest do not fit, and one between does."""
     config = parse(f"{HEAVY_MACHINE}[sizing]\nlarger = 1\n")
-    motors = [m for m in catalogue() if m.nameplate.poles == 4.0][:9]
+    motors = [m for m in catalogue() if m.nameplate.poles == 4.0][4:13]
     tried = []
 
     def bare(self, motor):
@@ -830,7 +885,7 @@ def test_the_next_motor_without_a_flywheel_gets_its_boost(monkeypatch):
     config, small = proposed("[sizing]\nlarger = 1\n", start="inverter")
     small.trial = TrialResult({"start": Check("time to start", 1.0, 2.0, "s")})
     small.drive = dataclasses.replace(small.drive, added_inertia=0.5)
-    motors = [m for m in catalogue() if m.nameplate.poles == small.motor.nameplate.poles][:6]
+    motors = [m for m in catalogue() if m.nameplate.poles == small.motor.nameplate.poles][4:10]
 
     def judged(self, c, **options):
         starts = c.drive.parameters.inverter.boost >= 0.1

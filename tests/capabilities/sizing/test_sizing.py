@@ -195,13 +195,12 @@ def test_a_small_flywheel_may_make_the_torque_less_even(monkeypatch):
 
 
 def test_flywheels_are_enlarged_until_a_limit_stops_them(monkeypatch):
-    """The motor of 10 N m gives 20 N m at most: in 10 s it brings at most 2 kg m2 up to 100 rad/s."""
+    """The motor gives 20 N m at most, and 16 N m over a start: in 10 s that brings 1.6 kg m2 up to 100 rad/s."""
     best, trials = wheel_of(monkeypatch, 75.0, lambda J: {"rms_torque": 1.5})
-    assert max(trials) == 2.0 == best.heaviest and best.stop == "start" and not best.drive.added_inertia
+    assert max(trials) == 1.6 == best.heaviest and best.stop == "start" and not best.drive.added_inertia
     rank([best], 2.0)
     assert best.reason.endswith(
-        "150 % of the permitted 1; flywheels of up to 2.00 kg m² were tried; "
-        "with a heavier one its start takes too long"
+        "flywheels of up to 1.60 kg m² were tried; with a heavier one its start takes too long"
     )
     # a flywheel that makes the torque even is the last
     best, trials = wheel_of(monkeypatch, 75.0, lambda J: {"rms_torque": 1.5}, torque_mean=1.48)
@@ -220,7 +219,9 @@ def test_of_flywheels_that_are_too_heavy_the_nearest_is_kept(monkeypatch):
     best, trials = wheel_of(monkeypatch, 75.0, lambda J: {"speed": 3.0 - J, "inertia": 0.5 + 1000.0 * J})
     assert len(trials) == 2 and best.drive.added_inertia == 0.0 and best.stop == "inertia"
     best, trials = wheel_of(monkeypatch, 75.0, lambda J: {"speed": 3.0 - J, "inertia": 0.5 + 3.0 * J})
-    assert best.violation == pytest.approx(2.7) and best.drive.added_inertia == max(trials)
+    assert (
+        best.violation == pytest.approx(2.7) and best.drive.added_inertia == max(trials) and len(trials) == 3
+    )
 
 
 def test_a_check_is_what_is_used_of_what_is_permitted():
@@ -314,7 +315,7 @@ def test_a_fixed_ratio_is_kept_and_must_give_the_speed(tmp_path, monkeypatch):
 
 def small(number, skipped=0):
     """Some 4-pole motors of the catalogue, from 0.55 kW on."""
-    motors = [m for m in catalogue() if m.nameplate.poles == 4.0]
+    motors = [m for m in catalogue() if m.nameplate.poles == 4.0 and m.nameplate.power >= 550.0]
     return sorted(motors, key=lambda m: m.nameplate.power)[skipped : skipped + number]
 
 
