@@ -43,7 +43,11 @@ def both(model):
     return Interface(model, {}), Interface(model, {}, script_with_names(model, "flat"))
 
 
-@pytest.mark.parametrize("model", [ChamberForces, DcMotor, lambda: read_linkage(LINKAGE).direct()], ids=["ChamberForces", "DcMotor", "linkage"])
+@pytest.mark.parametrize(
+    "model",
+    [ChamberForces, DcMotor, lambda: read_linkage(LINKAGE).direct()],
+    ids=["ChamberForces", "DcMotor", "linkage"],
+)
 def test_the_description_differs_by_its_names_alone(model):
     """Of FMI 2 and 3, terminals included; no variable of the model is left with its dots, whatever text names it."""
     interfaces = both(model if isinstance(model, type) else model())

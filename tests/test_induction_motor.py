@@ -315,6 +315,27 @@ def test_soft_starter_waits_for_the_supply():
     assert run(p, inputs(), 0.4, x)[ramp] == pytest.approx(0.7, rel=1e-9)
 
 
+def test_the_current_limit_of_the_inverter_holds_its_frequency_back():
+    """A heavy load cannot follow the ramp, and the current rises to many times the rated one; with a limit it stays
+    there, and the frequency waits. A limit that is not reached changes nothing."""
+    u, hertz = (
+        inputs({"w_ref": 150.0, "load.tau_bias": 5.0, "load.J": 0.3}),
+        LAYOUT.names.index("supply.frequency"),
+    )
+
+    def course(limit):
+        p, x, currents = parameters({**COLD, "inverter.on": 1.0, "inverter.limit": limit}), None, []
+        for _ in range(12):
+            x = run(p, u, 0.05, x)
+            currents.append(outputs(p, u, x).i)
+        return x, currents
+
+    free, held, ample = course(1e6), course(7.0), course(100.0)
+    assert max(free[1]) > 15.0 and free[0][hertz] > 25.0
+    assert 6.0 < held[1][-1] and max(held[1]) < 1.12 * 7.0 and held[0][hertz] < 12.0
+    assert ample[0] == pytest.approx(free[0], rel=1e-12)
+
+
 @pytest.mark.parametrize("w_ref", [40.0, 130.0])
 def test_inverter_follows_within_the_slip(w_ref):
     u = inputs({"w_ref": w_ref, "load.tau_bias": 6.0, "load.J": 0.01})

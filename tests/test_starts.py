@@ -15,6 +15,7 @@ from chainunit.app import cli
 from chainunit.capabilities.sizing import search as sizing
 from chainunit.capabilities.sizing.candidate import Candidate, TrialResult
 from chainunit.capabilities.sizing.preference import rank
+from chainunit.core.quantities import Layout
 from chainunit.drives.induction_steady import breakdown
 from chainunit.machines.api import machine_of
 from chainunit.machines.linkages.file import read_linkage
@@ -22,12 +23,15 @@ from chainunit.reading.results import as_data
 from chainunit.study import config
 from chainunit.study.choice import drive_of
 from chainunit.study.cycle import cycle
+from chainunit.study.inverter import inverter_need
 from chainunit.study.limits import Check
 from chainunit.study.ram_force import rams
 from chainunit.study.readings import crank_angle
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
-from chainunit.study.start_runs import START_ANGLES, starts_from_all
+from chainunit.study.sections import Starter
+from chainunit.study.start_runs import START_ANGLES, StartNumbers, starts_from_all
+from chainunit.study.starts import StartFindings, _with_own_limit
 from chainunit.study.turn import TurnAnalysis, TurnFindings
 from chainunit.study.verdict import shown_speed
 
@@ -43,6 +47,11 @@ settle_turns = 0
 [gear]
 ratio = 185
 """
+
+
+# with its compensation a wheel swings, and with its boost an unloaded motor is overexcited at low frequency
+PLAIN = "[starter]\ninverter = { slip = 0, boost = 0.005 }\n"
+NONE = {v.name: None for v in Layout(StartNumbers).variables}
 
 
 @pytest.fixture(scope="module")
@@ -113,6 +122,56 @@ def test_a_start_from_an_angle_by_the_compiled_system(pump):
     )
     for torque in (by_machine, by_motor):
         assert float(np.max(np.abs(torque))) * drive.ratio == pytest.approx(worst.gear_torque, rel=0.02)
+
+
+@pytest.mark.second
+def test_a_start_with_the_limit_of_an_inverter_of_the_rated_current(tmp_path):
+    """A heavy wheel cannot follow a short ramp; the start with the limit of an inverter of the rated current is run:
+    it takes longer and keeps the limit."""
+    file = tmp_path / "wheel.toml"
+    file.write_text(
+        "[ground]\nO = [0, 0]\n[driver]\nlink = 'wheel'\n[links.wheel]\npoints = { O = [0, 0], R = ['250 mm', 0] }\n"
+        "mass = '50 kg'\ninertia = '300 kg m2'\n"
+    )
+    text = f"start = 'inverter'\nevent = []\n[system]\nmachine = '{file}'\nmotor = 'IE3 4-pole 3 kW, 100L'\n"
+    given = config.parse(
+        f"{text}[gear]\nratio = 29\n[run]\ncrank_speed = '50 rev/min'\nramp = '1 s'\n{PLAIN}"
+    )
+    drive = drive_of(given)
+    rig, study = Rig(given.operation, drive, None), SimpleNamespace(config=given)
+    starts = starts_from_all(rig, 4.0)
+    limited, limit = _with_own_limit(study, rig, starts, 4.0)
+    assert limit == 1.5 * drive.rated_current < starts[0].current
+    assert max(start.current for start in limited) < 1.2 * limit
+    assert limited[0].start_time > starts[0].start_time
+
+
+def test_the_inverter_is_ordered_by_all_starts_and_events():
+    """By hand: a start from another angle takes 3.95 times the rated 6 A, the worst run of the study 2.3 times: 3.95
+    x 6 A/1.5 = 15.8 A; the runs of the choice alone said 6 A."""
+
+    def study(peaks, event, proposal=None):
+        starts = tuple(
+            StartNumbers(**NONE | {"angle": 0.1 * k, "current": 6.0 * x, "long_current": 0.0})
+            for k, x in enumerate(peaks)
+        )
+        return SimpleNamespace(
+            drive=SimpleNamespace(rated_current=6.0),
+            config=SimpleNamespace(drive=SimpleNamespace(start="inverter", starter=Starter())),
+            start=SimpleNamespace(current_peak=11.8),
+            answers={
+                "steady": SimpleNamespace(current_peak=9.0, current_rms=4.0),
+                "surge": SimpleNamespace(current_peak=6.0 * event),
+            },
+            findings={"starts": StartFindings(starts, 1.0, math.inf, "steady")},
+            proposal=proposal,
+            title_of=lambda name: name,
+        )
+
+    need = inverter_need(study((1.9, 3.95), 2.3))
+    assert need.current == pytest.approx(15.8) and need.case == "a start from 5.73 deg"
+    need = inverter_need(study((1.2, 1.3), 2.3, SimpleNamespace(inverter_current=6.0)))
+    assert (need.current, need.case) == (pytest.approx(9.2), "surge")
 
 
 @pytest.mark.parametrize(("factor", "passed"), [(1.0, True), (9.0, False)])

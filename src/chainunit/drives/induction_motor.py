@@ -110,6 +110,10 @@ class InverterControl:
     slip: Value = quantity(
         "Hz/(N.m)", "slip compensation: frequency added per air-gap torque", default=0.0, min=0.0, tunable=True,
     )  # fmt: skip
+    limit: Value = quantity(
+        "A", "current limit, RMS: at it the frequency is held back while the motor drives; 1 MA: none",
+        default=1e6, above=0.0, tunable=True, usual=(0.1, 1e6),
+    )  # fmt: skip
 
 
 @declaration
@@ -235,6 +239,12 @@ class Outputs(MotorOutputs):
     arc_power: Value = quantity("W", "losses of the arcs of the contactor", nominal=100.0)
 
 
+_STALL_GAIN = 4.0
+"""Rate of the frequency, in parts of the ramp, over the square of the current, in parts of its limit."""
+_STALL_LAGS = 5.0
+"""Time constant in which the frequency is taken back, over the lag of the inverter."""
+
+
 class InductionMotorPoint(MotorPoint):
     """The motor at one state: supply, circuit, shaft."""
 
@@ -262,6 +272,7 @@ class InductionMotorPoint(MotorPoint):
         demand = p.pole_pairs * u.w_ref / _TURN + p.inverter.slip * self.air_gap
         target = p.supply.f + p.inverter.on * (xp.maximum(demand, 0.0) - p.supply.f)
         self.df = xp.maximum(xp.minimum((target - f) / p.inverter.lag, p.inverter.ramp), -p.inverter.ramp)
+        self._limit_current(xp, p, f)
         self.heat = 1.5 * (
             self.R_s * (self.i_d * self.i_d + self.i_q * self.i_q)
             + self.R_r * (self.ir_d * self.ir_d + self.ir_q * self.ir_q)
@@ -269,6 +280,16 @@ class InductionMotorPoint(MotorPoint):
         self.cooling = InductionMotor.cooling(xp, p, x.w)
         self.turn(p, u, x)
         self._flux_rates(p, u, x, main, 6.0 * b * b * p.main.beta * p.main.beta / p.main.L)
+
+    def _limit_current(self, xp: Any, p: Any, f: Any) -> None:
+        """Hold the frequency of the inverter back at its current limit; beyond, take it back to that of the rotor,
+        by up to the ramp: the slip and with it the current fall. The limit acts while the motor drives."""
+        over = 0.5 * (self.i_d * self.i_d + self.i_q * self.i_q) / (p.inverter.limit * p.inverter.limit)
+        room = xp.maximum(xp.minimum(_STALL_GAIN * (1.0 - over), 1.0), -1.0)
+        back = -xp.minimum(self.slip_speed / _TURN, f) / (_STALL_LAGS * p.inverter.lag)
+        held = xp.minimum(self.df, xp.maximum(p.inverter.ramp * room, back))
+        drives = xp.maximum(xp.minimum(self.slip_speed, 1.0), 0.0)
+        self.df = self.df + drives * (held - self.df)
 
     def _flux_rates(self, p: Any, u: Any, x: Any, main: Any, bend: Any) -> None:
         """The derivatives of the fluxes, and the voltage by which an open contactor changes that of the winding.

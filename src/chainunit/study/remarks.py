@@ -11,11 +11,14 @@ import numpy as np
 from ..reading.text import number
 from .catalogue_drive import SLIP
 from .coupling import remark_on_coupling, remark_on_rams
+from .event_torques import peaks_in_events
+from .inverter import inverter_need
 from .judgement import lasts, model_verdict, motor_limits, no_reserve
 from .measures import STARTED, Answers
 from .readings import breakdown_speed, crank_speed, has_turn, less_than_a_turn
 from .record import LOAD_CYCLE, Amount, StudyRecord
 from .registry import capabilities, parts_of_line
+from .starts import StartFindings
 from .verdict import START, STEADY, shown_speed
 from .window import CLOSED, DRIFT, STORED
 
@@ -330,8 +333,7 @@ def _happenings(study: StudyRecord, name: str) -> Iterator[tuple[str, str, dict[
 
 
 def _on_inverter(study: StudyRecord) -> None:
-    """Note the runs with a current that an inverter can hardly give; its own limit is not in the model of the
-    motor."""
+    """Note the slip compensation, and the inverter to order by the currents of all starts and events."""
     rated_current = study.drive.rated_current
     if rated_current is None or study.config.drive.start != "inverter":
         return
@@ -345,31 +347,46 @@ def _on_inverter(study: StudyRecord) -> None:
             "The inverter compensates the rated slip of the motor by {slip} (starter.inverter.slip)."
         )
         study.note("slip compensation", compensated if slip else without, slip=(slip, "Hz/(N.m)"))
-    limit = study.config.drive.starter.overload
-    ordered = study.proposal and study.proposal.inverter_current
-    rated_current, whose = (
-        (ordered, "to be ordered") if ordered else (rated_current, "with the rated current of the motor")
+    need, overload = inverter_need(study), study.config.drive.starter.overload
+    if need is None:
+        return
+    high = {case: peak for case, peak in need.peaks.items() if peak > 1.001 * overload * rated_current}
+    if not high and need.current <= 1.001 * rated_current:
+        if study.proposal is not None:
+            study.note(
+                "inverter current",
+                "An inverter with the rated current of the motor, {rated}, suffices for running, all starts and all "
+                "events: it carries {overload} times that for up to 60 s (starter.overload).",
+                rated=(rated_current, "A"),
+                overload=f"{overload:g}",
+            )
+        return
+    study.note(
+        "inverter current",
+        "An inverter carries {overload} times its rated current for up to 60 s (starter.overload): order one of at "
+        "least {current}, for {case}{limited}. Times the rated {rated} of the motor: {cases}.",
+        overload=f"{overload:g}",
+        current=(need.current, "A"),
+        case=need.case,
+        rated=(rated_current, "A"),
+        cases="; ".join(f"{case} ({number(peak / rated_current, '1')})" for case, peak in need.peaks.items()),
+        limited=_limited(study),
     )
-    runs = {name: a.current_peak for name, a in (("start_up", study.start), *study.answers.items()) if a}
-    high = {
-        name: peak for name, peak in runs.items() if peak is not None and peak > 1.001 * limit * rated_current
-    }
-    if high:
-        where = (
-            f"{study.title_of(name)} ({number(peak / rated_current, '1')})" for name, peak in high.items()
-        )
-        study.note(
-            "inverter current",
-            "The inverter's own current limit is not in the model, and the one {whose} gives {limit} times its rated "
-            "current for up to 60 s (starter.overload). Take one for the peak current, or the motor gives "
-            "less torque than here. Times the rated {rated}: {where}.",
-            *high,
-            limit=f"{limit:g}",
-            whose=whose,
-            rated=(rated_current, "A"),
-            where="; ".join(where),
-            **{f"{name}.current_peak": (peak, "A") for name, peak in high.items()},
-        )
+
+
+def _limited(study: StudyRecord) -> str:
+    """Words on the starts with the current limit of an inverter with the rated current of the motor, to follow the
+    order; empty where there are none."""
+    found = StartFindings.found_in(study)
+    if found is None or found.current_limit is None:
+        return ""
+    held = number(found.current_limit, "A")
+    limit = f"one with the rated current of the motor, whose own limit of {held} holds its frequency back"
+    if stuck := [start for start in found.limited if start.start_time is None]:
+        where = " and ".join(number(start.angle, "rad") for start in stuck)
+        return f"; {limit}, does not bring the {study.driver_noun} to its speed from {where}"
+    time = number(max(start.start_time or 0.0 for start in found.limited), "s")
+    return f"; {limit}, starts in up to {time}"
 
 
 def _on_assumptions(study: StudyRecord) -> None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from ..core.quantities import quantity
@@ -15,9 +16,15 @@ from .drive import Drive
 from .event_torques import running_peak, running_words
 from .record import StudyRecord
 from .relay import MULTIPLE
+from .rig import Rig
 from .sections import SOFTER
 from .start_runs import StartNumbers, longest_start, starts_from_all
 from .torques import at_gear
+
+LIMIT = "starter.inverter.limit"
+"""Key of the current limit of the inverter."""
+_PATIENCE = 3.0
+"""Time for which a start with a current limit is followed, over that without one."""
 
 
 @result
@@ -28,6 +35,12 @@ class StartFindings(Findings):
     running: float = quantity("N.m", "largest torque of running at the output of the gear")
     limit: float = quantity("N.m", "permitted torque of the gear in a start, infinite where none is given")
     running_in: str = part("the run in which running puts most on the gear")
+    limited: tuple[StartNumbers, ...] = part(
+        "the starts with the current limit of an inverter with the rated current of the motor", default=()
+    )
+    current_limit: float | None = part(
+        "this limit; none where the starts take less current, or on the line", unit="A", default=None
+    )
 
     @derived()
     def worst(self) -> StartNumbers:
@@ -118,6 +131,21 @@ class StartFindings(Findings):
             )
 
 
+def _with_own_limit(
+    study: StudyRecord, rig: Rig, starts: Sequence[StartNumbers], longest: float
+) -> tuple[tuple[StartNumbers, ...], float | None]:
+    """The starts with the current limit of an inverter with the rated current of the motor, and this limit [A]; none
+    where the starts take less current, where the file gives a limit, or on the line."""
+    drive, tables = rig.drive, study.config.drive
+    limit = tables.starter.overload * (drive.rated_current or 0.0)
+    if not drive.follows or LIMIT in tables.given or max(start.current for start in starts) <= limit:
+        return (), None
+    inverter = replace(drive.parameters.inverter, limit=limit)
+    drive = replace(drive, parameters=replace(drive.parameters, inverter=inverter))
+    limited = starts_from_all(replace(rig, drive=drive, files=None), _PATIENCE * longest)
+    return tuple(limited), limit
+
+
 def transient_words(study: StudyRecord) -> str:
     """The title of the largest torque of a start at the output of the gear, with the electromagnetic transient."""
     line = (
@@ -153,8 +181,10 @@ class StartAnalysis(Analysis):
         if study.start is None or study.start.start_time is None:
             return None
         work.progress(f"starts from other {study.driver_noun} angles", 1.0, 1.0)
-        starts = starts_from_all(work.rig, longest_start(work.rig.operation.ramp_end, study.start.start_time))
+        rig, longest = work.rig, longest_start(work.rig.operation.ramp_end, study.start.start_time)
+        starts = starts_from_all(rig, longest)
+        limited, limit = _with_own_limit(study, rig, starts, longest)
         tables = study.config.drive
-        limit = tables.gear.start_limit if "gear.torque_limit" in tables.given else math.inf
+        permitted = tables.gear.start_limit if "gear.torque_limit" in tables.given else math.inf
         running = running_peak(study, at_gear)
-        return StartFindings(tuple(starts), running.torque, limit, running.run)
+        return StartFindings(tuple(starts), running.torque, permitted, running.run, limited, limit)

@@ -702,14 +702,14 @@ def test_an_inverter_takes_the_next_ratio_before_a_larger_motor(tmp_path, monkey
     rated = best.motor.nameplate.rated_current
     assert best.trial.start_class is None and best.drive.parameters.inverter.boost == 0.05
     assert best.trial.inverter_current == pytest.approx(max(rated, best.trial.start_current / 1.5))
-    assert "inverter_current" not in best.checks and 0.0 < best.trial.overload_time < 60.0
+    assert "inverter_current" not in best.checks
     w = best.drive.ratio * config.run.crank_speed
     assert best.trial.speed == pytest.approx(w, rel=0.03) and not best.weakened
     # the frequency is that of the speed asked for, and the compensation of the slip of the mean torque
     assert w / math.pi < best.trial.frequency < (w / math.pi) * 1.03
     notes = " ".join(result.notes)
     assert "needs a voltage boost of 5 %" in notes and "electronic motor protection" in notes
-    assert number(best.trial.inverter_current, "A") in notes and "relay of" not in notes
+    assert "relay of" not in notes
     chosen = result.proposal(config.drive).tables
     assert chosen.gear.efficiency == pytest.approx(0.98**3) and chosen.starter.inverter.boost == 0.05
 

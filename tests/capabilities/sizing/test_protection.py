@@ -750,7 +750,7 @@ def test_the_order_names_the_starter():
     result = {
         "run": {"ramp": entry(2.0, "s")},
         "starter": starter,
-        "sizing": {"candidates": [{"numbers": numbers}]},
+        "sizing": {"candidates": [{"numbers": numbers}], "inverter": {"rated_current": entry(49.1, "A")}},
     }
 
     def said(start):
@@ -766,7 +766,7 @@ def test_the_order_names_the_starter():
             f"(one of {other}, "
         )
     inverter = (
-        "inverter of at least 45.4 A, boost 5 %, ramp 2 s; in running 50.3 Hz, 157 rad/s (1497 rev/min)"
+        "inverter of at least 49.1 A, boost 5 %, ramp 2 s; in running 50.3 Hz, 157 rad/s (1497 rev/min)"
     )
     assert said("inverter") == inverter
     numbers["inverter_current"] = entry(None, "A")

@@ -103,7 +103,7 @@ class StudiedDrive:
     @property
     def inverter_current(self) -> float | None:
         """The least rated current of the inverter that the drive of sizing needs [A]."""
-        return _number(self.best, "numbers", "inverter_current")
+        return self.number("sizing", "inverter", "rated_current")
 
 
 def _at(node: Any, *path: str) -> Any:

@@ -51,7 +51,9 @@ class DriveNumbers:
     start_class: Value = quantity(
         "1", "trip class of the overload relay that holds in the start; 40: none up to class 30"
     )
-    inverter_current: Value = quantity("A", "least rated current of the inverter")
+    inverter_current: Value = quantity(
+        "A", "least rated current of the inverter by the runs of sizing, without the events of the study"
+    )
     frequency: Value = quantity("Hz", "frequency of the supply in steady running")
     speed: Value = quantity("rad/s", "speed of the motor in steady running", kind="speed")
     mass: Value = quantity("kg", "mass of motor and flywheel, the relative cost")
@@ -95,8 +97,6 @@ class TrialResult:
     """see `chainunit.study.relay`; None for an inverter, or where there is no start"""
     start_current: float | None = None
     """largest current of the motor in a start [A]; None without a start"""
-    overload_time: float | None = None
-    """longest time of a start above the rated current of the motor [s]; None without a start"""
     inverter_current: float | None = None
     """least rated current of an inverter [A] that carries running and starts, see `Trial.inverter_current`; None on
     the line, or without a start"""

@@ -29,7 +29,7 @@ from .gear_tables import with_gear
 from .parts import OrderedPart, PartsList, parts_list
 from .preference import order_words, poles_rank
 from .protection import Alternative, Obstacle, Setting
-from .result import drive_protection, ordered_belt, ordered_gear
+from .result import drive_protection, ordered_belt, ordered_gear, ordered_inverter
 from .table import Sizing, SizingPlan
 
 INSUFFICIENT = "No motor of the catalogue fits; all runs are with the nearest, which is insufficient."
@@ -190,8 +190,12 @@ class SizingFindings(Findings):
             "gear": ordered_gear(study, setting, self.plan, self.best.trial.inertia_factor),
             "protection": drive_protection(study, setting, self.alternatives, rated),
         }
-        parts, belt = self.parts(study, setting), ordered_belt(study, self.plan, self.best.trial)
-        ordered |= {name: each for name, each in (("belt", belt), ("parts", parts)) if each is not None}
+        others = {
+            "belt": ordered_belt(study, self.plan, self.best.trial),
+            "inverter": ordered_inverter(study),
+            "parts": self.parts(study, setting),
+        }
+        ordered |= {name: each for name, each in others.items() if each is not None}
         return super().data(study) | {
             name: {} if each is None else as_data(each, titled=True, driver=study.driver_noun)
             for name, each in ordered.items()

@@ -47,25 +47,13 @@ def misses_by_a_hair(c: Candidate) -> bool:
     return bool(over) and all(name in _RELIEVED and c.sizes[name] <= left for name in over)
 
 
-def inverter_needs(best: Candidate, overload: float, is_given: bool) -> Iterator[str]:
-    """The inverter and its settings: it carries `overload` times its rated current; its boost may be given."""
+def inverter_needs(best: Candidate, is_given: bool) -> Iterator[str]:
+    """The settings of the inverter, whose boost may be given."""
     boost, trial = best.drive.parameters.inverter.boost, best.trial
     if best.starts and not is_given:
         text = f"The inverter needs a voltage boost of {_percent(boost)} at frequency zero (starter.inverter.boost)"
         less = f"; with less the motor does not start the machine from every {best.drive.driver_noun} angle"
         yield f"{text}{less if boost > BOOSTS[0] else ''}."
-    ordered, highest = trial.inverter_current, trial.start_current
-    if ordered is not None and highest is not None:
-        rated = float(best.motor.nameplate.rated_current)
-        text = f"The inverter carries {_percent(overload)} of its rated current for up to 60 s (starter.overload)"
-        if ordered <= rated:
-            yield f"{text}: one with the rated current of the motor suffices, also for the start."
-        else:
-            yield (
-                f"{text}. The start takes up to {number(highest, 'A')}, "
-                f"{highest / rated:.2g} times the rated current of the motor, and more than this current "
-                f"for {number(trial.overload_time, 's')}: order one of at least {number(ordered, 'A')}."
-            )
     if best.weakened:
         yield (
             f"The motor runs at {number(trial.frequency, 'Hz')}, above its rated "

@@ -167,7 +167,8 @@ def _starter(s: b.Source, path: str) -> Iterator[Line]:
         yield s.line("star-delta starter, {=starter.star_delta.time} in star")
         yield _winding(s)
     elif start == "inverter":
-        current = s.line(f" of at least {{{path}.numbers.inverter_current}}") if _starts(s, path) else ()
+        is_ordered = "inverter" in s.result["sizing"] and _starts(s, path)
+        current = s.line(" of at least {sizing.inverter.rated_current}") if is_ordered else ()
         yield line("inverter", current, s.line(", boost {=starter.inverter.boost}, ramp {=run.ramp}"))
         if _starts(s, path):
             yield s.line(f"in running {{{path}.numbers.frequency}}, {{{path}.numbers.speed}}")
@@ -263,7 +264,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     if all(_sold(candidate) is None for candidate in candidates or ()):
         # it is a demand on gears of a catalogue
         side_keys = (*side_keys, "gear_torque")
-    for name in ("asked", "cycle", "flywheel", "belt", "gear", "protection"):
+    for name in ("asked", "cycle", "flywheel", "belt", "gear", "inverter", "protection"):
         # the sentences on the coupling are too long for a cell of a narrow table, and stand above with the ways to it
         leaves = [
             leaf

@@ -10,6 +10,7 @@ from ...drives.belt import belt_drive
 from ...drives.gear_ratios import belt_before_gear
 from ...reading.results import GIVEN, InUnit, part, result
 from ...reading.text import number
+from ...study.inverter import inverter_need
 from ...study.record import StudyRecord
 from ...study.relay import class_words
 from ...study.starts import transient_words
@@ -75,6 +76,23 @@ def ordered_gear(
 
 def _torque(value: float, title: str) -> InUnit:
     return InUnit(value, "N.m", title=title)
+
+
+@result
+class OrderedInverter:
+    """The inverter to order."""
+
+    rated_current: InUnit = part("least rated current")
+    decided_by: str = part("the case that decides")
+
+
+def ordered_inverter(study: StudyRecord) -> OrderedInverter | None:
+    """The inverter to order; None on the line, and for an insufficient motor."""
+    need = None if study.insufficient else inverter_need(study)
+    if need is None:
+        return None
+    title = f"inverter, rated current at least, decided by {need.case}"
+    return OrderedInverter(InUnit(need.current, "A", title=title), need.case)
 
 
 @result

@@ -340,7 +340,7 @@ def _needs(best: Candidate, trials: MotorTrials) -> Iterator[str]:
         relay = f"{'of ' if relay_class <= HEAVIEST else ''}{class_words(relay_class)}"
         yield f"The start takes an overload relay {relay}; one of class {LIGHT} may trip in it."
     if best.drive.follows:
-        yield from inverter_needs(best, trials.task.tables.starter.overload, trials.has_given_boost)
+        yield from inverter_needs(best, trials.has_given_boost)
     if best.unit is None:
         largest = UNITS[trials.plan.gear_kind][-1]
         end = (

@@ -34,7 +34,6 @@ from ...study.start_runs import (
     longest_of,
     longest_start,
     starts_from_all,
-    time_above,
 )
 from ...study.start_up import speeds_up, until_settled
 from ...study.torques import DutyPeak, all_feed_on, at_gear, duty_peak, quasi_static_peak
@@ -121,14 +120,6 @@ class Trial:
         if self.start_time is None:
             return None
         return max([peak(self._start_currents[1]), *(start.current for start in self.starts)])
-
-    @cached_property
-    def overload_time(self) -> float | None:
-        """Longest time of a start above the rated current of the motor [s]; None without a start."""
-        if self.start_time is None:
-            return None
-        first = time_above(*self._start_currents, self.motor.nameplate.rated_current)
-        return max([first, *(start.time_above for start in self.starts)])
 
     @property
     def _start_currents(self) -> tuple[np.ndarray, np.ndarray]:
@@ -275,7 +266,6 @@ class Trial:
             checks=self.checks(),
             start_class=self.start_class,
             start_current=self.start_current,
-            overload_time=self.overload_time,
             inverter_current=self.inverter_current,
             speed=self.speed if is_started else None,
             frequency=self.frequency if is_started else None,
