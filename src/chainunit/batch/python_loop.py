@@ -90,11 +90,14 @@ class PythonLoop:
         where the last one is not finite."""
         step, longest, tolerance, most = numbers
         time, stop = ends
+        signals = signals[: len(self._driven)]
+        u[self._driven], moving = signals[:, 0], _moving(signals)
         state = np.array(x, float)
         evaluated = {function: _Evaluation(function, (p, u, state)) for function in self._functions}
 
         def at(function: Any, t: float, states: Sequence[float]) -> list[float]:
-            u[self._driven] = _signals_at(signals[: len(self._driven)], t)
+            for k, row in moving:
+                u[self._driven[k]] = _signal_at(row, t)
             state[:] = states
             return evaluated[function]()
 
@@ -149,7 +152,9 @@ class _Evaluation:
 
     def __init__(self, function: Any, arguments: Sequence[Any]) -> None:
         self._buffer, self._evaluate = function.buffer()
-        self._arguments, self._values = arguments, np.zeros(function.numel_out(0))
+        # the buffer does not keep them alive
+        self._arguments = arguments
+        self._values: Any = np.zeros(function.numel_out(0))
         for k, array in enumerate(arguments):
             self._buffer.set_arg(k, memoryview(array))
         self._buffer.set_res(0, memoryview(self._values))
@@ -159,13 +164,16 @@ class _Evaluation:
         return self._values.tolist()
 
 
-def _signals_at(signals: Any, t: float) -> Any:
-    """Values of signals of the shape (inputs, 1 + 3*changes) at a time, see transients.h."""
-    value = signals[:, 0].copy()
-    before = signals[:, 0]
-    for k in range(1, signals.shape[-1], 3):
-        begin, duration, after = signals[:, k], signals[:, k + 1], signals[:, k + 2]
-        z = np.clip((t - begin) / duration, 0.0, 1.0)
+def _moving(signals: Any) -> list[tuple[int, list[float]]]:
+    """The signals that change, of the shape (inputs, 1 + 3*changes), each with its number."""
+    return [(k, row.tolist()) for k, row in enumerate(signals) if np.isfinite(row[1::3]).any()]
+
+
+def _signal_at(row: Sequence[float], t: float) -> float:
+    """The value of a signal at a time, see transients.h."""
+    value = before = row[0]
+    for begin, duration, after in zip(row[1::3], row[2::3], row[3::3], strict=True):
+        z = min(max((t - begin) / duration, 0.0), 1.0)
         value += (after - before) * (z * z * z * (10.0 + z * (6.0 * z - 15.0)))
         before = after
     return value

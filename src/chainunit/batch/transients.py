@@ -28,7 +28,7 @@ from ..core.engines import MATH, casadi_
 from ..core.errors import InputError, RunError
 from ..core.model import Model
 from ..core.native.c_forms import constant
-from ..core.native.compilers import Compiler, compiler
+from ..core.native.compilers import COMPILERS, Compiler, compiler
 from ..core.native.operations import Operations
 from ..core.symbolic_trace import outputs_of, trace
 from .equations import arguments_of, find, names_of
@@ -178,7 +178,7 @@ class Transients:
         if own := compiler():
             self._loop = _compiled(model, *chosen, self._by, changes, own)
         elif by:
-            raise InputError("no C compiler (cc, gcc, clang, or zig by pip install 'chainunit[cross]') found")
+            raise InputError(f"no C compiler ({COMPILERS}) found")
         elif has_wasmtime():
             self._loop = WasmLoop(model, *chosen, changes)
         else:

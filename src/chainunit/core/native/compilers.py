@@ -23,6 +23,9 @@ from ..errors import RunError
 from ..temporary_folders import scratch
 from .cache import entry
 
+COMPILERS = "cc, gcc, clang, or zig by pip install 'chainunit[cross]'"
+"""The compilers that serve, and how to have one, for refusals."""
+
 
 @dataclass(frozen=True)
 class Compiler:
