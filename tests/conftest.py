@@ -8,6 +8,7 @@ the first stage has in parts. ``.ci/run`` runs both. A named file runs with all 
 An FMU costs a test little: what exports compile is kept by its content, whichever worker, test or process asks, and
 for later runs of the tests, too (see `chainunit.core.native.cache`). Beyond that,
 
+- a test that needs a C compiler has the mark `compiler`: it is skipped where there is none, as `native_fmus` are;
 - `fmus` has the Python FMU of every model, `native_fmus` the native ones: take them where start values do not matter;
 - `once` fills a folder once a session, for all workers: take it for a study that tests of several files read, or for
   anything else that costs seconds and is only read;
@@ -32,6 +33,7 @@ import pytest
 
 from chainunit.core.native import cache
 from chainunit.core.native.cache import VARIABLE
+from chainunit.core.native.compilers import compiler
 from chainunit.fmu.export import export
 from chainunit.fmu.native.export import export as export_native
 from chainunit.models import MODELS
@@ -100,6 +102,13 @@ def pytest_configure(config):
             os.environ.setdefault(threads, "1")
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item):
+    """A test that needs a C compiler is skipped where there is none, before its fixtures are made."""
+    if item.get_closest_marker("compiler") and compiler() is None:
+        pytest.skip("no C compiler")
+
+
 @pytest.fixture(autouse=True)
 def _no_process_outlives_its_test(monkeypatch):
     """A test that fails before it ends its processes leaves none that would disturb the next. A process that was
@@ -161,6 +170,8 @@ def fmus(once):
 @pytest.fixture(scope="session")
 def native_fmus(once):
     """Native FMUs by FMI 2 and 3 of every model, unpacked: {(name, fmi): (file, folder)}."""
+    if compiler() is None:
+        pytest.skip("no C compiler")
 
     def fill(folder):
         name, fmi = folder.name[:-1], int(folder.name[-1])

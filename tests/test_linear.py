@@ -15,6 +15,7 @@ import pytest
 from records import record_of
 
 from chainunit import InputError, LinearModel, RunError, Study, linearize
+from chainunit.batch import transients
 from chainunit.core.engines import MATH
 from chainunit.core.model import Model, Part
 from chainunit.core.quantities import base_units, declaration, quantity
@@ -134,6 +135,15 @@ def test_slopes_of_linkages_are_those_of_differences(name, inverse):
 @pytest.fixture(scope="module")
 def drive():
     return linear_point(str(EXAMPLES / "jam_with_driveline.toml"), "start_up:0.4 s")
+
+
+def test_the_point_of_a_run_needs_no_compiler(monkeypatch):
+    """Without one, and without wasmtime, Python makes the run."""
+    file, at = str(EXAMPLES / "jam_with_driveline.toml"), "start_up:0.02 s"
+    wanted = linear_point(file, at).states
+    monkeypatch.setattr(transients, "compiler", lambda: None)
+    monkeypatch.setattr(transients, "has_wasmtime", lambda: False)
+    assert linear_point(file, at).states == pytest.approx(wanted, rel=1e-5, abs=1e-9)
 
 
 def test_slopes_of_the_compiled_drive_are_those_of_differences(drive):

@@ -195,12 +195,62 @@ def test_wrong_requests_are_refused(rig):
     assert rig.model.internal_step(MATH, rig.model.with_derived(MATH, rig.p)) < STEP
 
 
-def test_without_any_loop_both_ways_are_named(rig, monkeypatch):
+def without_any_fast_loop(monkeypatch):
     monkeypatch.setattr(transients, "compiler", lambda: None)
     monkeypatch.setattr(transients, "has_wasmtime", lambda: False)
     assert not transients.can_run()
-    with pytest.raises(InputError, match=r"no C compiler .*cross.*, and no wasmtime .*chainunit\[wasm\]"):
-        Transients(rig.model, KEPT)
+
+
+def test_without_any_fast_loop_python_makes_the_runs(rig, monkeypatch):
+    """Runs of different ends, with a guard, varying values, and states that leave all bounds, as the fast loop."""
+    signals = [events(rig.drive, force, 0.02) for force in (500.0, 1500.0)]
+    stop, limits = [0.1004, 0.08], np.array([[np.inf, 20.0]])
+    wild = np.repeat(np.array(rig.start, float)[:, None], 2, axis=1)
+    wild[rig.model.state_layout.names.index("motor.w"), 1] = 1e200
+    fast, failed = rig.run(signals, stop=stop, limits=limits), rig.run(signals, states=wild, stop=0.01)
+    without_any_fast_loop(monkeypatch)
+    own = Rig(guarded=["motor.tau"])
+    assert type(own.loop._loop).__name__ == "PythonLoop"
+    result = own.run(signals, stop=stop, limits=limits)
+    assert result.count.tolist() == fast.count.tolist() and result.count[0] == 102
+    for k, n in enumerate(fast.count):
+        wanted = fast.rows[:, k, :n]
+        scale = np.max(np.abs(wanted), axis=1, keepdims=True)
+        assert np.max(np.abs(result.rows[:, k, :n] - wanted) / scale) < 1e-7
+    np.testing.assert_allclose(result.states, fast.states, rtol=1e-7, atol=1e-9)
+    rest = own.run(signals, states=result.states, begin=stop, stop=0.11)
+    again = rig.run(signals, states=result.states, begin=stop, stop=0.11)
+    np.testing.assert_allclose(
+        rest.rows[:, 0, : rest.count[0]], again.rows[:, 0, : again.count[0]], rtol=1e-6
+    )
+    own_failed = own.run(signals, states=wild, stop=0.01)
+    assert own_failed.failed.tolist() == failed.failed.tolist() == [False, True]
+    names = ["machine.crank.m", "motor.armature.R"]
+    loop = Transients(own.model, KEPT, varying=names, driven=DRIVEN, changes=2)
+    table = np.array([[profile_rows(signals[0][name], 2)] for name in DRIVEN])
+    options = {"signals": np.moveaxis(table, 1, -1), "begin": 0.0, "step": STEP, "stop": [0.02]}
+    varied = loop.run(own.p, own.loads, own.start, varying=np.array([[80.0], [7.0]]), **options)
+    p = own.model.parameter_layout.from_names({names[0]: 80.0, names[1]: 7.0}, own.p)
+    wanted = rig.loop.run(p, rig.loads, rig.start, **options).rows
+    np.testing.assert_allclose(varied.rows, wanted, rtol=1e-7, atol=1e-9)
+
+
+@pytest.mark.second
+def test_without_any_fast_loop_python_makes_the_runs_of_chains(monkeypatch):
+    """They need the control of the error."""
+    text = 'organ = "chain"\n[chain]\nrods = 2\n'
+    fast = Rig(text)
+    signals = events(fast.drive, 200.0, 0.01)
+    wanted = fast.run([signals], stop=0.03).rows[:, 0]
+    without_any_fast_loop(monkeypatch)
+    rows = Rig(text).run([signals], stop=0.03).rows[:, 0]
+    assert np.max(np.abs(rows - wanted) / np.max(np.abs(wanted), axis=1, keepdims=True)) < 1e-6
+
+
+def test_directions_need_a_compiler(monkeypatch):
+    without_any_fast_loop(monkeypatch)
+    with pytest.raises(InputError, match=r"^no C compiler .*chainunit\[cross\].* found$"):
+        Rig(by=["machine.left.web_mass"])
 
 
 def test_both_loops_agree_to_the_tolerance_of_the_integrator(engine, rig, monkeypatch):

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..core.errors import InputError, RemarkWarning, RunError
 from ..core.model import Model
+from ..core.native.compilers import COMPILERS
 from ..core.native.operations import ARGUMENT
 from ..core.quantities import Variable
 from ..core.symbolic_trace import outputs_of
@@ -295,8 +296,7 @@ class Grid:
             return None
         if kernel is None:
             warnings.warn(
-                "no C compiler (cc, gcc, clang, or zig by pip install 'chainunit[cross]') found: numpy computes, "
-                "some twenty times slower",
+                f"no C compiler ({COMPILERS}) found: numpy computes, some twenty times slower",
                 RemarkWarning,
                 stacklevel=4,
             )

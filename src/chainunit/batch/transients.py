@@ -1,5 +1,5 @@
 """Transients of a model in blocks: many runs side by side, in one native loop without Python between the steps.
-Without a C compiler its WebAssembly module makes them, where ``wasmtime`` is installed.
+Without a C compiler its WebAssembly module makes them, where ``wasmtime`` is installed, else Python.
 
 Runs differ in parameters, states at the start, signals, and end. Each is integrated by the method of the model's FMU,
 with equal steps or with error control of its own (`chainunit.core.integrators`), and its signals are evaluated at
@@ -28,11 +28,12 @@ from ..core.engines import MATH, casadi_
 from ..core.errors import InputError, RunError
 from ..core.model import Model
 from ..core.native.c_forms import constant
-from ..core.native.compilers import Compiler, compiler
+from ..core.native.compilers import COMPILERS, Compiler, compiler
 from ..core.native.operations import Operations
 from ..core.symbolic_trace import outputs_of, trace
 from .equations import arguments_of, find, names_of
 from .native import load, threads
+from .python_loop import PythonLoop
 from .vector_code import VectorCode, c_file
 from .wasm_loop import WasmLoop, has_wasmtime
 
@@ -103,12 +104,12 @@ class Runs:
 
 
 def can_run() -> bool:
-    """Whether there is a loop for runs: a C compiler, or ``wasmtime``."""
+    """Whether there is a fast loop for many runs: a C compiler, or ``wasmtime``."""
     return compiler() is not None or has_wasmtime()
 
 
 def only_wasm() -> bool:
-    """Whether ``wasmtime`` is the only loop for runs."""
+    """Whether ``wasmtime`` is the only fast loop for runs."""
     return compiler() is None and has_wasmtime()
 
 
@@ -153,8 +154,7 @@ class Transients:
     Raises
     ------
     InputError
-        for an unknown name, a model without states, where there is neither a C compiler nor ``wasmtime``, and for
-        directions without a C compiler.
+        for an unknown name, a model without states, and for directions without a C compiler.
     """
 
     def __init__(
@@ -174,16 +174,15 @@ class Transients:
         self._varying, self._driven, self._guarded = tuple(varying), tuple(driven), tuple(guarded)
         self._changes, self._by = changes, tuple(by)
         chosen = self.outputs, self._varying, self._driven, self._guarded
-        self._loop: _NativeLoop | WasmLoop
+        self._loop: _NativeLoop | WasmLoop | PythonLoop
         if own := compiler():
             self._loop = _compiled(model, *chosen, self._by, changes, own)
-        elif has_wasmtime() and not by:
+        elif by:
+            raise InputError(f"no C compiler ({COMPILERS}) found")
+        elif has_wasmtime():
             self._loop = WasmLoop(model, *chosen, changes)
         else:
-            wasm = "" if by else ", and no wasmtime (pip install 'chainunit[wasm]')"
-            raise InputError(
-                f"no C compiler (cc, gcc, clang, or zig by pip install 'chainunit[cross]'){wasm} found"
-            )
+            self._loop = PythonLoop(model, *chosen, *_equations(model, self.outputs, ()))
         self.digest = self._loop.digest
 
     def run(
@@ -361,9 +360,16 @@ def _method(model: type[Model]) -> str:
 
 @lru_cache(maxsize=4)
 def _operations(model: type[Model], outputs: tuple[str, ...], by: tuple[str, ...]) -> Operations:
-    """Three groups: the derivatives of the states, these outputs and states, and the states that meet the constraints
-    of a model with error control. The derivatives of each group in a direction follow it; the direction consists of
-    derivatives of the states, behind the states, and of those `by` names, a fourth argument."""
+    """The operations of `_equations`."""
+    return Operations(*_equations(model, outputs, by))
+
+
+def _equations(
+    model: type[Model], outputs: tuple[str, ...], by: tuple[str, ...]
+) -> tuple[list[Any], list[Any]]:
+    """The arguments, and three groups: the derivatives of the states, these outputs and states, and the states that
+    meet the constraints of a model with error control. The derivatives of each group in a direction follow it; the
+    direction consists of derivatives of the states, behind the states, and of those `by` names, a fourth argument."""
     import casadi
 
     t = trace(model)
@@ -377,7 +383,7 @@ def _operations(model: type[Model], outputs: tuple[str, ...], by: tuple[str, ...
     p, u, x = t.symbols[:3]
     groups = t.explicit([rates, rows, met])
     if not by:
-        return Operations([p, u, x], groups)
+        return [p, u, x], groups
     known = [*model.parameter_layout.names, *model.input_layout.names]
     direction, changes = casadi.SX.zeros(len(known)), casadi.SX.sym("d", len(by))
     for k, place in enumerate(find(by, known, "parameter or input")):
@@ -385,4 +391,4 @@ def _operations(model: type[Model], outputs: tuple[str, ...], by: tuple[str, ...
     slopes = casadi.SX.sym("dx", x.numel())
     point, direction = casadi.vertcat(p, u, x), casadi.vertcat(direction, slopes)
     groups = [casadi.vertcat(group, casadi.jtimes(group, point, direction)) for group in groups]
-    return Operations([p, u, casadi.vertcat(x, slopes), changes], groups)
+    return [p, u, casadi.vertcat(x, slopes), changes], groups

@@ -9,6 +9,7 @@ from typing import Literal, get_args
 
 from ..core.errors import InputError, RunError, WriteError, one_of, shown
 from ..core.model import Model
+from ..core.native.compilers import COMPILERS
 from . import export as python
 from .native import export as native
 from .native import platforms as targets
@@ -99,10 +100,7 @@ def _by_python(
     why: str,
 ) -> Origin:
     if fmi != 2:
-        raise InputError(
-            "--fmi 3 needs the native backend, that is a C compiler (cc, gcc, clang, or zig by "
-            "pip install 'chainunit[cross]')"
-        )
+        raise InputError(f"--fmi 3 needs the native backend, that is a C compiler ({COMPILERS})")
     if platforms:
         raise InputError("--platforms needs the native backend; a Python FMU runs on Linux and Windows alike")
     python.export(model, file, start, names=names)

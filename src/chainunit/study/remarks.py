@@ -11,7 +11,6 @@ import numpy as np
 from ..reading.text import number
 from .catalogue_drive import SLIP
 from .coupling import remark_on_coupling, remark_on_rams
-from .event_torques import peaks_in_events
 from .inverter import inverter_need
 from .judgement import lasts, model_verdict, motor_limits, no_reserve
 from .measures import STARTED, Answers

@@ -80,7 +80,7 @@ class CompiledSimulation(Simulation):
     Raises
     ------
     InputError
-        where a component is an FMU, for an unknown input, and where there is neither a C compiler nor ``wasmtime``.
+        where a component is an FMU, and for an unknown input.
     """
 
     def __init__(

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from ...core.errors import InterruptedRunError, RunError
+from ...core.native.compilers import COMPILERS
 from ...core.quantities import Layout
 from ...drives.motor import Motor
 from ...fmu.backends import Backend
@@ -82,7 +83,7 @@ class ChainAnalysis(Analysis):
         if study.fmus["machine"].backend != "native":
             study.note(
                 "chains left out",
-                "chains at constant speed are left out: they need native code, that is a C compiler.",
+                f"chains at constant speed are left out: they need a C compiler ({COMPILERS}).",
             )
             return None
         assert work.rig.files is not None

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...batch.transients import can_run
+from ...core.native.compilers import COMPILERS
 from ...core.quantities import Value, declaration, quantity
 from ...machines.machine import Machine
 from ...mechanism.models import InverseMachine
@@ -92,7 +93,7 @@ def obstacle(drive: Drive) -> str:
     if not model.turns:
         return f"the {drive.driver_noun} goes to and fro, and makes no turn at constant speed"
     if not can_run():
-        return "it needs a C compiler, or wasmtime (pip install 'chainunit[wasm]')"
+        return f"it needs a C compiler ({COMPILERS}), or wasmtime (pip install 'chainunit[wasm]')"
     return ""
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...batch.transients import can_run
 from ...core.errors import Faults, InputError
+from ...core.native.compilers import COMPILERS
 from ...core.quantities import Layout
 from ...study.block_runs import BlockRuns, Cause, EventRun, RunPoint
 from ...study.event import Event
@@ -48,8 +49,8 @@ def check_drive(rig: Rig, plan: SweepPlan, event: Event) -> None:
             line = f"sweep.parameter: {name} {words}; leave it out, or sweep it without measures"
             faults.add([InputError(line, "sweep.parameter")])
     if not can_run():
-        words = "need a C compiler, or wasmtime (pip install 'chainunit[wasm]'), and there is neither"
-        line = f"sweep.measures: {words}; install one, or leave them out"
+        words = f"need a C compiler ({COMPILERS}), or wasmtime (pip install 'chainunit[wasm]')"
+        line = f"sweep.measures: {words}, and there is neither; install one, or leave them out"
         faults.add([InputError(line, "sweep.measures")])
     faults.refuse()
 

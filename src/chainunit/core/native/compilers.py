@@ -28,6 +28,8 @@ _CODE = (
     b"\x7fELF", b"MZ", b"\x64\x86", b"\x4c\x01", b"\xcf\xfa\xed\xfe", b"\xca\xfe\xba\xbe", b"\0asm",
 )  # fmt: skip
 """First bytes of libraries and objects: ELF, Windows (library, objects), macOS (one processor, more), WebAssembly."""
+COMPILERS = "cc, gcc, clang, or zig by pip install 'chainunit[cross]'"
+"""The compilers that serve, and how to have one, for refusals."""
 
 
 @dataclass(frozen=True)

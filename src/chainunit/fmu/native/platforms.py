@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from ...core.errors import InputError, RunError
-from ...core.native.compilers import Compiler, compile_code, compiler, host, zig_compiler
+from ...core.native.compilers import COMPILERS, Compiler, compile_code, compiler, host, zig_compiler
 from ...core.native.elementary_code import HEADER
 
 _FLAGS = ("-std=c99", "-O2", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off")
@@ -75,8 +75,7 @@ def choose(names: Sequence[str], fmi: int) -> tuple[tuple[str, ...], Compiler]:
         own = compiler()
         if here is None or own is None:
             raise InputError(
-                "no C compiler (cc, gcc, clang, or zig by pip install 'chainunit[cross]') for this machine found: "
-                "install one, or export with --backend python"
+                f"no C compiler ({COMPILERS}) for this machine found: install one, or export with --backend python"
             )
         if fmi not in PLATFORMS[here].folders:
             raise InputError(f"FMI {fmi}.0 has no folder for {here}; export with --fmi 3 or --backend python")
