@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
+from xml.etree import ElementTree
+from xml.sax.saxutils import escape
 
 import pytest
 
 from chainunit.core.errors import InputError
 from chainunit.machines.chain_unit import Parameters
 from chainunit.models import MODELS
-from chainunit.reading.tables import to_number
+from chainunit.reading.tables import _NO_SIGNS, text_faults, to_number
 from chainunit.study.config import load, of_tables, parse
 from chainunit.study.event import TYPES
 from chainunit.study.events import Jam
@@ -193,6 +196,18 @@ def test_texts_of_a_dictionary_are_checked_as_those_of_a_file():
     assert of_tables({"title": "press\tÄ €\n\U0001f600"}, "x").title
     with pytest.raises(InputError, match=r"title: .* has U\+0000, which is no sign of a text; take it out"):
         of_tables({"title": "a\0b"}, "x")
+
+
+def test_every_text_that_is_read_can_stand_in_xml():
+    """So that descriptions of FMUs and drawings are well-formed; nothing that people write is refused."""
+    everything = "".join(map(chr, range(0x30000)))
+    signs = _NO_SIGNS.sub("", everything)
+    assert not text_faults({"title": signs}) and text_faults({"title": everything})
+    assert ElementTree.fromstring(f"<a>{escape(signs)}</a>").text.replace("\n", "") == re.sub(
+        "[\r\n]", "", signs
+    )
+    assert {unicodedata.category(x) for x in set(everything) - set(signs)} == {"Cc", "Cn", "Cs"}
+    assert set("\t\n\r") < set(signs)
 
 
 def test_every_refusal_names_the_file(tmp_path):

@@ -112,7 +112,9 @@ def test_titles_are_harmless_wherever_they_go():
     from chainunit.report.markdown import markdown_text
     from chainunit.study.drive import Drive
 
-    values = config.parse(f"title = {toml_text(EVIL)}")
+    with pytest.raises(InputError, match=r"title: .* has U\+001B, which is no sign of a text"):
+        config.parse(f"title = {toml_text(EVIL)}")
+    values = config.parse(f"title = {toml_text(EVIL.replace(ESCAPE, '').replace(chr(7), ''))}")
     assert harmless(values.title) and "\n" not in values.title
     assert not re.search(r"(?<!\\)[<>\[\]|`*_]", markdown_text(values.title))
     drive = Drive(DcMotor, values.motor.parameters, values.machine)

@@ -105,7 +105,7 @@ class ReportedResult(Generic[Question, Outcome]):
 
 def _copy(kept: Path, to: Path) -> None:
     """Copy a file, or a folder with all that is in it."""
-    files = [kept] if kept.is_file() else [each for each in sorted(kept.rglob("*")) if each.is_file()]
+    files = [each for each in sorted(kept.rglob("*")) if each.is_file()] if kept.is_dir() else [kept]
     for file in files:
         target = to / file.relative_to(kept)
         target.parent.mkdir(parents=True, exist_ok=True)
