@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 
 import fmpy
@@ -15,6 +16,7 @@ from chainunit.core import engines
 from chainunit.core.native.compilers import compiler
 from chainunit.fmu.native.export import export
 from chainunit.machines.chain_unit import ChamberForces
+from chainunit.system import ModelComponent, System, monolithic
 from chainunit.system.instance import Fmu, Instance
 
 MODEL = ChamberForces.direct()
@@ -102,3 +104,41 @@ def test_the_fmu_falls_and_swings_as_the_equations(tmp_path):
     assert power == pytest.approx(5.0 * w, rel=1e-9) and math.isfinite(a)
     unit.close()
     fmu.close()
+
+
+@pytest.mark.second
+@pytest.mark.skipif(compiler() is None, reason="no C compiler")
+def test_the_error_at_long_steps_is_that_of_a_torque_that_bends_inside_them(native_fmus):
+    """From rest, with a torque that goes up and down, at communication steps of 10 and 5 ms, in parts of the peak.
+    Along its derivatives a triangle is exact, and only the integrator errs. A sine is a chord in each step: its
+    error is larger, whatever the integrator does, and falls with the square of the step."""
+    times = np.linspace(0.0, 2.0, 201)
+    system = System({"unit": ModelComponent(MODEL, MODEL.Parameters())})
+    corners = [0.0, 0.5, 1.5, 2.0], [0.0, 100.0, -100.0, 0.0]
+    courses = {
+        "triangle": lambda t: np.interp(t, *corners),
+        "sine": lambda t: 100.0 * np.sin(2.0 * np.pi * t),
+    }
+    errors = {}
+    with contextlib.closing(Fmu(native_fmus["ChainUnit", 2][0])) as fmu:
+        tau = fmu.variables["tau"].valueReference
+        for course, torque in courses.items():
+            exact = monolithic(system, {"unit.tau": torque}, times, rtol=1e-11)
+            for every in (1, 2):
+                unit, h, rows = Instance(fmu, "unit"), 0.01 / every, [[0.0, 0.0]]
+                unit.initialize({}, 0.0)
+                unit.finish_initialization()
+                for k in range(200 * every):
+                    begin, end = (float(torque(t * h)) for t in (k, k + 1))
+                    unit.set(["tau"], [begin])
+                    unit._fmi.setRealInputDerivatives([tau], [1], [(end - begin) / h])
+                    unit.step(k * h, h)
+                    rows.append(unit.get(["phi", "w"]))
+                unit.close()
+                for name, got in zip(("phi", "w"), np.array(rows)[::every].T, strict=True):
+                    wanted = exact[f"unit.{name}"].values
+                    errors[course, every, name] = np.max(np.abs(got - wanted)) / np.max(np.abs(wanted))
+    for name in ("phi", "w"):
+        assert max(errors["triangle", 1, name], errors["triangle", 2, name]) < 1e-6, errors
+        assert errors["sine", 1, name] > 1e-4, errors
+        assert 3.5 < errors["sine", 1, name] / errors["sine", 2, name] < 4.5, errors
