@@ -824,7 +824,8 @@ def test_no_scaffold_in_the_file(fmus):
     assert "modelDescription.xml" in names and "resources/modelDescription.xml" not in names
     assert not [n for n in names if "__pycache__" in n or "\\" in n]
     assert all(
-        Path(n).suffix in (".py", ".txt", ".xml", ".so", ".dll", ".html", ".png", ".csv") for n in names
+        Path(n).suffix in (".py", ".txt", ".xml", ".so", ".dll", ".html", ".png", ".csv", ".exp")
+        for n in names
     )
 
 
