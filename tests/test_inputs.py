@@ -15,6 +15,7 @@ import zipfile
 import numpy as np
 import pytest
 
+import chainunit
 from chainunit.capabilities.handover.cycle import load_cycle, read_cycle
 from chainunit.capabilities.vouching import archive
 from chainunit.capabilities.vouching.certify import members_of
@@ -267,6 +268,14 @@ def test_tables_inside_tables_have_a_largest_depth(text, tmp_path):
     file.write_text(text)
     for name in ("study", "linkage"):
         assert re.search("nested more than 30 times", refusal(READERS[name], file))
+
+
+def test_tables_from_python_have_a_largest_depth_too():
+    deep = {}
+    for _ in range(2000):
+        deep = {"a": deep}
+    with pytest.raises(InputError, match="nested more than 30 times"):
+        chainunit.Study(machine=deep)
 
 
 def test_an_archive_of_the_size_that_is_read_is_as_it_was():

@@ -16,7 +16,7 @@ from ..core.errors import InputError, RemarkWarning, near_name, shown
 from ..core.quantities import Layout
 from ..fmu.backends import Backend
 from ..machines.machine import Machine
-from ..reading.tables import in_file
+from ..reading.tables import TOO_DEEP, in_file, nested_deeply
 from ..reading.text import number, shown_in
 from ..reading.toml_lines import lines_of
 from ..report import series
@@ -75,6 +75,8 @@ class Study(StudyMethods):
     """The configuration of the study, checked."""
 
     def __init__(self, **tables: Any) -> None:
+        if nested_deeply(tables):
+            raise InputError(TOO_DEEP)
         self._take(study_files.of_tables(_plain(tables), _TABLES), _TABLES)
 
     @classmethod

@@ -391,9 +391,9 @@ def toml(text: str) -> dict[str, Any]:
     except ValueError as error:  # TOMLDecodeError, and numbers that are too long
         raise InputError.joined(syntax_faults(text, error)) from error
     except RecursionError as error:
-        raise InputError(_TOO_DEEP) from error
+        raise InputError(TOO_DEEP) from error
     if nested_deeply(data):
-        raise InputError(_TOO_DEEP)
+        raise InputError(TOO_DEEP)
     if faults := text_faults(data):
         raise InputError.joined(faults)
     return data
@@ -434,7 +434,7 @@ def _wrong_text(text: str, key: str, subject: str) -> Iterator[InputError]:
 
 _DEEPEST = 30
 """Most tables and lists inside each other: no key of a file has as many."""
-_TOO_DEEP = f"no valid TOML here: tables or lists are nested more than {_DEEPEST} times"
+TOO_DEEP = f"tables or lists are nested more than {_DEEPEST} times"
 
 
 def nested_deeply(data: Any) -> bool:
