@@ -53,7 +53,30 @@ def plate(**given) -> Nameplate:
 
 
 def test_table_is_whole():
-    powers = [0.12, 0.18, 0.25, 0.37, 0.55, 0.75, 1.1, 1.5, 2.2, 3, 4, 5.5, 7.5, 11, 15, 18.5, 22, 30, 37, 45, 55, 75]
+    powers = [
+        0.12,
+        0.18,
+        0.25,
+        0.37,
+        0.55,
+        0.75,
+        1.1,
+        1.5,
+        2.2,
+        3,
+        4,
+        5.5,
+        7.5,
+        11,
+        15,
+        18.5,
+        22,
+        30,
+        37,
+        45,
+        55,
+        75,
+    ]
     wanted = [(1000.0 * power, poles) for poles in (2.0, 4.0, 6.0) for power in powers]
     assert [(m.nameplate.power, m.nameplate.poles) for m in MOTORS] == wanted
     assert len({m.designation for m in MOTORS}) == 66
