@@ -21,6 +21,7 @@ KNIFE = """
 [system]
 machine = "KnifeDrive"
 [sizing]
+fluctuation = 0.05
 poles_least = 2
 poles_most = 2
 candidates = 1
