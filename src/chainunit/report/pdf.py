@@ -90,6 +90,8 @@ class _PrintedPage(Page):
 
     def _table(self, table: b.Table) -> str:
         """A table; one with many shares has the numbers alone, as paper has no room for their bars."""
+        # the page has the rows that a terminal leaves out
+        table = replace(table, rows=tuple(row for row in table.rows if row.form != "long") or table.rows)
         if sum(isinstance(cell, b.Share) for cell in table.rows[0].cells) > _BARS:
             table = replace(table, rows=tuple(map(_without_bars, table.rows)))
         return super()._table(table)

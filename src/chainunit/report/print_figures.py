@@ -44,8 +44,9 @@ _PLACES: dict[str, tuple[tuple[int, int], str, str]] = {
 
 _SMALL, _NAMED = 0.62, 0.8
 """Size of a figure for a sheet over that of one for a screen, and its height where an axis has names."""
-_LABELS = 8
-"""Size of the letters of labels in a small figure; the others are as large as in one for a screen."""
+_LABELS, _NARROW = 8, 6.0
+"""Size of the letters of labels in a small figure (the others are as large as in one for a screen), and width [in] up
+to which a legend below one panel has two columns."""
 
 
 def write(figures: Iterable[Figure], folder: Path, units: Units, are_small: bool = False) -> list[Path]:
@@ -98,13 +99,13 @@ def _figure(spec: Figure, units: Units, size: float = 1.0) -> Any:
         if size < 1.0:
             # rows are lower than the titles of their axes are long: the unit has a line of its own
             axes[r, c].set_ylabel(axes[r, c].get_ylabel().replace(" [", "\n["))
-    _legend(drawing, axes, columns, 2 if size < 1.0 else 3)
+    _legend(drawing, axes, columns)
     drawing.suptitle(fill(capital(figure.title), int(_LETTERS * drawing.get_figwidth())))
     return drawing
 
 
-def _legend(drawing: Any, axes: Any, columns: int, most: int) -> None:
-    """One legend below all panels, each name once; beside each other `most` below one column of panels."""
+def _legend(drawing: Any, axes: Any, columns: int) -> None:
+    """One legend below all panels, each name once."""
     entries: dict[str, Any] = {}
     for axis in axes.flat:
         if axis.figure is not None:
@@ -112,6 +113,7 @@ def _legend(drawing: Any, axes: Any, columns: int, most: int) -> None:
             for handle, label in zip(handles, labels, strict=True):
                 entries.setdefault(label, handle)
     if entries:
+        most = 3 if drawing.get_figwidth() > _NARROW else 2
         count = min(len(entries), most if columns == 1 else 2 + columns)
         drawing.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=count, fontsize=9)
 
