@@ -168,10 +168,14 @@ def fmus(once):
 
 
 @pytest.fixture(scope="session")
-def native_fmus(once):
+def c_compiler():
+    """The C compiler of this machine, for fixtures that need one: where there is none, their tests are skipped."""
+    return compiler() or pytest.skip("no C compiler")
+
+
+@pytest.fixture(scope="session")
+def native_fmus(c_compiler, once):
     """Native FMUs by FMI 2 and 3 of every model, unpacked: {(name, fmi): (file, folder)}."""
-    if compiler() is None:
-        pytest.skip("no C compiler")
 
     def fill(folder):
         name, fmi = folder.name[:-1], int(folder.name[-1])

@@ -177,7 +177,7 @@ def driven(**line):
 
 
 @pytest.fixture(scope="module")
-def system(tmp_path_factory):
+def system(c_compiler, tmp_path_factory):
     line = {"c2": 60.0, "c3": 60.0, "d2": 0.02, "d3": 0.02, "J4": 0.002, **BENT}
     return export(driven(**line), tmp_path_factory.mktemp("system"), "native")[0]
 
@@ -223,6 +223,7 @@ def test_from_rest_the_coupling_is_of_first_order(system, speed, ramp, order, of
     assert all(f"| {each} |" in page for each in shown)
 
 
+@pytest.mark.compiler
 def test_too_long_a_step_runs_away_and_no_fmu_can_tell(tmp_path):
     """A rotor on a stiff line, whose k the FMUs do not know: as docs/drives.md says."""
     line, motor = CardanDriveline.parameter_layout, DcMotor.parameter_layout
