@@ -277,6 +277,7 @@ def test_a_stiff_line_is_a_rigid_shaft():
         assert difference < 2e-3 * np.max(np.abs(other[name].values)), name
 
 
+@pytest.mark.compiler
 def test_both_backends_agree_also_in_a_turning_step(tmp_path):
     """The inputs run along w and a inside each step, in the native FMU as in that of pythonfmu."""
     from chainunit.fmu.export import export as python
@@ -320,6 +321,7 @@ def test_both_backends_agree_also_in_a_turning_step(tmp_path):
         ({"ratio": 0.0}, "ratio = 0: must be > 0"),
     ],
 )
+@pytest.mark.compiler
 def test_bad_parameters_are_refused_in_one_line(values, named, tmp_path):
     from chainunit.fmu.native.export import export
 
