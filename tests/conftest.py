@@ -93,6 +93,8 @@ def pytest_configure(config):
     do; and the folder of compiled code for all of them, workers included."""
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.default_int_handler)
+    if compiler() is None:  # a remark, which is expected then
+        config.addinivalue_line("filterwarnings", "ignore:no C compiler")
     if hasattr(config, "workerinput"):
         config.option.markexpr = config.workerinput["marks"]
     else:
