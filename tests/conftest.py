@@ -93,6 +93,8 @@ def pytest_configure(config):
     do; and the folder of compiled code for all of them, workers included."""
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.default_int_handler)
+    if compiler() is None:  # a remark, which is expected then
+        config.addinivalue_line("filterwarnings", "ignore:no C compiler")
     if hasattr(config, "workerinput"):
         config.option.markexpr = config.workerinput["marks"]
     else:
@@ -168,10 +170,14 @@ def fmus(once):
 
 
 @pytest.fixture(scope="session")
-def native_fmus(once):
+def c_compiler():
+    """The C compiler of this machine, for fixtures that need one: where there is none, their tests are skipped."""
+    return compiler() or pytest.skip("no C compiler")
+
+
+@pytest.fixture(scope="session")
+def native_fmus(c_compiler, once):
     """Native FMUs by FMI 2 and 3 of every model, unpacked: {(name, fmi): (file, folder)}."""
-    if compiler() is None:
-        pytest.skip("no C compiler")
 
     def fill(folder):
         name, fmi = folder.name[:-1], int(folder.name[-1])

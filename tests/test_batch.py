@@ -150,13 +150,13 @@ def test_an_earlier_result_gives_its_memory(engine, more):
 
 def test_memory_that_does_not_fit_is_refused():
     machine, values = ChainUnitMachine(), {"phi": np.linspace(0.0, 6.0, 5), "w": 3.0}
-    first = machine.batch(values, ["tau"])
+    first = machine.batch(values, ["tau"], engine="numpy")
     with pytest.raises(InputError, match="out: has no tau over \\(phi: 4\\)"):
-        machine.batch(values | {"phi": values["phi"][:4]}, ["tau"], out=first)
+        machine.batch(values | {"phi": values["phi"][:4]}, ["tau"], engine="numpy", out=first)
     with pytest.raises(InputError, match="out: has no margin over"):
-        machine.batch(values, ["tau", "margin"], out=first)
+        machine.batch(values, ["tau", "margin"], engine="numpy", out=first)
     with pytest.raises(InputError, match="tau is no array that can be filled"):
-        machine.batch(values, ["tau"], out=first.assign(tau=first.tau.astype("float32")))
+        machine.batch(values, ["tau"], engine="numpy", out=first.assign(tau=first.tau.astype("float32")))
 
 
 @NEEDS_COMPILER

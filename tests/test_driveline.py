@@ -178,7 +178,7 @@ def driven(**line):
 
 
 @pytest.fixture(scope="module")
-def system(tmp_path_factory):
+def system(c_compiler, tmp_path_factory):
     line = {"c2": 60.0, "c3": 60.0, "d2": 0.02, "d3": 0.02, "J4": 0.002, **BENT}
     return export(driven(**line), tmp_path_factory.mktemp("system"), "native")[0]
 
@@ -224,6 +224,7 @@ def test_from_rest_the_coupling_is_of_first_order(system, speed, ramp, order, of
     assert all(f"| {each} |" in page for each in shown)
 
 
+@pytest.mark.compiler
 def test_a_shaft_that_signals_turn_is_followed_to_second_order(tmp_path):
     """Angle and speed run on inside a step from where they are at its begin, and lie on their signals at its end."""
     start = {**BENT, "d3": 3.0, "w_start": 40.0}
@@ -251,6 +252,7 @@ def test_a_shaft_that_signals_turn_is_followed_to_second_order(tmp_path):
         assert np.all(simulation.run(0.01, 2e-3)["line.phi"] == 0.7)
 
 
+@pytest.mark.compiler
 def test_too_long_a_step_runs_away_and_no_fmu_can_tell(tmp_path):
     """A rotor on a stiff line, whose k the FMUs do not know: as docs/drives.md says."""
     line, motor = CardanDriveline.parameter_layout, DcMotor.parameter_layout
@@ -304,6 +306,7 @@ def test_a_stiff_line_is_a_rigid_shaft():
         assert difference < 2e-3 * np.max(np.abs(other[name].values)), name
 
 
+@pytest.mark.compiler
 def test_both_backends_agree_also_in_a_turning_step(tmp_path):
     """The inputs run along w and a inside each step, in the native FMU as in that of pythonfmu."""
     from chainunit.fmu.export import export as python
@@ -347,6 +350,7 @@ def test_both_backends_agree_also_in_a_turning_step(tmp_path):
         ({"ratio": 0.0}, "ratio = 0: must be > 0"),
     ],
 )
+@pytest.mark.compiler
 def test_bad_parameters_are_refused_in_one_line(values, named, tmp_path):
     from chainunit.fmu.native.export import export
 

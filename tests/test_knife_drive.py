@@ -73,6 +73,7 @@ def test_reference_points(point):
         assert deviation(got, {k: given[k] for k in got}) < 1e-9, name
 
 
+@pytest.mark.compiler
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_reference_points_by_the_native_fmu(fmi, tmp_path):
     from fmpy import simulate_fmu

@@ -32,6 +32,7 @@ def registered(monkeypatch):
     monkeypatch.setitem(MOTORS, ServoMotor.name, ServoMotor)
 
 
+@pytest.mark.compiler
 def test_it_runs_as_an_fmu(tmp_path):
     """Its co-simulation with the machine is the monolithic solution of the same equations."""
     system, _ = export(pair("ChamberForces", ServoMotor, values={"machine.ratio": 50.0}), tmp_path, "native")

@@ -162,6 +162,7 @@ def files(tmp_path_factory):
     return {name: folder / f"{name}.fmu" for name in models}
 
 
+@pytest.mark.compiler
 def test_fmpy_finds_no_fault(files, tmp_path):
     for fmi in (2, 3):
         export(MODELS["CardanDriveline"], tmp_path / f"line{fmi}.fmu", fmi=fmi)

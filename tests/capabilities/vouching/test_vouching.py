@@ -109,6 +109,7 @@ def checked(tmp_path, data, **options):
 # -- what holds
 
 
+@pytest.mark.compiler
 def test_a_certified_fmu_holds(made):
     run = chainunit("verify", "it.fmu", "--key", "chainunit.key.pub", cwd=made)
     lines = run.stdout.splitlines()
