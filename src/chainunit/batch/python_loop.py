@@ -156,8 +156,8 @@ class _Evaluation:
         self._arguments = arguments
         self._values: Any = np.zeros(function.numel_out(0))
         for k, array in enumerate(arguments):
-            self._buffer.set_arg(k, memoryview(array))
-        self._buffer.set_res(0, memoryview(self._values))
+            self._buffer.set_arg(k, array.data)
+        self._buffer.set_res(0, self._values.data)
 
     def __call__(self) -> list[float]:
         self._evaluate()
