@@ -131,6 +131,18 @@ def test_values_vary_smoothly_with_size():
             assert values == sorted(values, reverse=True), (poles, name)
 
 
+def test_locked_rotor_currents_are_those_of_efficient_motors():
+    """Makers publish 7 to 8.5 for IE3 motors of some kilowatts; IEC 60034-12 permits this in design N: its largest
+    apparent power with the rotor locked over the rated power."""
+    from_power = {2.0: 1.1e3, 4.0: 1.5e3, 6.0: 7.5e3}
+    for m in MOTORS:
+        n = m.nameplate
+        if n.power >= from_power[n.poles]:
+            assert 7.0 <= n.locked_current_ratio <= 8.5, m.designation
+        most = 13.0 if n.power <= 6.3e3 else 12.0 if n.power <= 25e3 else 11.0
+        assert n.locked_current_ratio * n.apparent_power <= most * n.power, m.designation
+
+
 def test_a_motor_is_found_by_its_designation():
     wanted = MOTORS[30]
     result = motor_of_catalogue(wanted.designation)

@@ -4,7 +4,8 @@ The packaged table has cage motors for 400 V, 50 Hz, 0.12 to 75 kW, with 2, 4 an
 EN 50347. Their efficiencies are the limits in IEC 60034-30-1 of the class that the regulation EU 2019/1781 asks of
 motors on the market: IE3, and IE4 from 75 kW on (since July 2023, up to 200 kW, with 2 to 6 poles). All other values
 are typical of such motors but belong to no maker: they vary smoothly with size, and take the place of a supplier's
-catalogue.
+catalogue. Their locked-rotor currents are in the range that makers publish for IE3 motors, and below the limits of
+IEC 60034-12 (design N).
 
 Files of the user have the same columns, see `chainunit.drives.catalogue_rows`; beside motors they may have gears and
 couplings (`chainunit.drives.catalogue_gears`, `chainunit.drives.catalogue_couplings`,
