@@ -1,10 +1,14 @@
 """Standard motors: the packaged table, and the rows of the user's file.
 
 The packaged table has cage motors for 400 V, 50 Hz, 0.12 to 75 kW, with 2, 4 and 6 poles, in the frames of
-EN 50347. Their efficiencies are the limits in IEC 60034-30-1 of the class that the regulation EU 2019/1781 asks of
-motors on the market: IE3, and IE4 from 75 kW on (since July 2023, up to 200 kW, with 2 to 6 poles). All other values
-are typical of such motors but belong to no maker: they vary smoothly with size, and take the place of a supplier's
-catalogue.
+EN 50347, and the same motors on 460 V, 60 Hz. Their efficiencies are the limits in IEC 60034-30-1 of the class that
+the regulation EU 2019/1781 asks of motors on the market: IE3, and IE4 from 75 kW on (since July 2023, up to 200 kW,
+with 2 to 6 poles). All other values are typical of such motors but belong to no maker: they vary smoothly with size,
+and take the place of a supplier's catalogue. Their locked-rotor currents are in the range that makers publish for IE3
+motors, and at 50 Hz below the limits of IEC 60034-12 (design N).
+
+On 60 Hz each has the same power, and the speed, power factor, torques and currents of its circuit with that supply.
+Its efficiency is the limit of its class for 60 Hz, or that at 50 Hz if it is higher.
 
 Files of the user have the same columns, see `chainunit.drives.catalogue_rows`; beside motors they may have gears and
 couplings (`chainunit.drives.catalogue_gears`, `chainunit.drives.catalogue_couplings`,

@@ -328,6 +328,26 @@ def test_only_own_motors_need_some(tmp_path):
         sized_by(config, tmp_path)
 
 
+@pytest.mark.second
+def test_the_frequency_of_the_supply_chooses_the_motors(tmp_path):
+    """All motors that are tried have it, their supply follows, and so does the ratio."""
+    found = {}
+    for hertz in (50, 60):
+        keys = f'[sizing]\nfrequency = "{hertz} Hz"\ncandidates = 1\npoles_least = 4\npoles_most = 4'
+        sizing = sized_by(parse(keys), tmp_path)
+        assert {c.motor.nameplate.frequency for c in sizing.candidates} == {hertz}
+        supply = sizing.best.drive.parameters.supply
+        assert (supply.V, supply.f) == ((460.0, 60.0) if hertz == 60 else (400.0, 50.0))
+        found[hertz] = sizing.best.drive.ratio
+    assert 1.1 < found[60] / found[50] < 1.35
+
+
+def test_a_frequency_of_no_motor_is_refused(tmp_path):
+    words = r'sizing\.frequency = 16\.7 Hz: the catalogue has no such motor .* must be "50 Hz" or "60 Hz"'
+    with pytest.raises(InputError, match=words):
+        sized_by(parse('[sizing]\nfrequency = "16.7 Hz"'), tmp_path)
+
+
 def test_a_catalogue_whose_ratios_keep_no_speed_is_refused(tmp_path):
     (far,) = (line for line in GEARS.splitlines() if line.startswith("far"))
     config = study_of(tmp_path, gears=f"{GEARS.splitlines()[0]}\n{far}\n")

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from ...core.errors import InputError, shown
 from ...drives.catalogue import CatalogueMotor, catalogue, motor_of_catalogue
 from ...study.catalogue_drive import with_inertia, with_starter
 from ...study.drive import Drive
@@ -24,10 +25,15 @@ def other_motor(motor: CatalogueMotor, designation: str, own_motors: Sequence[Pa
     Raises
     ------
     InputError
-        for an unknown designation.
+        for an unknown designation, and for a motor of another frequency.
     """
     if designation:
-        return motor_of_catalogue(designation, own_motors)
+        other = motor_of_catalogue(designation, own_motors)
+        frequency, own = other.nameplate.frequency, motor.nameplate.frequency
+        if frequency != own:
+            words = f"has {frequency:g} Hz, and the motor of the study {own:g} Hz; name a motor of {own:g} Hz"
+            raise InputError(f"usage.other = {shown(designation)}: {words}", "usage.other")
+        return other
     plate, above = motor.nameplate, next_class(motor.nameplate)
     if above is None:
         return None

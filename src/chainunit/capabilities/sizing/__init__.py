@@ -25,8 +25,8 @@ from ...work.progress import TaskProgress
 from .table import SIZING_KEYS, Sizing, SizingPlan
 
 _SUPPLY = (
-    "the supply has the rated voltage and frequency of the motor; motors for another supply stand in a catalogue of "
-    'your own, catalogue = "FILE.csv"'
+    "the supply has the rated voltage of the motor, 400 V at 50 Hz and 460 V at 60 Hz (sizing.frequency); motors for "
+    'another voltage stand in a catalogue of your own, catalogue = "FILE.csv"'
 )
 
 
@@ -52,7 +52,7 @@ class SizingCapability(Capability):
                 "hours": "usage.hours, if the file has it, else 16",
                 "load_class": "by the inertia of the machine over that of the motor",
             },
-            places=dict.fromkeys(("frequency", "voltage", "supply"), _SUPPLY),
+            places=dict.fromkeys(("voltage", "supply"), _SUPPLY),
             order=(("poles_least", ">=", "poles_most"), ("ambient", ">", "temperature")),
         )
     }

@@ -36,13 +36,15 @@ from .task import SizingTask
 
 _WISHES: Mapping[str, str] = {"speed": "fluctuation", "inertia": "inertia_ratio"}
 """By check, the demand that only a wish of the file makes."""
+_SAME_FREQUENCY = 0.01
+"""Relative difference of rated frequencies that count as equal."""
 _WORSE_WITH_POWER = ("gear_start", "gear_service")
 """Checks that a larger motor makes worse."""
 
 
 def motors_on_offer(task: SizingTask, own: Sequence[CatalogueMotor]) -> list[CatalogueMotor]:
-    """The motors of the catalogue with the requested numbers of poles, the smallest first, with the user's
-    `own` ones.
+    """The motors of the catalogue for the requested frequency with the requested numbers of poles, the smallest
+    first, with the user's `own` ones.
 
     Raises
     ------
@@ -63,6 +65,15 @@ def motors_on_offer(task: SizingTask, own: Sequence[CatalogueMotor]) -> list[Cat
         raise InputError(
             f"sizing.poles_least = {limits.poles_least:g}, sizing.poles_most = {limits.poles_most:g}: the catalogue "
             "has no motor with so many poles"
+        )
+    known = sorted({float(m.nameplate.frequency) for m in motors})
+    motors = [m for m in motors if abs(m.nameplate.frequency / limits.frequency - 1.0) < _SAME_FREQUENCY]
+    if not motors:
+        words = " or ".join(f'"{frequency:g} Hz"' for frequency in known)
+        raise InputError(
+            f"sizing.frequency = {limits.frequency:g} Hz: the catalogue has no such motor with so many poles; must "
+            f"be {words}",
+            "sizing.frequency",
         )
     if limits.gear_torque and not task.gears:
         words = "sizing.gear_torque: is of gears of a catalogue; name one by catalogue, or leave it out"

@@ -62,6 +62,13 @@ class Sizing:
     )
     poles_least: Value = quantity("1", "least number of poles", default=2, min=2, max=48, type="Integer")
     poles_most: Value = quantity("1", "largest number of poles", default=6, min=2, max=48, type="Integer")
+    frequency: Value = quantity(
+        "Hz",
+        "rated frequency of the motors that are tried, as of the supply",
+        default=50.0,
+        min=1.0,
+        max=1000.0,
+    )
     larger: Value = quantity(
         "1",
         "power of a motor, relative to the smallest that fits, up to which it may be preferred: without a "
