@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -104,6 +105,26 @@ def test_what_follows_an_event():
     assert stalled.stall_time == pytest.approx(1.5, abs=0.002) and stalled.recovery_time is None
     # in a start the speed says nothing of a dip
     assert read_answers(window(Phase.LOADED_START, steady=steady, **stands)).speed_dip is None
+
+
+def test_a_motor_on_the_line_dips_below_its_own_mean_in_running_and_events():
+    """It keeps the speed of its slip, here 3 % above the one asked for: no dip is below zero."""
+
+    def on_line(*of, **changed):
+        made = window(*of, **changed)
+        return replace(made, drive=replace(made.drive, follows=False))
+
+    q = 1.03 * SPEED * TIME + 0.01 * np.sin(SPEED * TIME)
+    speed = {"machine.w0": np.gradient(q, TIME) * RATIO, "motor.w": np.gradient(q, TIME) * RATIO}
+    steady = on_line(**speed)
+    answers = read_answers(steady)
+    assert (
+        answers.speed_dip == pytest.approx(0.5 * answers.speed_ripple, rel=0.05) and answers.speed_dip > 0.0
+    )
+    event = read_answers(on_line(Phase.EVENT, begin=1.0, steady=steady, **speed))
+    assert event.speed_dip == pytest.approx(answers.speed_dip, rel=0.01)
+    stands = np.zeros_like(TIME)
+    assert read_answers(on_line(**{"machine.w0": stands, "motor.w": stands})).speed_dip == 1.0
 
 
 def test_a_coupling_that_opened():

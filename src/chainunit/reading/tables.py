@@ -132,7 +132,8 @@ class UnusualValue:
 
     variable: Variable
     value: float
-    with_unit: bool
+    written: str
+    """the text of the file, if it states the unit"""
     meant: str | None = part("the probable value, in the form of a study file")
 
     @classmethod
@@ -140,8 +141,14 @@ class UnusualValue:
         """The unusual `value` of a variable, `given` so in a file; None for a usual one."""
         if variable.quantity.is_usual(value):
             return None
-        with_unit = units.has_unit(given)
-        return cls(variable, value, with_unit, None if with_unit else _meant(variable, given))
+        if units.has_unit(given):
+            return cls(variable, value, str(given), None)
+        return cls(variable, value, "", _meant(variable, given))
+
+    @property
+    def with_unit(self) -> bool:
+        """Whether the file states the unit."""
+        return bool(self.written)
 
     @derived()
     def name(self) -> str:
@@ -165,6 +172,12 @@ class UnusualValue:
 
     def __str__(self) -> str:
         v, (low, high) = self.variable, self.variable.quantity.usual or (0.0, 0.0)
+        if parts := units.split(self.written):
+            _, unit = parts
+            zero, one = (units.convert(x, unit, v.unit) for x in (0.0, 1.0))
+            low, high = ((x - zero) / (one - zero) for x in (low, high))
+            usual = f"usual: {low:.4g} to {high:.4g} {unit}"
+            return f"{v.name} = {self.written}: is unusual ({v.description}; {usual}); check it"
         unit = unit_behind(v.unit)
         hint = f'; was "{self.meant}" meant?' if self.meant else ""
         if v.unit == "rad" and not self.with_unit:

@@ -9,12 +9,14 @@ from __future__ import annotations
 import base64
 import logging
 import re
+import struct
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
 from itertools import groupby, starmap, zip_longest
 from operator import itemgetter
 from pathlib import Path
+from typing import Any
 
 from ..core.errors import InputError
 from ..reading.text import Units
@@ -77,6 +79,9 @@ class _PrintedPage(Page):
         for kind, together in groupby(blocks, _group):
             group = list(together)
             wide = [each for each in group if kind != _FIGURES or _is_wide(each)]
+            if kind == _FIGURES:
+                # the flattest first: it fits on the page that has begun
+                wide.sort(key=self._height)
             texts = list(filter(None, map(self.block, wide)))
             parts += [f'<ul class="verdicts">{"".join(texts)}</ul>'] if kind == _WARNINGS and texts else texts
             if narrow := "".join(self.block(each) for each in group if each not in wide):
@@ -95,6 +100,16 @@ class _PrintedPage(Page):
         if sum(isinstance(cell, b.Share) for cell in table.rows[0].cells) > _BARS:
             table = replace(table, rows=tuple(map(_without_bars, table.rows)))
         return super()._table(table)
+
+    def _height(self, figure: Any) -> float:
+        """The height of a printed figure over its width; 0 without a file."""
+        file = self._pictures.get(figure.file or "")
+        if file is None:
+            return 0.0
+        # the head of a PNG
+        with file.open("rb") as picture:
+            width, height = struct.unpack(">II", picture.read(24)[16:])
+        return float(height / width)
 
     def _printed(self, figure: Figure) -> str:
         file = self._pictures.get(figure.file or "")

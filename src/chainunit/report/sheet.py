@@ -23,8 +23,8 @@ _BEYOND = (
     "noise, dust, temperature of the surroundings beyond that of the study; safety of persons",
 )
 """Questions that the program does not answer."""
-_OF_START = {"soft_start": "soft", "inverter": "inverter", "star_delta": "star-delta"}
-"""The groups of values that one way of starting has, by that way."""
+_OF_START = {"soft_start": "soft", "inverter": "inverter", "overload": "inverter", "star_delta": "star-delta"}
+"""The values and groups of values that one way of starting has, by that way."""
 _LABELS = ("project", "author", "date", "revision")
 
 
@@ -131,22 +131,28 @@ def _not_assumed(section: b.Section, study: StudyRecord) -> b.Section:
 def _kept(block: b.Given, study: StudyRecord, are_assumed: bool) -> b.Given:
     kept = (
         (title, tuple(each for each in values if _is_assumed(each, study) == are_assumed))
-        for title, values in block.sections
+        for title, used in block.sections
+        if (values := [each for each in used if _is_used(each, study)])
     )
     return b.Given(tuple((title, values) for title, values in kept if values))
 
 
 def _is_assumed(value: b.GivenValue, study: StudyRecord) -> bool:
-    """Whether the files leave out a number that is neither chosen nor of an event; beside a motor of a catalogue,
-    neither its own nor of a starter that is not used."""
+    """Whether the files leave out a number that is neither chosen nor of an event, nor of a motor of a catalogue."""
     chosen = "" if study.proposal is None else study.proposal.name
     if value.origin in ("", "file", "linkage", chosen) or not isinstance(value.value, Number):
         return False
     of, _, name = value.name.partition(".")
     if of == "event" or study.plate is None:
         return of != "event"
-    if of == "motor":
-        return name.startswith("ambient.")
+    return of != "motor" or name.startswith("ambient.")
+
+
+def _is_used(value: b.GivenValue, study: StudyRecord) -> bool:
+    """Whether a value is not of a starter that the motor of a catalogue does without."""
+    of, _, name = value.name.partition(".")
+    if study.plate is None or of not in ("motor", "starter"):
+        return True
     start = study.config.drive.start
     return _OF_START.get(name.partition(".")[0], start) == start
 

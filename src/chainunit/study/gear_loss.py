@@ -43,7 +43,8 @@ class GearFindings(Findings):
     def remark(self, study: StudyRecord) -> None:
         """The loss beside the power of the machine, and its parts."""
         loss = self.loss
-        text = f"The {study.drive.transmission} takes {{total}} in steady running"
+        noun = study.drive.transmission
+        text = f"The {noun} {'take' if ' and ' in noun else 'takes'} {{total}} in steady running"
         if loss.share is not None:
             text += ", {share} of the {net_power} that the machine takes in the mean"
         text += (

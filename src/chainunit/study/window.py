@@ -124,9 +124,11 @@ class Window:
     def normal_speed(self) -> float:
         """Crank speed that the drive keeps without an event [rad/s]: the requested speed, or the speed that a
         motor on the line takes."""
-        if self.drive.follows or self.steady is None:
+        steady = self if self.phase is Phase.STEADY else self.steady
+        if self.drive.follows or steady is None:
             return self.requested_speed
-        return self.steady.speed_mean
+        mean = steady.speed_mean
+        return mean if steady is not self or mean > CREEPS * self.requested_speed else self.requested_speed
 
     @cached_property
     def settled_temperature(self) -> float:

@@ -243,7 +243,9 @@ def test_ratings_of_the_file_come_before_those_of_the_catalogue():
     given = rating_of(GearRatingTable(rated_torque=800.0, overhung_load=7e3), sold, 700.0)
     assert given == replace(sold, rated_torque=800.0, application_factor=1.0, overhung_load=7e3)
     limit = rating_of(GearRatingTable(application_factor=1.3, largest_speed=300.0), None, 700.0)
-    assert limit == GearRating(rated_torque=700.0, application_factor=1.3, largest_speed=300.0)
+    assert limit.application_factor == 1.3 and limit.largest_speed == 300.0
+    # gear.torque_limit is permitted in running, which sizing checks, too
+    assert gear_check(LOAD, limit, 2.0).running_limit == pytest.approx(700.0)
 
 
 def test_a_gear_of_a_catalogue_permits_the_same_torque_in_peaks_as_in_the_choice():
@@ -253,5 +255,8 @@ def test_a_gear_of_a_catalogue_permits_the_same_torque_in_peaks_as_in_the_choice
     factor = peak_factor_of(GearRatingTable(), sold, gear)
     assert gear_check(LOAD, sold, factor).torque_limit == gear.start_limit == 900.0
     assert peak_factor_of(GearRatingTable(), None, gear) == 2.0
+    own = GearRatingTable(application_factor=1.5)
+    limit = gear_check(LOAD, rating_of(own, None, 450.0), peak_factor_of(own, None, gear)).torque_limit
+    assert limit == gear.start_limit
     assert peak_factor_of(GearRatingTable(rated_torque=400.0), sold, gear) == 2.0
     assert peak_factor_of(GearRatingTable(peak_factor=1.8), sold, gear) == 1.8

@@ -61,7 +61,7 @@ class CheckCapability(Capability):
             optional=True,
             title="Ratings of the gear",
             follows={
-                "rated_torque": "gear.torque_limit, if the file gives it",
+                "rated_torque": "gear.torque_limit over the application factor, if the file gives it",
                 "peak_factor": "gear.start_factor",
             },
         ),

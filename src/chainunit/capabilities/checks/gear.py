@@ -227,8 +227,10 @@ def find(
 
 def rating_of(table: GearRatingTable, sold: GearRating | None, torque_limit: float) -> GearRating:
     """The ratings in the `table` of the file; for those that it leaves out, those of the gear that is `sold` in a
-    catalogue, and else for the rated torque the `torque_limit` of [gear]."""
-    sold = sold or GearRating(rated_torque=torque_limit, application_factor=table.application_factor)
+    catalogue, and else the `torque_limit` of [gear]: the rated torque times the application factor, as of a gear of
+    a catalogue."""
+    factor = table.application_factor
+    sold = sold or GearRating(rated_torque=torque_limit / factor, application_factor=factor)
     torque = table if table.rated_torque else sold
     return GearRating(
         rated_torque=torque.rated_torque,
@@ -241,8 +243,8 @@ def rating_of(table: GearRatingTable, sold: GearRating | None, torque_limit: flo
 
 def peak_factor_of(table: GearRatingTable, sold: GearRating | None, gear: Transmission) -> float:
     """The permitted torque in peaks over the rated torque: that in the `table` of the file, else in a start of the
-    `gear`; one that is `sold` in a catalogue permits it over the rated torque times its application factor."""
-    over_rated = 1.0 if sold is None or table.rated_torque else sold.application_factor
+    `gear`, which permits it over the rated torque times the application factor if the `table` has no rated torque."""
+    over_rated = 1.0 if table.rated_torque else (sold or table).application_factor
     return float(table.peak_factor or gear.start_factor * over_rated)
 
 

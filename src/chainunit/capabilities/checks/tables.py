@@ -158,8 +158,8 @@ class GearRatingTable(GearRating):
     )
     peak_factor: Value = quantity(
         "1",
-        "permitted torque in peaks and starts over the rated torque; 0: gear.start_factor, of a gear of a catalogue "
-        "times its application_factor",
+        "permitted torque in peaks and starts over the rated torque; 0: gear.start_factor, times application_factor "
+        "for a gear of a catalogue and for gear.torque_limit",
         default=0.0,
         min=0.0,
         max=20.0,

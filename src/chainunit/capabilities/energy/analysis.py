@@ -125,8 +125,9 @@ class EnergyFindings(Findings):
         if mean.gear and any(load.factor != 1.0 for load in self.loads.values()):
             study.note(
                 "gear at other loads",
-                "At each load the gear takes the loss that it has with the feed of the study: with less feed its "
-                "teeth lose less than the table says, with more feed they lose more.",
+                "At each load the loss of the {gear} is the one with the feed of the study: with less feed it is "
+                "less than the table says, with more feed it is more.",
+                gear=study.drive.transmission,
             )
         if self.inverter:
             study.note("losses of the inverter", f"The losses of the inverter are {self.inverter}.")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from ...core.quantities import Layout
 from ...report import blocks as b
@@ -14,7 +14,11 @@ from .motor_class import MotorClass, words_of
 from .running import PLACES, Losses
 
 PICTURE = "energy.png"
-_NAMES = {v.name: v.template for v in Layout(Losses).variables}
+
+
+def _titles(study: StudyRecord) -> dict[str, str]:
+    """The title of each power; the parts between motor and machine have their noun."""
+    return {v.name: v.template for v in Layout(Losses).variables} | {"gear": study.drive.transmission}
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
@@ -24,8 +28,9 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     found = MotorClass.found_in(study)
     if found is not None:
         yield b.Text(words_of(found))
-    yield _places(s, findings)
-    yield _figure(findings)
+    titles = _titles(study)
+    yield _places(s, findings, titles)
+    yield _figure(findings, titles)
     yield _year(s, findings)
     if findings.comparison is not None:
         yield b.Text(s.line(verdict_words(findings.comparison)))
@@ -51,11 +56,11 @@ def _known(findings: EnergyFindings) -> list[str]:
     return [name for name in PLACES if getattr(findings.own.mean, name) is not None]
 
 
-def _places(s: b.Source, findings: EnergyFindings) -> b.Table:
+def _places(s: b.Source, findings: EnergyFindings, titles: Mapping[str, str]) -> b.Table:
     loads = list(findings.loads)
     paths = ["energy.own.mean", *(f"energy.loads.{name}" for name in loads)]
     rows = [
-        b.TableRow((_NAMES[name], *(s.number(f"{path}.{name}") for path in paths)))
+        b.TableRow((titles[name], *(s.number(f"{path}.{name}") for path in paths)))
         for name in ("electric", *_known(findings), "missing")
     ]
     heads: list[Line] = ["mean"]
@@ -112,10 +117,10 @@ def verdict_words(comparison: MotorComparison) -> str:
     return text + "."
 
 
-def _figure(findings: EnergyFindings) -> fig.Figure:
+def _figure(findings: EnergyFindings, titles: Mapping[str, str]) -> fig.Figure:
     names, mean = _known(findings), findings.own.mean
     sizes = [float(getattr(mean, name)) for name in names]
-    y = fig.Axis("", names=tuple(_NAMES[name] for name in names))
+    y = fig.Axis("", names=tuple(titles[name] for name in names))
     bars = fig.Bars("mean over the time of running", list(range(len(names))), sizes, 0.6)
     return fig.Figure(
         "energy",

@@ -113,6 +113,8 @@ class TrialResult:
     """inertia of the machine over that of the motor with its flywheel, both at the motor's shaft"""
     stall_angle: float | None = None
     """crank angle at which the load stalls the motor [rad]; None for a motor that starts"""
+    failed_angle: float | None = None
+    """crank angle from which it does not start [rad], though it does from the angle 0; else None"""
 
 
 @result(frozen=False)

@@ -240,7 +240,6 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         yield from (b.Text(s.words(f"sizing.protection.alternatives.{k}.words")) for k in range(len(ways)))
         if ways:
             yield _ways(s, study)
-    yield from (b.Text(each, form="long") for each in s.lines("sizing.notes"))
     if candidates:
         if "tried" in section:
             weak = "; too weak by the nameplate: {=sizing.weak}" if s.value("sizing.weak") else ""

@@ -117,19 +117,20 @@ def ordered_belt(study: StudyRecord, plan: SizingPlan, trial: TrialResult) -> Or
         ratio = split[0]
     factor = plan.belt_factor(trial.inertia_factor, study.config.drive.start)
     belt = belt_drive(plate.power, trial.speed or plate.speed, ratio, factor)
-    power, free = (number(x, "W") for x in (plate.power, belt.design_power))
+    power = number(plate.power, "W")
     return OrderedBelt(
         InUnit(
             belt.design_power,
             "W",
-            title=f"V-belt, design power: rated {power} of the motor times the service factor",
+            title="V-belt, design power, for which its maker gives number and tension of the belts: "
+            f"rated {power} of the motor times the service factor",
         ),
         InUnit(factor, "1", title=f"service factor of the belt: {plan.service_words(trial.inertia_factor)}"),
         InUnit(belt.speed, "m/s", title="belt speed"),
         InUnit(ratio, "1", title="ratio of the belt"),
         InUnit(belt.small, "m", title="pulley of the motor, pitch diameter"),
         InUnit(belt.large, "m", title="other pulley, pitch diameter; take the nearest standard one"),
-        f"narrow V-belts {belt.section}; number and tension by their maker for {free}",
+        f"{belt.section}, narrow V-belts",
     )
 
 

@@ -196,8 +196,9 @@ class SizingPlan:
             return "of the file"
         by = "by the file" if self.load_class else f"by an inertia factor of {inertia_factor:.3g}"
         hours, starts = (f"{float(x):g}" for x in (self.demands.hours, self.demands.starts_per_hour))
+        noun = "start" if starts == "1" else "starts"
         return (
-            f"{LOAD_WORDS[self.load(inertia_factor)]} {by}, {hours} h a day, {starts} starts an hour; typical of "
+            f"{LOAD_WORDS[self.load(inertia_factor)]} {by}, {hours} h a day, {starts} {noun} an hour; typical of "
             "makers (sizing.load_class, sizing.hours, sizing.service_factor)"
         )
 

@@ -101,6 +101,14 @@ class Trial:
             return None
         return float(np.max(crank_angle(self.drive, self.steady))) % (2.0 * math.pi)
 
+    @property
+    def failed_angle(self) -> float | None:
+        """Crank angle from which the motor does not bring the machine up to speed [rad], though it does from the
+        angle 0; else None."""
+        if self._first is None:
+            return None
+        return next((start.angle for start in self.starts if start.start_time is None), None)
+
     @cached_property
     def start_class(self) -> int | None:
         """Trip class of the relay that holds in each start; None for an inverter, or without a start."""
@@ -274,6 +282,7 @@ class Trial:
             fluctuation=self.fluctuation,
             inertia_factor=self.inertia_factor,
             stall_angle=self.stall_angle,
+            failed_angle=self.failed_angle,
         )
 
     def checks(self) -> dict[str, Check]:
