@@ -24,8 +24,8 @@ from figures import least, parser, save
 from other_engines import LOADS, W
 
 from chainunit import ChainUnitMachine, batch
-from chainunit.batch.equations import outputs_of
 from chainunit.core.native.compilers import compiler
+from chainunit.core.symbolic_trace import outputs_of
 from chainunit.machines.chain_unit import ChamberForces
 
 ALL = tuple(v.name for v in outputs_of(ChamberForces))

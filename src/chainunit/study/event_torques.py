@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from .event import Role
 from .record import StudyRecord
 from .torques import DutyPeak, PeakOf, at_gear, duty_peak, on_coupling, quasi_static_peak
-from .verdict import STEADY
+from .verdict import START, STEADY
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,10 +29,13 @@ def peaks_in_events(study: StudyRecord, *roles: Role, of: PeakOf = on_coupling) 
 
 
 def gear_peaks(study: StudyRecord) -> dict[str, float]:
-    """Peak torque at the output of the gear in the start-up and in each event [N m], by the name of the run. Where
-    the supply is switched, in starts and in disturbances, it is the one by load and acceleration."""
-    events = study.config.events
-    peaks = {"start_up": quasi_static_peak(study.drive, study.runs["start_up"])}
+    """Peak torque at the output of the gear in steady running, in the start-up and in each event [N m], by the name
+    of the run. If the supply is switched, in starts and in disturbances, it is that by load and acceleration."""
+    events, rise = study.config.events, study.runs["start_up"].sel(time=slice(None, study.steady_begin))
+    peaks = {
+        STEADY: at_gear(study.drive, study.steady),
+        START: quasi_static_peak(study.drive, rise),
+    }
     for name in study.event:
         if name in study.runs:
             is_switched = events[name].from_rest or events[name].role is Role.DISTURBANCE

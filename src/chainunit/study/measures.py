@@ -92,7 +92,9 @@ def _relay(w: Window) -> float | None:
     if setting is None or w.trip is not None:
         return None
     assert w.steady is not None
-    current = w.drive.relay_current(w.run["time"].values, w.value(w.current))
+    current = w.value(w.current)
+    if w.phase is Phase.LOADED_START:
+        current = w.drive.relay_current(w.since, current)
     before, lasts = w.steady.rms(w.current), lasting_current(current)
     return relay_trip(w.since, current, setting, before, lasts, w.relay_class, TRIPS_AT)
 

@@ -8,12 +8,18 @@ by FI/(1 - ML/MH), and running takes a share of the heat that the surface gives 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..core.quantities import Value, declaration, quantity
+from ..drives.nameplate import Nameplate
 from ..reading.results import result
+from .drive import Drive
+from .readings import load_inertia
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @declaration
@@ -31,7 +37,7 @@ class StartingData:
 
 
 @result
-class Starting(StartingData):
+class PermittedStarts(StartingData):
     """The permitted starts, and the factors behind them."""
 
     inertia_factor: float = quantity("1", "factor of inertia FI")
@@ -40,17 +46,49 @@ class Starting(StartingData):
     permitted: float = quantity("1", "permitted starts an hour")
 
 
-def starting(of: StartingData, most: float = math.inf) -> Starting:
+def permitted_starts(of: StartingData, most: float = math.inf) -> PermittedStarts:
     """The permitted starts of a motor, at most so many an hour as another rule permits."""
     inertia = of.inertia / of.rotor_inertia
     torque = max(0.0, 1.0 - of.counter_torque / of.motor_torque)
     running = max(0.0, 1.0 - (of.current / of.rated_current) ** 2)
-    return Starting(
+    return PermittedStarts(
         **vars(of),
         inertia_factor=inertia,
         torque_factor=torque,
         running_factor=running,
         permitted=min(most, of.bare * torque * running / inertia),
+    )
+
+
+def starting_data(
+    drive: Drive,
+    plate: Nameplate,
+    start: xr.Dataset,
+    steady: xr.Dataset,
+    *,
+    per_hour: float,
+    bare: float,
+    current: float,
+) -> StartingData:
+    """The data of a `start` from rest until the motor has its speed, and of `steady` running after it.
+
+    Parameters
+    ----------
+    per_hour, bare : starts an hour, those that are asked for and those of the bare rotor
+    current : RMS current of running [A]
+    """
+    inertia = float(drive.fmu_parameters.rotor.J + np.mean(load_inertia(drive, steady)))
+    time, torque, speed = (start[name].values for name in ("time", "motor.air_gap_tau", "motor.w"))
+    motor, counter = start_torques(time, torque, speed, inertia)
+    return StartingData(
+        per_hour=per_hour,
+        bare=bare,
+        rotor_inertia=plate.J,
+        inertia=inertia,
+        motor_torque=motor,
+        counter_torque=counter,
+        current=current,
+        rated_current=plate.rated_current,
     )
 
 

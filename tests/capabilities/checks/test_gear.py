@@ -30,6 +30,7 @@ from chainunit.core.errors import InputError
 from chainunit.drives.gear_rating import GearRating
 from chainunit.drives.gearing import Transmission
 from chainunit.report.blocks import at
+from chainunit.study import event_torques
 from chainunit.study.bearings import driver_bearing
 from chainunit.study.config import parse
 
@@ -188,6 +189,23 @@ def done(tmp_path_factory):
     (folder / "mine.toml").write_text(STUDY, "utf-8")
     assert chainunit("study", "mine.toml", "-o", "out", cwd=folder).returncode == 0
     return folder / "out"
+
+
+def test_running_puts_its_torque_of_the_run_on_the_gear_not_that_of_the_curve(monkeypatch):
+    """The cage does not follow fast loads: in running the torque by the curve of the motor is another one."""
+    time = np.arange(6.0)
+    run = xr.Dataset({"torque": ("time", [0.0, 9.0, 2.0, 5.0, 4.0, 5.0])}, {"time": time})
+
+    def of_run(drive, run):
+        return float(run["torque"].max())
+
+    monkeypatch.setattr(event_torques, "at_gear", of_run)
+    monkeypatch.setattr(event_torques, "quasi_static_peak", lambda *given: 0.4 * of_run(*given))
+    study = SimpleNamespace(
+        drive=None, config=SimpleNamespace(events={}), event={}, runs={"start_up": run}, steady_begin=2.5,
+        steady=run.sel(time=slice(2.5, None)),
+    )  # fmt: skip
+    assert event_torques.gear_peaks(study) == {"steady": 5.0, "start_up": pytest.approx(3.6)}
 
 
 @pytest.mark.second

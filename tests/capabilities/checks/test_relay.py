@@ -17,7 +17,16 @@ from chainunit.core.errors import InputError
 from chainunit.report.blocks import at
 from chainunit.study.choice import drive_of
 from chainunit.study.config import parse
-from chainunit.study.relay import CLASSES, protecting_class, stall_trip, start_seconds
+from chainunit.study.measures import read_measure
+from chainunit.study.relay import (
+    CLASSES,
+    TRIPS_AT,
+    protecting_class,
+    relay_trip,
+    stall_trip,
+    start_seconds,
+)
+from chainunit.study.window import Phase, Window
 
 DOCS = (Path(__file__).parents[3] / "docs" / "checks.md").read_text("utf-8")
 BASE = {"setting": 20.0, "before": 16.0, "start_seconds": 1.890, "stall_current": 140.0, "stall_time": 12.0}
@@ -187,6 +196,30 @@ def test_a_relay_in_the_phases_of_a_delta_carries_the_whole_current_of_star():
     late = np.where(time > 7.0, 5.0, 0.0)
     assert np.array_equal(drive.relay_current(time, late), late)
     assert parse('[relay]\nplace = "line"').plans["checks"].relay.is_in_phases is False
+
+
+def test_the_clock_of_an_event_in_running_says_nothing_of_star():
+    """The runs of a sweep begin with their event, long after the starter changed to delta; a start begins in star."""
+    motor = '[system]\nmotor = "IE3 4-pole 4 kW, 112M"\n[starter]\nstar_delta = { time = 6 }'
+    drive = drive_of(parse(f'start = "star-delta"\n{motor}'))
+    time, name = np.linspace(0.0, 8.0, 8001), f"motor.{drive.motor.current}"
+
+    def trip(phase):
+        turning = {"machine.phi0": ("time", 9.0 * time), "machine.w0": ("time", np.full_like(time, 9.0))}
+        run, steady = (
+            xr.Dataset(
+                turning | {name: ("time", np.full_like(time, times * drive.rated_current))}, {"time": time}
+            )
+            for times in (4.0, 0.0)
+        )
+        window = Window(phase, run, drive, (), 1.0, 0.0, Window(Phase.STEADY, steady, drive, (), 1.0))
+        return read_measure("thermal_trip_time", window)
+
+    current = np.full_like(time, 4.0)
+    usual = relay_trip(time, current, 1.0, 0.0, 4.0, 10, TRIPS_AT)
+    assert trip(Phase.EVENT) == pytest.approx(usual)
+    # 6 s of star heat three times as much
+    assert trip(Phase.LOADED_START) == pytest.approx(usual - 12.0, rel=0.05)
 
 
 def test_a_relay_of_an_unknown_class_and_of_an_fmu_are_refused():

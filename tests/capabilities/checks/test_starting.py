@@ -13,11 +13,7 @@ from command import chainunit
 
 from chainunit.capabilities.checks.starting import starting_rows
 from chainunit.study.config import parse
-from chainunit.study.permitted_starts import (
-    StartingData,
-    start_torques,
-    starting,
-)
+from chainunit.study.permitted_starts import StartingData, permitted_starts, start_torques
 
 DOCS = (Path(__file__).parents[3] / "docs" / "checks.md").read_text("utf-8")
 BASE = {
@@ -27,7 +23,7 @@ BASE = {
 
 
 def row(**values):
-    (only,) = starting_rows(starting(StartingData(**BASE | values)))
+    (only,) = starting_rows(permitted_starts(StartingData(**BASE | values)))
     return only
 
 
@@ -44,7 +40,7 @@ def test_the_heat_of_the_slip_is_larger_than_that_of_the_bare_rotor_by_the_facto
     time = np.linspace(0.0, inertia * ws / (motor - counter), 20_001)
     speed = (motor - counter) / inertia * time
     heat = np.trapezoid((ws - speed) * motor, time)
-    found = starting(StartingData(**BASE | {"current": 0.0}))
+    found = permitted_starts(StartingData(**BASE | {"current": 0.0}))
     share = found.permitted / found.bare
     assert heat / (0.5 * bare * ws**2) == pytest.approx(1.0 / share, rel=1e-6)
     assert start_torques(time, np.full_like(time, motor), speed, inertia) == pytest.approx((motor, counter))
@@ -71,8 +67,9 @@ def test_the_used_share_moves_in_the_right_direction(name, sign):
 def test_another_rule_may_permit_fewer_starts():
     """Sizing and the check show one number: the least of the rule of the maker and the heat of the winding."""
     of = StartingData(**BASE)
-    assert starting(of, 164.0).permitted == 164.0 and starting(of, 390.0).permitted == starting(of).permitted
-    (row,) = starting_rows(starting(of, 164.0), is_chosen=True)
+    assert permitted_starts(of, 164.0).permitted == 164.0
+    assert permitted_starts(of, 390.0).permitted == permitted_starts(of).permitted
+    (row,) = starting_rows(permitted_starts(of, 164.0), is_chosen=True)
     assert row.limit == 164.0 and row.formula.endswith("by the heat of its winding")
 
 

@@ -501,7 +501,7 @@ def test_a_motor_in_field_weakening_stands_behind_one_at_its_rated_frequency():
     assert ranking == [large, small] and small.weakened and not large.weakened
     assert small.criterion is Criterion.FIELD and "75.0 Hz in field weakening" in small.reason
     assert "runs at 51.5 Hz, where IE3 6-pole 1.1 kW, 90L" in large.reason
-    assert any("75.0 Hz, above its rated 50.0 Hz" in note for note in inverter_needs(small, 1.5, False))
+    assert any("75.0 Hz, above its rated 50.0 Hz" in note for note in inverter_needs(small, False))
 
 
 @pytest.mark.parametrize("length, held", [(120.0, 12.0), (59.0, 0.0)])
@@ -746,7 +746,7 @@ def test_the_least_boost_with_which_it_starts_is_taken():
     assert least_boost(c, failing(0.12), False).drive.parameters.inverter.boost == 0.15
     first = least_boost(c, failing(0.3), False)
     assert first.drive.parameters.inverter.boost == 0.05 and first.checks
-    (boost, _) = inverter_needs(least_boost(c, judged(0.12), False), 1.5, False)
+    (boost, _) = inverter_needs(least_boost(c, judged(0.12), False), False)
     assert boost.startswith("The inverter needs a voltage boost of 15 % ") and "with less" in boost
     given, c = proposed("[starter.inverter]\nboost = 0.08\n[sizing]\n", start="inverter")
     is_given = trials_of(given, SimpleNamespace()).has_given_boost

@@ -21,7 +21,7 @@ from chainunit.capabilities.sizing.candidate import Criterion, Standing, TrialRe
 from chainunit.capabilities.sizing.duty import rms
 from chainunit.capabilities.sizing.motor_trials import MotorTrials
 from chainunit.capabilities.sizing.preference import rank
-from chainunit.capabilities.sizing.trial import Trial, permitted_starts, try_motor
+from chainunit.capabilities.sizing.trial import Trial, starts_by_heat, try_motor
 from chainunit.core.engines import MATH
 from chainunit.core.errors import InputError, InterruptedRunError
 from chainunit.drives.catalogue import catalogue
@@ -124,9 +124,9 @@ def test_start_up_time_by_hand(dc):
 def test_permitted_starts_by_hand():
     p = SimpleNamespace(ambient=SimpleNamespace(T=313.15), stator=SimpleNamespace(R_th=0.1))
     # 80 K over 0.1 K/W leaves 800 W; 300 W are taken; a start brings 36 kJ: 3600*500/36000
-    assert permitted_starts(p, 300.0, 36000.0, 1.0, 393.15) == pytest.approx(50.0)
+    assert starts_by_heat(p, 300.0, 36000.0, 1.0, 393.15) == pytest.approx(50.0)
     # running alone is too hot
-    assert permitted_starts(p, 900.0, 36000.0, 1.0, 393.15) == 0.0
+    assert starts_by_heat(p, 900.0, 36000.0, 1.0, 393.15) == 0.0
 
 
 def trial_of(config, time, heat):

@@ -10,7 +10,7 @@ from ...reading.results import part, result
 from ...reading.text import number
 from ...study.analysis import Analysis, Findings, Work
 from ...study.bearings import largest_load, pin_force
-from ...study.permitted_starts import Starting
+from ...study.permitted_starts import PermittedStarts
 from ...study.readings import has_turn, less_than_a_turn, machine_series, turns_made
 from ...study.record import StudyRecord
 from . import coupling, gear, plain, relay, rigid, rolling, section, starting
@@ -38,7 +38,9 @@ class CheckFindings(Findings):
     relay: RelayFindings | None = part(
         "thermal overload relay, where it is checked", optional=True, default=None
     )
-    starting: Starting | None = part("starts per hour, where they are checked", optional=True, default=None)
+    starting: PermittedStarts | None = part(
+        "starts per hour, where they are checked", optional=True, default=None
+    )
     gear: GearCheck | None = part("the gear beside its ratings", optional=True, default=None)
     motor_shaft: ShaftLoad | None = part("the shaft of the motor", optional=True, default=None)
     flexible_coupling: CouplingCheck | None = part("the flexible coupling", optional=True, default=None)

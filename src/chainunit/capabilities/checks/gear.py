@@ -26,6 +26,7 @@ from ...study.readings import crank_angle, shaft_power
 from ...study.record import StudyRecord
 from ...study.starts import StartFindings
 from ...study.torques import at_gear, gear_torque
+from ...study.verdict import START
 from ...study.window import mean
 from .row import CheckRow, NotChecked
 from .runs import largest
@@ -202,10 +203,10 @@ def find(
         return None, [NotChecked("gear", "the motor is an FMU, whose torque is not known")]
     turns = study.steady
     torque = gear_torque(drive, turns)
-    most, run = max((peak, name) for name, peak in gear_peaks(study).items())
+    most, run = max((torque, name) for name, torque in gear_peaks(study).items())
     starts = StartFindings.found_in(study)
     if starts is not None and starts.worst.quasi_static > most:
-        most, run = starts.worst.quasi_static, "start_up"
+        most, run = starts.worst.quasi_static, START
     title, radial, largest_radial = ("", None, None) if separate else bearing_force(study, turns)
     equivalent = equivalent_torque(torque, crank_angle(drive, turns), table.exponent)
     load = GearDuty(

@@ -5,10 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-import numpy as np
-
-from ...study.permitted_starts import Starting, StartingData, start_torques, starting
-from ...study.readings import load_inertia
+from ...study.permitted_starts import PermittedStarts, permitted_starts, starting_data
 from ...study.record import StudyRecord
 from ...study.verdict import STEADY
 from .row import CheckRow, NotChecked
@@ -19,7 +16,7 @@ _WHAT = "starts per hour by the rule of makers of motors"
 
 def find(
     study: StudyRecord, table: StartingTable, asked: float
-) -> tuple[Starting | None, list[CheckRow | NotChecked]]:
+) -> tuple[PermittedStarts | None, list[CheckRow | NotChecked]]:
     """The starts of a study and their check, or the reason against it; the file asks for so many starts an hour, 0
     where it does not say."""
     if study.drive.follows and study.drive.foreign is None:
@@ -29,28 +26,17 @@ def find(
         return None, [NotChecked(_WHAT, why)]
     assert study.plate is not None
     assert study.start is not None
-    plate, drive = study.plate.nameplate, study.drive
+    plate = study.plate.nameplate
     rise = study.runs["start_up"].sel(time=slice(None, study.start.start_time))
-    inertia = float(drive.fmu_parameters.rotor.J + np.mean(load_inertia(drive, study.steady)))
-    time, torque, speed = (rise[name].values for name in ("time", "motor.air_gap_tau", drive.motor_speed))
-    motor, counter = start_torques(time, torque, speed, inertia)
-    found = starting(
-        StartingData(
-            per_hour=asked,
-            bare=table.permitted or plate.starts,
-            rotor_inertia=plate.J,
-            inertia=inertia,
-            motor_torque=motor,
-            counter_torque=counter,
-            current=study.answers[STEADY].current_rms,
-            rated_current=plate.rated_current,
-        ),
+    current, bare = study.answers[STEADY].current_rms, table.permitted or plate.starts
+    found = permitted_starts(
+        starting_data(study.drive, plate, rise, study.steady, per_hour=asked, bare=bare, current=current),
         math.inf if study.proposal is None else study.proposal.permitted_starts,
     )
     return found, list(starting_rows(found, is_chosen=study.proposal is not None))
 
 
-def starting_rows(of: Starting, is_chosen: bool = False) -> Iterator[CheckRow]:
+def starting_rows(of: PermittedStarts, is_chosen: bool = False) -> Iterator[CheckRow]:
     """The row of the starts; those of a motor that `is_chosen` are limited by the criteria of the choice, too."""
     at = {name: f"checks.starting.{name}" for name in vars(of)}
     both = (

@@ -20,10 +20,9 @@ from ...machines.chain_unit import SideName
 from ...study.arrays import peak
 from ...study.drive import Drive
 from ...study.events import one_sided_event
-from ...study.limits import Check, heating, keeping_speed
-from ...study.limits import starting as start_on_line
+from ...study.limits import Check, heating, keeping_speed, starting
 from ...study.measures import time_to_start
-from ...study.permitted_starts import StartingData, start_torques, starting
+from ...study.permitted_starts import permitted_starts, starting_data
 from ...study.readings import crank_angle, load_inertia, turns_made
 from ...study.relay import start_class
 from ...study.rig import Rig
@@ -206,24 +205,20 @@ class Trial:
         # the runs are short and their winding is as cold as the surroundings; a warm winding has larger
         # losses
         running, start = (warm / cold * heat for heat in self._heat)
-        starts = permitted_starts(p, running, start, self._cooling, self._demands.temperature)
+        starts = starts_by_heat(p, running, start, self._cooling, self._demands.temperature)
         if not plate.starts or self.drive.follows or self._first is None:
             return starts
         rise = self.start.sel(time=slice(None, self._first))
-        inertia = float(p.rotor.J + np.mean(load_inertia(self.drive, self.steady)))
-        time, torque, speed = (rise[name].values for name in ("time", _GAP, "motor.w"))
-        motor, counter = start_torques(time, torque, speed, inertia)
-        of = StartingData(
+        of = starting_data(
+            self.drive,
+            plate,
+            rise,
+            self.steady,
             per_hour=self._demands.starts_per_hour,
             bare=plate.starts,
-            rotor_inertia=plate.J,
-            inertia=inertia,
-            motor_torque=motor,
-            counter_torque=counter,
             current=self._rms(f"motor.{self.drive.motor.current}"),
-            rated_current=plate.rated_current,
         )
-        return starting(of, starts).permitted
+        return permitted_starts(of, starts).permitted
 
     @property
     def _cooling(self) -> float:
@@ -347,7 +342,7 @@ def start_check(
     task: SizingTask, motor: CatalogueMotor, drive: Drive, start_time: float | None = None
 ) -> Check:
     """The time of a start [s] beside the permitted one."""
-    check = start_on_line(start_time, motor.nameplate)
+    check = starting(start_time, motor.nameplate)
     return dataclasses.replace(check, limit=1.0 + 1.2 * task.operation.run.ramp) if drive.follows else check
 
 
@@ -406,7 +401,7 @@ def try_motor(
     )
 
 
-def permitted_starts(
+def starts_by_heat(
     p: Any, running_heat: float, start_heat: float, cooling: float, temperature: float
 ) -> float:
     """Starts per hour that bring the winding to its permitted `temperature` [K], with the `running_heat` [W]
