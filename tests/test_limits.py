@@ -137,7 +137,7 @@ def test_sizing_has_the_permitted_temperature():
 @pytest.mark.slow
 def test_a_motor_that_fits_by_its_speed_keeps_it(tmp_path):
     """One limit for the choice and the verdict: behind the given gear the crank is 2.5 % too fast."""
-    text = "event = []\n[sizing]\npoles_least = 4\npoles_most = 4\ncandidates = 1\n[gear]\nratio = 51.0\n"
+    text = "event = []\n[sizing]\npoles_least = 4\npoles_most = 4\ncandidates = 1\n[gear]\nratio = 50.4\n"
     study, verdict, warnings = studied(text + "[run]\nturns = 1\n", tmp_path)
     check = study.findings["sizing"].chosen_candidate.checks["crank_speed"]
     assert 0.5 < check.utilisation < 1.0 and check.limit == SPEED_DEVIATION
