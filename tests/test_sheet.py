@@ -85,6 +85,7 @@ def test_assumptions_are_the_numbers_that_the_file_leaves_out(study, made):
 def test_values_that_were_chosen_and_those_of_a_motor_of_a_catalogue_are_no_assumptions(study):
     names = {"sizing.margin": "declared", "machine.ratio": "sizing", "motor.rotor.J": "declared"}
     names |= {"motor.ambient.T": "declared", "gear.J": "file", "starter.inverter.lag": "declared"}
+    names |= {"motor.soft_start.voltage": "declared", "starter.soft_start.voltage": "file"}
     values = tuple(b.GivenValue(name, name, Number(1.0, "1"), origin) for name, origin in names.items())
     chosen = replace(
         study, proposal=SimpleNamespace(name="sizing", insufficient="", motor=object(), duty=None, keys={})
@@ -100,7 +101,8 @@ def test_values_that_were_chosen_and_those_of_a_motor_of_a_catalogue_are_no_assu
     (others,) = (each for each in made.annex if each.name == "given")
     (left,) = others.blocks
     names = [each.name for _, values in left.sections for each in values]
-    assert names == ["machine.ratio", "motor.rotor.J", "gear.J", "starter.inverter.lag"], "each stands once"
+    # each stands once, those of a starter that is not used only if the file gives them
+    assert names == ["machine.ratio", "motor.rotor.J", "gear.J", "starter.soft_start.voltage"]
 
 
 def test_it_says_up_to_which_speed_it_holds(study, made):
