@@ -85,6 +85,7 @@ def test_assumptions_are_the_numbers_that_the_file_leaves_out(study, made):
 def test_values_that_were_chosen_and_those_of_a_motor_of_a_catalogue_are_no_assumptions(study):
     names = {"sizing.margin": "declared", "machine.ratio": "sizing", "motor.rotor.J": "declared"}
     names |= {"motor.ambient.T": "declared", "gear.J": "file", "starter.inverter.lag": "declared"}
+    names |= {"motor.soft_start.voltage": "declared", "starter.soft_start.voltage": "file"}
     values = tuple(b.GivenValue(name, name, Number(1.0, "1"), origin) for name, origin in names.items())
     chosen = replace(
         study, proposal=SimpleNamespace(name="sizing", insufficient="", motor=object(), duty=None, keys={})
@@ -100,7 +101,8 @@ def test_values_that_were_chosen_and_those_of_a_motor_of_a_catalogue_are_no_assu
     (others,) = (each for each in made.annex if each.name == "given")
     (left,) = others.blocks
     names = [each.name for _, values in left.sections for each in values]
-    assert names == ["machine.ratio", "motor.rotor.J", "gear.J", "starter.inverter.lag"], "each stands once"
+    # each stands once, those of a starter that is not used only if the file gives them
+    assert names == ["machine.ratio", "motor.rotor.J", "gear.J", "starter.soft_start.voltage"]
 
 
 def test_it_says_up_to_which_speed_it_holds(study, made):
@@ -220,11 +222,17 @@ def test_things_that_were_not_checked_for_one_reason_share_a_line(study, made):
     assert missing and all(each.what in text and text.count(each.why) == 1 for each in missing)
 
 
-MOST_PAGES = 8
+MOST_PAGES = pdf.MOST_PAGES
 
 
 def depth_of(page):
-    """The share of the height of a page down to its lowest text above the foot, or its lowest picture."""
+    """The share of the height of a page down to its lowest text above the foot; 1 for a page with a picture."""
+    # the pages share their resources, so that page.images has the pictures of all
+    return 1.0 if re.search(rb"/\S+ Do\b", page.get_contents().get_data()) else lowest_text(page)
+
+
+def lowest_text(page):
+    """The share of the height of a page down to its lowest text above the foot."""
     lowest = [1.0]
 
     def note(text, transform, lines, font, size):
@@ -233,7 +241,7 @@ def depth_of(page):
             lowest.append(y)
 
     page.extract_text(visitor_text=note)
-    return 1.0 if len(page.images) else 1.0 - min(lowest)
+    return 1.0 - min(lowest)
 
 
 def pages_of(file):
@@ -270,6 +278,22 @@ def test_the_pdf_is_two_to_four_pages_and_an_annex_and_has_eight_at_most(study, 
     first = " ".join(pages[: annex + 1])
     for words in ("Quarry 7", "Prepared", "What was not checked", "Basis and validity", "The question"):
         assert words in first
+
+
+@pytest.mark.second
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_an_annex_that_would_be_too_long_is_set_closer(study, made, tmp_path, monkeypatch):
+    try:
+        pdf.check_library()
+    except InputError as missing:
+        pytest.skip(str(missing))
+    pictures = print_figures.write(study_report.report(study).figures, tmp_path, made.units, are_small=True)
+    pictured, lengths = {each.name: each for each in pictures}, []
+    for most in (100, 1):
+        monkeypatch.setattr(pdf, "MOST_PAGES", most)
+        reader, pages = pages_of(pdf.write(made, pictured, tmp_path / pdf.NAME))
+        lengths.append(len(pages) - 1 + lowest_text(reader.pages[-1]))
+    assert lengths[1] < lengths[0] - 0.2
 
 
 EXAMPLES = Path(__file__).parents[1] / "examples"

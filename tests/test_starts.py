@@ -206,7 +206,11 @@ def test_no_start_is_permitted_where_running_alone_is_too_hot():
     candidates = [first, second]
     rank(candidates, larger=2.0)
     assert candidates[0] is second and second.reason.endswith(words) and "1000" not in second.reason
-    assert first.reason == "it does not bring the machine up to speed"
+    assert first.reason == "it does not bring the machine up to speed in the permitted 10.0 s"
+    drive.driver_noun = "crank"
+    some = Candidate(motor, drive, TrialResult({"start": lost}, failed_angle=math.pi / 4.0))
+    rank([some], larger=2.0)
+    assert "up to speed from 0 deg, but not from 45.0 deg of the crank in the permitted" in some.reason
 
 
 @pytest.mark.second

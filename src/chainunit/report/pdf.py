@@ -30,6 +30,8 @@ NAME = "sheet.pdf"
 _BEGIN = re.compile(r'(<(?:th|h3|span class="said")\b[^>]*>(?:<[^>]+>)*)([a-z])')
 """The first letter of a heading, of a row's title, and of a warning: a capital on paper. (`::first-letter` would do
 it, as on the screen, but WeasyPrint nests such a box again each time that it lays out a column or a page.)"""
+MOST_PAGES = 8
+"""Pages beyond which the annex is set closer."""
 _BARS = 2
 """Shares in a row up to which they have bars."""
 _SIGNED = ("Prepared", "Checked", "Released")
@@ -170,8 +172,12 @@ def write(sheet: Sheet, pictures: Mapping[str, Path], file: Path) -> Path:
 
     # it names every property of a screen that paper does not have
     logging.getLogger("weasyprint").setLevel(logging.ERROR)
-    document = weasyprint.HTML(string=page_text(sheet, pictures), base_url=str(file.parent))
-    document.write_pdf(file, pdf_variant="pdf/a-3u")
+    text, variant = page_text(sheet, pictures), {"pdf_variant": "pdf/a-3u"}
+    document = weasyprint.HTML(string=text, base_url=str(file.parent)).render(**variant)
+    if len(document.pages) > MOST_PAGES:
+        close = text.replace("<body>", '<body class="close">', 1)
+        document = weasyprint.HTML(string=close, base_url=str(file.parent)).render(**variant)
+    document.write_pdf(file, **variant)
     return file
 
 

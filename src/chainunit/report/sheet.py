@@ -149,9 +149,9 @@ def _is_assumed(value: b.GivenValue, study: StudyRecord) -> bool:
 
 
 def _is_used(value: b.GivenValue, study: StudyRecord) -> bool:
-    """Whether a value is not of a starter that the motor of a catalogue does without."""
+    """Whether a value is of the files, or not of a starter that the motor of a catalogue does without."""
     of, _, name = value.name.partition(".")
-    if study.plate is None or of not in ("motor", "starter"):
+    if value.origin == "file" or study.plate is None or of not in ("motor", "starter"):
         return True
     start = study.config.drive.start
     return _OF_START.get(name.partition(".")[0], start) == start

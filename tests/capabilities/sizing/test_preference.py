@@ -229,6 +229,8 @@ def test_a_belt_is_ordered_by_its_design_power_and_no_gear_with_it():
     )
     belt = ordered_belt(study, plan, TrialResult(inertia_factor=20.0))
     assert belt.service_factor.value == 1.5 and belt.design_power.value == pytest.approx(112.5e3)
+    # a long text in a narrow column ran over its neighbour
+    assert "its maker gives number and tension" in belt.design_power.title and len(belt.section) < 22
     assert belt.ratio.value == 5.4 and belt.speed.value == pytest.approx(
         0.5 * belt.small_pulley.value * motor.nameplate.speed
     )

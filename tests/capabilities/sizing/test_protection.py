@@ -308,6 +308,10 @@ def test_a_drive_whose_start_is_harder_than_its_shocks_has_no_coupling(on_line):
     words = sentence(on_line)
     assert words.startswith("No safety coupling protects this drive as it starts now: ")
     assert "held" not in words and not on_line.insufficient
+    # beside the peak of some milliseconds stands the torque that lasts
+    lasting = on_line.findings["starts"].worst.quasi_static
+    assert setting.start > 1.1 * lasting and "electromagnetic transient of that start" in words
+    assert f"and 1.25 times that is {number(1.25 * lasting, 'N.m')}." in words
     # all feed on the right is normal duty, and its torque the larger
     assert setting.running > 1.15 * max(sizing_of(on_line).duty.numbers.torque_peak, 208.0)
     ways = {each.way: each for each in sizing_of(on_line).alternatives}

@@ -11,7 +11,18 @@ from ...study.coupling import hardest_start
 from ...study.event_torques import running_peak, running_words
 from ...study.record import StudyRecord
 from ...study.sections import Coupling
-from .protection import MARGIN, Alternative, CouplingEffect, Obstacle, Setting, Way, WayNumbers, spares
+from ...study.starts import StartFindings
+from .protection import (
+    MARGIN,
+    MARKED_START,
+    Alternative,
+    CouplingEffect,
+    Obstacle,
+    Setting,
+    Way,
+    WayNumbers,
+    spares,
+)
 
 
 def _torque(value: float) -> str:
@@ -34,7 +45,7 @@ _OBSTACLES = {
     Obstacle.MOTOR: "No safety coupling protects this drive: it has to open above {above}, and the motor gives at "
     "most {motor} at the {driver}.",
     Obstacle.GEAR: "No safety coupling protects this drive: it has to open above {above}, and the gear may carry "
-    "{gear}.",
+    "{gear} in running.",
     Obstacle.OVERLOADS: "No safety coupling is recommended: it has to open above {above}, and {bound}.",
     Obstacle.RELEASE: "No safety coupling is recommended: one that opens at {setting}, opens too late. The largest "
     "torques until no torque passes it, {release} after its trip: {effects}. That saves nothing.",
@@ -47,7 +58,7 @@ _OBSTACLES = {
 _REASONS = {
     Obstacle.START: "a start puts {start} on it",
     Obstacle.MOTOR: "the motor gives {motor} at most",
-    Obstacle.GEAR: "the gear may carry {gear}",
+    Obstacle.GEAR: "the gear may carry {gear} in running",
     Obstacle.OVERLOADS: "no overload of this study would open it",
     Obstacle.RELEASE: "it opens too late",
     Obstacle.ENERGY: "the energy balance of its runs is not kept",
@@ -86,7 +97,7 @@ def coupling_sentence(study: StudyRecord, setting: Setting, alternatives: Sequen
             motor=_torque(setting.motor),
             gear=_torque(setting.gear),
             bound=_bound(setting),
-        )
+        ) + _transient(study, setting)
     shut = {name: peak for name, peak in setting.overloads.items() if name not in setting.opens}
     text = (
         f"Recommended safety coupling{caveat}: {_at_both(study, setting.least)}; this is {MARGIN:g} times the "
@@ -95,7 +106,7 @@ def coupling_sentence(study: StudyRecord, setting: Setting, alternatives: Sequen
         f"{_effects(study, setting.effects)}"
     )
     text += f"; it stays shut where {_list_of(study, shut)}." if shut else "."
-    text += _too_late(study, setting, alternatives)
+    text += _transient(study, setting) + _too_late(study, setting, alternatives)
     if setting.wrong:
         names = ", ".join(map(study.title_of, setting.wrong))
         text += f" Left out, as the energy balance is not kept: {names}."
@@ -111,6 +122,22 @@ def coupling_sentence(study: StudyRecord, setting: Setting, alternatives: Sequen
     return text
 
 
+def _transient(study: StudyRecord, setting: Setting) -> str:
+    """A sentence on the share of the electromagnetic transient in the torque of a start that decides the setting;
+    empty where it has hardly any."""
+    found = StartFindings.found_in(study)
+    if found is None or not setting.is_of_start:
+        return ""
+    lasting = found.worst.quasi_static
+    if setting.start <= MARKED_START * lasting:
+        return ""
+    bound = "" if study.drive.line else ", and is an upper bound, as the shafts are rigid"
+    return (
+        f" The electromagnetic transient of that start lasts some milliseconds{bound}; load and acceleration put "
+        f"{_torque(lasting)} on the output of the gear, and {MARGIN:g} times that is {_torque(MARGIN * lasting)}."
+    )
+
+
 def _effects(study: StudyRecord, effects: Mapping[str, CouplingEffect]) -> str:
     """A list of overloads with the effects of a coupling in them, in words."""
     return ", ".join(
@@ -123,7 +150,7 @@ def _effects(study: StudyRecord, effects: Mapping[str, CouplingEffect]) -> str:
 def _bound(setting: Setting) -> str:
     """The reason why a coupling of the least setting protects nothing, in words."""
     if setting.obstacle is Obstacle.START and setting.least >= setting.gear:
-        return f"the gear may carry {_torque(setting.gear)}"
+        return f"the gear may carry {_torque(setting.gear)} in running"
     if not setting.overloads:
         return "this study has no jam, lump or block that could open it"
     most = _torque(max(setting.overloads.values()))

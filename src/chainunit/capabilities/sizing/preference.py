@@ -223,7 +223,7 @@ def _unstarted(c: Candidate) -> str:
         late = f" in the permitted {number(start.limit, 's')}" if start else ""
         if c.trial.failed_angle is not None:
             angle = f"{number(c.trial.failed_angle, 'rad')} of the {c.drive.driver_noun}"
-            return f"it brings the machine up to speed from 0 deg, but from {angle} not{late}"
+            return f"it brings the machine up to speed from 0 deg, but not from {angle}{late}"
         return f"it does not bring the machine up to speed{late}"
     return (
         f"without a flywheel it stalls at {number(c.trial.stall_angle, 'rad')} of the {c.drive.driver_noun}"

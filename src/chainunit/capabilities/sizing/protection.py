@@ -11,7 +11,7 @@ from ...core.quantities import Value, declaration, quantity, variables
 
 MARGIN = 1.25
 """Ratio of the setting of a safety coupling to the largest torque of normal duty."""
-_MARKED = 1.1
+MARKED_START = 1.1
 """Ratio of the torque of a start to that of running from which on the start decides the setting."""
 _ALIKE = 1.01
 """The same, up to which the torque is that of running: a start ends in running."""
@@ -114,7 +114,7 @@ class Setting:
     @property
     def start_decides(self) -> bool:
         """Whether a start puts markedly more on the coupling than running does."""
-        return self.start > _MARKED * self.running
+        return self.start > MARKED_START * self.running
 
     def opened_by(self, setting: float) -> dict[str, float]:
         """The overloads in which a coupling of that setting opens, with their peaks."""
