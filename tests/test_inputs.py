@@ -10,10 +10,12 @@ import json
 import os
 import re
 import socket
+import time
 import zipfile
 
 import numpy as np
 import pytest
+from command import chainunit as command_line
 
 import chainunit
 from chainunit.capabilities.handover.cycle import load_cycle, read_cycle
@@ -23,7 +25,7 @@ from chainunit.capabilities.vouching.keys import private_key, public_key
 from chainunit.capabilities.vouching.verify import verify
 from chainunit.capabilities.watch import watch
 from chainunit.core import inputs
-from chainunit.core.errors import InputError
+from chainunit.core.errors import Faults, InputError
 from chainunit.drives.catalogue import offer
 from chainunit.drives.catalogue_rows import MOST_FAULTS, MOST_ROWS
 from chainunit.machines.linkages.file import description_of, read_linkage
@@ -285,3 +287,34 @@ def test_an_archive_of_the_size_that_is_read_is_as_it_was():
         for name, data in content.items():
             made.writestr(name, data)
     assert archive.contents(out.getvalue()).members == content
+
+
+@pytest.mark.parametrize(
+    ("command", "text"),
+    [
+        ("study", "[machine]\n" + "".join(f"key_{k} = {k}\n" for k in range(100_000))),
+        ("study", "".join(f"[key_{k}]\n" for k in range(100_000))),
+        ("linkage", "".join(f"[loads.x{k}]\n" for k in range(20_000))),
+    ],
+    ids=["keys", "tables", "loads"],
+)
+def test_a_file_of_very_many_keys_is_refused_at_once(tmp_path, command, text):
+    """The words on each unknown key took a millisecond, and their collection the square of their number."""
+    (tmp_path / "many.toml").write_text(text)
+    begin = time.monotonic()
+    run = command_line(command, "many.toml", "-o", "out", cwd=tmp_path)
+    assert (run.returncode, run.stderr.splitlines()) == (
+        2, ["chainunit: many.toml: has more than 5000 keys, the most that are read"],
+    )  # fmt: skip
+    assert time.monotonic() - begin < 30.0
+
+
+def test_faults_are_collected_in_a_time_that_grows_with_their_number():
+    faults, begin = Faults(), time.process_time()
+    for _ in range(20_000):
+        with faults.collected():
+            raise InputError("wrong")
+    again = faults.errors[7]
+    with faults.collected():
+        raise again
+    assert len(faults.errors) == 20_000 and time.process_time() - begin < 2.0

@@ -90,6 +90,7 @@ class Faults:
 
     def __init__(self) -> None:
         self.errors: list[InputError] = []
+        self._places: set[int] = set()
 
     @contextmanager
     def collected(self) -> Iterator[None]:
@@ -97,11 +98,13 @@ class Faults:
         try:
             yield
         except InputError as error:
-            self.errors += [fault for fault in error.faults if fault not in self.errors]
+            self.add(fault for fault in error.faults if id(fault) not in self._places)
 
     def add(self, errors: Iterable[InputError]) -> None:
         """Add some errors."""
-        self.errors += errors
+        for error in errors:
+            self.errors.append(error)
+            self._places.add(id(error))
 
     def refuse(self) -> None:
         """Raise the refusals, if there are any.

@@ -341,7 +341,7 @@ def _toml_rows(
     brackets = [f"[[{kind.name}]]" for kind in kinds]
     each_is = f"each thing is a table {' or '.join(brackets)}"
     with in_file(file, lambda: toml_lines.lines_of(text)):
-        data = toml(text)
+        data = toml(text, 20 * MOST_ROWS)
         wrong, known = Faults(), {kind.name for kind in kinds}
         if not data:
             wrong.add([InputError(f"is empty; {each_is}")])

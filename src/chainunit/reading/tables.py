@@ -391,13 +391,17 @@ def packaged(name: str) -> str:
     return (resources.files("chainunit") / "data" / name).read_text("utf-8")
 
 
-def toml(text: str) -> dict[str, Any]:
+MOST_KEYS = 5000
+"""Most keys of a file, those of its tables among them."""
+
+
+def toml(text: str, most: int = MOST_KEYS) -> dict[str, Any]:
     """The tables in a TOML text.
 
     Raises
     ------
     InputError
-        where the text is no TOML, each fault with its line, and for `text_faults`.
+        where the text is no TOML, each fault with its line, has more than so many keys, and for `text_faults`.
     """
     try:
         data = tomllib.loads(text)
@@ -407,6 +411,8 @@ def toml(text: str) -> dict[str, Any]:
         raise InputError(TOO_DEEP) from error
     if nested_deeply(data):
         raise InputError(TOO_DEEP)
+    if _keys_in(data) > most:
+        raise InputError(f"has more than {most} keys, the most that are read")
     if faults := text_faults(data):
         raise InputError.joined(faults)
     return data
@@ -457,6 +463,12 @@ def nested_deeply(data: Any) -> bool:
         inner = (each.values() if isinstance(each, Mapping) else each for each in level)
         level = [x for each in inner for x in each if isinstance(x, Mapping | list | tuple)]
     return bool(level)
+
+
+def _keys_in(data: Any) -> int:
+    if isinstance(data, Mapping):
+        return len(data) + sum(map(_keys_in, data.values()))
+    return sum(map(_keys_in, data)) if isinstance(data, list) else 0
 
 
 def read(file: Path | None, example: Callable[[], str], parse: Callable[[str, str], T]) -> T:

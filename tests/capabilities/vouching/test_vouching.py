@@ -33,7 +33,8 @@ from chainunit.capabilities.vouching import (
 )
 from chainunit.capabilities.vouching.domain import domain
 from chainunit.capabilities.vouching.integrity import integrity
-from chainunit.capabilities.vouching.verify import FAILS, OPEN, _difference, conclusion, verify
+from chainunit.capabilities.vouching.judgement import _difference
+from chainunit.capabilities.vouching.verify import FAILS, HOLDS, OPEN, conclusion, verify
 from chainunit.core.errors import WriteError
 from chainunit.fmu.backends import export
 from chainunit.fmu.native.export import export as native
@@ -122,7 +123,7 @@ def test_a_certified_fmu_holds(made):
         )
     ]  # fmt: skip
     assert lines[-1] == "it.fmu: holds"
-    assert "by the expected key" in lines[0] and "29 members" in lines[1]
+    assert "by the expected key" in lines[0] and "30 members" in lines[1]
 
 
 NEEDED = {"cryptography", "fmpy", "numpy", "pydantic", "pythonfmu", "rich", "scipy", "typer"}
@@ -416,6 +417,24 @@ def test_a_member_under_another_order_of_the_directory_is_found(data):
         opened.comment = b"signed by me"
     (words,) = failing(stream.getvalue())
     assert words.startswith("the end of the archive is changed")
+
+
+@pytest.mark.second
+def test_a_file_that_is_bad_from_its_bytes_on_is_judged_without_the_models(made, tmp_path, data):
+    """So in some tenths of a second: neither the models nor the reader of FMUs is imported."""
+    (tmp_path / "cut.fmu").write_bytes(data[:5000])
+    (tmp_path / "plain.fmu").write_bytes((made / "plain.fmu").read_bytes())
+    (tmp_path / "bit.fmu").write_bytes(data[:700] + bytes([data[700] ^ 1]) + data[701:])
+    words = (
+        "import sys\nfrom chainunit.app.cli import app\ntry:\n    app(sys.argv[1:], standalone_mode=False)\n"
+    )
+    code = f"{words}finally:\n    print('loaded', *sys.modules)"
+    for name in ("cut.fmu", "bit.fmu", "plain.fmu"):
+        arguments = ["verify", str(tmp_path / name), "--key", str(made / "chainunit.key.pub")]
+        run = subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True)
+        assert "does not hold" in run.stdout
+        loaded = set(run.stdout.splitlines()[-1].split())
+        assert not loaded & {"scipy", "casadi", "fmpy", "chainunit.models"}
 
 
 def test_an_unsigned_file_no_archive_and_no_file(made, tmp_path):
@@ -745,9 +764,9 @@ FORGERIES = {
         evidence(energy__missing=1e9, energy__flow=1e12), "says something else",
     ),
     "a gap of the powers": (evidence(points__power_gap=1.0), "points.power_gap = 1.0: must be a number"),
-    "no evidence": (lost(documents.EVIDENCE), "evidence.json: cannot be read (is missing)"),
+    "no evidence": (lost(documents.EVIDENCE), "evidence.json: is missing"),
     "evidence without end": (
-        lambda members: {**members, documents.EVIDENCE: b"[" * 100_000}, "evidence.json: cannot be read",
+        lambda members: {**members, documents.EVIDENCE: b"[" * 100_000}, "evidence.json: is no JSON (it is nested",
     ),
     "no smooth experiment": (evidence(convergence=None), "convergence: is missing"),
     "no points": (evidence(points=None), "points: is missing"),
@@ -1143,6 +1162,23 @@ def test_every_model_is_certified_and_holds(native_fmus, own, tmp_path, name, fm
 
 
 @pytest.mark.second
+def test_an_fmu_with_flat_names_is_certified_as_any_other(own, tmp_path):
+    """Its names in tables are those of the FMU; points and limits are there, and a changed start value is found."""
+    export(ChamberForces, tmp_path / "plain.fmu", {"left.material_mass": 45.0}, names="flat")
+    whole = certify.certified(certify.members_of(tmp_path / "plain.fmu"), "it.fmu", own, None, silent).data
+    members = archive.contents(whole).members
+    head = members[certify.SMOOTH_IN].splitlines()[0]
+    assert b"left_material_mass" in head and b"left." not in head
+    found = checked(tmp_path, whole)
+    if "sources/model.c" in members:
+        assert conclusion(list(found.values())) == (HOLDS, "holds")
+    assert found["equations"].holds and "at 12 states" in found["equations"].words
+    assert "41 variables and 4 limits" in found["domain"].words
+    heavier = text(b'start="45.0"', b'start="46.0"')(members)
+    assert conclusion(list(checked(tmp_path, signed(heavier, own)).values()))[0] == FAILS
+
+
+@pytest.mark.second
 def test_a_python_fmu_is_certified_and_holds(fmus, own, tmp_path):
     made = certify.certified(certify.members_of(fmus["DcMotor"]), "DcMotor.fmu", own, None, silent)
     (tmp_path / "DcMotor.fmu").write_bytes(made.data)
@@ -1238,7 +1274,7 @@ def test_a_chain_has_no_limits_of_two_bars(tmp_path):
     export(model, tmp_path / "it.fmu")
     members = certify.members_of(tmp_path / "it.fmu")
     with rerun.unpacked(members, "it.fmu") as fmu:
-        found = domain(fmu, certify.interface_for(fmu), [], [])
+        found = domain(fmu, certify.with_interface(fmu)[1], [], [])
     assert [each["name"] for each in found["limits"]] == ["chain_resonance"]
 
 
@@ -1279,7 +1315,7 @@ def test_the_step_of_a_driveline_has_its_order(native_fmus):
     for name, low, high in (("CardanDriveline", 2.7, 3.3), ("ChainUnitFlexible", 1.7, 2.4)):
         members = certify.members_of(native_fmus[name, 2][0])
         with rerun.unpacked(members, name) as fmu:
-            interface = certify.interface_for(fmu)
+            interface = certify.with_interface(fmu)[1]
             given = experiments.smooth_inputs(interface)
             outputs = [s.name for s in interface.signals_of("output")]
             found, run = experiments.convergence(fmu, given, outputs)

@@ -17,6 +17,7 @@ from ...fmu.description import Interface, Signal, generation_time
 from ...fmu.pack import interface_of
 from ...fmu.recipe import recipes
 from ...fmu.reference import RELATED
+from ...fmu.script import Names, name_in_fmu
 from ...machines.flexible import with_rods
 from ...models import MODELS
 from . import documents as docs
@@ -24,7 +25,7 @@ from . import experiments as ex
 from .archive import LOCAL, contents, unsafe
 from .domain import domain
 from .manifest import MANIFEST, OWN, SIGNATURE, json_bytes, sha3, signed
-from .rerun import TimeTable, UnpackedFmu, table_bytes, unpacked
+from .rerun import TimeTable, UnpackedFmu, unpacked
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
@@ -154,9 +155,9 @@ def certified(
 def _certified_fmu(
     members: dict[str, bytes], name: str, key: Ed25519PrivateKey, model: type[Model] | None, told: Told
 ) -> Certified:
-    with unpacked(members, name) as fmu:
-        _require_own(fmu, name)
-        interface = interface_for(fmu, model)
+    with unpacked(members, name) as read:
+        _require_own(read, name)
+        fmu, interface = with_interface(read, model)
         if interface is None and (model or fmu.name in MODELS):
             remedy = "name another file by --of" if model else "export it anew"
             raise InputError(
@@ -165,10 +166,9 @@ def _certified_fmu(
         found = evidence(fmu, interface, told)
         given = [t for t in (found.tables and found.tables[0], found.given) if t]
         limits = domain(fmu, interface, found.points, given)
-        types = {v.name: v.type for v in fmu.variables.values()}
         if found.given is not None and found.results is not None:
-            members[SMOOTH_IN] = table_bytes(found.given, types)
-            members[SMOOTH_OUT] = table_bytes(found.results, types)
+            members[SMOOTH_IN] = fmu.table_bytes(found.given)
+            members[SMOOTH_OUT] = fmu.table_bytes(found.results)
         if found.tables:
             members[docs.EXPERIMENTS] = docs.experiments(
                 fmu.name, found.tolerance, smooth=found.given is not None
@@ -253,21 +253,26 @@ def _require_own(fmu: UnpackedFmu, name: str) -> None:
         )
 
 
-def interface_for(fmu: UnpackedFmu, model: type[Model] | None = None) -> Interface | None:
-    """The interface of the FMU's model with its start values; None for a model that this package does not know, and
-    where the variables are not those of the model."""
-    start = fmu.start("parameter") | fmu.start("input")
+def with_interface(
+    fmu: UnpackedFmu, model: type[Model] | None = None
+) -> tuple[UnpackedFmu, Interface | None]:
+    """The FMU with the names of its model, and the interface of that with its start values; None for a model
+    that this package does not know, and where the variables are not those of the model."""
+    names: Names = "flat" if fmu.description.variableNamingConvention == "flat" else "structured"
     own = model or MODELS.get(fmu.name)
     if fmu.name == "ChainUnitFlexible" and model is None:
-        rods = sum(name.startswith("left.theta_") for name in fmu.variables)
-        own = with_rods(rods, start)
+        rods = sum(name.startswith(name_in_fmu("left.theta_", names)) for name in fmu.variables)
+        own = with_rods(rods, fmu.start("parameter"))
     if own is None:
-        return None
+        return fmu, None
+    if names == "flat":
+        of_model = [signal.name for signal in Interface(own, {}).signals]
+        fmu = fmu.with_names({name: name_in_fmu(name, names) for name in of_model})
     try:
-        interface = interface_of(own, start)
+        interface = interface_of(own, fmu.start("parameter") | fmu.start("input"))
     except (KeyError, InputError):
-        return None
-    return interface if all(_is_in(fmu, s) for s in interface.signals) else None
+        return fmu, None
+    return fmu, interface if all(_is_in(fmu, s) for s in interface.signals) else None
 
 
 def _is_in(fmu: UnpackedFmu, signal: Signal) -> bool:

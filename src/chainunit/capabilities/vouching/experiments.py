@@ -25,7 +25,7 @@ from ...fmu.description import Interface
 from ...fmu.reference import INPUTS, READ, REFERENCE, ROWS, STEPPED, excitation
 from ...fmu.reference import STEP as REFERENCE_STEP
 from ...fmu.reference import reference_tables as equation_tables
-from .rerun import TimeTable, UnpackedFmu, deviation, sizes, slave, stepped, table
+from .rerun import TimeTable, UnpackedFmu, deviation, sizes, slave, stepped
 
 STEP, END = 0.004, 1.0
 """Largest step and end of the smooth experiment [s]."""
@@ -106,7 +106,7 @@ def reference_tables(fmu: UnpackedFmu) -> tuple[TimeTable, TimeTable, TimeTable]
     found = []
     for name, text in zip(files, texts, strict=True):
         try:
-            own = table(text or b"")
+            own = fmu.table(text or b"")
         except InputError as error:
             raise InputError(f"{name}: {error}") from error
         if unknown := [each for each in own.names if each not in fmu.variables]:

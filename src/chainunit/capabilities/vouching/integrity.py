@@ -12,6 +12,8 @@ from . import archive
 from .keys import fingerprint
 from .manifest import MANIFEST, OWN, SIGNATURE, Manifest, SignedMember, check_signature, parsed, sha3
 
+NOT_RUN = "experiments"
+"""Topic of the line on experiments that are not run."""
 _MOST_NAMED = 12
 """Largest number of members that are named one by one."""
 
@@ -41,6 +43,13 @@ class Integrity:
     def holds(self) -> bool:
         """Whether nothing is wrong."""
         return all(each.holds is not False for each in self.findings)
+
+    def trusted_manifest(self) -> Manifest | None:
+        """The manifest of a file that is as signed; of another one a line is added, that its experiments are not
+        run."""
+        if self.manifest is not None and not self.holds:
+            self.add(None, NOT_RUN, "are not run: a file that is not as signed is not loaded")
+        return self.manifest if self.holds else None
 
     def add(self, holds: bool | None, topic: str, words: str, left_open: str = "") -> None:
         """Add a finding."""

@@ -10,7 +10,7 @@ import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -52,13 +52,15 @@ class FmuVariable(NamedTuple):
 
 @dataclass(frozen=True)
 class UnpackedFmu:
-    """An FMU in a folder: its description by fmpy, and its variables by name."""
+    """An FMU in a folder: its description by fmpy, and its variables by the names of its model."""
 
     folder: Path
     description: Any
     variables: Mapping[str, FmuVariable]
     instead: Callable[..., Any] | None = None
     """what is called in place of fmpy's class, with the same arguments, where the FMU's own library is not used"""
+    names: Mapping[str, str] = field(default_factory=dict)
+    """by names of the model, those in the FMU, where they may differ"""
 
     @property
     def fmi(self) -> int:
@@ -75,6 +77,12 @@ class UnpackedFmu:
         """The name of the model."""
         return str(self.description.modelName)
 
+    def with_names(self, names: Mapping[str, str]) -> UnpackedFmu:
+        """The FMU with the names of its model for its variables; `names` has by them those in the FMU."""
+        of_model = {name: model for model, name in names.items()}
+        variables = [v._replace(name=of_model.get(v.name, v.name)) for v in self.variables.values()]
+        return replace(self, variables={v.name: v for v in variables}, names=names)
+
     def of(self, causality: str) -> list[FmuVariable]:
         """The variables of a causality, in declared order."""
         return [v for v in self.variables.values() if v.causality == causality]
@@ -87,6 +95,18 @@ class UnpackedFmu:
         """The content of a member; None where there is none."""
         place = self.folder / path
         return place.read_bytes() if place.is_file() else None
+
+    def table(self, content: bytes) -> TimeTable:
+        """A table in CSV of the FMU, with the names of the model; see `table`."""
+        of_model = {name: model for model, name in self.names.items()}
+        found = table(content)
+        return found._replace(names=tuple(of_model.get(name, name) for name in found.names))
+
+    def table_bytes(self, of: TimeTable) -> bytes:
+        """A table in CSV, with the names in the FMU."""
+        names = [self.names.get(name, name) for name in of.names]
+        types = {new: self.variables[name].type for new, name in zip(names, of.names, strict=True)}
+        return csv_bytes(["time", *names], np.column_stack([of.time, of.values]), types)
 
 
 @contextmanager
@@ -312,11 +332,6 @@ def table(content: bytes) -> TimeTable:
     except (ValueError, csv.Error) as error:
         raise InputError(f"is no table in CSV ({printable(str(error))})") from error
     return TimeTable(tuple(head[1:]), values[:, 0], values[:, 1:])
-
-
-def table_bytes(of: TimeTable, types: Mapping[str, Type]) -> bytes:
-    """The table in CSV."""
-    return csv_bytes(["time", *of.names], np.column_stack([of.time, of.values]), types)
 
 
 def stepped(
