@@ -117,7 +117,7 @@ def ordered_belt(study: StudyRecord, plan: SizingPlan, trial: TrialResult) -> Or
         ratio = split[0]
     factor = plan.belt_factor(trial.inertia_factor, study.config.drive.start)
     belt = belt_drive(plate.power, trial.speed or plate.speed, ratio, factor)
-    power, free = (number(x, "W") for x in (plate.power, belt.design_power))
+    power, design = (number(x, "W") for x in (plate.power, belt.design_power))
     return OrderedBelt(
         InUnit(
             belt.design_power,
@@ -129,7 +129,7 @@ def ordered_belt(study: StudyRecord, plan: SizingPlan, trial: TrialResult) -> Or
         InUnit(ratio, "1", title="ratio of the belt"),
         InUnit(belt.small, "m", title="pulley of the motor, pitch diameter"),
         InUnit(belt.large, "m", title="other pulley, pitch diameter; take the nearest standard one"),
-        f"narrow V-belts {belt.section}; number and tension by their maker for {free}",
+        f"narrow V-belts {belt.section}; number and tension by their maker for {design}",
     )
 
 

@@ -1,5 +1,5 @@
 """Verification: the bytes of a certified file, its evidence by the equations of the package here, and its experiments
-again on this machine. The limits are those of the package here; a file can only state stricter ones."""
+again on this machine. The package here sets the limits; a file can only state stricter ones."""
 
 from __future__ import annotations
 
@@ -95,7 +95,10 @@ def _judge(found: Integrity, name: str, model: type[Model] | None, unrun: str, t
     try:
         stated = json_value(members.get(docs.EVIDENCE), docs.EVIDENCE)
         if stated["sources"] != certify.sources_hash():
-            words = "the sources of chainunit here are not those that certified the file, though the version may be"
+            words = (
+                "the sources of chainunit here differ from the ones that certified the file, even if the version is the "
+                "same"
+            )
             found.add(None, "sources", words)
         if kind == "ssp":
             _system(found, stated, name, unrun, told)
