@@ -95,10 +95,7 @@ def _judge(found: Integrity, name: str, model: type[Model] | None, unrun: str, t
     try:
         stated = json_value(members.get(docs.EVIDENCE), docs.EVIDENCE)
         if stated["sources"] != certify.sources_hash():
-            words = (
-                "the sources of chainunit here differ from the ones that certified the file, even if the version is the "
-                "same"
-            )
+            words = "the sources of chainunit here did not certify the file, even if the version is the same"
             found.add(None, "sources", words)
         if kind == "ssp":
             _system(found, stated, name, unrun, told)
