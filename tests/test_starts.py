@@ -146,6 +146,14 @@ def test_a_start_with_the_limit_of_an_inverter_of_the_rated_current(tmp_path):
     assert limited[0].start_time > starts[0].start_time
 
 
+def test_the_heat_of_a_relay_is_bounded_with_the_current_of_star():
+    """6 A for 2 s direct on line; in a starter that changes to delta after 3 s up to sqrt(3) 6 A in the windings."""
+    starts = (StartNumbers(**NONE | {"start_time": 2.0, "current": 6.0}),)
+    found = StartFindings(starts, 1.0, math.inf, "steady")
+    assert found.start_seconds(1.0, 0.0) == pytest.approx(2.0 * (6.0 / 7.2) ** 2)
+    assert found.start_seconds(1.0, 3.0) == pytest.approx(3.0 * 3.0 * (6.0 / 7.2) ** 2)
+
+
 def test_the_inverter_is_ordered_by_all_starts_and_events():
     """By hand: a start from another angle takes 3.95 times the rated 6 A, the worst run of the study 2.3 times: 3.95
     x 6 A/1.5 = 15.8 A; the runs of the choice alone said 6 A."""

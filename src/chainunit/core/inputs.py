@@ -61,7 +61,7 @@ ARCHIVE_ERRORS = (
 
 
 def regular(file: Path) -> Path:
-    """A file that is one: no folder, and nothing for which a reader would wait, or that has no end.
+    """A file that is a regular one: no folder, and nothing that makes a reader wait or has no end.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def regular(file: Path) -> Path:
     except (OSError, ValueError) as error:
         raise InputError(f"{file}: cannot be read ({getattr(error, 'strerror', None) or error})") from error
     if not stat.S_ISREG(mode):
-        kind = next((words for is_kind, words in _KINDS if is_kind(mode)), "no regular file")
+        kind = next((kind for is_of, kind in _KINDS if is_of(mode)), "no regular file")
         raise InputError(f"{file}: cannot be read (is {kind}); name a file")
     return file
 
@@ -99,7 +99,7 @@ def file_bytes(file: Path, most: int = TEXT) -> bytes:
 
 
 class TooLargeError(InputError):
-    """A file, or what is packed in it, is larger than what is read."""
+    """A file or its unpacked content is larger than the limit."""
 
 
 def _too_large(place: str, most: int, of: str = "") -> InputError:
@@ -109,7 +109,7 @@ def _too_large(place: str, most: int, of: str = "") -> InputError:
 
 
 def regular_bytes(file: Path, most: int = TEXT) -> bytes | None:
-    """The content of a file; None where there is none that `file_bytes` reads."""
+    """The content of a file; None if `file_bytes` refuses it."""
     try:
         return file_bytes(file, most)
     except InputError:
@@ -203,7 +203,7 @@ def cells_of(file: Path | str, lines: Iterable[str], mark: str) -> list[list[str
 
 
 def json_of(data: bytes, name: str, kind: str = "JSON") -> Any:
-    """What the content of a file in JSON says; `kind` is what it must be, in words.
+    """The data in the content of a file in JSON; `kind` names in words the kind of file that it must be.
 
     Raises
     ------
@@ -284,7 +284,7 @@ def check_archive(source: Path | bytes, name: str, most: int = UNPACKED, kind: s
 
 
 def refuse_large_archive(data: bytes, name: str) -> None:
-    """Refuse an archive as `check_archive` does, but for its size alone: what is damaged, a caller tells by itself.
+    """Refuse an archive as `check_archive` does, but for its size alone: the caller reports damage.
 
     Raises
     ------

@@ -1,6 +1,6 @@
 """V-belts as they are ordered: by the design power, with the belt speed and the pulleys.
 
-The sections of narrow V-belts are those of the chart of DIN 7753-2, by the design torque on the small pulley; its
+The sections of narrow V-belts follow the chart of DIN 7753-2, by the design torque on the small pulley. Its
 diameter is usual for motors, 27 mm (T/Nm)^(1/3), and a preferred number of ISO 3. The number of belts and their
 tension are the maker's.
 """

@@ -82,9 +82,9 @@ def gear_unit(kind: str, ratio: float, is_given: bool = False) -> GearUnit | Non
     last = UNITS[kind][-1]
     unit = next(usual, last if is_given and ratio <= last.made else None)
     if unit is None and kind == "belt" and (split := belt_before_gear(ratio)) is not None:
-        belt, gear, behind = split
-        title = f"V-belt of {belt:.3g} before a {behind.title} of {gear:g}"
-        return GearUnit(title, ratio, ratio, last.efficiency * behind.efficiency, "belt and gear")
+        belt, gear, second = split
+        title = f"V-belt of {belt:.3g} before a {second.title} of {gear:g}"
+        return GearUnit(title, ratio, ratio, last.efficiency * second.efficiency, "belt and gear")
     return unit
 
 

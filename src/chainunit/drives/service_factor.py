@@ -1,9 +1,9 @@
 """Service factors: how many times the rated torque of its motor a gear is ordered for, and how many times its rated
 power a belt, by the class of the load, the hours of running a day and the starts an hour.
 
-No standard defines the service factor fB of gears. The numbers are of the size of those that makers of geared motors
-publish (class II, 16 h a day, 300 starts an hour: 1.5), and belong to none of them; these makers take the class of a
-load from its inertia factor: the inertia of the machine over that of the motor, both at the motor's shaft. The
+No standard defines the service factor fB of gears. Makers of geared motors publish factors of this size (class II,
+16 h a day, 300 starts an hour: 1.5), but the numbers belong to none of them. These makers take the class of a load
+from its inertia factor: the inertia of the machine over that of the motor, both at the motor's shaft. The
 factors of V-belts are c2 of DIN 7753-2.
 """
 

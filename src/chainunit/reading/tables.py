@@ -187,7 +187,7 @@ class UnusualValue:
 
 
 def slips_of(unusual: Iterable[UnusualValue]) -> tuple[UnusualValue, ...]:
-    """Those of the unusual values whose unit is likely mistaken, as the file does not state it."""
+    """The unusual values whose unit is likely mistaken, as the file does not state it."""
     return tuple(value for value in unusual if not value.with_unit)
 
 

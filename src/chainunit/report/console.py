@@ -158,7 +158,7 @@ def study_file(file: Path | None) -> Any:
 
 
 def show_slips(unusual: Iterable[UnusualValue]) -> None:
-    """Show those of the unusual values of a file whose unit is likely mistaken."""
+    """Show the unusual values of a file whose unit is likely mistaken."""
     from ..reading.tables import slips_of
 
     for value in slips_of(unusual):

@@ -115,7 +115,7 @@ def _assumed(given: dict[str, b.Section], study: StudyRecord) -> Iterator[b.Bloc
         if isinstance(block, b.Given):
             yield _kept(block, study, are_assumed=True)
     if study.plate is not None:
-        words = 'Values of the motor, and those that were chosen: section "Other given values" of the annex.'
+        words = 'Values of the motor and chosen values: section "Other given values" of the annex.'
         yield b.Text(words, "note", "long")
 
 

@@ -38,7 +38,7 @@ class StartingData:
 
 @result
 class PermittedStarts(StartingData):
-    """The permitted starts, and the factors behind them."""
+    """The permitted starts and their factors."""
 
     inertia_factor: float = quantity("1", "factor of inertia FI")
     torque_factor: float = quantity("1", "factor of the counter torque, KM")
@@ -74,7 +74,7 @@ def starting_data(
 
     Parameters
     ----------
-    per_hour, bare : starts an hour, those that are asked for and those of the bare rotor
+    per_hour, bare : starts an hour that are asked for, and permitted starts an hour of the bare rotor
     current : RMS current of running [A]
     """
     inertia = float(drive.fmu_parameters.rotor.J + np.mean(load_inertia(drive, steady)))

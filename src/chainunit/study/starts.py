@@ -59,13 +59,16 @@ class StartFindings(Findings):
 
     def start_seconds(self, setting: float, switched_until: float) -> float:
         """An upper bound of the time [s] for which `MULTIPLE` times the `setting` [A] of a relay heats it as much as
-        the hardest start does, which ends after the motor is `switched_until` its last connection [s]; infinite where
-        a start does not reach its speed."""
+        the hardest start does, which ends after the motor is `switched_until` its last connection [s]; infinite if a
+        start does not reach its speed. In star the whole current of the line is in the windings, see
+        `Drive.relay_current`."""
+        windings = math.sqrt(3.0) if switched_until else 1.0
         return max(
             math.inf
-            if each.start_time is None
-            else max(each.start_time, switched_until) * (each.current / (MULTIPLE * setting)) ** 2
-            for each in self.starts
+            if start.start_time is None
+            else max(start.start_time, switched_until)
+            * (windings * start.current / (MULTIPLE * setting)) ** 2
+            for start in self.starts
         )
 
     @property

@@ -41,7 +41,8 @@ class CoSimulation(FmuSimulation):
         for (instance, handle, at), (_, _, between) in zip(points, middles, strict=True):
             run_on = [name in self._run_on(instance.name) for name in handle.names]
             between[:, run_on] = at[:-1, run_on]
-            moves_over = [any(run_on) or moves for moves in moves_over]
+            if any(run_on):
+                moves_over = [True] * len(moves_over)
         for k, after in enumerate(times[1:].tolist()):
             if moves_inside[k]:
                 _apply(middles, k)

@@ -40,6 +40,7 @@ from chainunit.study.events import one_sided_event
 from chainunit.study.limits import Check
 from chainunit.study.measures import time_to_start
 from chainunit.study.rig import Rig
+from chainunit.study.verdict import SETTLING
 from chainunit.system import CompiledSimulation, CoSimulation, Profile, System
 
 ANGLE = np.linspace(0.0, 2.0 * math.pi, 7200, endpoint=False)
@@ -130,13 +131,15 @@ def test_permitted_starts_by_hand():
 
 
 def trial_of(config, time, heat):
-    """A trial whose start heats the winding so much [W]; loaded it takes 400 W."""
+    """A trial whose start, of 0.5 s, heats the winding so much [W]; loaded it takes 400 W."""
     start, steady = (
         xr.Dataset({"motor.heat": ("time", x)}, {"time": t})
         for t, x in ((time, heat), (time[-1] + np.linspace(0.0, 4.0, 401), np.full(401, 400.0)))
     )
     drive = Drive(DcMotor, DcMotor.Parameters(), config.machine)
-    return Trial(task_of(config), catalogue()[0], drive, None, start, steady, (), {})
+    trial = Trial(task_of(config), catalogue()[0], drive, None, start, steady, (), {})
+    vars(trial)["_first"] = 0.5
+    return trial
 
 
 @pytest.mark.parametrize("window", [3.0, 9.0])
@@ -391,7 +394,7 @@ def test_poles_that_no_motor_has_are_refused(tmp_path):
 
 
 def test_ratios_with_which_no_motor_keeps_the_speed_are_refused_before_any_run(tmp_path):
-    """All motors were simulated with 5 and 7, where about 50 is needed; an inverter takes any ratio."""
+    """All motors were simulated with 5 and 7, where about 49 is needed; an inverter takes any ratio."""
     slow = f"{HEAVY}ratios = [5, 7]\n"
 
     def report(*said):
@@ -399,7 +402,7 @@ def test_ratios_with_which_no_motor_keeps_the_speed_are_refused_before_any_run(t
 
     with pytest.raises(InputError, match=r"sizing\.ratios = \[\]: must have at least one value"):
         parse(f"{HEAVY}ratios = []\n")
-    with pytest.raises(InputError, match=r"about 50 \(4 poles\) is needed, the nearest on offer is 7;"):
+    with pytest.raises(InputError, match=r"about 49 \(4 poles\) is needed, the nearest on offer is 7;"):
         sized_by(parse(slow), tmp_path, report)
     for more in ('start = "inverter"\n' + slow, slow + "[gear]\nratio = 62\n", slow.replace("7]", "52]")):
         with pytest.raises(AssertionError, match="the machine at constant speed"):
@@ -440,8 +443,9 @@ def test_a_long_soft_start_is_waited_for(tmp_path):
     c, *weak = sized_by(config, tmp_path).candidates
     assert c.verdict is Standing.CHOSEN and c.worst_start
     assert c.checks["start"].value is not None and c.checks["crank_speed"].utilisation < 1.0
-    # from the worst angle the smaller ones take longer, or do not start at all
-    assert all(each.power < c.power and each.worst_start for each in weak)
+    # from the worst angle the smaller ones take longer, or do not start at all; the smallest stall from the first
+    assert all(each.power < c.power for each in weak)
+    assert all(each.worst_start or each.trial.stall_angle is not None for each in weak)
 
 
 def test_ctrl_c_ends_sizing(tmp_path, monkeypatch):
@@ -503,7 +507,7 @@ def test_above_the_corner_an_inverter_has_less_torque(tmp_path, monkeypatch):
     assert lighter.sizes["peak_torque"] > 0.9
 
 
-def test_the_peak_torque_is_that_of_the_feed_that_moves_too(tmp_path, monkeypatch):
+def test_the_peak_torque_is_that_of_the_feed_that_moves_too(tmp_path):
     """A motor that breaks down while the feed moves to one side stalls there."""
     config = one_candidate("", fluctuation=0.9)
     duty = duty_by(config, tmp_path)
@@ -516,6 +520,23 @@ def test_the_peak_torque_is_that_of_the_feed_that_moves_too(tmp_path, monkeypatc
     harder = dataclasses.replace(trial, shifts=(("all feed on the left", moved),))
     assert harder.checks()["peak_torque"].value == pytest.approx(most)
     assert harder.checks()["rms_torque"].value == trial.checks()["rms_torque"].value
+
+
+def test_a_start_that_ends_while_the_motor_settles_is_read_over_all_of_it(tmp_path):
+    """The same runs, cut in the middle of the start: time, class and heat of it stay."""
+    config = one_candidate("", fluctuation=0.9)
+    duty = duty_by(config, tmp_path)
+    c = trials_of(config, duty).candidate(small(1)[0])
+    trial = try_motor(task_of(config), c.motor, c.drive, duty, None)
+    middle = 0.5 * trial.start_time
+    early, late = (trial.start.sel(time=part) for part in (slice(None, middle), slice(middle, None)))
+    end = late.sel(time=slice(None, trial.start_time))
+    cut = dataclasses.replace(trial, start=early, shifts=((SETTLING, late), *trial.shifts))
+    assert cut.start_time == trial.start_time and cut.start_class == trial.start_class
+    # beside the heat of the rest of the first run
+    gap = np.trapezoid(late["motor.heat"], late["time"]) - np.trapezoid(end["motor.heat"], end["time"])
+    rest = float(late["time"][-1] - end["time"][-1]) * cut._heat[0]
+    assert cut._heat[1] == pytest.approx(trial._heat[1] - (gap - rest), rel=1e-3)
 
 
 def test_the_shift_of_the_feed_keeps_its_mass():

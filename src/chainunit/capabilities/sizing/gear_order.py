@@ -19,7 +19,7 @@ from .protection import Setting
 @dataclass(frozen=True)
 class GearLoad:
     """The largest torque on the output of the gear in one kind of duty [N m], its case in `words`, how many times
-    its rated torque a gear may carry in it, and the `rule` behind that in words, to follow the case."""
+    its rated torque a gear may carry in it, and the `rule` for that in words, to follow the case."""
 
     torque: float
     words: str

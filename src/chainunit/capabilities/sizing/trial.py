@@ -25,7 +25,7 @@ from ...study.measures import time_to_start
 from ...study.permitted_starts import permitted_starts, starting_data
 from ...study.readings import crank_angle, load_inertia, turns_made
 from ...study.relay import start_class
-from ...study.rig import Rig
+from ...study.rig import Rig, join
 from ...study.start_runs import (
     OVERLOADED,
     StartNumbers,
@@ -81,15 +81,20 @@ class Trial:
         return None if others is None else max(self._first, others)
 
     @cached_property
+    def _from_rest(self) -> xr.Dataset:
+        """The run from rest to the end of steady running: a start may end while the motor settles."""
+        settling = [run for name, run in self.shifts if name == SETTLING]
+        return join([self.start, *settling, self.steady])
+
+    @cached_property
     def _first(self) -> float | None:
         """Time of the start from the angle 0 [s]; None where it fails."""
-        runs = (self.start, self.steady)
-        speed, time = (np.concatenate([run[name].values for run in runs]) for name in ("motor.w", "time"))
         requested = self.task.operation.crank_speed * self.drive.ratio
         if self.speed <= CREEPS * requested or speeds_up(
             Rig(self.task.operation, self.drive, None), self.steady
         ):
             return None
+        time, speed = (self._from_rest[name].values for name in ("time", "motor.w"))
         return time_to_start(time, speed, self.speed, requested)
 
     @cached_property
@@ -113,12 +118,10 @@ class Trial:
         """Trip class of the relay that holds in each start; None for an inverter, or without a start."""
         if self._first is None or self.start_time is None or self.drive.follows:
             return None
-        runs = (self.start, self.steady)
-        names = ("time", f"motor.{self.drive.motor.current}")
-        time, current = (np.concatenate([run[name].values for run in runs]) for name in names)
-        starting = time <= max(self._first, self.drive.switched_until)
+        rise = self._from_rest.sel(time=slice(None, max(self._first, self.drive.switched_until)))
+        time, current = (rise[name].values for name in ("time", f"motor.{self.drive.motor.current}"))
         current = self.drive.relay_current(time, current)
-        first = start_class(time[starting], current[starting], self.motor.nameplate.rated_current)
+        first = start_class(time, current, self.motor.nameplate.rated_current)
         return max(first, *(start.start_class for start in self.starts), 0)
 
     @cached_property
@@ -208,7 +211,7 @@ class Trial:
         starts = starts_by_heat(p, running, start, self._cooling, self._demands.temperature)
         if not plate.starts or self.drive.follows or self._first is None:
             return starts
-        rise = self.start.sel(time=slice(None, self._first))
+        rise = self._from_rest.sel(time=slice(None, self._first))
         of = starting_data(
             self.drive,
             plate,
@@ -234,10 +237,12 @@ class Trial:
         """Heat of the duty [W], and the additional heat of the worst start [J] beyond that of the running which
         follows it: of the duty or, for a machine that starts empty, of a turn without feed."""
         steady = after = sum(share * float(np.mean(run["motor.heat"])) for share, run in self._cases)
-        time, heat = self.start["time"].values, self.start["motor.heat"].values
+        end = float(self.start["time"][-1])
         if self.task.operation.empty_start:
-            after = float(np.mean(heat[time >= time[-1] - self.task.operation.turn]))
-        extra = [float(np.trapezoid(heat - after, time))]
+            empty = self.start.sel(time=slice(end - self.task.operation.turn, None))
+            after = float(np.mean(empty["motor.heat"]))
+        rise = self._from_rest.sel(time=slice(None, max(end, self._first or 0.0)))
+        extra = [float(np.trapezoid(rise["motor.heat"].values - after, rise["time"].values))]
         extra += [start.heat - after * start.followed for start in self.starts]
         return steady, max(0.0, *extra)
 

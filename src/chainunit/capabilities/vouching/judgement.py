@@ -41,7 +41,7 @@ def judge(
     try:
         stated = json_value(members.get(docs.EVIDENCE), docs.EVIDENCE)
         if stated["sources"] != certify.sources_hash():
-            words = "the sources of chainunit here are not those that certified the file, though the version may be"
+            words = "the sources of chainunit here did not certify the file, even if the version is the same"
             found.add(None, "sources", words)
         with np.errstate(all="ignore"):  # numbers from outside, and those of other code
             if kind == "ssp":

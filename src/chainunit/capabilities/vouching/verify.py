@@ -1,5 +1,5 @@
 """Verification: the bytes of a certified file, its evidence by the equations of the package here, and its experiments
-again on this machine. The limits are those of the package here; a file can only state stricter ones."""
+again on this machine. The package here sets the limits; a file can only state stricter ones."""
 
 from __future__ import annotations
 

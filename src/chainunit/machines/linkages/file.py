@@ -341,7 +341,7 @@ class _LinkageReader(LoadReader):
             ends = []
             for each in ("on", "by"):
                 with self.at(f"{key}.{each}"):
-                    ends.append(self.end(f"{key}.{each}", given.get(each)))
+                    ends.append(self.end(given.get(each)))
             if len(ends) < 2:
                 continue
             if ends[0][0] == ends[1][0]:

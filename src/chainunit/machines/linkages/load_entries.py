@@ -231,7 +231,7 @@ class LoadReader(EntryReader):
             }
         for each in ("on", "by") if kind == "spring" else ("on",):
             with self.at(f"{key}.{each}"):
-                load[each] = self.end(f"{key}.{each}", table.get(each))
+                load[each] = self.end(table.get(each))
                 if kind != "spring" and load[each][0] == GROUND:
                     raise InputError("acts on the ground; give a point of a link")
         if kind == "spring":
@@ -259,7 +259,7 @@ class LoadReader(EntryReader):
         way = {"phi": "m", "w": "m/s"} if "joint" in self.table("driver") else {}
         return {**motion, **way, **self.table_units}
 
-    def end(self, key: str, given: Any) -> list[str]:
+    def end(self, given: Any) -> list[str]:
         """A point of a link, as "link.point" or a list of two."""
         if given is None:
             raise InputError('is missing; must be a link and its point, such as "rod.A"')
