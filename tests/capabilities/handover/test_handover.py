@@ -15,7 +15,7 @@ from command import chainunit
 from chainunit import InputError
 from chainunit.capabilities.handover.cycle import SECTION, read_cycle
 from chainunit.capabilities.handover.page import HandoverQuestion, hand_over, save
-from chainunit.capabilities.handover.shell import LONGEST, environment
+from chainunit.capabilities.handover.shell import LONGEST, _element, environment
 from chainunit.capabilities.handover.template import ROOT, elements
 
 pytestmark = pytest.mark.second
@@ -475,3 +475,11 @@ def test_the_columns_are_named_in_the_shell(folder):
     assert [path.rsplit("/", 1)[1] for path in metadata[1:6]] == [
         head.split(" ")[0] for head in heads.split(";")
     ]
+
+
+@pytest.mark.parametrize("kind", ["MultiLanguageProperty", "Property"])
+def test_a_text_that_is_empty_is_an_element_without_a_value(kind):
+    """As a result without its motor has it: the metamodel has no empty text, and its reader stopped there."""
+    template = next(each for each in elements().values() if each.type == kind)
+    assert "value" not in _element(template, "Name", "", "")
+    assert _element(template, "Name", "", "") == _element(template, "Name", None, "")

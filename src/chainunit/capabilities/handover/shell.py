@@ -114,7 +114,7 @@ def _element(template: TemplateElement, name: str, value: Any, folder: str) -> d
         return head | own | ({"entityType": "CoManagedEntity"} if template.type == "Entity" else {})
     if template.type == "Property":
         return head | {"valueType": template.value_type} | _value(template, value)
-    if value is None:
+    if value is None or value == "":
         return head
     if template.type == "MultiLanguageProperty":
         return head | {"value": _english(value)}
@@ -135,7 +135,7 @@ def _english(text: str) -> list[dict[str, str]]:
 def _value(template: TemplateElement, value: Any) -> dict[str, Any]:
     """The value of a property. Where the template has a whole number, the number itself stands in an extension, and
     the whole number only where it is near enough."""
-    if value is None:
+    if value is None or value == "":
         return {}
     if template.value_type not in _WHOLE:
         return {"value": str(value)}
