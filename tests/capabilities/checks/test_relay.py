@@ -165,7 +165,7 @@ def test_the_numbers_of_a_study_follow_from_its_run(done):
     found = result["checks"]["relay"]
     plate = 750.0 / (0.825 * 0.75 * math.sqrt(3.0) * 400.0)
     assert found["setting"]["value"] == pytest.approx(plate, rel=1e-9)
-    assert found["stall_current"]["value"] == pytest.approx(5.4 * plate, rel=1e-9)
+    assert found["stall_current"]["value"] == pytest.approx(6.0 * plate, rel=1e-9)
     assert found["trip_class"] == "20" and found["suitable"] == ["5", "10A", "10"]
     start = result["start_up"]["start_time"]["value"]
     with xr.open_dataset(done / "result.nc", group="start_up") as run:
