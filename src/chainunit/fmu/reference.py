@@ -187,7 +187,8 @@ def _tables(
             x = march(t, new, x)
         u = list(new)
         for place, rate, half in model.extrapolations(new):
-            u[place] += STEP * (rate + STEP * half)
+            moved = u[place] + STEP * (rate + STEP * half)
+            u[place] = model.input_layout.variables[place].quantity.within_bounds(moved)
     heads = {kind: ["time", *(s.name for s in interface.signals_of(kind))] for kind in ("input", "output")}
     return {end: (heads["input" if end == INPUTS else "output"], rows) for end, rows in tables.items()}
 
