@@ -249,7 +249,6 @@ def test_the_usual_speed_is_that_of_the_machine():
             '[motor]\nkind = "DC"',
             'the kind of the motor stands in [system]: motor = "DcMotor", "InductionMotor"',
         ),
-        ('[sizing]\nfrequency = "60 Hz"', 'a catalogue of your own, catalogue = "FILE.csv"'),
         ('[sizing]\nvoltage = "480 V"', 'a catalogue of your own, catalogue = "FILE.csv"'),
         ('[run]\ncrank_speed = "-30 rpm"', 'positive = "clockwise" in [driver] of its file'),
     ],
