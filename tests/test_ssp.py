@@ -34,7 +34,7 @@ from chainunit.system import CoSimulation, System, fmu_component, shaft_joints, 
 pytestmark = pytest.mark.second
 
 MINE = """
-title = "Mine, with \\u0001 and <marks>"
+title = "Mine, with <marks>"
 [run]
 crank_speed = 2.4
 [feed]
