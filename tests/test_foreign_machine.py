@@ -291,7 +291,7 @@ def test_a_study_file_with_our_motor(folder):
 SIZED = (
     STUDY.replace(f"ratio = {RATIO}\n", "")
     + MACHINE
-    + "[sizing]\ncandidates = 1\ninertia_ratio = 1000\nratio_series = 'exact'\n"
+    + "[sizing]\ncandidates = 1\nfluctuation = 0.05\ninertia_ratio = 1000\nratio_series = 'exact'\n"
 )
 
 
