@@ -44,7 +44,9 @@ def test_a_motor_is_picked(result):
     assert choice["verdict"] == "chosen" and f"Motor: {choice['motor']}" in message
     assert all(check["utilisation"]["value"] <= 1.0 for check in choice["checks"].values())
     rejected = [c for c in sizing["candidates"] if c["verdict"] == "rejected"]
-    assert rejected and all(c["motor"] in message and c["reason"] for c in rejected)
+    # the terminal names the first six candidates, the page all
+    assert rejected and all(c["reason"] for c in rejected)
+    assert all(c["motor"] in message for c in sizing["candidates"][:6])
     assert numbers["motor"]["kind"] == "InductionMotor"
     # the study goes on with it, at the speed that was asked
     steady = numbers["answers"]["steady"]

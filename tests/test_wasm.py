@@ -186,30 +186,22 @@ def read(results, count):
     return [np.array(arrays[k::4]).T.reshape(-1, count) for k in range(4)]
 
 
-SHORT_LINE = r"(left|right)[.](web|wall)[.](w|a)"
+SHORT_LINE = r"(left|right)[.](web|wall)[.](angle|w|a)"
 """Outputs of a chain that divide by the length of a line, which is nearly 0 in a few random states."""
 
 
-def compare(got, want, names, units, most=1e-12):
-    """Each row within so much of its largest number, one that divides by a short line within ten times of it; one
-    that is 0 but for rounding, of the largest of its unit."""
+def compare(got, want, names, units, most=1e-12, short=1e-11):
+    """Each row within so much of its largest number, one that divides by a short line within `short` of it; one that
+    is 0 but for rounding, of the largest of its unit."""
     size = np.max(np.abs(want), axis=1, initial=0.0)
     of_unit = {unit: max(x for x, own in zip(size, units, strict=True) if own == unit) for unit in units}
     for k, unit in enumerate(units):
         if size[k] < 1e-12 * of_unit[unit]:
             size[k] = of_unit[unit]
     off = np.max(np.abs(got - want), axis=1, initial=0.0) / np.where(size > 0.0, size, 1.0)
-    limits = [10.0 * most if re.fullmatch(SHORT_LINE, name) else most for name in names]
+    limits = [short if re.fullmatch(SHORT_LINE, name) else most for name in names]
     worst = {name: x for name, x, limit in zip(names, off, limits, strict=True) if not x <= limit}
     assert not worst, worst
-
-
-def are_usual(names, values):
-    """The points in which no line is so short that it multiplies the rounding of all that is divided by it."""
-    sizes = np.abs(values[[k for k, name in enumerate(names) if re.fullmatch(SHORT_LINE, name)]])
-    usual = np.all(sizes <= 30.0 * np.median(sizes, axis=1, keepdims=True), axis=0)
-    assert np.mean(usual) > 0.5
-    return usual
 
 
 def check_points(name, count, engine):
@@ -220,16 +212,14 @@ def check_points(name, count, engine):
     want = points.by_numpy()
     names, states = ((d[kind]["names"], d[kind]["units"]) for kind in ("outputs", "states"))
     assert np.isfinite(want[0]).all()
-    is_chain = name.startswith("ChainUnitFlexible")
-    usual = are_usual(names[0], want[0]) if is_chain else np.full(count, True)
-    compare(outputs[:, usual], want[0][:, usual], *names)
-    compare(rates[:, usual], want[1][:, usual], *states)
+    compare(outputs, want[0], *names)
+    compare(rates, want[1], *states)
     want = points.slopes(du, dx)
     without = [k for g in d["without_slopes"] for k in d["groups"][g]]
     assert not np.any(slopes[without])
     want[without] = 0.0
-    compare(slopes[:, usual], want[: len(slopes), usual], *names)
-    compare(rate_slopes[:, usual], want[len(slopes) :, usual], *states)
+    compare(slopes, want[: len(slopes)], *names, short=1e-7)
+    compare(rate_slopes, want[len(slopes) :], *states)
 
 
 @engines
