@@ -380,9 +380,10 @@ def test_a_long_start_is_awaited(tmp_path):
 @pytest.mark.second
 @pytest.mark.parametrize("name", ["chain-unit", "knife", "inverter", "jam_with_driveline.toml"])
 def test_every_overload_has_the_peaks_of_the_co_simulation(name, tmp_path):
-    """The page integrates one system; a study couples FMUs, with an error of its step."""
+    """The page integrates one system; a study couples FMUs, with an error of its step, which is halved here: at 1 ms
+    the peak of the current in a dip is 2e-3 off."""
     config = study_of(name)
-    study = run_study(config, tmp_path)
+    study = run_study(replace(config, run=replace(config.run, step=0.5 * config.run.step)), tmp_path)
     live, _ = live_of(config, tmp_path)
     names = [each["name"] for each in live.data["runs"]["events"]]
     found = in_node(live, f"{OUTCOME} return {names}.map((name) => outcome({{}}, name));")
