@@ -28,7 +28,7 @@ candidates = 1
 [gear]
 efficiency = 0.95
 [run]
-settle_turns = 2
+settle_turns = 8
 turns = 1
 [monte_carlo]
 runs = 2
