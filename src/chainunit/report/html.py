@@ -67,7 +67,7 @@ def render(report: b.Report) -> str:
     title = report.title or report.kind
     figures = _figures(report)
     animation = next((block for block in report.blocks("long") if isinstance(block, motion.Animation)), None)
-    result = json.dumps(report.result, allow_nan=False, ensure_ascii=False)
+    result = json.dumps(report.result, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
     data = {
         "figures": packed(figures),
         "pictures": packed(animation and motion.pictures(animation, report.units)),
