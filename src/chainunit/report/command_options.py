@@ -20,4 +20,5 @@ BackendOption = Annotated[
     Backend | None,
     typer.Option("--backend", help="FMUs in native code or in Python; native where a C compiler is found."),
 ]
+PicturesOption = Annotated[bool, typer.Option("--png", help="Also write the figures of the page as PNG files.")]
 OutputFolder = Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")]
