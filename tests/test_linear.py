@@ -161,7 +161,9 @@ def _speed_loop(p, inertia):
     s = control.tf("s")
     current = p.current_control.kp + p.current_control.ki / s
     current = control.feedback(control.minreal(current / (p.armature.L * s + p.armature.R), verbose=False), 1)
-    torque = control.minreal((p.speed_control.kp + p.speed_control.ki / s) * current * p.armature.k, verbose=False)
+    torque = control.minreal(
+        (p.speed_control.kp + p.speed_control.ki / s) * current * p.armature.k, verbose=False
+    )
     by_load = control.minreal(control.feedback(-1.0 / (inertia * s), -torque), verbose=False)
     return control.minreal(torque / (inertia * s), verbose=False), by_load
 

@@ -19,7 +19,7 @@ import typer.core
 from ..capabilities import modules
 from ..core.errors import InputError, InterruptedRunError, RunError, printable
 from ..core.files import full, written
-from ..report.command_options import BackendOption, OutputFolder
+from ..report.command_options import AllOption, BackendOption, OutputFolder, PicturesOption
 from ..report.console import carry_out, exit_status, show_slips, study_file, terminal_console
 from ..work import interrupts
 from .catalogue_command import catalogue
@@ -107,10 +107,12 @@ def study(
         Example | None,
         typer.Option("--example", help="Print a packaged study file, as a start for your own, and stop."),
     ] = None,
+    whole: AllOption = False,
+    png: PicturesOption = False,
 ) -> None:
     """Run a machine with its motor: start-up, steady running, overloads.
 
-    Writes report.html, result.json, result.md, result.nc, plots and the FMUs into the output folder.
+    Writes report.html, result.json, result.md, result.nc and the FMUs into the output folder.
     """
     from ..study import parts
 
@@ -125,7 +127,16 @@ def study(
     from ..report.study_task import SHEET_TASK, TASK
 
     task = SHEET_TASK if pdf else TASK
-    carry_out(task, question, output, check=check, backend=backend and backend.value, scheduler=scheduler)
+    carry_out(
+        task,
+        question,
+        output,
+        whole=whole,
+        png=png,
+        check=check,
+        backend=backend and backend.value,
+        scheduler=scheduler,
+    )
 
 
 for module in modules("command"):
@@ -174,7 +185,7 @@ def reproduce(
     """
     from ..papers.output import TASK
 
-    carry_out(TASK, None, output)
+    carry_out(TASK, None, output, png=True)
 
 
 @app.command("two-bar-error")
@@ -187,7 +198,7 @@ def two_bar_error(
     """
     from ..papers.two_bar import TASK
 
-    carry_out(TASK, None, output)
+    carry_out(TASK, None, output, png=True)
 
 
 @app.command("linkage")
@@ -198,6 +209,8 @@ def linkage_command(
         str | None,
         typer.Option("--speed", help='Speed of the driver with its unit; "60 rpm" by default, or "0.1 m/s".'),
     ] = None,
+    whole: AllOption = False,
+    png: PicturesOption = False,
 ) -> None:
     """Show a linkage: its groups, drawing, motion, torque, inertia and reactions over a turn, or over its range.
 
@@ -211,7 +224,8 @@ def linkage_command(
     model, unusual = linkage_in(file)
     show_slips(unusual)
     machine = Machine(model)
-    carry_out(TASK, LinkageQuestion(machine, speed_of_driver(machine, speed), str(file), unusual), output)
+    question = LinkageQuestion(machine, speed_of_driver(machine, speed), str(file), unusual)
+    carry_out(TASK, question, output, whole=whole, png=png)
 
 
 @app.command()

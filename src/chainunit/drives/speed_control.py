@@ -107,7 +107,9 @@ def loop(motor: Any, inertia: float) -> Loop:
     plant = inertia * np.polymul([1.0, 0.0, 0.0], closed)
     squares = [np.polymul(gain, gain * (-1.0) ** np.arange(gain.size)[::-1]) for gain in (rise, plant)]
     crossings = np.roots(np.polysub(*squares)[::2])  # in -w^2, as a gain times its mirror is even
-    crossings = np.sqrt([-root.real for root in crossings if root.real < 0.0 and abs(root.imag) < 1e-9 * abs(root)])
+    crossings = np.sqrt(
+        [-root.real for root in crossings if root.real < 0.0 and abs(root.imag) < 1e-9 * abs(root)]
+    )
 
     def answer(w: Any) -> Any:
         return np.polyval(rise, 1j * w) / np.polyval(plant, 1j * w)

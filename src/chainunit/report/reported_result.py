@@ -70,8 +70,8 @@ class ReportedResult(Generic[Question, Outcome]):
         return files.numbers_text(self._shown)
 
     def save(self, folder: str | Path, png: bool = False) -> list[Path]:
-        """Write the files of the command of the same name with ``-o``, and with `png` the figures as pictures; returns
-        the files.
+        """Write the files of the command of the same name with ``-o``, and with `png` the figures as pictures;
+        returns the files.
 
         Raises
         ------

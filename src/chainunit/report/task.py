@@ -125,4 +125,6 @@ class Task(Generic[Question, Outcome]):
     ) -> tuple[list[Path], WriteError | None]:
         """Write all files, figures as PNG with `png`. Returns the files, and the first error of a file that could not
         be written, or None."""
-        return write_all(self.writers(outcome, report, folder, files.writers(report, folder, self._stem, png)))
+        return write_all(
+            self.writers(outcome, report, folder, files.writers(report, folder, self._stem, png))
+        )

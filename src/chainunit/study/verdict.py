@@ -64,12 +64,12 @@ _FINER = "{finer}"
 TOPICS: Mapping[str, Topic] = {
     "pushed": Topic(
         "bars are in compression, where a chain goes slack: rocker torque and organ forces are no predictions",
-        "Bars in compression, where a chain goes slack and snatches",
+        "Bars in compression, where a chain goes slack",
         _FINER,
     ),
     "end pushed": Topic(
         "bar ends are in compression, where a chain sags",
-        "Bar ends in compression: a chain sags there, which changes the force in that pin and hardly the torques",
+        "Bar ends in compression, where a chain sags (force in that pin, hardly the torques)",
     ),
     "slack speed": Topic(
         "the crank turns faster than the speed at which a web goes slack",
@@ -96,9 +96,8 @@ TOPICS: Mapping[str, Topic] = {
 """By kind of fault, its words."""
 _UP_TO = {
     "slack speed": "A web goes slack from a crank speed of {} on",
-    "crank torque": "The crank torque of two bars is good to 10 % only up to a crank speed of {}, the rocker torque "
-    "less far",
-    "rocker torque": "The rocker torque of two bars is good to 10 % only up to a crank speed of {}",
+    "crank torque": "Crank torque of two bars: 10 % up to a crank speed of {}, rocker torque less far",
+    "rocker torque": "Rocker torque of two bars: 10 % up to a crank speed of {}",
 }
 """By kind of fault at a crank speed: the line that names its limit."""
 
