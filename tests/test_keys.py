@@ -11,6 +11,7 @@ import pytest
 import typer.main
 from command import chainunit
 
+from chainunit.app.cli import app
 from chainunit.core.errors import InputError
 from chainunit.core.quantities import Layout
 from chainunit.drives.dc_motor import DcMotor
