@@ -187,7 +187,7 @@ def read(results, count):
 
 
 SHORT_LINE = r"(left|right)[.](web|wall)[.](angle|w|a)"
-"""Outputs of a chain that divide by the length of a line, which is nearly 0 in a few random states. There their slopes
+"""Outputs of a chain that divide by the length of a line, which is nearly 0 in a few random states. There slopes
 change ten times as much by the last bit of the angles as by the rounding of the formula (against 50 digits)."""
 
 
