@@ -395,7 +395,7 @@ def _settles(point: RunPoint, run: xr.Dataset) -> bool:
     turn on once it is past it."""
     drive = point.rig.drive
     has_turns = has_turn(drive, run) or drive.simulated_machine.model.never_repeats
-    return has_turns and is_settled(drive, _turns(point, run))
+    return bool(has_turns) and is_settled(drive, _turns(point, run))
 
 
 class EventSimulation:
