@@ -379,7 +379,8 @@ def _before_flywheel(study: StudyRecord, rig: Rig, setting: Setting) -> Alternat
         return None
     events = _loaded_starts(study)
     longest = longest_start(rig.operation.ramp_end, study.start.start_time)
-    starts = starts_from_all(rig, longest, events, on_motor_side)
+    before = rig.drive.added_inertia + rig.drive.gear_inertia
+    starts = starts_from_all(rig, longest, events, on_motor_side, before)
     if any(start.start_time is None for start in starts):
         return None
     running, shocks = _runs(study, dataclasses.replace(rig, fed_from=None), on_motor_side)

@@ -72,7 +72,8 @@ def spares(effects: Mapping[str, CouplingEffect], gear: float = math.inf) -> boo
 class Setting:
     """A safety coupling between motor and gear, judged by the torques in a study; all at the crank [N m].
 
-    A coupling has to carry `running` and every `start`: the setting is `MARGIN` times the larger of the two. It has
+    A coupling has to carry `running` and every `start` by load and acceleration: the setting is `MARGIN` times the
+    larger of the two. It has
     to be below the limit of the `gear`, and below the peak of at least one of the `overloads` (peaks by name), the
     shocks that a coupling is for. Otherwise `obstacle` says why there is no setting. The largest torque of the
     `motor` in steady running may be less than the setting, as rotor and flywheel also give torque in a shock; then a

@@ -174,7 +174,9 @@ class DriveProtection:
     why_none: str = part("a few words on it")
     normal_torque: float = quantity("N.m", "largest torque of normal duty on the coupling, at the {driver}")
     running_torque: float = quantity("N.m", "largest torque of running on the coupling")
-    start_torque: float = quantity("N.m", "largest torque of a start on the coupling")
+    start_torque: float = quantity(
+        "N.m", "largest torque of a start on the coupling by load and acceleration"
+    )
     breakdown_torque: float = quantity("N.m", "most that the motor gives at the {driver}")
     effects: Mapping[str, Mapping[str, InUnit]] = part("peak at the output of the gear, by overload")
     overloads: Mapping[str, InUnit] = part("peak of each overload on the coupling")

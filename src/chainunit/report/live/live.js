@@ -487,7 +487,6 @@
       const mean = steady ? steady.reduce((a, b) => a + b, 0) / steady.length : w;
       if (found.refused) [text, mark] = [found.refused, "partly"];
       else if (found.opened) [text, mark] = ["The safety coupling opens before the event: in the start, or in steady running.", "bad"];
-      else if (!event?.from_rest && mean < 0.01 * w) [text, mark] = ["The motor stalls in the start: the machine stands.", "bad"];
       else if (!found.run) [text, mark] = ["The motor does not come to steady running with this load: it stalls, falls far behind, or turns ever slower or faster.", "bad"];
       else if (found.run.tripped !== undefined) [text, mark] = [`The safety coupling opens ${model.digits(found.run.tripped)} s after the begin.`, "partly"];
       else if (found.measures.stall_time !== null) [text, mark] = [`The motor stalls ${model.digits(found.measures.stall_time)} s after the begin.`, "bad"];
