@@ -44,8 +44,7 @@ def conclude(study: StudyRecord) -> None:
     if any(value for name, value in study.drive.machine.by_name.items() if name.endswith("friction")):
         note(
             "smoothed friction",
-            "Friction is smoothed: at rest nothing sticks, so that the torque to break away from a loaded stop is "
-            "not in the start-up.",
+            "Static friction is not modelled; breakaway torque from a loaded stop is not included.",
         )
     for value in config.file.unusual:
         if value.with_unit:
