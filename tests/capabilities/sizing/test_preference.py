@@ -779,9 +779,9 @@ def test_a_motor_that_fails_from_the_worst_angle_makes_room_for_the_next(monkeyp
 
 
 def searched(monkeypatch, bare, wheeled, *, angles=math.inf, more=""):
-    """The candidates of a search, and the motors that were tried with flywheels, in a machine that runs evenly enough
-    with a motor of the power `bare`, and with a flywheel from `wheeled` on [W]. From the worst angle only motors above
-    the power `angles` do not start."""
+    """The candidates of a search, and the motors that were tried with flywheels, in a machine that runs evenly
+    enough with a motor of the power `bare`, and with a flywheel from `wheeled` on [W]. From the worst angle only
+    motors above the power `angles` do not start."""
     motors, tried = [m for m in catalogue() if m.nameplate.frequency == 50.0], []
 
     def checked(c, least, worst_start=False):
