@@ -28,6 +28,7 @@ from chainunit.drives.nameplate import TYPICAL, Assumptions, Nameplate, check, i
 from chainunit.study.config import parse
 from chainunit.study.study_file import changed_tables
 
+EXAMPLES = Path(__file__).parents[1] / "examples"
 MOTORS = catalogue()
 FIFTY, SIXTY = ([m for m in MOTORS if m.nameplate.frequency == f] for f in (50.0, 60.0))
 STATES = InductionMotor.state_layout
