@@ -282,7 +282,7 @@ def test_other_supply_and_assumptions():
 
 
 def test_what_small_motors_lose_in_iron_shows_as_a_residual():
-    """Their stator cannot make up for iron losses and still have the breakdown torque: the fit leaves that to the
+    """Their stator cannot make up for iron losses and still have the pull-out torque: the fit leaves that to the
     efficiency, and says so."""
     small = plate(
         power=750.0,
@@ -638,7 +638,7 @@ def test_the_command_writes_templates_and_checks_files(tmp_path):
         "flexible_couplings.csv",
         "gears.csv",
         "motors.csv",
-        "safety_couplings.csv",
+        "torque_limiters.csv",
     ]
     names = [str(file) for file in files]
     right = chainunit("catalogue", *names, cwd=tmp_path)

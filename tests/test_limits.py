@@ -66,7 +66,7 @@ def test_a_motor_that_burns_in_steady_running_is_no_good(tmp_path):
     assert warnings["no reserve"].quantities["over"][0] == -steady.torque_reserve > 0.1
     # steady running comes in each turn, a dip for a moment: one sentence, of the verdict as of the warning
     for when, where in (("in each turn", warnings["no reserve"].text), ("for a moment", verdict.text)):
-        assert re.search(rf"overloaded {when}: .* above its breakdown torque", where)
+        assert re.search(rf"overloaded {when}: .* above its pull-out torque", where)
         assert "a moment the motor gives" not in where
     assert "; a heavier load or a dip of the voltage stalls it; " in warnings["no reserve"].text
 
@@ -89,7 +89,7 @@ def test_a_motor_below_its_breakdown_speed_stalls_under_the_load(tmp_path):
     missed = warnings["speed missed"].text
     below = breakdown_speed(study.drive, study.steady)
     assert steady.speed_mean < 0.5 * below and "the motor stalls under the load" in missed
-    assert f"below {below:.2f} rad/s, the speed of its breakdown torque" in missed
+    assert f"below {below:.2f} rad/s, the speed of its pull-out torque" in missed
     assert "slip" not in missed and "verload" not in missed
     # there the torque is the largest of all speeds
     T, w = float(study.steady["motor.stator.T"].mean()), below * study.drive.ratio

@@ -1,4 +1,4 @@
-"""The safety coupling of a drive: whether it protects the drive, and the torques by which it is set."""
+"""The torque limiter of a drive: whether it protects the drive, and the torques by which it is set."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def remark_on_coupling(study: StudyRecord, trip: float) -> None:
     if start.torque > trip:
         warn(
             "coupling opens in start",
-            "The safety coupling opens at {trip}, and a start puts up to {start} on it ({where}): it opens in some "
+            "The torque limiter opens at {trip}, and a start puts up to {start} on it ({where}): it opens in some "
             'of the starts. Set it higher, or start softer (start = "soft" or "inverter").',
             "start_up",
             where=start.title(study),
@@ -101,7 +101,7 @@ def remark_on_coupling(study: StudyRecord, trip: float) -> None:
     elif quick.transient > trip:
         warn(
             "coupling opens in start",
-            "The safety coupling is set to {trip}. Load and acceleration put {start} on it in a start at most; the "
+            "The torque limiter is set to {trip}. Load and acceleration put {start} on it in a start at most; the "
             "{transient}: {most} ({where}). {words}.",
             "start_up",
             where=quick.title(study),
@@ -115,7 +115,7 @@ def remark_on_coupling(study: StudyRecord, trip: float) -> None:
     if nuisances := [name for name in openings if name not in shocks]:
         warn(
             "nuisance trip",
-            "The safety coupling, set to {trip}, opens where no shock asks for it, a nuisance trip that protects "
+            "The torque limiter, set to {trip}, opens where no shock asks for it, a nuisance trip that protects "
             "nothing: {where}.",
             *nuisances,
             where="; ".join(map(study.title_of, nuisances)),
@@ -124,7 +124,7 @@ def remark_on_coupling(study: StudyRecord, trip: float) -> None:
     if shocks and not set(openings) & set(shocks):
         warn(
             "coupling never opens",
-            "The safety coupling opens in no jam, lump or block of this study: it is set to {trip}, they put "
+            "The torque limiter opens in no jam, lump or block of this study: it is set to {trip}, they put "
             "{largest} on it at most, steady running {steady}"
             + ("." if most is None else "; the motor gives {motor} at most."),
             *shocks,
@@ -135,7 +135,7 @@ def remark_on_coupling(study: StudyRecord, trip: float) -> None:
     elif most is not None and trip > most:
         warn(
             "coupling above motor",
-            "The safety coupling is set to {trip} and the motor gives {motor} at most: a load that rises "
+            "The torque limiter is set to {trip} and the motor gives {motor} at most: a load that rises "
             "slowly stalls the motor and does not open it.",
             **amounts,
         )

@@ -1,4 +1,4 @@
-"""The torque on the parts between motor and machine in a run, at the crank: on a safety coupling on the
+"""The torque on the parts between motor and machine in a run, at the crank: on a torque limiter on the
 motor's shaft, and at the output of the gear."""
 
 from __future__ import annotations

@@ -312,15 +312,13 @@ def test_a_coupling_is_set_by_load_and_acceleration_of_the_start(on_line):
     assert 0.9 * transient < largest(on_line, "start_up") < 1.001 * transient
     assert transient > max(setting.overloads.values()) > setting.least > 1.2 * setting.start
     words = sentence(on_line)
-    assert (
-        words.startswith("Recommended safety coupling: ") and "puts on it by load and acceleration" in words
-    )
+    assert words.startswith("Recommended torque limiter: ") and "puts on it by load and acceleration" in words
     assert "held" not in words and not on_line.insufficient
     assert f"rigid): {number(transient, 'N.m')}. A friction clutch slips in it" in words
     harder = dataclasses.replace(setting, start=1200.0, effects={})
     none = having(on_line, setting=harder)
     assert harder.obstacle is Obstacle.START and harder.least > max(setting.overloads.values())
-    assert sentence(none).startswith("No safety coupling protects this drive as it starts now: ")
+    assert sentence(none).startswith("No torque limiter protects this drive as it starts now: ")
     # all feed on the right is normal duty, and its torque the larger
     assert setting.running > 1.15 * max(sizing_of(on_line).duty.numbers.torque_peak, 208.0)
     ways = {each.way: each for each in sizing_of(on_line).alternatives}
@@ -335,7 +333,7 @@ def test_a_coupling_is_set_by_load_and_acceleration_of_the_start(on_line):
         way_words(on_line, each, setting) for each in sizing_of(on_line).alternatives
     ]
     page = page_of(on_line)
-    (table,) = re.findall(r"<table[^>]*><caption>Ways to a safety coupling.*?</table>", page, re.DOTALL)
+    (table,) = re.findall(r"<table[^>]*><caption>Ways to a torque limiter.*?</table>", page, re.DOTALL)
     cells = [
         re.sub(r"<[^>]*>", "", row).replace("\xa0", " ")
         for row in re.findall(r"<tr>.*?</tr>", table, re.DOTALL)[1:]
@@ -346,7 +344,7 @@ def test_a_coupling_is_set_by_load_and_acceleration_of_the_start(on_line):
     # a sentence in a cell that does not wrap made the page twice as wide as the screen
     assert "alternatives, 0" not in page
     said = said_of(none)
-    assert "No safety coupling protects this drive as it starts now" in said
+    assert "No torque limiter protects this drive as it starts now" in said
     assert "With a soft starter" in said and "slip clutch" in said
     # what has to be ordered, with the reason where nothing is
     plate, gear = sizing_of(on_line).best.motor.nameplate, as_dict(none)["sizing"]["gear"]
@@ -378,7 +376,7 @@ def test_a_coupling_is_set_by_load_and_acceleration_of_the_start(on_line):
     own = having(own, setting=Setting(280.0, 0.0, 3000.0, 900.0, setting.overloads, effects=spared))
     ordered = as_dict(own)["sizing"]["gear"]
     assert ordered["overload"]["value"] < 0.6 * block
-    assert f"{plate.torque:.2f} N m" in said and "no safety coupling (a start puts 1" in said
+    assert f"{plate.torque:.2f} N m" in said and "no torque limiter (a start puts 1" in said
     assert "running (all feed on the right) puts" in said
 
 
@@ -492,7 +490,7 @@ def test_the_sentence_on_a_coupling_names_both_shafts_and_its_effect(on_line):
     assert as_dict(study)["sizing"]["protection"]["why_none"] == "it opens too late"
     over = dataclasses.replace(own, effects={"blocked": CouplingEffect(1324.0, 1100.0, 900.0, 0.002)})
     words = sentence(having(on_line, setting=over, alternatives=()))
-    assert words.startswith("Recommended safety coupling")
+    assert words.startswith("Recommended torque limiter")
     assert (
         "too late to keep below the 900 N m" in words
         and "the rocker is blocked (by 200 N m, 22.2 %)" in words
@@ -583,7 +581,7 @@ def test_a_higher_setting_and_a_dip_that_opens_it(on_line, tmp_path, monkeypatch
         # another start leaves another steady turn
         assert trials.spreads["blocked"].peaks[name] == pytest.approx(peak, rel=0.02), name
     (note,) = [note.text for note in trials.notes if note.kind == "assumption"]
-    assert "These peaks are without the safety coupling" in note
+    assert "These peaks are without the torque limiter" in note
 
 
 @pytest.mark.second
@@ -672,7 +670,7 @@ def test_without_a_shock_no_coupling_is_recommended(tmp_path, monkeypatch):
     study = ran(heavy("feed_left", "feed_right"), tmp_path, monkeypatch)
     assert sizing_of(study).setting.obstacle is Obstacle.OVERLOADS
     numbers = as_dict(study)["sizing"]["protection"]
-    assert numbers["trip_torque"]["value"] is None and numbers["coupling"].startswith("No safety coupling")
+    assert numbers["trip_torque"]["value"] is None and numbers["coupling"].startswith("No torque limiter")
 
 
 @pytest.mark.second
@@ -707,7 +705,7 @@ def test_one_sided_feed_and_a_loaded_soft_start_are_normal_duty(tmp_path, monkey
     [
         (
             {"trip_torque": (None, "N.m")},
-            "; flywheel 0.300 kg m² (steel disc 22.1 kg, 0.330 m in diameter); no safety coupling; relay at 2.45 A.",
+            "; flywheel 0.300 kg m² (steel disc 22.1 kg, 0.330 m in diameter); no torque limiter; relay at 2.45 A.",
         ),
         ({"trip_torque": (400.0, "N.m")}, "; trip torque 400 N m; relay at 2.45 A."),
         ({}, "; thermal relay, setting 2.45 A."),

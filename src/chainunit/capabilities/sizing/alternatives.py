@@ -1,4 +1,4 @@
-"""The ways to a safety coupling for a drive whose start puts more on it than running does: each is tried in a
+"""The ways to a torque limiter for a drive whose start puts more on it than running does: each is tried in a
 simulation of its own."""
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ def _for_starts(
     )
     ways = []
     for make in makers:
-        progress("ways to a safety coupling", 1.0, 1.0)
+        progress("ways to a torque limiter", 1.0, 1.0)
         try:
             ways.append(make(study, rig, setting))
         except InterruptedRunError:
@@ -287,7 +287,7 @@ def slip_run(rig: Rig, start: StartNumbers, setting: float) -> xr.Dataset | None
     speed; None where it slips on for three times as long as the start takes. The variables of the clutch are
     ``clutch.*``.
 
-    The clutch may slip again near the breakdown torque of the motor: the attribute `slip_time` [s] is the sum of all
+    The clutch may slip again near the pull-out torque of the motor: the attribute `slip_time` [s] is the sum of all
     times in which it slips."""
     rig = from_angle(rig, start.angle)
     drive = rig.drive

@@ -238,7 +238,7 @@ def _chosen(best: Candidate, ranking: Sequence[Candidate], objective: str) -> st
     if objective == PRICE:
         if best.price is None:
             return "the first that fits, of drives of which none has a price for each part"
-        return f"the cheapest that fits: {price_words(best.price)} without a safety coupling"
+        return f"the cheapest that fits: {price_words(best.price)} without a torque limiter"
     smaller = [c for c in ranking[1:] if c.keeps_margin and c.power < best.power]
     if not smaller:
         barely = any(c.power < best.power for c in ranking[1:])

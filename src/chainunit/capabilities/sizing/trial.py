@@ -182,7 +182,7 @@ class Trial:
 
     @cached_property
     def breakdown_torque(self) -> float:
-        """Breakdown torque of the motor [N m] at its permitted temperature and at the frequency at which it
+        """Pull-out torque of the motor [N m] at its permitted temperature and at the frequency at which it
         runs: above the corner frequency the voltage of an inverter does not rise any more."""
         p = self.drive.fmu_parameters
         voltage = float(volts_per_hertz(MATH, p, self.frequency)) if self.drive.follows else 1.0

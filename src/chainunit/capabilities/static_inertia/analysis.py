@@ -178,7 +178,7 @@ class StaticInertiaAnalysis(Analysis):
 
 
 def _events(study: StudyRecord) -> list[Event]:
-    """The events whose runs can be compared: a safety coupling cuts the peaks off."""
+    """The events whose runs can be compared: a torque limiter cuts the peaks off."""
     if study.config.coupling:
         return []
     return [event for name, event in study.config.events.items() if name in study.answers]
