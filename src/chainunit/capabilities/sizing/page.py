@@ -310,7 +310,7 @@ def _best(s: b.Source, path: str, word: str) -> Iterator[b.Block]:
     order += _starter(s, path)
     if order and word == "Motor":
         yield b.Text(line("Order: ", join(order, "; "), "."), form="short", central=True)
-    yield b.Text(line(begin, s.words(f"{path}.reason"), doubt, "."))
+    yield b.Text(line(begin, s.words(f"{path}.reason"), doubt, "."), central=True)
 
 
 def _leading(section: Mapping[str, Any] | None) -> str | None:
