@@ -1,10 +1,13 @@
 """Writes the generated tables into docs/papers.md."""
 
 import re
+import sys
 from pathlib import Path
 
-from chainunit.papers import PAPERS, reproduce
-from chainunit.papers.output import markdown
+sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
+
+from papers import PAPERS, reproduce
+from papers.output import markdown
 
 PAGE = Path(__file__).parent / "papers.md"
 
