@@ -38,7 +38,7 @@ INSTALLS = ("pip install", "python3 -m venv")
 README = ROOT / "README.md"
 PAGES = (README, *sorted(DOCS.rglob("*.md")))
 """Whose commands run."""
-QUICK = ("docs/how-to/python.md", "docs/system.md")
+QUICK = ("docs/system.md",)
 """Pages that take some seconds; the others run in `.ci/full`."""
 OWN_TEST = ("docs/python.md",)
 """Of these `test_docs_python` compares every line."""
