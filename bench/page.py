@@ -233,7 +233,8 @@ def evidence(f: Any) -> str:
         ratio=large(m["compiled"] / m["cosimulation"]),
         thousand=f"{1e3 / m['compiled']:.1f}", difference=small(max(m["differences"].values())),
         seconds=f"{f['cosim_memory']['seconds']:.0f}", whole=memory["all rows, in memory"],
-        file=memory["all rows, to a file"], libraries=memory["a second"], sweep=sweep(f), sweep_angles=f["sweep_time"]["angles"],
+        file=memory["all rows, to a file"], libraries=memory["a second"],
+        sweep=sweep(f), sweep_angles=f["sweep_time"]["angles"],
         sweep_parameters=f["sweep_time"]["parameters"], sweep_quantities=f["sweep_time"]["quantities"],
         **identification.tables(f["identification"]), **observer.tables(f["observer"]),
     )  # fmt: skip
