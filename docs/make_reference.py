@@ -18,7 +18,13 @@ from chainunit.report.reference import reference
 def commands() -> Iterator[tuple[str, str, list[tuple[str, str]]]]:
     """Name of each command, the first paragraph of its help, and its arguments and options with their help."""
     group = typer.main.get_command(app)
-    for name, command in {"": group, **group.commands}.items():
+    named = {name: each for name, each in group.commands.items() if not each.hidden}
+    below = {
+        f"{name} {own}": each
+        for name, of in named.items()
+        for own, each in getattr(of, "commands", {}).items()
+    }
+    for name, command in {"": group, **named, **below}.items():
         # some arguments are described when the help is asked for
         command.get_help(typer.Context(command))
         options = [
@@ -37,8 +43,8 @@ def text() -> str:
     head = (
         "# Reference\n\nThis page is made from the declarations. A number is in the declared "
         'SI unit; a text may have\nany unit of the same kind: `"150 mm"`, `"4 kNm"`, `"30 rev/min"`, `"8 %"`. '
-        "`chainunit keys [TABLE]` shows the same on the terminal;\n`chainunit schema` writes a JSON Schema by which "
-        "editors complete and check a study file.\n"
+        "`chainunit keys [TABLE]` shows the same on the terminal;\n`chainunit keys --schema` writes a JSON Schema by "
+        "which editors complete and check a study file.\n"
     )
     tasks = [study_task.TASK, *(module.RESULT._task for module in modules("study_method"))]
     contents = {task.name: task.content for task in tasks}

@@ -62,7 +62,8 @@ motor, rows = Motor(), []
 for k in range(round(STOP / STEP)):
     time = k * STEP
     if time == 6.0:
-        put(left__material_mass=60.0, right__material_mass=0.0)
+        put(left__material_mass=60.0, right__material_mass=0.0, left__processing_force=20.0)
+        put(right__processing_force=0.0)
     load = dict(zip(PORT, read(*PORT), strict=True))
     motor.step(time, STEP, load)
     machine.doStep(time, STEP)

@@ -7,8 +7,8 @@ import numpy as np
 variables = fmpy.read_model_description("mine.fmu").modelVariables
 normal = {v.name: float(v.start) for v in variables if v.causality == "input"}
 ratio = next(float(v.start) for v in variables if v.name == "machine.ratio")  # motor turns per crank turn
-feed = sum(normal[f"machine.{side}.material_mass"] for side in ("left", "right"))
-overload = normal | {"machine.left.material_mass": feed, "machine.right.material_mass": 0.0}
+left = {n: load + normal[n.replace("left", "right")] for n, load in normal.items() if ".left." in n}
+overload = normal | left | {n.replace("left", "right"): 0.0 for n in left}  # material and force
 rows = [(t, *loads.values()) for t, loads in ((0, normal), (10, normal), (10, overload), (20, overload))]
 inputs = np.array(rows, [("time", float), *((name, float) for name in normal)])
 run = fmpy.simulate_fmu("mine.fmu", stop_time=20, output_interval=0.005, input=inputs)

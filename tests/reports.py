@@ -25,8 +25,17 @@ def said_of(study, width=200):
     return out.getvalue()
 
 
+def screen_of(report):
+    """The lines of one screen of a terminal of 80 columns."""
+    out = io.StringIO()
+    terminal.screen(
+        report, Console(file=out, markup=False, highlight=False, width=80), "All numbers here: --all."
+    )
+    return [line.rstrip() for line in out.getvalue().splitlines()]
+
+
 def write(study, folder):
-    numbers, *others = files.writers(study_report.report(study), folder, "result")
+    numbers, *others = files.writers(study_report.report(study), folder, "result", png=True)
     return [file for each in (numbers, lambda: series.write(study, folder), *others) for file in each()]
 
 

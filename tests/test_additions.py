@@ -295,7 +295,7 @@ def test_a_capability_is_a_folder_and_a_line(house):
     keys = house.run("keys", "pin_life")
     assert all(f"│ {key} " in keys for key in ("pin", "C", "p", "wanted"))
     assert "[pin_life]" in house.run("study", "--example", "full")
-    house.run("schema")
+    house.run("keys", "--schema")
     schema = json.loads((house.folder / "chainunit.schema.json").read_text("utf-8"))
     assert set(schema["properties"]["pin_life"]["properties"]) == {"pin", "C", "p", "wanted"}
     house.run("study", "life.toml", "-o", "life")

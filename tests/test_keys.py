@@ -8,8 +8,10 @@ from dataclasses import fields, replace
 from pathlib import Path
 
 import pytest
+import typer.main
 from command import chainunit
 
+from chainunit.app.cli import app
 from chainunit.core.errors import InputError
 from chainunit.core.quantities import Layout
 from chainunit.drives.dc_motor import DcMotor
@@ -230,7 +232,7 @@ def test_the_commands(tmp_path):
         assert near.returncode == 2 and f'no such key; was "{meant}" meant?' in near.stderr
     near = chainunit("keys", "knifedrive", cwd=tmp_path)
     assert near.returncode == 2 and 'was "KnifeDrive" meant?' in near.stderr
-    assert chainunit("schema", cwd=tmp_path).returncode == 0
+    assert chainunit("keys", "--schema", cwd=tmp_path).returncode == 0
     assert json.loads((tmp_path / "chainunit.schema.json").read_text("utf-8")) == json_schema()
     first, *_ = chainunit("study", "--example", "knife", cwd=tmp_path).stdout.splitlines()
     assert first == "#:schema chainunit.schema.json"
@@ -272,3 +274,18 @@ def test_the_page_of_reference_has_every_key_variable_and_command():
                 assert f"| {signal.variable.name} | {causality} |" in parts[f"FMU {name}"], name
     for command, *_ in module.commands():
         assert f"chainunit {command}".strip() in parts
+
+
+def test_the_help_has_at_most_fourteen_commands_by_group_each_with_an_example(tmp_path):
+    text = chainunit("--help", cwd=tmp_path, whole=False).stdout
+    assert max(map(len, text.splitlines())) <= 80
+    group = typer.main.get_command(app)
+    shown = [name for name, command in group.commands.items() if not command.hidden]
+    assert len(shown) <= 14 and "Others:" not in text
+    for name in shown:
+        (example,) = re.findall(rf"^ +(chainunit {name} .+)$", text, re.MULTILINE)
+        words = example.split()[1:]
+        command, context = group, typer.Context(group)
+        while words and hasattr(command, "commands"):
+            command = command.commands[words.pop(0)]
+        command.make_context(name, words, parent=context)  # refuses what the command does not have

@@ -19,7 +19,6 @@ from chainunit.batch import transients
 from chainunit.core.engines import MATH
 from chainunit.core.model import Model, Part
 from chainunit.core.quantities import base_units, declaration, quantity
-from chainunit.drives import speed_control
 from chainunit.drives.motor import T_RATED
 from chainunit.models import MODELS
 from chainunit.reading.results import as_data
@@ -157,6 +156,40 @@ def test_slopes_of_the_compiled_drive_are_those_of_differences(drive):
 # -- the speed loop of a study
 
 
+def _speed_loop(p, inertia):
+    """The open loop by python-control, and the response of the speed to the load."""
+    s = control.tf("s")
+    current = p.current_control.kp + p.current_control.ki / s
+    current = control.feedback(control.minreal(current / (p.armature.L * s + p.armature.R), verbose=False), 1)
+    torque = control.minreal(
+        (p.speed_control.kp + p.speed_control.ki / s) * current * p.armature.k, verbose=False
+    )
+    by_load = control.minreal(control.feedback(-1.0 / (inertia * s), -torque), verbose=False)
+    return control.minreal(torque / (inertia * s), verbose=False), by_load
+
+
+@pytest.mark.parametrize("factor", [1.0, 0.4, 3.0])
+def test_the_speed_loop_is_that_of_python_control(factor):
+    """Also with gains whose zero does not cancel the pole of the armature."""
+    motor = MODELS["DcMotor"]
+    usual = motor.parameter_layout.from_names({})
+    gains = {
+        "speed_control.ki": factor * usual.speed_control.ki,
+        "current_control.ki": usual.current_control.ki / factor,
+        "current_control.kp": usual.current_control.kp * factor,
+    }
+    p = motor.parameter_layout.from_names(gains)
+    loop = motor.speed_loop(p, 0.9)
+    open_loop, by_load = _speed_loop(p, 0.9)
+    _, phase, _, crossover = control.margin(open_loop)
+    np.testing.assert_allclose([loop.phase_margin, loop.crossover], [phase, crossover], rtol=1e-9)
+    answer = open_loop(1j * loop.frequency)
+    np.testing.assert_allclose(loop.gain * np.exp(1j * np.radians(loop.phase)), answer, rtol=1e-9)
+    np.testing.assert_allclose(
+        control.step_response(by_load, loop.time).outputs, loop.deviation, atol=1e-9 * loop.largest_deviation
+    )
+
+
 def test_poles_of_the_speed_loop_are_those_of_the_study():
     motor = MODELS["DcMotor"]
     lossless = {n: 0.0 for n in ("rotor.d", "rotor.friction") if n in motor.parameter_layout.names}
@@ -165,11 +198,8 @@ def test_poles_of_the_speed_loop_are_those_of_the_study():
     inertia = p.rotor.J + load
     found = linearize_model(motor, p, {"load.J": load, "w_ref": 50.0}, {"w": 50.0, "phi": 1.0})
     loop = motor.speed_loop(p, inertia)
-    speed = p.speed_control.kp, p.speed_control.ki
-    current = p.current_control.kp, p.current_control.ki
-    closed = control.feedback(
-        control.minreal(speed_control._open_loop(p.armature, speed, current, inertia), verbose=False), 1
-    )
+    open_loop, by_load = _speed_loop(p, inertia)
+    closed = control.feedback(open_loop, 1)
     own = [
         complex(pole.real, sign * pole.imaginary)
         for pole in found.poles
@@ -179,10 +209,6 @@ def test_poles_of_the_speed_loop_are_those_of_the_study():
         assert min(abs(each - pole) for each in own) < 1e-6 * abs(pole), (pole, own)
     # the deviation after a step of the load, as the study draws it
     response = found.response("load.tau_bias", "w", loop.crossover * np.array([0.1, 1.0, 10.0]))
-    s = control.tf("s")
-    kp, ki = speed
-    torque = (kp + ki / s) * speed_control._current_loop(p.armature, current) * p.armature.k
-    by_load = control.minreal(control.feedback(-1.0 / (inertia * s), -torque), verbose=False)
     np.testing.assert_allclose(response, by_load(1j * loop.crossover * np.array([0.1, 1.0, 10.0])), rtol=1e-6)
     step = control.step_response(found.state_space()["w", "load_tau_bias"], loop.time)
     np.testing.assert_allclose(step.outputs, loop.deviation, atol=1e-6 * loop.largest_deviation)

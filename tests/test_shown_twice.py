@@ -8,6 +8,7 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 
 import pytest
+from reports import screen_of
 
 from chainunit.reading.text import number
 from chainunit.report import blocks as b
@@ -130,6 +131,21 @@ def pieces_of(node):
     elif is_dataclass(node) and not isinstance(node, type):
         for each in fields(node):
             yield from pieces_of(getattr(node, each.name))
+
+
+def test_one_screen_has_the_answer_and_one_table(study, report):
+    lines = screen_of(report)
+    assert len(lines) <= 45 and max(map(len, lines)) <= 80
+    text = " ".join(" ".join(lines).split())
+    verdict = report.result["verdict"]
+    for each in ("model", "motor"):
+        assert verdict[each] is None or verdict[each]["text"] in text
+    assert sum("┏" in line for line in lines) == 1
+    # the worst overload is the one with the largest crank torque, and stands there with its title
+    peaks = {run: abs(report.result["answers"][run]["crank_torque_peak"]["value"]) for run in study.overloads}
+    if peaks:
+        assert study.title_of(max(peaks, key=peaks.get)) in text
+    assert ("Motor: " in text or "Insufficient motor: " in text) == ("sizing" in report.result)
 
 
 def rows_of(result):

@@ -46,7 +46,7 @@ def below(x):
 def test_two_bars_hold_where_nothing_speaks_against_them():
     verdict = bars()
     assert verdict.holds == "true" and verdict.reasons == () and verdict.details(CALLED) == []
-    assert verdict.text == "The model of the organs holds: two bars, the crank at 1.00 rad/s."
+    assert verdict.text == "Model of the organs, two bars, crank at 1.00 rad/s: valid."
     # without weight or organs there is no mode, no slack speed and no pull
     nothing = bars(6.0, math.inf, math.inf, {}, {"steady": 0.0})
     assert nothing.holds == "true"
@@ -70,12 +70,13 @@ def test_a_rod_of_which_only_an_end_is_pushed_is_no_slack_rod():
     heavy = {"web": LeastPull(-341.0, "B", 1100.0), "wall": LeastPull(900.0, "B", 1500.0)}
     verdict = bars(pulls={"steady": heavy, "jam_left": heavy})
     assert verdict.holds == "in part" and verdict.caveat is None
-    assert verdict.text.endswith("; an end of a bar is pushed, where a chain sags, in steady running, too.")
+    assert verdict.text.endswith(
+        " Limits: in steady running, too, bar ends are in compression, where a chain sags."
+    )
     ((topic, line),) = verdict.details(CALLED)
     assert topic == "end pushed" and line == (
-        "Bars that are pushed at an end, though pulled in the mean: a chain sags there, which changes the force in "
-        "that pin and hardly the torques: steady running (web end pull at B -341 N); a lump jams (web end "
-        "pull at B -341 N)."
+        "Bar ends in compression, where a chain sags (force in that pin, hardly the torques): steady running (web "
+        "end pull at B -341 N); a lump jams (web end pull at B -341 N)."
     )
     assert [(r["topic"], r["quantity"], r["place"]) for r in as_data(verdict)["reasons"]] == [
         ("end pushed", "web_pull", "B")
@@ -87,39 +88,39 @@ def test_a_rod_of_which_only_an_end_is_pushed_is_no_slack_rod():
 def test_a_pull_below_zero_in_the_start_up_is_told_by_name():
     started = PULLED | {"start_up": least(-1304.0, -433.0)}
     verdict = bars(pulls=started)
-    assert verdict.holds == "in part" and "would go slack and snatch, in the start-up; take" in verdict.text
+    assert verdict.holds == "in part" and "Limits: in the start-up bars are in compression" in verdict.text
     words = (
-        "Bars that are pushed, where a chain would go slack and snatch: start-up (web mean pull "
+        "Bars in compression, where a chain goes slack: start-up (web mean pull "
         "-1304 N, wall mean pull -433 N)."
     )
     assert verdict.details(CALLED | {"start_up": "start-up"}) == [("pushed", words)]
     both = bars(pulls=started | {"jam_left": least(-1.0, 1.0)})
-    assert ", in the start-up and in overloads; " in both.text
+    assert "in the start-up and in overloads bars are" in both.text
 
 
 def test_the_speed_is_the_one_that_the_crank_has():
     """Judged at the larger one that is asked for, which is named as such."""
     slow = bars(30.0, 50.0, 4.58, actual=1.57)
-    assert "two bars, the crank at 1.57 rad/s, judged at the 30.0 rad/s asked for; " in slow.text
+    assert "two bars, crank at 1.57 rad/s, judged at the required 30.0 rad/s: not valid. " in slow.text
     assert slow.details(CALLED)[0] == ("slack speed", "A web goes slack from a crank speed of 4.58 rad/s on.")
     data = as_data(slow)
     assert (data["speed"]["value"], data["reached"]["value"]) == (30.0, 1.57)
-    assert "asked" not in bars(3.0, actual=2.999).text
+    assert "required" not in bars(3.0, actual=2.999).text
     _, rest = bars(1.57, 50.0, 0.0).details(CALLED)[0]
     assert rest == "A web is slack at rest already."
 
 
 def test_each_reason_has_its_own_remedy():
     stiff = bars(residuals=KEPT | {"jam_left": 2e-3})
-    assert stiff.text.endswith("the energy balance is not kept, in overloads; shorten run.step.")
+    assert stiff.text.endswith("in overloads the energy balance is not kept. Shorten run.step.")
     # the value of the key that would do, where it is known: the residual falls with the square of the step at least
     for residual, step in ((1.55 * RESIDUAL, "0.5"), (5.0 * RESIDUAL, "0.25")):
         named = replace(rigid_links(6.0, {"surge": residual}), step=1e-3)
-        assert named.text.endswith(f'in overloads; shorten run.step: run.step = "{step} ms".')
-    assert replace(rigid_links(6.0, {"surge": 1.0}), step=1e-3).text.endswith("; shorten run.step.")
+        assert named.text.endswith(f'is not kept. Shorten run.step: run.step = "{step} ms".')
+    assert replace(rigid_links(6.0, {"surge": 1.0}), step=1e-3).text.endswith(". Shorten run.step.")
     both = bars(3.0, residuals=KEPT | {"jam_left": 2e-3})
-    assert both.text.endswith('; take organ = "chain"; shorten run.step.')
-    assert of_chains(independent=71.0).text.endswith("; raise chain.starts.")
+    assert both.text.endswith('. Take organ = "chain"; shorten run.step.')
+    assert of_chains(independent=71.0).text.endswith(". Raise chain.starts.")
 
 
 def test_what_rests_on_a_model_that_does_not_hold_carries_a_caveat():
@@ -161,16 +162,14 @@ def test_an_energy_balance_that_is_not_kept():
 def test_a_shorter_step_is_no_advice_for_a_crank_that_stalls():
     """It moves hardly any energy, so that the residual over the energy moved says nothing of the step."""
     turning, stalled = (rigid_links(3.0, {"steady": 0.1}, actual=speed) for speed in (2.9, 0.05))
-    assert "shorten run.step" in turning.text and "shorten run.step" not in stalled.text
+    assert "Shorten run.step" in turning.text and "shorten run.step" not in stalled.text
     assert stalled.holds == "false" and "the energy balance is not kept" in stalled.text
 
 
 def test_of_a_machine_that_is_not_known_only_the_energy_balance_is_judged():
     kept, lost = (foreign_machine(3.0, {"steady": share}) for share in (1e-6, 1.0))
     assert (kept.holds, kept.caveat) == ("true", None) and as_data(kept)["model"] is None
-    assert kept.text == (
-        "The machine is an FMU whose own model is not known; its energy balance holds: the crank at 3.00 rad/s."
-    )
+    assert kept.text == ("Energy balance of a machine that is an FMU, crank at 3.00 rad/s: valid.")
     assert lost.holds == "false" and lost.caveat == "the energy balance does not hold here"
     assert "rigid links" not in kept.text and "organs" not in lost.text
 
@@ -198,16 +197,17 @@ def test_words_and_data():
     pulls = {"steady": least(20.0, 50.0), "feed_left": least(-44.3, -26.2), "jam_left": least(5.0, -995.0)}
     verdict = bars(3.0, 5.0, 4.5, pulls)
     assert verdict.text == (
-        "The model of the organs holds in part: two bars, the crank at 3.00 rad/s; bars are pushed, where a chain "
-        "would go slack and snatch, in overloads; the rocker torque may be off by more than 10 %, as a chain "
-        'resonates; take organ = "chain".'
+        "Model of the organs, two bars, crank at 3.00 rad/s: valid in steady running for crank torque and motor "
+        "(10 %). Limits: in overloads bars are in compression, where a chain goes slack: rocker torque and organ "
+        "forces are no predictions; the rocker torque may be off by more than 10 %, as a chain resonates. "
+        'Take organ = "chain".'
     )
     # once, with all runs, webs and walls
     topics, lines = zip(*verdict.details(CALLED | {"feed_left": "feed to left"}), strict=True)
     assert topics == ("pushed", "rocker torque") and lines == (
-        "Bars that are pushed, where a chain would go slack and snatch: feed to left (web mean pull -44.3 N, "
+        "Bars in compression, where a chain goes slack: feed to left (web mean pull -44.3 N, "
         "wall mean pull -26.2 N); a lump jams (wall mean pull -995 N).",
-        "The rocker torque of two bars is good to 10 % only up to a crank speed of 2.00 rad/s.",
+        "Rocker torque of two bars: 10 % up to a crank speed of 2.00 rad/s.",
     )
     data = as_data(verdict)
     assert data["holds"] == "in part" and data["speed"] == {"value": 3.0, "unit": "rad/s", "kind": "speed"}

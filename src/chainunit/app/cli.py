@@ -17,9 +17,10 @@ import typer
 import typer.core
 
 from ..capabilities import modules
+from ..capabilities.vouching.command import COMMANDS as VOUCHING
 from ..core.errors import InputError, InterruptedRunError, RunError, printable
 from ..core.files import full, written
-from ..report.command_options import BackendOption, OutputFolder
+from ..report.command_options import AllOption, BackendOption, OutputFolder, PicturesOption
 from ..report.console import carry_out, exit_status, show_slips, study_file, terminal_console
 from ..work import interrupts
 from .catalogue_command import catalogue
@@ -35,9 +36,62 @@ class Example(StrEnum):
     full = "full"
 
 
+_GROUPS = {
+    "Study": {
+        "study": ("Run a machine with its motor; size the drive.", "chainunit study mine.toml -o mine"),
+        "sweep": ("Vary parameters of a study, over many points.", "chainunit sweep map.toml -o map"),
+        "optimize": ("Search for the best machine within limits.", "chainunit optimize best.toml -o best"),
+        "compare": ("Show two results side by side.", "chainunit compare mine other"),
+        "handover": ("Write a sized drive for other programs.", "chainunit handover mine -o files"),
+        "catalogue": ("Check catalogues of your own.", "chainunit catalogue motors.csv"),
+        "keys": ("Explain the keys of study files.", "chainunit keys sizing"),
+    },
+    "Linkages": {
+        "linkage": (
+            "Show motion, torque and reactions of a linkage.",
+            "chainunit linkage crusher.toml -o crusher",
+        ),
+        "live": ("Write a page in which the machine runs.", "chainunit live crusher.toml -o crusher.html"),
+    },
+    "FMUs": {
+        "export": (
+            "Write a model as an FMU, a study as FMU or SSP.",
+            "chainunit export mine.toml -o mine.fmu",
+        ),
+        "linearize": ("Write the linear model at a point.", "chainunit linearize mine.toml -o linear"),
+        "vouch": ("Certify an FMU or SSP, verify a certified one.", "chainunit vouch certify mine.fmu"),
+    },
+    "Real machines": {
+        "identify": (
+            "Identify a machine from recordings of its motor.",
+            "chainunit identify mill.toml -o mill",
+        ),
+        "watch": (
+            "Find one-sided overloads in a recording.",
+            "chainunit watch mill/identified.toml -o watched",
+        ),
+    },
+}
+"""By heading of the help, the commands, each with a line and an example."""
+
+
 class _Commands(typer.core.TyperGroup):
     """The group of all commands. It turns an interrupt into an error of this package, as typer would turn a
     KeyboardInterrupt into a bare exit status."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """The commands by group, each with its example."""
+        listed = [name for group in _GROUPS.values() for name in group]
+        others = {
+            name: (command.get_short_help_str(), f"chainunit {name} --help")
+            for name, command in self.commands.items()
+            if name not in listed and not command.hidden
+        }
+        for heading, group in (*_GROUPS.items(), *([("Others", others)] if others else [])):
+            with formatter.section(heading):
+                formatter.write_dl(
+                    [row for name, rest in group.items() for row in zip((name, ""), rest, strict=True)]
+                )
 
     def invoke(self, ctx: Any) -> Any:
         try:
@@ -107,10 +161,12 @@ def study(
         Example | None,
         typer.Option("--example", help="Print a packaged study file, as a start for your own, and stop."),
     ] = None,
+    whole: AllOption = False,
+    png: PicturesOption = False,
 ) -> None:
     """Run a machine with its motor: start-up, steady running, overloads.
 
-    Writes report.html, result.json, result.md, result.nc, plots and the FMUs into the output folder.
+    Writes report.html, result.json, result.md, result.nc and the FMUs into the output folder.
     """
     from ..study import parts
 
@@ -125,14 +181,27 @@ def study(
     from ..report.study_task import SHEET_TASK, TASK
 
     task = SHEET_TASK if pdf else TASK
-    carry_out(task, question, output, check=check, backend=backend and backend.value, scheduler=scheduler)
+    carry_out(
+        task,
+        question,
+        output,
+        whole=whole,
+        png=png,
+        check=check,
+        backend=backend and backend.value,
+        scheduler=scheduler,
+    )
 
 
+vouch = typer.Typer(rich_markup_mode=None, no_args_is_help=True)
+app.add_typer(vouch, name="vouch", help="Certify an FMU or SSP package, verify a certified one, make a key.")
 for module in modules("command"):
     for command in module.COMMANDS:
-        app.command()(command)
+        app.command(hidden=command in VOUCHING)(command)
+for command in VOUCHING:
+    vouch.command()(command)
 app.command(cls=ExportCommand)(export)
-app.command("export-ssp")(export_ssp)
+app.command("export-ssp", hidden=True)(export_ssp)
 app.command()(catalogue)
 
 
@@ -141,30 +210,31 @@ def keys(
     table: Annotated[
         str | None, typer.Argument(help="Table of a study file, type of event, machine or motor; or a key.")
     ] = None,
+    schema: Annotated[
+        bool, typer.Option("--schema", help="Write chainunit.schema.json, by which an editor completes keys.")
+    ] = False,
 ) -> None:
-    """Show the keys of study files and catalogues: what each means, allows, and is where a file leaves it out."""
+    """Show the keys of study files and catalogues: meaning, allowed values, default."""
     from ..report import reference, terminal
+
+    if schema:
+        _write_schema(Path())
+        return
 
     terminal.show(reference.keys_of(table) if table else reference.overview(), terminal_console())
 
 
-@app.command()
-def schema(
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="File; chainunit.schema.json by default.")
-    ] = None,
-) -> None:
-    """Write the JSON Schema of study files, by which an editor completes keys and marks mistakes."""
+def _write_schema(folder: Path) -> None:
+    """The JSON Schema of study files, in a folder."""
     from ..core.files import atomic_file
     from ..study.schema import FILE, json_schema
 
-    file = output or Path(FILE)
-    with atomic_file(file) as part:
+    with atomic_file(folder / FILE) as part:
         part.write_text(json.dumps(json_schema(), indent=1, ensure_ascii=False) + "\n", "utf-8")
-    print(f"{file}: schema of study files")
+    print(f"{FILE}: schema of study files")
 
 
-@app.command()
+@app.command(hidden=True)
 def reproduce(
     output: OutputFolder = Path("reproduction"),
 ) -> None:
@@ -174,10 +244,10 @@ def reproduce(
     """
     from ..papers.output import TASK
 
-    carry_out(TASK, None, output)
+    carry_out(TASK, None, output, png=True)
 
 
-@app.command("two-bar-error")
+@app.command("two-bar-error", hidden=True)
 def two_bar_error(
     output: OutputFolder = Path("two-bar"),
 ) -> None:
@@ -187,7 +257,7 @@ def two_bar_error(
     """
     from ..papers.two_bar import TASK
 
-    carry_out(TASK, None, output)
+    carry_out(TASK, None, output, png=True)
 
 
 @app.command("linkage")
@@ -198,6 +268,8 @@ def linkage_command(
         str | None,
         typer.Option("--speed", help='Speed of the driver with its unit; "60 rpm" by default, or "0.1 m/s".'),
     ] = None,
+    whole: AllOption = False,
+    png: PicturesOption = False,
 ) -> None:
     """Show a linkage: its groups, drawing, motion, torque, inertia and reactions over a turn, or over its range.
 
@@ -211,7 +283,8 @@ def linkage_command(
     model, unusual = linkage_in(file)
     show_slips(unusual)
     machine = Machine(model)
-    carry_out(TASK, LinkageQuestion(machine, speed_of_driver(machine, speed), str(file), unusual), output)
+    question = LinkageQuestion(machine, speed_of_driver(machine, speed), str(file), unusual)
+    carry_out(TASK, question, output, whole=whole, png=png)
 
 
 @app.command()

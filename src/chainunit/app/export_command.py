@@ -29,6 +29,15 @@ NamesOption: TypeAlias = Annotated[
 ]
 
 
+InputsOption: TypeAlias = Annotated[
+    bool,
+    typer.Option(
+        "--all-inputs",
+        help="Of a package: connectors for inputs without connection, too; fmpy cannot run it then.",
+    ),
+]
+
+
 class ExportCommand(typer.core.TyperCommand):
     """The command that writes a model; its help names all models."""
 
@@ -46,7 +55,11 @@ def export(
     name: Annotated[str, typer.Argument(help="The model, a linkage file or a study file (.toml).")],
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="FMU file; by default NAME.fmu, of the model's name."),
+        typer.Option(
+            "-o",
+            "--output",
+            help="FMU file, by default NAME.fmu, of the model's name; of a study file also an SSP package, NAME.ssp.",
+        ),
     ] = None,
     config: Annotated[
         Path | None,
@@ -77,15 +90,24 @@ def export(
         bool, typer.Option("--direct", help="Of a linkage file: torque in and motion out.")
     ] = False,
     names: NamesOption = VariableNames.structured,
+    all_inputs: InputsOption = False,
 ) -> None:
-    """Write a model as an FMU; of a study file its whole system, from control to machine, as one FMU."""
+    """Write a model as an FMU; of a study file its whole system as one FMU, or as an SSP package of FMUs."""
     from ..fmu.backends import export as write
     from ..study.package import is_study_file, left_out, model_and_start
 
     file = output
-    if file and file.suffix != ".fmu":
-        raise InputError(f"-o {file}: must be a file name that ends in .fmu")
     whole = is_study_file(name)
+    if file and file.suffix == ".ssp" and whole:
+        if config or direct or wasm or platforms or fmi != 2:
+            raise InputError(
+                f"-o {file}: a package has FMUs 2.0 for this machine; leave the options of one FMU out"
+            )
+        export_ssp(Path(name), file, backend, all_inputs, names)
+        return
+    if file and file.suffix != ".fmu":
+        of_study = " or .ssp" if whole else ""
+        raise InputError(f"-o {file}: must be a file name that ends in .fmu{of_study}")
     if whole and (config or direct):
         given = f"--config {config}" if config else "--direct"
         raise InputError(
@@ -123,13 +145,7 @@ def export_ssp(
     ] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="SSP file.")] = Path("ChainUnitDrive.ssp"),
     backend: BackendOption = None,
-    all_inputs: Annotated[
-        bool,
-        typer.Option(
-            "--all-inputs",
-            help="Connectors for inputs without connection, too; fmpy cannot run the package then.",
-        ),
-    ] = False,
+    all_inputs: InputsOption = False,
     names: NamesOption = VariableNames.structured,
 ) -> None:
     """Write motor and machine, connected, with their parameter sets, as an SSP 1.0 package of FMUs 2.0."""

@@ -1,4 +1,4 @@
-"""Tuning of a cascaded speed control, checked with python-control.
+"""Tuning of a cascaded speed control.
 
 The zero of the PI control of the current cancels the armature pole R/L, so that the open loop is w_c/s. The PI
 control of the speed acts on the integrator k/(J s) behind the closed current loop; its crossover is a tenth of w_c,
@@ -64,27 +64,6 @@ def _tuned_margin(share: float) -> tuple[float, float]:
     return math.degrees(math.atan2(5.0 * at, share) - math.atan(at)), at
 
 
-def _current_loop(armature: Any, current: tuple[float, float]) -> Any:
-    """The transfer function from the current reference to the current; with the feed-forward of the back-EMF the
-    plant is only the armature circuit."""
-    import control
-
-    s = control.tf("s")
-    kp, ki = current
-    return control.feedback(control.minreal((kp + ki / s) / (armature.L * s + armature.R), verbose=False), 1)
-
-
-def _open_loop(
-    armature: Any, speed: tuple[float, float], current: tuple[float, float], inertia: float
-) -> Any:
-    """The open speed loop, cut at the measured speed."""
-    import control
-
-    s = control.tf("s")
-    kp, ki = speed
-    return (kp + ki / s) * _current_loop(armature, current) * armature.k / (inertia * s)
-
-
 @result
 class Loop:
     """The linearised speed loop of a motor with one inertia at its shaft."""
@@ -112,34 +91,52 @@ class Loop:
 
 def loop(motor: Any, inertia: float) -> Loop:
     """The speed loop of a DC motor with the parameters `motor`, without limits and friction, at a total `inertia`
-    [kg m2]."""
-    import control
-    import numpy as np
+    [kg m2]. With the current loop C/D the loop, cut at the measured speed, and the response to the load are
 
-    speed = (motor.speed_control.kp, motor.speed_control.ki)
-    current = (motor.current_control.kp, motor.current_control.ki)
-    open_loop = control.minreal(_open_loop(motor.armature, speed, current, inertia), verbose=False)
-    _, phase, _, at = control.margin(open_loop)
-    s = control.tf("s")
-    kp, ki = speed
-    torque = (kp + ki / s) * _current_loop(motor.armature, current) * motor.armature.k
-    by_load = control.minreal(control.feedback(-1.0 / (inertia * s), -torque), verbose=False)
+        G = k (kp s + ki) C/(J s^2 D),    w/T_load = -s D/(J s^2 D + k (kp s + ki) C)
+
+    A test has both of python-control, whose import takes a second.
+    """
+    import numpy as np
+    from scipy.linalg import expm
+
+    armature, current = motor.armature, motor.current_control
+    control = np.array([current.kp, current.ki])
+    closed = np.polyadd(np.array([armature.L, armature.R, 0.0]), control)
+    rise = armature.k * np.polymul([motor.speed_control.kp, motor.speed_control.ki], control)
+    plant = inertia * np.polymul([1.0, 0.0, 0.0], closed)
+    squares = [np.polymul(gain, gain * (-1.0) ** np.arange(gain.size)[::-1]) for gain in (rise, plant)]
+    crossings = np.roots(np.polysub(*squares)[::2])  # in -w^2, as a gain times its mirror is even
+    crossings = np.sqrt(
+        [-root.real for root in crossings if root.real < 0.0 and abs(root.imag) < 1e-9 * abs(root)]
+    )
+
+    def answer(w: Any) -> Any:
+        return np.polyval(rise, 1j * w) / np.polyval(plant, 1j * w)
+
+    margins = [(float(np.degrees(np.angle(-answer(w)))), float(w)) for w in crossings]
+    phase, at = min(margins, key=lambda margin: abs(margin[0]))
     time = np.linspace(0.0, 40.0 / at, 2001)
-    response = control.step_response(by_load, time)
-    deviation = np.asarray(response.outputs)
+    deviation = np.zeros(time.size)
+    poles = np.polyadd(plant, rise)
+    step = expm(np.vstack([-poles[1:] / poles[0], np.eye(3, 4)]) * time[1])
+    state = np.array([1.0, 0.0, 0.0, 0.0])  # after an impulse: a step is an impulse of w/T_load/s
+    for k in range(time.size):
+        deviation[k] = -(closed @ state[1:]) / poles[0]
+        state = step @ state
     dip = float(np.max(np.abs(deviation)))
     outside = np.flatnonzero(np.abs(deviation) > 0.05 * dip)
     frequency = np.logspace(-2.0, 1.5, 200) * at
-    answer = open_loop(1j * frequency)
+    gain = answer(frequency)
     return Loop(
         inertia,
-        float(phase),
-        float(at),
+        phase,
+        at,
         dip,
         float(time[outside[-1]]),
         frequency,
-        np.abs(answer),
-        np.degrees(np.unwrap(np.angle(answer))),
+        np.abs(gain),
+        np.degrees(np.unwrap(np.angle(gain))),
         time,
         deviation,
     )

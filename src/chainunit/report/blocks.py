@@ -1,7 +1,9 @@
 """The blocks of a report. Every section consists of blocks, and a renderer knows blocks alone.
 
-A block, a row or a column is in the ``short`` form of a report (the terminal), the ``long`` one (page and Markdown),
-or in both. Blocks of the form ``sheet`` stand on the sheet of a study, in place of the long ones of their section.
+A block, a row or a column is in the ``short`` form of a report (the terminal with ``--all``), the ``long`` one (page
+and Markdown), or in both. Blocks of the form ``sheet`` stand on the sheet of a study, in place of the long ones of
+their section. The terminal has one screen, as far as there is room: judgements, blocks that are `central`, and those
+of the form ``screen``; if there are none, all of the short form.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ from .lines import Aside, Line, Number, Piece, Words, capital, line, pieces
 from .live_block import Live
 from .motion import Animation
 
-Form = Literal["both", "short", "long", "sheet"]
+Form = Literal["both", "short", "long", "sheet", "screen"]
 Severity = Literal["good", "partly", "bad", "warning", "alarm", "remark"]
 Content: TypeAlias = "Number | Words | str"
 """The content of a given value: a number, words of the result, or the text of a switch or a list."""
@@ -33,6 +35,7 @@ class Text:
     line: Line
     role: Literal["plain", "lead", "note", "fine", "hint"] = "plain"
     form: Form = "both"
+    central: bool = False
 
 
 @dataclass(frozen=True)
@@ -112,6 +115,7 @@ class Table:
     note_title: str = ""
     numeric: bool = True
     form: Form = "both"
+    central: bool = False
 
 
 @dataclass(frozen=True)
@@ -162,6 +166,10 @@ def of_form(blocks: Iterable[Block], form: Form) -> list[Block]:
     return [block for block in blocks if block.form in ("both", form)]
 
 
+def _is_central(block: Block) -> bool:
+    return isinstance(block, Text | Table) and (block.central or block.form == "screen")
+
+
 @dataclass(frozen=True)
 class Section:
     """Blocks under a heading; `name` is the address of the section on the page."""
@@ -194,6 +202,14 @@ class Report:
     def blocks(self, form: Form) -> list[Block]:
         """The blocks of one form, in order."""
         return of_form((*self.opening, *(block for s in self.sections for block in s.blocks)), form)
+
+    @property
+    def screen(self) -> list[Block]:
+        """The blocks of one screen, in order: the central ones, if there are any, else those of the short form."""
+        blocks = [*self.opening, *(block for s in self.sections for block in s.blocks)]
+        if not any(_is_central(block) for block in blocks):
+            return self.blocks("short")
+        return [block for block in blocks if not isinstance(block, Text | Table) or _is_central(block)]
 
     @property
     def drawings(self) -> list[Drawing]:

@@ -33,10 +33,14 @@ def carry_out(
     question: Question,
     output: Path,
     errors: Console | None = None,
+    *,
+    whole: bool = True,
+    png: bool = False,
     **options: Any,
 ) -> None:
-    """Run a task in the folder `output`, show its report, and name the files. `errors` is the console of the standard
-    error, for the progress; the task has these options.
+    """Run a task in the folder `output`, show its report on one screen or as a `whole`, and name the files. `errors`
+    is the console of the standard error, for the progress. With `png` the figures are files, too. The task has
+    these options.
 
     Raises
     ------
@@ -52,14 +56,20 @@ def carry_out(
         with progress_bar(errors) as progress:
             outcome = task.outcome(question, output, progress, **options)
         report = task.report(outcome)
-        written, unwritten = task.write(outcome, report, output)
+        written, unwritten = task.write(outcome, report, output, png)
         from . import terminal
 
         console = terminal_console()
         has_remarks = task.tells_remarks and errors.is_terminal and console.is_terminal
-        terminal.show(report, console, remarks=not has_remarks)
         words = ", ".join(printable(str(path), 500) for path in written)
-        console.print(f"Written: {words}", soft_wrap=True)
+        if whole:
+            terminal.show(report, console, remarks=not has_remarks)
+            console.print(f"Written: {words}", soft_wrap=True)
+        else:
+            names = ", ".join(printable(str(path.relative_to(output)), 500) for path in written[:_MOST_NAMES])
+            names += f" and {len(written) - _MOST_NAMES} more" if len(written) > _MOST_NAMES else ""
+            more = f"All numbers here: --all. Written to {printable(str(output), 500)}: {names}"
+            terminal.screen(report, console, more)
     if (failure := task.failure(outcome)) is not None:
         sentence = f"The run stopped early: {failure}. What was computed before is in {output}."
         errors.print(printable(sentence, 2000), soft_wrap=True)
@@ -70,6 +80,10 @@ def carry_out(
         if shortfall:
             errors.print(shortfall)
         raise typer.Exit(1)
+
+
+_MOST_NAMES = 8
+"""Largest number of files that one screen names."""
 
 
 def exit_status(error: BaseException) -> int:

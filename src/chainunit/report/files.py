@@ -12,9 +12,10 @@ from .blocks import Report
 from .markdown import markdown
 
 
-def writers(report: Report, folder: Path, name: str) -> list[Callable[[], list[Path]]]:
+def writers(report: Report, folder: Path, name: str, png: bool = False) -> list[Callable[[], list[Path]]]:
     """The functions that write the numbers (``NAME.json``), the pictures, the text (``NAME.md``) and the page of a
-    report, in this order; each function returns the files that it wrote."""
+    report, in this order; each function returns the files that it wrote. The page has all figures; they are drawn as
+    pictures, too, with `png`."""
     pictures: list[Path] = []
 
     def numbers() -> list[Path]:
@@ -28,7 +29,8 @@ def writers(report: Report, folder: Path, name: str) -> list[Callable[[], list[P
             with atomic_file(folder / drawing.file) as part:
                 part.write_text(drawing.svg, "utf-8")
             pictures.append(folder / drawing.file)
-        pictures.extend(print_figures.write(report.figures, folder, report.units))
+        if png:
+            pictures.extend(print_figures.write(report.figures, folder, report.units))
         return pictures
 
     def text() -> list[Path]:

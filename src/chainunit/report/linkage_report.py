@@ -141,7 +141,7 @@ def _over_the_way(f: LinkageFindings) -> dict[str, Any]:
 
 
 def _opening(s: b.Source, f: LinkageFindings) -> Iterator[b.Block]:
-    yield b.Text(s.line("The driver gives one degree of freedom: {groups_in_words}."))
+    yield b.Text(s.line("The driver gives one degree of freedom: {groups_in_words}."), central=True)
     if slips := s.result["slips"]:
         items = tuple(s.words(f"slips.{i}") for i in range(len(slips)))
         yield b.Judgement("remark", Strong("Is this what was meant?"), items=items)
@@ -295,13 +295,13 @@ def _forces(s: b.Source, f: LinkageFindings) -> Iterator[b.Block]:
     for way in _ways(f):
         path, on = "back." if way == "back" else "", f", on the way {way}" if way else ""
         title = f"{capital(effort)}, power and {inertia_word} at the driver{on}"
-        yield b.Table(s.rows(type(f.turn), f"{path}turn"), title=title)
+        yield b.Table(s.rows(type(f.turn), f"{path}turn"), title=title, central=True)
         rows = (
             b.TableRow((_title(f, name), *(s.number(f"{path}joints.{name}.{each}") for each in names)))
             for name in f.joints
         )
         heads = b.heads("joint", "largest force", "at", "RMS", "largest moment")
-        yield b.Table(tuple(rows), heads, title=f"Reactions{on}")
+        yield b.Table(tuple(rows), heads, title=f"Reactions{on}", central=True)
     yield from _figures(f, effort, inertia_word)
 
 

@@ -69,8 +69,9 @@ class ReportedResult(Generic[Question, Outcome]):
         """All numbers with their units, as the text of result.json."""
         return files.numbers_text(self._shown)
 
-    def save(self, folder: str | Path) -> list[Path]:
-        """Write the files of the command of the same name with ``-o``; returns the files.
+    def save(self, folder: str | Path, png: bool = False) -> list[Path]:
+        """Write the files of the command of the same name with ``-o``, and with `png` the figures as pictures;
+        returns the files.
 
         Raises
         ------
@@ -87,10 +88,10 @@ class ReportedResult(Generic[Question, Outcome]):
                 task.clear(place)
                 for kept in task.kept(self._outcome, self._folder):
                     _copy(kept, place / kept.relative_to(self._folder))
-            return self._write(place)
+            return self._write(place, png)
 
-    def _write(self, folder: Path) -> list[Path]:
-        paths, failure = self._task.write(self._outcome, self._report, folder)
+    def _write(self, folder: Path, png: bool = False) -> list[Path]:
+        paths, failure = self._task.write(self._outcome, self._report, folder, png)
         if failure is not None:
             raise WriteError(str(failure)) from failure
         return paths

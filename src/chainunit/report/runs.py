@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 from ..core.quantities import Layout
@@ -20,6 +21,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """Tables of the answers of every run, the forces in the bearings and the speed loop."""
     if s.result["answers"]:
         yield table_of_runs(s, study)
+        yield _beside_the_worst(s, study)
     for run, phase in (("start_up", Phase.START_UP), ("settling", Phase.SETTLING)):
         if s.result.get(run):
             yield from _begin(s, study, run, phase)
@@ -91,6 +93,24 @@ def table_of_runs(s: b.Source, study: StudyRecord) -> b.Table:
         head += "; {=run.crank_speed:4} NOT reached"
     title = f"Demands of each run on the drive{'; the motor is insufficient' if study.insufficient else ''}"
     return over_runs(study, runs, rows, title, plain_line(s.line(head), study.config.units))
+
+
+def _beside_the_worst(s: b.Source, study: StudyRecord) -> b.Table:
+    """Steady running beside the overload with the largest crank torque, for one screen."""
+    whole, answers = table_of_runs(s, study), s.result["answers"]
+    runs = by_side(study, answers)
+    shown = [run for run in ("steady",) if run in runs] or runs[:1]
+    peaks = {
+        run: s.value(f"answers.{run}.crank_torque_peak") or 0.0 for run in study.overloads if run in runs
+    }
+    title = whole.title
+    if peaks:
+        shown.append(max(peaks, key=lambda run: abs(peaks[run])))
+        title = f"Steady running beside the worst overload: {run_names.title(study, shown[-1])}"
+    places = [0, *(1 + runs.index(run) for run in shown)]
+    rows = (replace(row, cells=tuple(row.cells[i] for i in places)) for row in whole.rows)
+    columns = tuple(whole.columns[i] for i in places)
+    return replace(whole, rows=tuple(rows), columns=columns, groups=(), title=title, form="screen")
 
 
 def _pins(s: b.Source, study: StudyRecord) -> b.Table:

@@ -120,6 +120,11 @@ class Task(Generic[Question, Outcome]):
         if folder is not None:
             self.clear(folder)
 
-    def write(self, outcome: Outcome, report: Report, folder: Path) -> tuple[list[Path], WriteError | None]:
-        """Write all files. Returns the files, and the first error of a file that could not be written, or None."""
-        return write_all(self.writers(outcome, report, folder, files.writers(report, folder, self._stem)))
+    def write(
+        self, outcome: Outcome, report: Report, folder: Path, png: bool = False
+    ) -> tuple[list[Path], WriteError | None]:
+        """Write all files, figures as PNG with `png`. Returns the files, and the first error of a file that could not
+        be written, or None."""
+        return write_all(
+            self.writers(outcome, report, folder, files.writers(report, folder, self._stem, png))
+        )

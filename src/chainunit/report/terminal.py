@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from functools import partial
+from textwrap import shorten
 
 from rich.console import Console
 from rich.table import Table as Grid
@@ -67,6 +70,64 @@ def show(report: Report, console: Console, *, remarks: bool = True) -> None:
                 console.print(prefix + words, soft_wrap=True)
     for words in last:
         console.print(words, soft_wrap=True)
+
+
+_LINES, _WARNINGS, _ROWS = 45, 5, 3
+"""Lines of one screen, warnings on it, and rows up to which a table is cut to the room that is left."""
+
+
+def screen(report: Report, console: Console, rest: str) -> None:
+    """Print one screen: judgements and the central blocks as far as there is room, warnings of one line each, and
+    where the rest is (`rest`)."""
+    blocks = report.screen
+    last = [
+        _LAST[_role(each)] + words
+        for each in blocks
+        if _role(each) in _LAST
+        for words in _sentences(each, report.units)
+    ]
+    warnings = [each for each in last if each.startswith(_LAST["warning"])][:_WARNINGS]
+    if len(last) > len(warnings):
+        rest = f"{len(last) - len(warnings)} more warnings and notes, {rest[0].lower()}{rest[1:]}"
+    end = [shorten(each, console.width - 1, placeholder=" ...") + "\n" for each in warnings]
+    end.append(_printed(console, lambda: console.print(rest)))
+    room = _LINES - _count(end)
+    title = f"{report.title}\n" if report.title else ""
+    for block in blocks:
+        if _role(block) in (*_LAST, "remark"):
+            continue
+        text = _fitted(block, console, report.units, room - _count([title]))
+        if text:
+            shown = title + text if isinstance(block, Table) else text
+            title = "" if isinstance(block, Table) else title
+            console.file.write(shown)
+            room -= _count([shown])
+    console.file.write("".join(end))
+
+
+def _printed(console: Console, show: Callable[[], None]) -> str:
+    with console.capture() as printed:
+        show()
+    return printed.get()
+
+
+def _count(texts: Iterable[str]) -> int:
+    return sum(text.count("\n") for text in texts)
+
+
+def _fitted(block: Block, console: Console, units: Units, room: int) -> str:
+    """A block as the console prints it, a table with its first rows; empty if it has no room."""
+    if not isinstance(block, Table):
+        text = _printed(console, lambda: console.print("\n".join(_sentences(block, units))))
+        return text if text.strip() and _count([text]) <= room else ""
+    for count in range(len(block.rows), min(_ROWS, len(block.rows)) - 1, -1):
+        part = replace(block, rows=block.rows[:count])
+        text = _printed(console, partial(_show_table, part, console, units))
+        if count < len(block.rows):
+            text += f"... and {len(block.rows) - count} more rows\n"
+        if _count([text]) <= room:
+            return text
+    return ""
 
 
 def plain(report: Report, width: int = 120) -> str:

@@ -8,7 +8,7 @@ capability that brings another model brings its verdict, too.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Set
 from dataclasses import field
 from typing import Any, Literal, NamedTuple
 
@@ -25,6 +25,8 @@ torque (loaded, with an empty side) and the crank torque to a tenth of the peak 
 packaged machine, see docs/physics.md."""
 RESIDUAL = 1e-3
 """Energy residual, relative to the energy moved, up to which a run counts as right."""
+BARS = "two bars"
+"""The papers' model of an organ."""
 STEADY = "steady"
 """Run of normal running; if the model fails in it, the model does not hold at all."""
 START = "start_up"
@@ -37,10 +39,16 @@ Subject = Literal["organs", "machine", "energy balance"]
 """The subject of the verdict: the model of the organs, the model of the machine, or only the energy balance,
 for a machine whose own model is not known."""
 _SUBJECTS: Mapping[Subject, str] = {
-    "organs": "The model of the organs",
-    "machine": "The model of the machine",
-    "energy balance": "The machine is an FMU whose own model is not known; its energy balance",
+    "organs": "Model of the organs, {}",
+    "machine": "Model of the machine, {}",
+    "energy balance": "Energy balance of a machine that is an FMU",
 }
+_HOLDS: Mapping[Holds, str] = {
+    "true": "valid",
+    "in part": "valid in steady running{}",
+    "false": "not valid",
+}
+_BARS_IN_PART = " for crank torque and motor (10 %)"
 
 
 class Topic(NamedTuple):
@@ -55,14 +63,13 @@ _FINER = "{finer}"
 """In place of a remedy: the model that is good where two bars are not, see `Verdict.finer`."""
 TOPICS: Mapping[str, Topic] = {
     "pushed": Topic(
-        "bars are pushed, where a chain would go slack and snatch",
-        "Bars that are pushed, where a chain would go slack and snatch",
+        "bars are in compression, where a chain goes slack: rocker torque and organ forces are no predictions",
+        "Bars in compression, where a chain goes slack",
         _FINER,
     ),
     "end pushed": Topic(
-        "an end of a bar is pushed, where a chain sags",
-        "Bars that are pushed at an end, though pulled in the mean: a chain sags there, which changes the force in "
-        "that pin and hardly the torques",
+        "bar ends are in compression, where a chain sags",
+        "Bar ends in compression, where a chain sags (force in that pin, hardly the torques)",
     ),
     "slack speed": Topic(
         "the crank turns faster than the speed at which a web goes slack",
@@ -89,9 +96,8 @@ TOPICS: Mapping[str, Topic] = {
 """By kind of fault, its words."""
 _UP_TO = {
     "slack speed": "A web goes slack from a crank speed of {} on",
-    "crank torque": "The crank torque of two bars is good to 10 % only up to a crank speed of {}, the rocker torque "
-    "less far",
-    "rocker torque": "The rocker torque of two bars is good to 10 % only up to a crank speed of {}",
+    "crank torque": "Crank torque of two bars: 10 % up to a crank speed of {}, rocker torque less far",
+    "rocker torque": "Rocker torque of two bars: 10 % up to a crank speed of {}",
 }
 """By kind of fault at a crank speed: the line that names its limit."""
 
@@ -203,11 +209,10 @@ class Verdict:
     @derived()
     def text(self) -> str:
         """The verdict in a line."""
-        holds = {"true": "holds", "in part": "holds in part", "false": "does not hold"}[self.holds]
-        model = f"{self.model}, " if self.model else ""
-        line = f"{_SUBJECTS[self.subject]} {holds}: {model}the {self.driver} at "
+        holds = _HOLDS[self.holds].format(_BARS_IN_PART if self.model == BARS else "")
+        line = f"{_SUBJECTS[self.subject].format(self.model)}, {self.driver} at "
         line += (
-            f"{self._turns}, judged at the {self._judged_speed} asked for"
+            f"{self._turns}, judged at the required {self._judged_speed}"
             if self._is_at_requested_speed
             else self._judged_speed
         )
@@ -215,13 +220,16 @@ class Verdict:
         for topic, (short, _, remedy) in self.topics.items():
             runs = {reason.run for reason in self.reasons if reason.topic == topic}
             if runs:
-                why.append(short + _where(runs))
+                why.append(_where(runs) + short)
                 remedy = remedy.format(finer=self.finer)
                 # a crank that hardly turns moves no energy that a residual could be compared with
                 remedy += self._shorter if topic == "energy" else ""
                 remedies.append("" if topic == "energy" and self._stalls else remedy)
         # a remedy for several faults is named once
-        return "; ".join((line, *why, *dict.fromkeys(filter(None, remedies)))) + "."
+        remedy = "; ".join(dict.fromkeys(filter(None, remedies)))
+        remedy = remedy[:1].upper() + remedy[1:]
+        limits = f"{'Limits' if self.holds == 'in part' else 'Reason'}: {'; '.join(why)}" if why else ""
+        return ". ".join(filter(None, (f"{line}: {holds}", limits, remedy))) + "."
 
     def details(self, titles: Mapping[str, str]) -> list[tuple[str, str]]:
         """The topics, each with its line: the runs, by their `titles`, with their numbers."""
@@ -275,16 +283,16 @@ def _at_speed(topic: str, speed: float, limit: float, run: str = "", grave: bool
     return Reason(topic, "crank_speed", speed, limit, "rad/s", run, "speed", grave)
 
 
-def _where(runs: Collection[str]) -> str:
-    """Words on the runs; empty where only the machine itself is meant."""
+def _where(runs: Set[str]) -> str:
+    """The begin of a clause on the runs; empty where only the machine itself is meant."""
     if "" in runs:
         return ""
     if STEADY in runs:
-        return ", in steady running, too"
+        return "in steady running, too, " if runs - {STEADY} else "in steady running "
     places = ["the start-up"] if START in runs else []
     places += ["the settling under the feed"] if SETTLING in runs else []
     places += ["overloads"] if set(runs) - {START, SETTLING} else []
-    return f", in {', '.join(places[:-1])}{' and in ' if places[1:] else ''}{places[-1]}"
+    return f"in {', '.join(places[:-1])}{' and in ' if places[1:] else ''}{places[-1]} "
 
 
 @result
@@ -372,7 +380,7 @@ def two_bars(
         runs = [""] if "" in empty else sorted(empty)
         of_empty = passed_limits(speed_limits(math.inf, mode, empty=True), speed)
         reasons += [_at_speed(each.topic, speed, each.speed, run) for each in of_empty for run in runs]
-    return Verdict("organs", "two bars", speed, (*reasons, *balance_faults(residuals)), actual, finer=finer)
+    return Verdict("organs", BARS, speed, (*reasons, *balance_faults(residuals)), actual, finer=finer)
 
 
 def rigid_links(

@@ -439,7 +439,9 @@ def test_a_file_that_is_bad_from_its_bytes_on_is_judged_without_the_models(made,
 
 def test_an_unsigned_file_no_archive_and_no_file(made, tmp_path):
     run = chainunit("verify", "plain.fmu", cwd=made)
-    assert run.returncode == 1 and "the file is not signed; chainunit certify FILE signs one" in run.stdout
+    assert (
+        run.returncode == 1 and "the file is not signed; chainunit vouch certify FILE signs one" in run.stdout
+    )
     (tmp_path / "text.fmu").write_text("no archive")
     run = chainunit("verify", "text.fmu", cwd=tmp_path)
     assert run.returncode == 2 and "is no FMU and no SSP package: it is not a zip archive" in run.stderr
@@ -1021,7 +1023,7 @@ def test_files_that_are_no_keys_are_refused(made, tmp_path):
         with pytest.raises(InputError, match=r"has no (private|public) key in PEM"):
             read(tmp_path / "text")
         with pytest.raises(
-            InputError, match=r"none: cannot be read \(No such file or directory\); chainunit key makes"
+            InputError, match=r"none: cannot be read \(No such file or directory\); chainunit vouch key makes"
         ):
             read(tmp_path / "none")
     assert keys.public_key(made / "chainunit.key") == keys.public_key(made / "chainunit.key.pub")

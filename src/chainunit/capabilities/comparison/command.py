@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ...core.files import ResultKind
-from ...report.command_options import OutputFolder
+from ...report.command_options import AllOption, OutputFolder, PicturesOption
 from ...report.console import carry_out
 
 
@@ -16,6 +16,8 @@ def compare(
     first: Annotated[Path, typer.Argument(help="Folder of a study, or its result.json.")],
     second: Annotated[Path, typer.Argument(help="Folder of the other study, or its result.json.")],
     output: OutputFolder = Path("comparison"),
+    whole: AllOption = False,
+    png: PicturesOption = False,
 ) -> None:
     """Show two results side by side: the given values that differ, and every measure of each run of both.
 
@@ -23,7 +25,7 @@ def compare(
     """
     from .page import TASK
 
-    carry_out(TASK, (first, second), output)
+    carry_out(TASK, (first, second), output, whole=whole, png=png)
 
 
 COMMANDS = (compare,)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ...core.files import ResultKind
-from ...report.command_options import OutputFolder
+from ...report.command_options import AllOption, OutputFolder, PicturesOption
 from ...report.console import carry_out
 
 
@@ -19,6 +19,8 @@ def handover(
         typer.Option(help="Write the package sizing.aasx, too, which needs pip install 'chainunit[aas]'."),
     ] = True,
     output: OutputFolder = Path("handover"),
+    whole: AllOption = False,
+    png: PicturesOption = False,
 ) -> None:
     """Write the files of a sized drive for other programs, from the folder of a study: no run is made.
 
@@ -27,7 +29,7 @@ def handover(
     they leave open."""
     from .page import TASK, HandoverQuestion
 
-    carry_out(TASK, HandoverQuestion(results, aasx), output)
+    carry_out(TASK, HandoverQuestion(results, aasx), output, whole=whole, png=png)
 
 
 COMMANDS = (handover,)

@@ -8,13 +8,15 @@ from typing import Annotated, Any
 import typer
 
 from ...core.files import ResultKind
-from ...report.command_options import OutputFolder
+from ...report.command_options import AllOption, OutputFolder, PicturesOption
 from ...report.console import carry_out, study_file, terminal_console
 
 
 def identify(
     config: Annotated[Path, typer.Argument(help="Study file (TOML) with a table [identify].")],
     output: OutputFolder = Path("identified"),
+    whole: AllOption = False,
+    png: PicturesOption = False,
 ) -> None:
     """Identify masses, friction and feed of a real machine from recordings of its motor.
 
@@ -31,7 +33,7 @@ def identify(
     def before_fit(*information: Any) -> None:
         errors.print(sentence_before_fit(*information), soft_wrap=True)
 
-    carry_out(TASK, question, output, errors, before_fit=before_fit)
+    carry_out(TASK, question, output, errors, before_fit=before_fit, whole=whole, png=png)
 
 
 COMMANDS = (identify,)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ...core.files import ResultKind
-from ...report.command_options import OutputFolder
+from ...report.command_options import AllOption, OutputFolder, PicturesOption
 from ...report.console import carry_out
 
 
@@ -43,6 +43,8 @@ def linearize(
         typer.Option("--inverse", help="Of a linkage file: motion in and forces out, in place of torque in."),
     ] = False,
     output: OutputFolder = Path("linear"),
+    whole: AllOption = False,
+    png: PicturesOption = False,
 ) -> None:
     """Write the linear model at a point: A, B, C, D with names and units, the poles, Bode plots.
 
@@ -51,7 +53,7 @@ def linearize(
     from .page import TASK
     from .result import LinearQuestion
 
-    carry_out(TASK, LinearQuestion(name, at, pairs, config, inverse), output)
+    carry_out(TASK, LinearQuestion(name, at, pairs, config, inverse), output, whole=whole, png=png)
 
 
 COMMANDS = (linearize,)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ...core.files import ResultKind
-from ...report.command_options import BackendOption, OutputFolder
+from ...report.command_options import AllOption, BackendOption, OutputFolder, PicturesOption
 from ...report.console import carry_out, study_file
 
 
@@ -16,6 +16,8 @@ def optimize(
     config: Annotated[Path, typer.Argument(help="Study file (TOML) with the table [optimize].")],
     output: OutputFolder = Path("best"),
     backend: BackendOption = None,
+    whole: AllOption = False,
+    png: PicturesOption = False,
 ) -> None:
     """Search for the best machine: parameters with the least torque, load, power or energy under limits.
 
@@ -24,7 +26,7 @@ def optimize(
     question = study_file(config)
     from .page import TASK
 
-    carry_out(TASK, question, output, backend=backend and backend.value)
+    carry_out(TASK, question, output, backend=backend and backend.value, whole=whole, png=png)
 
 
 COMMANDS = (optimize,)

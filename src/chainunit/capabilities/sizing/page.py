@@ -235,7 +235,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     if best is not None:
         yield from _best(s, best, "Motor" if choice is not None else "Insufficient motor")
     if "coupling" in section.get("protection", {}):
-        yield b.Text(s.words("sizing.protection.coupling"))
+        yield b.Text(s.words("sizing.protection.coupling"), central=True)
         ways = section["protection"]["alternatives"]
         yield from (b.Text(s.words(f"sizing.protection.alternatives.{k}.words")) for k in range(len(ways)))
         if ways:
@@ -297,7 +297,7 @@ def _best(s: b.Source, path: str, word: str) -> Iterator[b.Block]:
     model = s.result["verdict"]["model"]
     doubt = s.line(" ({verdict.model.caveat})") if model is not None and model["caveat"] else ()
     begin = "Chosen: " if word == "Motor" else "Insufficient: "
-    yield b.Text(line(sentence, doubt, "."), form="short")
+    yield b.Text(line(sentence, doubt, "."), form="short", central=True)
     # a motor that does not suffice is not ordered
     parts = s.result["sizing"].get("parts", {}).get("parts", ())
     motor = [line("motor ", s.words(f"{path}.motor"), " of ", each) for each in _data(s)]
@@ -309,7 +309,7 @@ def _best(s: b.Source, path: str, word: str) -> Iterator[b.Block]:
         order.append(line(f"{parts[k]['part']} ", named, *_how_to_order(s, k)))
     order += _starter(s, path)
     if order and word == "Motor":
-        yield b.Text(line("Order: ", join(order, "; "), "."), form="short")
+        yield b.Text(line("Order: ", join(order, "; "), "."), form="short", central=True)
     yield b.Text(line(begin, s.words(f"{path}.reason"), doubt, "."))
 
 

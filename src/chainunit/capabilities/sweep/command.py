@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ...core.files import ResultKind
-from ...report.command_options import OutputFolder
+from ...report.command_options import AllOption, OutputFolder, PicturesOption
 from ...report.console import carry_out, study_file
 
 
@@ -28,6 +28,8 @@ def sweep(
             help="Address of a Dask scheduler whose workers make the points: tcp://10.0.0.5:8786.",
         ),
     ] = None,
+    whole: AllOption = False,
+    png: PicturesOption = False,
 ) -> None:
     """Vary parameters of a study: quantities of a turn, and measures of runs with an event, at many points.
 
@@ -37,7 +39,7 @@ def sweep(
     question = study_file(config)
     from .page import TASK
 
-    carry_out(TASK, question, output, workers=workers, scheduler=scheduler)
+    carry_out(TASK, question, output, workers=workers, scheduler=scheduler, whole=whole, png=png)
 
 
 COMMANDS = (sweep,)

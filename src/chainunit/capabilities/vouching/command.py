@@ -33,7 +33,7 @@ def certify(
         ),
     ],
     key_file: Annotated[
-        Path, typer.Option("--key", help="File of the private key, by chainunit key.")
+        Path, typer.Option("--key", help="File of the private key, by chainunit vouch key.")
     ] = _KEY,
     output: Annotated[
         Path | None,

@@ -66,7 +66,7 @@ def integrity(data: bytes, key: bytes | None = None, whose: str = "the expected 
         for name, fault in read.faults.items():
             found.add(False, "archive", _told(name, fault))
         if not read.faults or read.members:
-            found.add(False, "signature", "the file is not signed; chainunit certify FILE signs one")
+            found.add(False, "signature", "the file is not signed; chainunit vouch certify FILE signs one")
         return found
     contents: dict[str, bytes] = {}
     for name, place in zip((MANIFEST, SIGNATURE), places, strict=True):

@@ -87,12 +87,16 @@ def private_key(file: Path) -> Ed25519PrivateKey:
     except (ValueError, TypeError) as error:
         hint = "; it has a public key: name the file without .pub" if b"PUBLIC KEY" in text else ""
         raise InputError(
-            f"{file}: has no private key in PEM without password{hint}; chainunit key makes one"
+            f"{file}: has no private key in PEM without password{hint}; chainunit vouch key makes one"
         ) from error
     except Exception as error:  # of kinds of keys that the library does not know
-        raise InputError(f"{file}: has no private key of a known kind; chainunit key makes one") from error
+        raise InputError(
+            f"{file}: has no private key of a known kind; chainunit vouch key makes one"
+        ) from error
     if not isinstance(key, ed25519.Ed25519PrivateKey):
-        raise InputError(f"{file}: is a key of another kind; must be Ed25519, as chainunit key makes it")
+        raise InputError(
+            f"{file}: is a key of another kind; must be Ed25519, as chainunit vouch key makes it"
+        )
     return key
 
 
@@ -117,10 +121,12 @@ def public_key(file: Path) -> bytes:
         key = forms.load_pem_public_key(text)
     except Exception as error:  # the library has several, by the kind of fault
         raise InputError(
-            f"{file}: has no public key in PEM; chainunit key writes one beside the key"
+            f"{file}: has no public key in PEM; chainunit vouch key writes one beside the key"
         ) from error
     if not isinstance(key, ed25519.Ed25519PublicKey):
-        raise InputError(f"{file}: is a key of another kind; must be Ed25519, as chainunit key makes it")
+        raise InputError(
+            f"{file}: is a key of another kind; must be Ed25519, as chainunit vouch key makes it"
+        )
     return bytes(key.public_bytes_raw())
 
 
@@ -128,7 +134,7 @@ def _text(file: Path) -> bytes:
     try:
         return file_bytes(file, MIB)
     except InputError as error:
-        raise InputError(f"{error}; chainunit key makes a file with a key") from error
+        raise InputError(f"{error}; chainunit vouch key makes a file with a key") from error
 
 
 def fingerprint(public: bytes) -> str:

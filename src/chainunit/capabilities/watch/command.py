@@ -8,13 +8,15 @@ from typing import Annotated
 import typer
 
 from ...core.files import ResultKind
-from ...report.command_options import OutputFolder
+from ...report.command_options import AllOption, OutputFolder, PicturesOption
 from ...report.console import carry_out, study_file
 
 
 def watch(
     config: Annotated[Path, typer.Argument(help="Study file (TOML) with a table [watch].")],
     output: OutputFolder = Path("watched"),
+    whole: AllOption = False,
+    png: PicturesOption = False,
 ) -> None:
     """Run the load observer over a recording: feed and force of each side over time, and alarms with their grounds.
 
@@ -23,7 +25,7 @@ def watch(
     question = study_file(config)
     from .page import TASK
 
-    carry_out(TASK, question, output)
+    carry_out(TASK, question, output, whole=whole, png=png)
 
 
 COMMANDS = (watch,)
