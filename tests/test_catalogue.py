@@ -28,6 +28,7 @@ from chainunit.drives.nameplate import TYPICAL, Assumptions, Nameplate, check, i
 from chainunit.study.config import parse
 from chainunit.study.study_file import changed_tables
 
+EXAMPLES = Path(__file__).parents[1] / "examples"
 MOTORS = catalogue()
 FIFTY, SIXTY = ([m for m in MOTORS if m.nameplate.frequency == f] for f in (50.0, 60.0))
 STATES = InductionMotor.state_layout
@@ -281,7 +282,7 @@ def test_other_supply_and_assumptions():
 
 
 def test_what_small_motors_lose_in_iron_shows_as_a_residual():
-    """Their stator cannot make up for iron losses and still have the breakdown torque: the fit leaves that to the
+    """Their stator cannot make up for iron losses and still have the pull-out torque: the fit leaves that to the
     efficiency, and says so."""
     small = plate(
         power=750.0,
@@ -637,7 +638,7 @@ def test_the_command_writes_templates_and_checks_files(tmp_path):
         "flexible_couplings.csv",
         "gears.csv",
         "motors.csv",
-        "safety_couplings.csv",
+        "torque_limiters.csv",
     ]
     names = [str(file) for file in files]
     right = chainunit("catalogue", *names, cwd=tmp_path)

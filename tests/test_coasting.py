@@ -1,4 +1,4 @@
-"""The machine behind a safety coupling that opens: of the same kind as in the study, from its state then."""
+"""The machine behind a torque limiter that opens: of the same kind as in the study, from its state then."""
 
 from __future__ import annotations
 

@@ -275,7 +275,7 @@ def test_what_an_exported_study_leaves_out():
     events = "[coupling]\n[[event]]\ntype = 'jam'\nside = 'left'\n"
     bare, full = config.parse(STUDY), config.parse(STUDY + events)
     assert left_out(bare.operation, bare.given_events) == ""
-    words = "Not in it: the safety coupling; the events jam_left. Its loads are those of normal running."
+    words = "Not in it: the torque limiter; the events jam_left. Its loads are those of normal running."
     assert left_out(full.operation, full.given_events) == words
 
 

@@ -104,7 +104,7 @@ def test_the_jam_trips_the_coupling(result):
     assert 0.0 < jam["coupling_trip_time"]["value"] < 0.1 and jam["energy_after_trip"]["value"] > 0.0
     assert jam["standstill_time"]["value"] > jam["coupling_trip_time"]["value"]
     assert (
-        feed["coupling_trip_time"]["value"] is None and "The safety coupling opens after the event" in message
+        feed["coupling_trip_time"]["value"] is None and "The torque limiter opens after the event" in message
     )
     assert jam["crank_torque_peak"]["value"] > 350.0
     random = numbers["monte_carlo"]
@@ -120,7 +120,7 @@ def test_the_observer_notices_what_the_coupling_does_not(result):
     numbers, message, folder = result("observer_beside_coupling")
     found = numbers["observer"]
     times = {
-        run: [of[device]["time"]["value"] for device in ("safety_coupling", "current_limit", "observer")]
+        run: [of[device]["time"]["value"] for device in ("torque_limiter", "current_limit", "observer")]
         for run, of in found["notices"].items()
     }
     assert times == {
@@ -131,9 +131,9 @@ def test_the_observer_notices_what_the_coupling_does_not(result):
     assert [sides["named"] for sides in found["sides"].values()] == ["left", "right", None]
     for run, device, carried in (
         ("feed_left", "observer", 1.64),
-        ("feed_left", "safety_coupling", 1.67),
+        ("feed_left", "torque_limiter", 1.67),
         ("jam_right", "observer", 10.13),
-        ("hard_lump", "safety_coupling", 28.6),
+        ("hard_lump", "torque_limiter", 28.6),
     ):
         assert found["notices"][run][device]["carried"]["value"] == pytest.approx(carried, rel=5e-3)
     assert "Who notices" in message and (folder / "observer.png").exists()

@@ -504,7 +504,7 @@ def test_a_block_has_no_peaks_of_what_is_not_known(folder):
 
 
 @pytest.mark.parametrize("trip, opens", [(120, True), (400, False)])
-def test_a_safety_coupling_behind_it(trip, opens, folder):
+def test_a_torque_limiter_behind_it(trip, opens, folder):
     """It opens in the jam or is said not to; the torque at which the motor stalls is not compared."""
     text = (folder / "foreign.toml").read_text() + f"[coupling]\ntrip_torque = {trip}\n"
     study = run.run_study(config.parse(text, str(folder / "x.toml")), folder / "coupling")

@@ -1,4 +1,4 @@
-"""The knife drive with a DC motor, a safety coupling that trips in a hard cut, a cardan line on its crank: each is a
+"""The knife drive with a DC motor, a torque limiter that trips in a hard cut, a cardan line on its crank: each is a
 study with the same page; its numbers by another route."""
 
 from __future__ import annotations

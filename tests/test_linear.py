@@ -296,7 +296,7 @@ def test_points_of_steady_running_and_of_an_event():
         for each in (before, later)
     ]
     assert forces[0] == force < forces[1]
-    with pytest.raises(RunError, match="the safety coupling opens at t = "):
+    with pytest.raises(RunError, match="the torque limiter opens at t = "):
         linearize(study, f"jam_left:{begin + 3.0:.4f} s")
 
 

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from chainunit.core.engines import MATH, Dual, casadi_, dual, numpy_, slope
+from chainunit.core.engines import MATH, NAMES, Dual, casadi_, dual, numpy_, slope
+from chainunit.core.errors import InputError
+from chainunit.core.native.operations import Operations
 from chainunit.machines.linkages.file import description_of
 from chainunit.machines.linkages.model import machine_of
 from chainunit.machines.machine import Machine
@@ -196,3 +199,71 @@ def test_the_slope_in_an_fmu_is_right_at_the_points_of_a_table():
         before, at, after = (float(derivative(place + h)) for h in (-1e-9, 0.0, 1e-9))
         assert before == pytest.approx(after, abs=1e-6)
         assert at == pytest.approx(before, abs=1e-6), place
+
+
+def wild(turns, points=200):
+    """A table with uneven places and jumping values."""
+    rng = np.random.default_rng(5)
+    places = np.sort(rng.uniform(0.0, 6.28, points))
+    return TableCurve(list(places), list(rng.normal(0.0, 1e4, points)), turns)
+
+
+@pytest.mark.parametrize("turns", [True, False])
+def test_numbers_are_looked_up_in_a_table_and_symbols_say_the_same(turns):
+    """Value and slope of floats, of arrays and of symbols; a number takes one piece, and not a sum over all."""
+    import casadi
+
+    of, symbol = wild(turns), casadi.SX.sym("q")
+    lifted = of.value(dual(casadi_()), Dual(symbol, 2.0))
+    value = of.value(casadi_(), symbol)
+    traced = casadi.Function("f", [symbol], [value, casadi.gradient(value, symbol), lifted.v, lifted.d])
+    calls = []
+
+    def counted(name):
+        return lambda *x: calls.append(name) or getattr(MATH, name)(*x)
+
+    counting = SimpleNamespace(**{name: counted(name) for name in NAMES})
+    q = np.linspace(-1.0, 8.0, 997)
+    array = of.value(dual(numpy_()), Dual(q, 2.0))
+    for k, each in enumerate(q):
+        calls.clear()
+        single = of.value(dual(counting), Dual(float(each), 2.0))
+        assert len(calls) < 10
+        by_symbol, by_gradient, by_lifted, slope_of_lifted = map(float, traced(each))
+        values = [single.v, array.v[k], by_symbol, by_lifted, of.value(MATH, float(each))]
+        slopes = [single.d, array.d[k], 2.0 * by_gradient, slope_of_lifted]
+        assert values == pytest.approx([values[0]] * 5, rel=1e-9, abs=1e-7), each
+        assert slopes == pytest.approx([slopes[0]] * 4, rel=1e-9, abs=1e-5), each
+
+
+def test_a_point_of_a_table_adds_few_operations_to_an_fmu():
+    """The slope, and its own derivative, take the piece that the value takes."""
+    import casadi
+
+    def count(points):
+        q = casadi.SX.sym("q")
+        both = wild(True, points).value(dual(casadi_()), Dual(q, 1.0))
+        along = casadi.jtimes(casadi.vertcat(both.v, both.d), q, casadi.SX(1.0))
+        items = Operations([q], [casadi.vertcat(both.v, both.d, along)]).items
+        return sum(bool(each.operands) for each in items)
+
+    assert count(200) - count(100) < 1400
+
+
+def test_the_points_of_all_tables_are_counted_as_often_as_loads_take_them():
+    """Each costs time in each step of an FMU and in its compiler."""
+
+    def many(*force, **more):
+        half = {"value": [0.0] * 100}
+        over = {"x": [0.001 * k for k in range(100)]}, {"phi": [0.01 * k for k in range(100)]}
+        tables = {"a": half | over[0], "b": half | over[1]}
+        forces = {f"push{k}": {"on": "ram.B", "force": [each, 0]} for k, each in enumerate(force)}
+        return description_of(press({"tables": tables, "loads": forces, **more}), "press")
+
+    assert many("table(x, a) + b * b")
+    for force in (["table(x, a) + table(y, a) + b"], ["table(x, a) + b", "b"]):
+        with pytest.raises(InputError, match=r"brings the points of tables to 300.* at most 200"):
+            many(*force)
+    numbers = "table(r, " + ", ".join(f"{k}, 0" for k in range(101)) + ")"
+    with pytest.raises(InputError, match=r"parameters.s: brings the points of tables to 201|loads.push0"):
+        many("table(x, a) + b + s", parameters={"r": 1, "s": numbers})

@@ -130,7 +130,7 @@ SIZING = {
     "protection": {
         "setting": number(1.6, "A"),
         "trip_torque": number(210.0, "N.m"),
-        "coupling": "Recommended safety coupling: 210 N m.",
+        "coupling": "Recommended torque limiter: 210 N m.",
         "alternatives": [],
     },
     "candidates": [
@@ -443,7 +443,7 @@ def test_a_run_whose_energy_balance_is_not_kept_is_no_verdict_on_the_motor(study
     steady = study.answers | {"steady": dataclasses.replace(study.answers["steady"], torque_reserve=-0.3)}
     for worst, when in ((answers, "for a moment"), (steady, "in each turn")):
         said = as_dict(dataclasses.replace(study, answers=worst))["verdict"]["motor"]["text"]
-        assert re.search(rf"overloaded {when}: .* above its breakdown torque", said)
+        assert re.search(rf"overloaded {when}: .* above its pull-out torque", said)
     # with none left nothing is known of the reserve
     nothing = {name: {"energy_residual_share": math.nan} for name in certificate}
     motor = as_dict(dataclasses.replace(study, certificate=nothing))["verdict"]["motor"]

@@ -7,6 +7,7 @@ import ast
 import io
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -230,6 +231,15 @@ def test_a_scale_that_panels_share_holds_all_of_them(tmp_path, monkeypatch):
     assert page_figures.figure(figure, DEFAULT_UNITS).layout.yaxis2.matches == "y"
 
 
+def test_a_curve_that_hardly_changes_is_not_on_the_edge(tmp_path, monkeypatch):
+    curve = fig.Curve("c", [0.0, 1.0], [899.0, 900.0])
+    panel, seen = fig.Panel(fig.Axis("x"), fig.Axis("y", low=0.0), (curve,)), []
+    monkeypatch.setattr(print_figures, "_legend", lambda drawing, axes, columns: seen.extend(axes.flat))
+    figure = fig.Figure("one", "", "", ((panel,),), file="one.png")
+    print_figures.write([figure], tmp_path, DEFAULT_UNITS)
+    assert seen[0].get_ylim()[1] > 1.02 * 900.0
+
+
 def test_curves_over_the_same_points_are_thinned_together():
     x = np.linspace(0.0, 1.0, 5001)
     straight, bent = fig.Curve("straight", x, x), fig.Curve("bent", x, np.abs(x - 0.3))
@@ -332,3 +342,26 @@ def test_markdown_has_the_lines_below_the_numbers_of_a_card():
     document = markdown(b.Report("T", "k", {}, (b.Cards(cards),), ()), [])
     assert "| Crank torque | 40.0 N m | peak |" in document
     assert document.count("\n- ") == 1 and "\n- Crank torque: overload: peak 194 N m, a lump\n" in document
+
+
+@pytest.mark.parametrize(
+    ("largest", "label", "shown"), [(2.1e6, "force [kN]", 2100.0), (900.0, "force [N]", 900.0)]
+)
+def test_an_axis_has_the_unit_of_its_largest_value(largest, label, shown):
+    """All curves of one axis have one unit, and so have equal axes and the level panels of a row; a unit that the
+    reader chose stays."""
+
+    def panel(size, name="force"):
+        return fig.Panel(
+            fig.Axis("time", "s"), fig.Axis(name, "N"), (fig.Curve("", [0.0, 1.0], [0.0, size]),)
+        )
+
+    figure = fig.Figure("f", "f", "f", ((panel(largest), panel(5.0)), (panel(5.0, "pull"), None)))
+    (first, second), (third, _) = fig.in_units(figure, DEFAULT_UNITS).panels
+    assert [each.y.label for each in (first, second, third)] == [label, label, "pull [N]"]
+    for each, size in ((first, shown), (second, 5.0 * shown / largest), (third, 5.0)):
+        np.testing.assert_allclose(each.items[0].y, [0.0, size])
+    row = replace(figure, panels=((panel(largest), panel(5.0, "pull")),), level=True)
+    assert fig.in_units(row, DEFAULT_UNITS).panels[0][1].y.label == label.replace("force", "pull")
+    chosen = fig.in_units(figure, chosen_units({"force": "N"})).panels[0]
+    assert [each.y.label for each in chosen] == ["force [N]", "force [N]"]

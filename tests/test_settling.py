@@ -149,13 +149,18 @@ def test_the_loss_of_the_gear_stands_beside_the_net_power(mill):
     assert loss.by_load == pytest.approx((1.0 / 0.94 - 1.0) * np.mean(np.abs(torque)) * w, rel=0.03)
     assert loss.without_load == pytest.approx(1e-5 * (197.0 * w) ** 2, rel=1e-3)
     assert loss.net_power == pytest.approx(np.mean(torque) * w, rel=0.05)
-    assert loss.share == pytest.approx((loss.by_load + loss.without_load) / loss.net_power)
+    assert loss.whole == pytest.approx(loss.by_load + loss.without_load)
+    assert loss.share == pytest.approx(loss.whole / loss.net_power)
     assert loss.share > 5.0 * (1.0 / 0.94 - 1.0) and loss.passed_power > 4.0 * loss.net_power
     findings.remark(study)
     (note,) = study.notes
     assert note.quantities["share"][0] == loss.share and "efficiency of 94.0 %" in note.text
     assert "swings energy to and fro" in note.text and "without load (gear.d)" in note.text
     assert as_data(findings)["without_load"] == {"value": loss.without_load, "unit": "W"}
+    # the warm motor of the energy turns more slowly: one number
+    study.findings["energy"] = SimpleNamespace(gear_loss=0.99 * loss.whole)
+    warm = GearAnalysis.find(study, Work(rig, lambda *_: None)).loss
+    assert warm.whole == 0.99 * loss.whole and warm.by_load + warm.without_load == pytest.approx(warm.whole)
 
 
 @pytest.fixture(scope="module")

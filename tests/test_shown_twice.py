@@ -100,6 +100,7 @@ QUANTITIES = {
     "torque of running at the gear": r"starts\.running|checks\.gear\.running|sizing\.gear\.running",
     "worst torque of a start at the gear": r"starts\.worst\.gear_torque|sizing\.gear\.start",
     "permitted starts": r"sizing\.candidates\.0\.checks\.starts\.limit|checks\.starting\.permitted",
+    "loss of the gear": r"gear_loss\.whole|energy\.own\.mean\.gear",
     "least reserve": r"verdict\.motor\.least_reserve|LEAST",
 }
 """By quantity, the places of a result at which it stands, as an expression; one of them is its own."""

@@ -23,7 +23,7 @@ from chainunit.reading.results import as_data
 from chainunit.study import config
 from chainunit.study.choice import drive_of
 from chainunit.study.cycle import cycle
-from chainunit.study.inverter import inverter_need
+from chainunit.study.inverter import inverter_need, need_of
 from chainunit.study.limits import Check
 from chainunit.study.ram_force import rams
 from chainunit.study.readings import crank_angle
@@ -180,6 +180,23 @@ def test_the_inverter_is_ordered_by_all_starts_and_events():
     assert need.current == pytest.approx(15.8) and need.case == "a start from 5.73 deg"
     need = inverter_need(study((1.2, 1.3), 2.3, SimpleNamespace(inverter_current=6.0)))
     assert (need.current, need.case) == (pytest.approx(9.2), "surge")
+    need = inverter_need(study((1.2, 1.3), 2.3, SimpleNamespace(inverter_current=9.5)))
+    assert (need.current, need.case) == (9.5, "the runs of the choice")
+
+
+@pytest.mark.parametrize(
+    ("values", "case", "current"),
+    [
+        ((6.0, 5.0, [], {"start": 8.0}), "the rated current of the motor", 6.0),
+        ((6.0, 6.5, [4.0], {"start": 8.0}), "the RMS current of running", 6.5),
+        ((6.0, 6.5, [4.0, 7.0], {"start": 8.0}), "a start of more than 60 s", 7.0),
+        ((6.0, None, [4.0, 7.0], {"start": 9.0, "running": 12.0}), "running", 8.0),
+    ],
+)
+def test_each_current_may_decide_on_the_inverter(values, case, current):
+    """The one rule for the runs of a choice and for those of a study."""
+    need = need_of(*values, 1.5)
+    assert (need.case, need.current) == (case, current)
 
 
 @pytest.mark.parametrize(("factor", "passed"), [(1.0, True), (9.0, False)])

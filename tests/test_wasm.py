@@ -187,7 +187,8 @@ def read(results, count):
 
 
 SHORT_LINE = r"(left|right)[.](web|wall)[.](angle|w|a)"
-"""Outputs of a chain that divide by the length of a line, which is nearly 0 in a few random states."""
+"""Outputs of a chain that divide by the length of a line, which is nearly 0 in a few random states. There slopes
+change ten times as much by the last bit of the angles as by the rounding of the formula (against 50 digits)."""
 
 
 def compare(got, want, names, units, most=1e-12, short=1e-11):

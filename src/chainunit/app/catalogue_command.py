@@ -19,14 +19,14 @@ def catalogue(
     template: Annotated[
         bool,
         typer.Option(
-            "--template", help="Write a file for motors, one for gears and one for safety couplings."
+            "--template", help="Write a file for motors, one for gears and one for torque limiters."
         ),
     ] = False,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the templates.")] = Path(
         "catalogue"
     ),
 ) -> None:
-    """Check catalogues of your own line by line: motors, gears, safety couplings; or write templates for them.
+    """Check catalogues of your own line by line: motors, gears, torque limiters; or write templates for them.
 
     Each fault is a line with file, line, column, value and allowed range. A study file names the files by
     catalogue = [...]."""

@@ -1,4 +1,4 @@
-"""Safety couplings that somebody sells, for the motor's shaft: each opens at a torque that can be set."""
+"""Torque limiters that somebody sells, for the motor's shaft: each opens at a torque that can be set."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .catalogue_rows import CatalogueItem, CatalogueKind, Sold
 
 @declaration
 class SafetyCouplingValues:
-    """The values of a safety coupling: its settings and its limits."""
+    """The values of a torque limiter: its settings and its limits."""
 
     setting_least: Value = quantity("N.m", "least torque at which it can be set to open", above=0.0)
     setting_most: Value = quantity("N.m", "largest torque at which it can be set to open", above=0.0)
@@ -26,11 +26,11 @@ class SafetyCouplingValues:
 
 @declaration
 class SafetyCouplingData(Sold, SafetyCouplingValues):
-    """The columns of a safety coupling in a catalogue."""
+    """The columns of a torque limiter in a catalogue."""
 
 
 class CatalogueCoupling(CatalogueItem):
-    """A safety coupling of a catalogue; its `data` are a `SafetyCouplingData`."""
+    """A torque limiter of a catalogue; its `data` are a `SafetyCouplingData`."""
 
     def can_be_set(self, torque: float, speed: float) -> bool:
         """Whether it can be set to that `torque` [N m] and may turn at that `speed` [rad/s]."""
@@ -57,7 +57,7 @@ def _consistent(data: SafetyCouplingData) -> None:
 
 COUPLINGS = CatalogueKind(
     "coupling",
-    "safety couplings",
+    "torque limiters",
     SafetyCouplingData,
     _consistent,
     (
@@ -75,4 +75,4 @@ COUPLINGS = CatalogueKind(
         },
     ),
 )
-"""Safety couplings in catalogues."""
+"""Torque limiters in catalogues."""

@@ -411,17 +411,17 @@ class InductionMotor(Motor):
 
     @staticmethod
     def largest_torque(p: Any, T: float, *at: float) -> float:
-        """The breakdown torque at the present voltage [V] and frequency [Hz] of the motor."""
+        """The pull-out torque at the present voltage [V] and frequency [Hz] of the motor."""
         return float(breakdown(p, at[0] / p.supply.V, at[1], T).air_gap_tau) if min(at) > 0.0 else 0.0
 
     @staticmethod
     def pull_out(p: Any, T: float, *at: float) -> float:
-        """The breakdown torque after friction and windage."""
+        """The pull-out torque after friction and windage."""
         return float(breakdown(p, at[0] / p.supply.V, at[1], T).tau) if min(at) > 0.0 else 0.0
 
     @staticmethod
     def breakdown_speed(p: Any, T: float, *at: float) -> float:
-        """The speed of the breakdown torque after friction and windage."""
+        """The speed of the pull-out torque after friction and windage."""
         V, f = at
         slip = float(breakdown(p, V / p.supply.V, f, T).slip) if min(V, f) > 0.0 else 1.0
         return (1.0 - slip) * _TURN * f / p.pole_pairs

@@ -1,12 +1,12 @@
 """The equivalent circuit of an induction motor from its nameplate and catalogue data.
 
-Six values of the catalogue - torque, current and power factor in rated running, breakdown torque, torque and
+Six values of the catalogue - torque, current and power factor in rated running, pull-out torque, torque and
 current with the rotor locked - give six parameters: two resistances, leakage, magnetising inductance, and the changes
 of resistance and leakage at standstill by the skin effect. Values that no catalogue has are declared in
 `Assumptions`.
 
 The model has no iron and stray losses. `stator.R` is fitted so that the copper losses include them in rated running;
-it is therefore larger than the resistance by an ohmmeter. In small motors the breakdown torque would be too small
+it is therefore larger than the resistance by an ohmmeter. In small motors the pull-out torque would be too small
 with that resistance; there the fit departs from power factor and efficiency first (`_WEIGHTS`). Saturation
 (`main.beta`) stays 0, because it follows from no value of a catalogue; `cage.skin_L` includes the fall of the leakage
 by saturation of the teeth in the locked motor.
@@ -53,7 +53,7 @@ class Nameplate:
         default=0.0,
         min=0.0,
     )
-    breakdown_ratio: Value = quantity("1", "breakdown torque over rated torque", above=1.0, max=10.0)
+    breakdown_ratio: Value = quantity("1", "pull-out torque over rated torque", above=1.0, max=10.0)
     locked_torque_ratio: Value = quantity("1", "locked-rotor torque over rated torque", above=0.0, max=10.0)
     locked_current_ratio: Value = quantity(
         "1", "locked-rotor current over rated current", above=1.0, max=20.0

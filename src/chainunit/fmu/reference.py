@@ -15,12 +15,12 @@ import math
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple, cast
-from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement, register_namespace
 
 import numpy as np
 
 from ..core.engines import MATH
+from ..core.inputs import xml_of
 from ..core.model import Model
 from ..core.ports import FLANGE, LOAD
 from ..core.quantities import Quantity, Type, written
@@ -136,7 +136,7 @@ def related_files(content: bytes | None = None) -> Element:
     file yet."""
     register_namespace("fmi-ls", _NAMESPACE)
     if content is not None:
-        return ElementTree.fromstring(content)
+        return xml_of(content, RELATED)
     said = {
         "name": STANDARD,
         "version": "1.0.0-beta.1",

@@ -7,9 +7,14 @@ Standard library only: FMUs carry this file.
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Sequence
+from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from operator import mul
+from typing import Any, NamedTuple
+
+from ..core import engines
 
 ROUNDED = 0.1
 """Part of the way of a `ramp` over which each of its corners is rounded."""
@@ -50,6 +55,24 @@ def ramp(xp: Any, x: Any, begin: Any, end: Any) -> Any:
     return positive(xp, t, ROUNDED) - positive(xp, t - 1.0, ROUNDED)
 
 
+class _Piece(NamedTuple):
+    """A piece of a table from a `place` on: from its `value` there on, a polynomial of the part of its width, from 0
+    to 1. `per_width` is 1 by the width."""
+
+    place: Any
+    per_width: Any
+    value: Any
+    linear: Any
+    square: Any
+    cubic: Any
+
+    def at(self, way: Any) -> tuple[Any, Any]:
+        """Value and slope at a place of it."""
+        t = (way - self.place) * self.per_width
+        value = self.value + t * (self.linear + t * (self.square + t * self.cubic))
+        return value, (self.linear + t * (2.0 * self.square + t * (3.0 * self.cubic))) * self.per_width
+
+
 class TableCurve:
     """A table of one variable, between its points by cubic pieces that rise or fall as their ends do (Fritsch and
     Carlson). Over an angle it repeats itself each turn; over a way its ends go on."""
@@ -62,41 +85,58 @@ class TableCurve:
         values : at these places
         turns : whether the coordinate is an angle
         """
-        self.turns = turns
-        places, values = list(places), list(values)
+        self.turns, self._first = turns, places[0]
+        at, values = [place - places[0] for place in places], list(values)
         if turns:
-            places.append(places[0] + 2.0 * math.pi)
+            at.append(2.0 * math.pi)
             values.append(values[0])
-        widths = [b - a for a, b in pairwise(places)]
+        widths = [b - a for a, b in pairwise(at)]
         rises = [(b - a) / h for a, b, h in zip(values, values[1:], widths, strict=False)]
         slopes = [_mean_slope(rises[k - 1], rises[k], widths[k - 1], widths[k]) for k in range(len(rises))]
         slopes.append(slopes[0])
         if not turns:
             slopes[0] = slopes[-1] = 0.0
-        knots = [place - places[0] for place in places]
-        pieces = [*zip(widths, rises, slopes, slopes[1:], strict=False)]
-        self._first, self._value, self._before = places[0], values[0], 0.0
-        if turns:
-            # the turn begins within the last piece, not at a point: there the slope would be that of one side alone
-            knots.insert(0, knots[-2] - 2.0 * math.pi)
-            pieces.insert(0, pieces[-1])
-            self._value, self._before = values[-2], 0.5 * widths[-1]
-        self._knots, self._pieces = tuple(knots), tuple(pieces)
+        self._pieces = [
+            # Hermite's cubic
+            _Piece(a, 1.0 / h, value, h * begin, h * (3.0 * rise - 2.0 * begin - end), h * (begin + end - 2.0 * rise))
+            for a, h, value, rise, begin, end in zip(
+                at, widths, values, rises, slopes, slopes[1:], strict=False
+            )
+        ]  # fmt: skip
+        self._later, self._length = at[1:-1], at[-1]
 
     def value(self, xp: Any, q: Any) -> Any:
         """The value at the coordinate `q` [rad, m]."""
-        total, way = self._value, q - self._first
-        if self.turns:  # in one turn, from half of the last piece before the first place on
-            x = way + self._before
-            way = xp.atan2(-xp.sin(x), -xp.cos(x)) + (math.pi - self._before)
-        # where two pieces meet they share the size of one distance, so that the sum of their slopes is right there
-        sizes = [xp.abs(way - knot) for knot in self._knots]
-        for before, after, (width, rise, begin, end) in zip(sizes, sizes[1:], self._pieces, strict=False):
-            t = 0.5 + (before - after) * (0.5 / width)  # from 0 to 1
-            # Hermite's cubic, from the value at its begin
-            cubic = 3.0 * rise - 2.0 * begin - end + t * (begin + end - 2.0 * rise)
-            total = total + width * t * (begin + t * cubic)
-        return total
+        x = q - self._first
+        if self.turns:
+            x = xp.atan2(-xp.sin(x), -xp.cos(x)) + math.pi
+        way = engines.value(x)
+        if not self.turns:
+            way = xp.minimum(xp.maximum(way, 0.0), self._length)
+        value, slope = self._piece(way).at(way)
+        return engines.Dual(value, slope * x.d) if isinstance(x, engines.Dual) else value
+
+    def _piece(self, way: Any) -> _Piece:
+        """The piece at a number, those at an array, or the one at a symbol, by which nothing can be looked up: there
+        each of its numbers is a sum of steps."""
+        if isinstance(way, float | int):
+            return self._pieces[bisect_right(self._later, way)]
+        if type(way).__module__ == "numpy":
+            later, columns = self._arrays
+            return _Piece(*columns[:, later.searchsorted(way, "right")])
+        first, *_ = self._pieces
+        passed = [way >= place for place in self._later]
+        steps = [
+            (after - before for before, after in pairwise(column))
+            for column in zip(*self._pieces, strict=True)
+        ]
+        return _Piece(*(sum(map(mul, passed, each), begin) for begin, each in zip(first, steps, strict=True)))
+
+    @cached_property
+    def _arrays(self) -> tuple[Any, Any]:
+        import numpy as np
+
+        return np.array(self._later), np.array(self._pieces).T
 
 
 def _mean_slope(before: float, after: float, left: float, right: float) -> float:

@@ -127,6 +127,8 @@ class Expression:
     def __init__(self, text: str) -> None:
         self.text, self._depth = text, 0
         self.widths: list[Width] = []
+        self.lookups: list[str] = []
+        self.points: list[int] = []
         if len(text) > LONGEST:
             raise InputError(f"{shown(text)}: has {len(text)} letters; must have <= {LONGEST}{_SPLIT}")
         try:
@@ -302,6 +304,7 @@ class Expression:
     def _table(self, x: Term, rest: Sequence[ast.AST]) -> Term:
         if len(rest) == 1 and isinstance(rest[0], ast.Name):
             name = rest[0].id
+            self.lookups.append(name)
             return Term(
                 lambda xp, of: of[f"table {name}"].value(xp, x.value(xp, of)),
                 x.names,
@@ -318,6 +321,7 @@ class Expression:
         places = values[::2]
         if any(b <= a for a, b in pairwise(places)):
             raise InputError(f"{shown(self.text)}: the places x1, x2, ... of the table must rise")
+        self.points.append(len(places))
         curve = TableCurve(places, values[1::2], turns=False)
         return Term.of(lambda xp, of: curve.value(xp, x.value(xp, of)), x)
 

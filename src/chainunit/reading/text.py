@@ -140,9 +140,9 @@ def scales(unit: str, kind: str = "", units: Units = DEFAULT_UNITS) -> list[tupl
     return [(unit, 1.0, 0.0)]
 
 
-def _of_size(value: float, unit: str, kind: str, units: Units) -> list[tuple[str, float, float]]:
-    """The `scales` of one number: a large torque is in kN m and a small power in W, unless the user chose another
-    unit."""
+def scales_of_size(value: float, unit: str, kind: str, units: Units) -> list[tuple[str, float, float]]:
+    """The `scales` of one number, or of an axis up to that number: a large torque is in kN m and a small power in W,
+    unless the user chose another unit."""
     of = kind if kind in _SCALES else _KIND_OF.get(unit, "")
     if of not in _BY_SIZE or units.get(of) != DEFAULT_UNITS.get(of):
         return scales(unit, kind, units)
@@ -213,7 +213,7 @@ def forms(
     if kind == "assumed":
         value, full = float(f"{value:.0e}"), False
     texts = []
-    for name, factor, offset in _of_size(value, unit, kind, units):
+    for name, factor, offset in scales_of_size(value, unit, kind, units):
         texts.append((digits_text(factor * value + offset, digits, full=full), unit_text(name)))
         # beside a number as it was given the other unit is a result
         digits, full = digits if full else 3, True

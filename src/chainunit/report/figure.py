@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
 
-from ..reading.text import Units, plain, scales, unit_text
+from ..reading.text import Units, plain, scales_of_size, unit_text
 from .lines import Line
 
 
@@ -237,12 +237,14 @@ def hatch_lines(hatch: Hatch) -> tuple[Any, Any]:
 
 
 def in_units(figure: Figure, units: Units) -> Figure:
-    """The figure with all values in the units in which they are shown; the labels of its axes name these units."""
+    """The figure with all values in the units in which they are shown; the labels of its axes name these units. An
+    axis has one unit, that of its largest value."""
     cache: dict[tuple[int, float, float], Any] = {}
+    sizes = _sizes(figure)
 
-    def values(axis: Axis, x: Any) -> Any:
+    def values(axis: Axis, x: Any, size: float) -> Any:
         """Values on an axis. The same array gives the same array again, so that curves over one x still share it."""
-        _, factor, offset = scales(axis.unit, axis.kind, units)[0]
+        _, factor, offset = scales_of_size(size, axis.unit, axis.kind, units)[0]
         key = (id(x), factor, offset)
         if key not in cache:
             result = factor * np.asarray(x, float) + offset
@@ -250,27 +252,59 @@ def in_units(figure: Figure, units: Units) -> Figure:
             cache[key] = float(result) if result.ndim == 0 else result, x
         return cache[key][0]
 
-    def panel(original: Panel) -> Panel:
+    def panel(original: Panel, row: int) -> Panel:
         axes = {"x": original.x, "y": original.y}
+        size = {on: sizes[_shared(figure, on, axis, row)] for on, axis in axes.items()}
         items = (
-            replace(item, **{name: values(axes[on], getattr(item, name)) for name, on in along(item).items()})
+            replace(
+                item,
+                **{name: values(axes[on], getattr(item, name), size[on]) for name, on in along(item).items()},
+            )
             for item in original.items
         )
-        ends = (
-            replace(axis, low=axis.low and values(axis, axis.low), high=axis.high and values(axis, axis.high))
-            for axis in axes.values()
-        )
-        x, y = (_with_unit(axis, units) for axis in ends)
+        ends = {
+            on: replace(
+                axis,
+                low=axis.low and values(axis, axis.low, size[on]),
+                high=axis.high and values(axis, axis.high, size[on]),
+            )
+            for on, axis in axes.items()
+        }
+        x, y = (_with_unit(axis, units, size[on]) for on, axis in ends.items())
         return replace(original, x=x, y=y, items=tuple(items))
 
-    return replace(figure, panels=tuple(tuple(each and panel(each) for each in row) for row in figure.panels))
+    rows = enumerate(figure.panels)
+    return replace(figure, panels=tuple(tuple(each and panel(each, r) for each in row) for r, row in rows))
 
 
-def _with_unit(axis: Axis, units: Units) -> Axis:
+def _shared(figure: Figure, on: str, axis: Axis, row: int) -> tuple[Any, ...]:
+    """The axes that have one scale have one such key: equal axes in x, and in y of a row that is level."""
+    return (on, axis) if on == "x" or not figure.level else (on, row)
+
+
+def _sizes(figure: Figure) -> dict[tuple[Any, ...], float]:
+    """The largest size of a value on each axis, in its declared unit, by the key of the axes that share it."""
+    sizes: dict[tuple[Any, ...], float] = {}
+    for row, _, panel in figure.all_panels():
+        for on, axis in (("x", panel.x), ("y", panel.y)):
+            every = [
+                np.abs(np.asarray(getattr(item, name), float)).ravel()
+                for item in panel.items
+                for name, along_axis in along(item).items()
+                if along_axis == on
+            ]
+            every.append(np.abs([x for x in (axis.low, axis.high) if x is not None]))
+            table = np.concatenate(every)
+            key = _shared(figure, on, axis, row)
+            sizes[key] = float(np.max(table[np.isfinite(table)], initial=sizes.get(key, 0.0)))
+    return sizes
+
+
+def _with_unit(axis: Axis, units: Units, size: float) -> Axis:
     """The axis with its unit in its label."""
     if axis.names:
         return axis
-    (unit, factor, _), *others = scales(axis.unit, axis.kind, units)
+    (unit, factor, _), *others = scales_of_size(size, axis.unit, axis.kind, units)
     word = plain(unit_text(unit))
     second = (f"{axis.label} [{others[0][0]}]", others[0][1] / factor) if others else None
     return replace(axis, label=f"{axis.label} [{word or '1'}]", unit=word, second=second)

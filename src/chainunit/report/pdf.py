@@ -32,6 +32,8 @@ _BEGIN = re.compile(r'(<(?:th|h3|span class="said")\b[^>]*>(?:<[^>]+>)*)([a-z])'
 it, as on the screen, but WeasyPrint nests such a box again each time that it lays out a column or a page.)"""
 MOST_PAGES = 8
 """Pages beyond which the annex is set closer."""
+_SETS = ("", "close", "close closer")
+"""Ways to set the annex, from wide to close: classes of the page."""
 _BARS = 2
 """Shares in a row up to which they have bars."""
 _SIGNED = ("Prepared", "Checked", "Released")
@@ -173,10 +175,11 @@ def write(sheet: Sheet, pictures: Mapping[str, Path], file: Path) -> Path:
     # it names every property of a screen that paper does not have
     logging.getLogger("weasyprint").setLevel(logging.ERROR)
     text, variant = page_text(sheet, pictures), {"pdf_variant": "pdf/a-3u"}
-    document = weasyprint.HTML(string=text, base_url=str(file.parent)).render(**variant)
-    if len(document.pages) > MOST_PAGES:
-        close = text.replace("<body>", '<body class="close">', 1)
-        document = weasyprint.HTML(string=close, base_url=str(file.parent)).render(**variant)
+    for way in _SETS:
+        page = text.replace("<body>", f'<body class="{way}">', 1)
+        document = weasyprint.HTML(string=page, base_url=str(file.parent)).render(**variant)
+        if len(document.pages) <= MOST_PAGES:
+            break
     document.write_pdf(file, **variant)
     return file
 

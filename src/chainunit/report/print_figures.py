@@ -44,6 +44,10 @@ _PLACES: dict[str, tuple[tuple[int, int], str, str]] = {
 
 _SMALL, _NAMED = 0.62, 0.8
 """Size of a figure for a sheet over that of one for a screen, and its height where an axis has names."""
+_ROOM = 0.04
+"""Room above the largest value of an axis that begins at a given one, relative to the axis."""
+_WORDS = 0.75
+"""Size of the words beside bars in a small figure over that in one for a screen."""
 _LABELS, _NARROW = 8, 6.0
 """Size of the letters of labels in a small figure (the others are as large as in one for a screen), and width [in] up
 to which a legend below one panel has two columns."""
@@ -91,7 +95,7 @@ def _figure(spec: Figure, units: Units, size: float = 1.0) -> Any:
         if figure.level and c and (r, 0) in places:
             axes[r, c].sharey(axes[r, 0])
         for item in panel.items:
-            _draw(axes[r, c], item)
+            _draw(axes[r, c], item, size)
     # scales come last: axes that share one need the items of all their panels
     for r, c, panel in figure.all_panels():
         sharing = figure.sharing(r, c)
@@ -152,6 +156,11 @@ def _scale(axis: Any, spec: Axis, side: str) -> None:
         axis.ticklabel_format(axis=side, useOffset=False)
     if spec.low is not None or spec.high is not None:
         getattr(axis, f"set_{side}lim")(spec.low, spec.high)
+        low, high = getattr(axis, f"get_{side}lim")()
+        largest = getattr(axis.dataLim, f"interval{side}")[1]
+        if spec.high is None and not spec.log and np.isfinite(largest):
+            # a curve that hardly changes is not on the edge
+            getattr(axis, f"set_{side}lim")(low, max(high, largest + _ROOM * (largest - low)))
     if spec.ticks:
         which.set_ticks(list(spec.ticks))
     elif spec.step is not None and spec.low is not None and spec.high is not None:
@@ -163,7 +172,7 @@ def _name(axis: Any, name: str) -> str | None:
     return name if name and name not in axis.get_legend_handles_labels()[1] else None
 
 
-def _draw(axis: Any, item: Item) -> None:
+def _draw(axis: Any, item: Item, size: float = 1.0) -> None:
     match item:
         case Curve():
             look = look_of(item.look) | ({} if item.has_line else {"linestyle": ""})
@@ -190,7 +199,7 @@ def _draw(axis: Any, item: Item) -> None:
                 else:
                     axis.annotate(item.words, (item.at, 1.0), (0.0, 3.0), **top, ha="center", va="bottom")
         case Bars():
-            _bars(axis, item)
+            _bars(axis, item, size)
         case Label():
             offset, ha, va = _PLACES[item.place]
             style = {"ha": ha, "va": va, "fontsize": 9, "bbox": _WHITE, "zorder": 6}
@@ -202,14 +211,15 @@ def _draw(axis: Any, item: Item) -> None:
             axis.plot(*hatch_lines(item), label=_name(axis, item.name), **style)
 
 
-def _bars(axis: Any, bars: Bars) -> None:
+def _bars(axis: Any, bars: Bars, size: float) -> None:
     look = BARS[bars.look % len(BARS)]
     lying = axis.barh(
         bars.at, bars.size, bars.height, label=bars.name or None, edgecolor=INK, linewidth=0.6,
         color=INK if bars.slim else look["color"], hatch=None if bars.slim else look["hatch"],
     )  # fmt: skip
     if bars.words:
-        axis.bar_label(lying, bars.words, padding=4, fontsize=8)
+        # the words of two bars of one name stand below each other
+        axis.bar_label(lying, bars.words, padding=4, fontsize=8 * max(size, _WORDS))
         axis.margins(x=0.22)
 
 

@@ -8,7 +8,7 @@ from ..study.event import in_groups
 from ..study.record import StudyRecord
 
 COASTING = "_coasting"
-"""The end of the name of a run of the machine alone, after the safety coupling has opened; the name begins with that
+"""The end of the name of a run of the machine alone, after the torque limiter has opened; the name begins with that
 of the run in which it opened."""
 _TITLES = {"start_up": "start-up and steady running", "unfinished": "the run that stopped early"}
 

@@ -120,12 +120,32 @@ def _assumed(given: dict[str, b.Section], study: StudyRecord) -> Iterator[b.Bloc
 
 
 def _not_assumed(section: b.Section, study: StudyRecord) -> b.Section:
-    """The section of given values without those that the sheet lists as assumptions."""
+    """The section of given values without those that the sheet lists as assumptions; a value of an event that no file
+    gives stands at the first of the events that have it."""
     blocks = (
-        _kept(each, study, are_assumed=False) if isinstance(each, b.Given) else each
+        _once(_kept(each, study, are_assumed=False)) if isinstance(each, b.Given) else each
         for each in section.blocks
     )
     return replace(section, heading="Other given values", blocks=tuple(blocks))
+
+
+def _once(block: b.Given) -> b.Given:
+    """The values, each value of an event that no file gives at the first event that has it."""
+    earlier: set[tuple[str, Any]] = set()
+    sections = []
+    for title, values in block.sections:
+        kept = []
+        for each in values:
+            number = each.value.value if isinstance(each.value, Number) else each.value
+            key = each.description, number
+            is_default = each.name.startswith("event.") and each.origin == "declared"
+            if not is_default or key not in earlier:
+                kept.append(each)
+            if is_default:
+                earlier.add(key)
+        if kept:
+            sections.append((title, tuple(kept)))
+    return b.Given(tuple(sections))
 
 
 def _kept(block: b.Given, study: StudyRecord, are_assumed: bool) -> b.Given:

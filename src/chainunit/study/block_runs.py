@@ -391,8 +391,11 @@ def _turns(point: RunPoint, run: xr.Dataset) -> xr.Dataset:
 
 
 def _settles(point: RunPoint, run: xr.Dataset) -> bool:
-    """Whether a point is in steady running."""
-    return is_settled(point.rig.drive, _turns(point, run))
+    """Whether a point is in steady running; a crank that makes no whole turn is not: it may creep up to a load, and
+    turn on once it is past it."""
+    drive = point.rig.drive
+    has_turns = has_turn(drive, run) or drive.simulated_machine.model.never_repeats
+    return bool(has_turns) and is_settled(drive, _turns(point, run))
 
 
 class EventSimulation:

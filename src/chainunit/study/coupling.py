@@ -1,4 +1,4 @@
-"""The safety coupling of a drive: whether it protects the drive, and the torques by which it is set."""
+"""The torque limiter of a drive: whether it protects the drive, and the torques by which it is set."""
 
 from __future__ import annotations
 
@@ -8,22 +8,24 @@ from typing import Any
 
 from ..reading.text import number
 from .event import Role
-from .event_torques import peaks_in_events
+from .event_torques import from_event_on, peaks_in_events
 from .ram_force import TIMES, rams
 from .readings import pull_out_torque
 from .record import StudyRecord
-from .starts import StartFindings
-from .torques import on_coupling
+from .starts import StartFindings, transient_words
+from .torques import on_coupling, quasi_static_peak
 from .verdict import START
 from .window import Phase
 
 
 @dataclass(frozen=True)
 class StartPeak:
-    """The largest torque of a start on the coupling, at the crank [N m]: in the run of that name, or in a start from
-    a crank angle [rad] without a run of its own."""
+    """The largest torque of a start on the coupling by load and acceleration, at the crank [N m], and with the
+    electromagnetic `transient`: in the run of that name, or in a start from a crank angle [rad] without a run of its
+    own."""
 
     torque: float
+    transient: float
     run: str = START
     angle: float | None = None
 
@@ -39,17 +41,38 @@ class StartPeak:
 def start_peaks(study: StudyRecord) -> list[StartPeak]:
     """The largest torques on the coupling in the parts of the start: the start-up with the settling under a feed that
     comes later, starts from other crank angles, starts under load."""
-    events, peaks = study.config.events, peaks_in_events(study)
-    run = study.runs[START].sel(time=slice(None, study.steady_begin))
-    parts = [StartPeak(on_coupling(study.drive, run))]
+    drive, events = study.drive, study.config.events
+    runs = {START: study.runs[START].sel(time=slice(None, study.steady_begin))}
+    runs |= {
+        name: from_event_on(study, name)
+        for name in study.event
+        if name in study.runs and events[name].from_rest
+    }
+    parts = [
+        StartPeak(quasi_static_peak(drive, run, on_coupling), on_coupling(drive, run), name)
+        for name, run in runs.items()
+    ]
     if findings := StartFindings.found_in(study):
-        parts += [StartPeak(start.coupling_torque, angle=start.angle) for start in findings.starts]
-    return parts + [StartPeak(peak, name) for name, peak in peaks.items() if events[name].from_rest]
+        starts = findings.starts
+        parts += [StartPeak(x.coupling_torque, x.coupling_transient, angle=x.angle) for x in starts]
+    return parts
 
 
 def hardest_start(study: StudyRecord) -> StartPeak:
-    """The part of the start with the largest torque on the coupling."""
+    """The part of the start with the largest torque on the coupling by load and acceleration."""
     return max(start_peaks(study), key=lambda start: start.torque)
+
+
+def transient_of_starts(study: StudyRecord) -> StartPeak:
+    """The part of the start with the largest torque on the coupling, with the electromagnetic transient."""
+    return max(start_peaks(study), key=lambda start: start.transient)
+
+
+TRIPS_IN_TRANSIENT = (
+    "A friction clutch slips in it for this time; a ball detent or a shear pin that is set lower may open in it, "
+    "unless the line between motor and coupling is soft"
+)
+"""The response of a coupling to the electromagnetic transient, in words."""
 
 
 def pull_out(study: StudyRecord) -> float:
@@ -64,22 +87,35 @@ def remark_on_coupling(study: StudyRecord, trip: float) -> None:
     peaks, shocks = peaks_in_events(study), peaks_in_events(study, Role.SHOCK)
     amounts = {"trip": (trip, "N.m")} | ({} if most is None else {"motor": (most, "N.m")})
     warn = study.warn
-    start = hardest_start(study)
+    start, quick = hardest_start(study), transient_of_starts(study)
     if start.torque > trip:
         warn(
             "coupling opens in start",
-            "The safety coupling opens at {trip}, and a start puts up to {start} on it ({where}): it opens in some "
+            "The torque limiter opens at {trip}, and a start puts up to {start} on it ({where}): it opens in some "
             'of the starts. Set it higher, or start softer (start = "soft" or "inverter").',
             "start_up",
             where=start.title(study),
             start=(start.torque, "N.m"),
             **amounts,
         )
+    elif quick.transient > trip:
+        warn(
+            "coupling opens in start",
+            "The torque limiter is set to {trip}. Load and acceleration put {start} on it in a start at most; the "
+            "{transient}: {most} ({where}). {words}.",
+            "start_up",
+            where=quick.title(study),
+            start=(start.torque, "N.m"),
+            transient=transient_words(study),
+            most=(quick.transient, "N.m"),
+            words=TRIPS_IN_TRANSIENT,
+            **amounts,
+        )
     openings = [name for name in peaks if study.answers[name].coupling_trip_time is not None]
     if nuisances := [name for name in openings if name not in shocks]:
         warn(
             "nuisance trip",
-            "The safety coupling, set to {trip}, opens where no shock asks for it, a nuisance trip that protects "
+            "The torque limiter, set to {trip}, opens where no shock asks for it, a nuisance trip that protects "
             "nothing: {where}.",
             *nuisances,
             where="; ".join(map(study.title_of, nuisances)),
@@ -88,7 +124,7 @@ def remark_on_coupling(study: StudyRecord, trip: float) -> None:
     if shocks and not set(openings) & set(shocks):
         warn(
             "coupling never opens",
-            "The safety coupling opens in no jam, lump or block of this study: it is set to {trip}, they put "
+            "The torque limiter opens in no jam, lump or block of this study: it is set to {trip}, they put "
             "{largest} on it at most, steady running {steady}"
             + ("." if most is None else "; the motor gives {motor} at most."),
             *shocks,
@@ -99,7 +135,7 @@ def remark_on_coupling(study: StudyRecord, trip: float) -> None:
     elif most is not None and trip > most:
         warn(
             "coupling above motor",
-            "The safety coupling is set to {trip} and the motor gives {motor} at most: a load that rises "
+            "The torque limiter is set to {trip} and the motor gives {motor} at most: a load that rises "
             "slowly stalls the motor and does not open it.",
             **amounts,
         )

@@ -32,7 +32,7 @@ AnySide: TypeAlias = SideName | Literal[""]
 
 
 class Role(StrEnum):
-    """The meaning of an event for a safety coupling."""
+    """The meaning of an event for a torque limiter."""
 
     DUTY = "duty"
     """the event may last, or comes with every start: a coupling has to carry its torque"""

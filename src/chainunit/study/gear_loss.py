@@ -24,8 +24,10 @@ SWINGS = 1.5
 @declaration
 class GearLoss:
     """The mean loss of the gear in steady running. The loss by load is that of its efficiency, taken of the power
-    that passes in either direction; the loss without load is that of its drag `gear.d`."""
+    that passes in either direction; the loss without load is that of its drag `gear.d`. It is that of the warm motor
+    if an analysis has run that, else that of the run of the study."""
 
+    whole: Value = quantity("W", "whole loss")
     by_load: Value = quantity("W", "loss by load")
     without_load: Value = quantity("W", "loss without load")
     net_power: Value = quantity("W", "mean power that the machine takes")
@@ -59,7 +61,7 @@ class GearFindings(Findings):
             "gear loss",
             text,
             STEADY,
-            total=(loss.by_load + loss.without_load, "W"),
+            total=(loss.whole, "W"),
             share=(loss.share, "1", "percent"),
             net_power=(loss.net_power, "W"),
             by_load=(loss.by_load, "W"),
@@ -73,7 +75,7 @@ class GearAnalysis(Analysis):
     """The loss of the gear, where the study knows one: with a motor of the catalogue."""
 
     name = "gear_loss"
-    needs_runs = True
+    needs_runs, at_end = True, True
 
     @staticmethod
     def applies(drive: Drive, plans: Mapping[str, Any]) -> bool:
@@ -89,12 +91,14 @@ class GearAnalysis(Analysis):
         drive, gear = study.drive, study.config.drive.gear
         window = study.window(Phase.STEADY, study.steady)
         squared = window.mean(lambda drive, run: run[drive.motor_speed].values ** 2)
-        total, net = drive.gear_friction * squared, study.answers[STEADY].power_mean
+        warm = [each.gear_loss for each in study.findings.values() if each.gear_loss is not None]
+        total, net = warm[0] if warm else drive.gear_friction * squared, study.answers[STEADY].power_mean
         if net is None:
             return None
         without_load = min(total, gear.d * squared)
         return GearFindings(
             GearLoss(
+                whole=total,
                 by_load=total - without_load,
                 without_load=without_load,
                 net_power=net,

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 
 from ..reading.text import number
 from .record import StudyRecord
+from .start_runs import OVERLOADED
 from .starts import StartFindings
 from .verdict import STEADY
 
@@ -21,26 +22,38 @@ class InverterNeed:
     peaks: Mapping[str, float]
 
 
-def inverter_need(study: StudyRecord) -> InverterNeed | None:
-    """The inverter of a study; None on the line.
+def need_of(
+    rated: float, rms: float | None, lasting: Iterable[float], peaks: Mapping[str, float], overload: float
+) -> InverterNeed:
+    """The inverter for a motor of that `rated` current, all in A: with the `rms` current of running, the `lasting`
+    ones that a start exceeds for `OVERLOADED`, and the `peaks` of running, starts and events by case.
 
-    It carries `starter.overload` times its rated current for up to 60 s: its rated current is at least that of the
-    motor, the RMS current of running, the peak of each start, of running and of each event over that factor, and the
-    current that a start exceeds for 60 s."""
+    It carries `overload` times its rated current for up to that time: its own is at least that of the motor, the RMS,
+    each lasting one, and each peak over that factor."""
+    needs = {"the rated current of the motor": rated}
+    if rms is not None:
+        needs["the RMS current of running"] = rms
+    needs[f"a start of more than {OVERLOADED:g} s"] = max(lasting, default=0.0)
+    needs |= {case: peak / overload for case, peak in peaks.items()}
+    case = max(needs, key=lambda case: needs[case])
+    return InverterNeed(needs[case], case, peaks)
+
+
+def inverter_need(study: StudyRecord) -> InverterNeed | None:
+    """The inverter of a study, by its runs and those of the choice; None on the line."""
     rated, overload = study.drive.rated_current, study.config.drive.starter.overload
     if rated is None or study.config.drive.start != "inverter":
         return None
     named = (("start_up", study.start), *study.answers.items())
     peaks = {study.title_of(name): a.current_peak for name, a in named if a and a.current_peak is not None}
-    needs = {"the rated current of the motor": rated}
+    lasting: list[float] = []
     if found := StartFindings.found_in(study):
         worst = max(found.starts, key=lambda start: start.current)
         peaks[f"a start from {number(worst.angle, 'rad')}"] = worst.current
-        needs["a start of more than 60 s"] = max(start.long_current for start in found.starts)
-    if (steady := study.answers.get(STEADY)) is not None and steady.current_rms is not None:
-        needs["the RMS current of running"] = steady.current_rms
-    if study.proposal is not None and study.proposal.inverter_current is not None:
-        needs["the runs of the choice"] = study.proposal.inverter_current
-    needs |= {case: peak / overload for case, peak in peaks.items()}
-    case = max(needs, key=lambda case: needs[case])
-    return InverterNeed(needs[case], case, peaks)
+        lasting = [start.long_current for start in found.starts]
+    steady = study.answers.get(STEADY)
+    need = need_of(rated, None if steady is None else steady.current_rms, lasting, peaks, overload)
+    chosen = None if study.proposal is None else study.proposal.inverter_current
+    if chosen is None or chosen <= need.current:
+        return need
+    return replace(need, current=chosen, case="the runs of the choice")

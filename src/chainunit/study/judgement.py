@@ -96,7 +96,7 @@ def no_reserve(run: str, reserve: float) -> str:
     0."""
     over = number(-reserve, "1", "percent") + (" or more" if reserve <= -1.0 else "")
     when = "in each turn" if run == STEADY else "for a moment"
-    return f"overloaded {when}: {over} above its breakdown torque"
+    return f"{when} its torque exceeds the pull-out torque by {over}"
 
 
 def lasts(study: StudyRecord) -> bool:
@@ -162,11 +162,12 @@ def motor_verdict(study: StudyRecord) -> MotorVerdict | None:
     elif keeps_speed:
         text = f"The motor keeps the {study.driver_noun} at {speed}"
         if speed != number(requested, "rad/s", "speed", beside=False):
-            text += f", near enough to the {requested_text} asked for"
+            share = number(steady.speed_mean / requested - 1.0, "1", "percent")
+            text += f", {'+' if steady.speed_mean > requested else ''}{share} of {requested_text}"
     elif steady.speed_mean > requested:
         text = (
             f"The motor does NOT keep the speed: the {study.driver_noun} turns at {speed}, faster than the "
-            f"{requested_text} asked for"
+            f"required {requested_text}"
         )
     else:
         text = f"The motor does NOT reach the speed: {speed} in place of {requested_text}"

@@ -281,7 +281,7 @@ def drive_point(
     InputError
         where motor or machine is a foreign FMU, for an unknown run, and for a time that the run has not.
     RunError
-        where the safety coupling opens before.
+        where the torque limiter opens before.
     """
     rig = Rig(operation, drive, None)
     with refusal_prefix("linear model: "):
@@ -344,7 +344,7 @@ def _run(simulation: Simulation, rig: Rig, time: float) -> None:
     Raises
     ------
     RunError
-        where the safety coupling opens before.
+        where the torque limiter opens before.
     """
     if time > simulation.time:
         simulation.run(time, rig.step, guards=rig.guards)
@@ -354,7 +354,7 @@ def _run(simulation: Simulation, rig: Rig, time: float) -> None:
 def _refuse_opened(simulation: Simulation, time: float) -> None:
     if simulation.time < time * (1.0 - 1e-9) - 1e-9:
         raise RunError(
-            f"the safety coupling opens at t = {simulation.time:.4g} s, before the point at {time:.4g} s; take an "
+            f"the torque limiter opens at t = {simulation.time:.4g} s, before the point at {time:.4g} s; take an "
             "earlier one"
         )
 

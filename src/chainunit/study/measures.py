@@ -211,7 +211,7 @@ class Answers:
       motor's shaft to and fro
     - `cycle_gap`: the difference between the ends of the steady turns, of speed or torque, over the largest value
     - `speed_drift`: the change of the speed between these ends over its ripple, 0 where it hardly changes
-    - `energy_after_trip`: the energy that passes the safety coupling while it opens
+    - `energy_after_trip`: the energy that passes the torque limiter while it opens
     - `energy_behind`: the energy that stays in the machine behind the coupling
     """
 
@@ -360,7 +360,7 @@ class Answers:
     )
     coupling_trip_time: Value = measure(
         "s",
-        "safety coupling trips after",
+        "torque limiter trips after",
         lambda w: w.trip.time - w.begin if w.trip else None,
         during=_EVENTS,
     )

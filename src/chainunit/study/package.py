@@ -153,7 +153,7 @@ def _running(operation: OperatingConditions) -> float:
 def left_out(operation: OperatingConditions, events: Iterable[str]) -> str:
     """A sentence on the parts of a study that its exported system does not have, among them the `events` of its
     file by name; empty where there are none."""
-    names = ["the safety coupling"] if operation.coupling is not None else []
+    names = ["the torque limiter"] if operation.coupling is not None else []
     if listed := ", ".join(events):
         names.append(f"the events {listed}")
     if operation.empty_start:

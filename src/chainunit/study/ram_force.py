@@ -1,4 +1,4 @@
-"""The force at a ram for which the setting of a safety coupling stands.
+"""The force at a ram for which the setting of a torque limiter stands.
 
 At constant speed the power of the crank is that of the ram: T w = F v. So a torque T at the crank stands for the
 force F = T/|ds/dphi| along the guide, with the way s of the ram and the crank angle phi. Towards a dead centre

@@ -247,6 +247,12 @@ class Findings(ABC):
     examines: ClassVar[str] = ""
     """name of the part of the line of which it says more than the base of a study"""
 
+    @property
+    def gear_loss(self) -> float | None:
+        """The mean loss of the gear [W] in its own runs of the study's steady running, with a winding as warm as that
+        makes it; None without such runs."""
+        return None
+
     @classmethod
     def found_in(cls, study: StudyRecord) -> Self | None:
         """The findings of this kind of a study; None where it has none."""

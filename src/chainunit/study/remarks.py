@@ -44,8 +44,7 @@ def conclude(study: StudyRecord) -> None:
     if any(value for name, value in study.drive.machine.by_name.items() if name.endswith("friction")):
         note(
             "smoothed friction",
-            "Friction is smoothed: at rest nothing sticks, so that the torque to break away from a loaded stop is "
-            "not in the start-up.",
+            "Static friction is not modelled; breakaway torque from a loaded stop is not included.",
         )
     for value in config.file.unusual:
         if value.with_unit:
@@ -190,7 +189,7 @@ def _why_missed(study: StudyRecord, steady: Answers) -> str:
     if (breakdown := _stall_speed(study, steady)) is not None:
         below = number(breakdown, "rad/s", "speed", beside=False)
         return (
-            f"the motor stalls under the load: below {below}, the speed of its breakdown torque, its torque falls "
+            f"the motor stalls under the load: below {below}, the speed of its pull-out torque, its torque falls "
             "with the speed; take a larger motor, less load, or for a load that comes and goes a heavier flywheel"
         )
     if steady.energy_gap > STORED:
@@ -278,7 +277,7 @@ _HAPPENINGS = {
     "chain",
     "current limit": "The motor runs into its current limit of {limit}",
     "stall": "The {driver} stands after the event",
-    "trip": "The safety coupling opens after the event",
+    "trip": "The torque limiter opens after the event",
     "not recovered": "The speed does not return to its steady band within the time followed",
 }
 """By kind of happening in a run, the begin of its warning, with the limit that is exceeded."""
@@ -393,7 +392,7 @@ def _on_assumptions(study: StudyRecord) -> None:
     coupling = study.config.coupling
     for name, spread in study.spreads.items():
         event = study.config.events[name]
-        without = " These peaks are without the safety coupling, which opens at {trip}." if coupling else ""
+        without = " These peaks are without the torque limiter, which opens at {trip}." if coupling else ""
         low, high = spread.peaks["crank_torque"]
         study.note(
             "assumption",

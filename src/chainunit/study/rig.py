@@ -72,7 +72,7 @@ class Rig:
 
     @property
     def guards(self) -> dict[str, float]:
-        """The variable on the motor's shaft at which a safety coupling opens, with its limit."""
+        """The variable on the motor's shaft at which a torque limiter opens, with its limit."""
         coupling = self.operation.coupling
         return {self.drive.motor_torque: coupling.trip_torque / self.drive.ratio} if coupling else {}
 

@@ -38,7 +38,7 @@ from .rig import Rig
 from .start_up import start_up
 from .starts import StartAnalysis, StartFindings
 from .statics import statics
-from .torques import on_coupling
+from .torques import on_coupling, quasi_static_peak
 from .transients import Transient, coast, compare, follow, lead_times, release
 from .window import Phase, Trip
 
@@ -220,7 +220,7 @@ class Runner:
         Raises
         ------
         RunError
-            where the safety coupling opens in one of them.
+            where the torque limiter opens in one of them.
         """
         study, rig, config = self.study, self.rig, self.study.config
         progress = self._progress("start-up and steady running", 0.0)
@@ -250,7 +250,7 @@ class Runner:
         torque = on_coupling(rig.drive, steady)
         if config.coupling and torque > config.coupling.trip_torque:
             raise RunError(
-                f"the safety coupling opens in steady running, which puts {number(torque, 'N.m', digits=4)} on it; "
+                f"the torque limiter opens in steady running, which puts {number(torque, 'N.m', digits=4)} on it; "
                 "coupling.trip_torque must be above that"
             )
 
@@ -310,11 +310,18 @@ class Runner:
         with self.rig.from_rest() as simulation:
             run = simulation.run(time + _AFTER_TRIP, self.rig.step)
         start, trip = on_coupling(self.rig.drive, run), coupling.trip_torque
+        lasting = quasi_static_peak(self.rig.drive, run, on_coupling)
+        share = (
+            " for some milliseconds (the electromagnetic transient of the motor; load and acceleration put "
+            f"{number(lasting, 'N.m')} on it)"
+            if lasting <= trip
+            else ""
+        )
         return (
-            f"the safety coupling opens in the start-up, at t = {time:.3g} s: it is set to {number(trip, 'N.m')}, "
-            f"and this start puts up to {number(start, 'N.m')} on it; coupling.trip_torque must be above that, or "
-            'the start softer (start = "soft" or "inverter"); without [coupling] a study with [sizing] compares the '
-            "ways"
+            f"the torque limiter opens in the start-up, at t = {time:.3g} s: it is set to {number(trip, 'N.m')}, "
+            f"and this start puts up to {number(start, 'N.m')} on it{share}; coupling.trip_torque must be above "
+            'that, or the start softer (start = "soft" or "inverter"); without [coupling] a study with [sizing] '
+            "compares the ways"
         )
 
     def _pins_and_pulls(self, name: str, run: xr.Dataset) -> None:
@@ -331,7 +338,7 @@ class Runner:
 
     def _assumption(self, simulation: Simulation, transient: Transient, before: float) -> None:
         """Record the peaks over the range of the assumption of an event, run from the saved steady state. The
-        runs are without a safety coupling, which would cut the peaks off."""
+        runs are without a torque limiter, which would cut the peaks off."""
         event, begin = transient.event, transient.begin
         variants = event.variants()
         if not variants:

@@ -70,7 +70,7 @@ class Run:
 
 @declaration
 class Coupling:
-    """A safety coupling or shear pin on the motor shaft."""
+    """A torque limiter or shear pin on the motor shaft."""
 
     trip_torque: Value = quantity(
         "N.m", "torque of the {driver} at which it opens", default=1000.0, above=0.0
@@ -195,7 +195,7 @@ variables whose names differ from ours."""
 
 SECTIONS: Mapping[str, FileSection] = {
     "run": FileSection(Run, title="Run"),
-    "coupling": FileSection(Coupling, optional=True, title="Safety coupling"),
+    "coupling": FileSection(Coupling, optional=True, title="Torque limiter"),
     "gear": FileSection(
         Transmission,
         default=KINDS["gear"],

@@ -45,7 +45,10 @@ class StartNumbers:
         "N.m", "the same with the electromagnetic transient of the motor, for some milliseconds"
     )
     coupling_torque: Value = quantity(
-        "N.m", "largest torque on a coupling on the motor's shaft, at the {driver}"
+        "N.m", "largest torque on a coupling on the motor's shaft by load and acceleration, at the {driver}"
+    )
+    coupling_transient: Value = quantity(
+        "N.m", "the same with the electromagnetic transient, at the {driver}"
     )
     start_time: Value = quantity("s", "start-up time")
     start_class: Value = quantity(
@@ -67,18 +70,28 @@ def from_angle(rig: Rig, angle: float) -> Rig:
 
 
 def start_from(
-    rig: Rig, angle: float, longest: float, event: Event | None = None, of: PeakOf = on_coupling
+    rig: Rig,
+    angle: float,
+    longest: float,
+    event: Event | None = None,
+    of: PeakOf = on_coupling,
+    before: float = 0.0,
 ) -> StartNumbers:
     """A start from the crank angle [rad], with the `event` of a start, if one is given.
 
     It is followed until the crank has its speed and a little longer, at most to the time `longest` [s]; `start_time`
     is None where the crank comes to no lasting speed by then, by the rule of `time_to_start`. `of` gives the torque
-    on the coupling."""
-    return _starts_from([from_angle(rig, angle)], [angle], longest, event, of)[0]
+    on the coupling, which accelerates the inertia `before` the machine, too, see `quasi_static_torque`."""
+    return _starts_from([from_angle(rig, angle)], [angle], longest, event, of, before)[0]
 
 
 def _starts_from(
-    rigs: Sequence[Rig], angles: Sequence[float], longest: float, event: Event | None, of: PeakOf
+    rigs: Sequence[Rig],
+    angles: Sequence[float],
+    longest: float,
+    event: Event | None,
+    of: PeakOf,
+    before: float,
 ) -> list[StartNumbers]:
     """The starts of rigs that differ in the angle [rad] alone; see `start_from`."""
     drive, operation, step = rigs[0].drive, rigs[0].operation, min(rigs[0].step, _STEP)
@@ -103,7 +116,7 @@ def _starts_from(
             time, speed = run["time"].values, run[name].values / ratio
             final = float(np.mean(speed[time >= time[-1] - operation.turn]))
             reached[k] = time_to_start(time, speed, final, operation.crank_speed)
-    return [_numbers(rigs[k].drive, angles[k], runs[k], reached[k], of) for k in range(len(rigs))]
+    return [_numbers(rigs[k].drive, angles[k], runs[k], reached[k], of, before) for k in range(len(rigs))]
 
 
 def _read(rig: Rig) -> list[str]:
@@ -114,7 +127,9 @@ def _read(rig: Rig) -> list[str]:
     return [full for full in names if rig.gives(full)]
 
 
-def _numbers(drive: Drive, angle: float, run: xr.Dataset, reached: float | None, of: PeakOf) -> StartNumbers:
+def _numbers(
+    drive: Drive, angle: float, run: xr.Dataset, reached: float | None, of: PeakOf, before: float
+) -> StartNumbers:
     """The numbers of a start that has `reached` its speed at that time [s]."""
     time, current = run["time"].values, np.abs(run[f"motor.{drive.motor.current}"].values)
     relay, rated = None, drive.rated_current
@@ -125,7 +140,8 @@ def _numbers(drive: Drive, angle: float, run: xr.Dataset, reached: float | None,
         angle=angle,
         quasi_static=quasi_static_peak(drive, run),
         gear_torque=at_gear(drive, run),
-        coupling_torque=of(drive, run),
+        coupling_torque=quasi_static_peak(drive, run, of, before),
+        coupling_transient=of(drive, run),
         start_time=reached,
         start_class=relay,
         current=peak(current),
@@ -162,13 +178,17 @@ def longest_start(ramp_end: float, start_time: float) -> float:
 
 
 def starts_from_all(
-    rig: Rig, longest: float, events: Sequence[Event] = (), of: PeakOf = on_coupling
+    rig: Rig,
+    longest: float,
+    events: Sequence[Event] = (),
+    of: PeakOf = on_coupling,
+    before: float = 0.0,
 ) -> list[StartNumbers]:
-    """Starts from `START_ANGLES` angles over the turn; each of the `events`, which are starts, from the angle 0. `of`
-    gives the torque on the coupling."""
+    """Starts from `START_ANGLES` angles over the turn; each of the `events`, which are starts, from the angle 0. For
+    `of` and `before` see `start_from`."""
     angles = [2.0 * math.pi * k / START_ANGLES for k in range(START_ANGLES)]
-    starts = _starts_from([from_angle(rig, angle) for angle in angles], angles, longest, None, of)
-    return starts + [start_from(rig, 0.0, longest, event, of) for event in events]
+    starts = _starts_from([from_angle(rig, angle) for angle in angles], angles, longest, None, of, before)
+    return starts + [start_from(rig, 0.0, longest, event, of, before) for event in events]
 
 
 def longest_of(starts: Sequence[StartNumbers]) -> float | None:
@@ -178,5 +198,5 @@ def longest_of(starts: Sequence[StartNumbers]) -> float | None:
 
 
 def hardest(starts: Sequence[StartNumbers]) -> float:
-    """The largest torque on the coupling, at the crank [N m]."""
+    """The largest torque on the coupling by load and acceleration, at the crank [N m]."""
     return max(start.coupling_torque for start in starts)

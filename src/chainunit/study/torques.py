@@ -1,4 +1,4 @@
-"""The torque on the parts between motor and machine in a run, at the crank: on a safety coupling on the
+"""The torque on the parts between motor and machine in a run, at the crank: on a torque limiter on the
 motor's shaft, and at the output of the gear."""
 
 from __future__ import annotations
@@ -44,9 +44,10 @@ CURVE = ("motor.v", "motor.supply.frequency", "machine.tau_bias", "machine.J")
 """The outputs of a run, beside the speed, that `quasi_static_torque` follows from."""
 
 
-def quasi_static_torque(drive: Drive, run: xr.Dataset) -> Any:
+def quasi_static_torque(drive: Drive, run: xr.Dataset, before: float = 0.0) -> Any:
     """Torque in a run at the output of the gear [N m], shape (time,), by load and acceleration: the motor gives the
     torque of its curve at the present speed, voltage and frequency, and accelerates rotor and machine as one body.
+    With the inertia `before` [kg m2 at the motor's shaft] it is that on a part which accelerates this inertia, too.
 
     It lacks the electromagnetic transient of a motor that is switched on, some periods of the line long: play and
     stiffness of a real line change its peaks. The speed of the run overshoots by this transient; the curve brakes no
@@ -60,13 +61,16 @@ def quasi_static_torque(drive: Drive, run: xr.Dataset) -> Any:
     inertia = load_inertia(drive, run)
     load = run["machine.tau_bias"].values * drive.ratio_at_machine / ratio
     motor = np.maximum(motor, np.minimum(load, 0.0))
-    return ratio * (load + inertia * (motor - load) / (p.rotor.J + inertia))
+    return ratio * (load + (inertia + before) * (motor - load) / (p.rotor.J + inertia))
 
 
-def quasi_static_peak(drive: Drive, run: xr.Dataset) -> float:
-    """Peak torque in a run at the output of the gear by load and acceleration [N m], see `quasi_static_torque`; at
+def quasi_static_peak(drive: Drive, run: xr.Dataset, of: PeakOf = at_gear, before: float = 0.0) -> float:
+    """Peak torque `of` a part in a run by load and acceleration, at the crank [N m], see `quasi_static_torque`; at
     most that of the run, whose motor may speed up faster than its field follows the curve."""
-    return min(peak(quasi_static_torque(drive, run)), at_gear(drive, run))
+    most = of(drive, run)
+    if drive.follows or any(name not in run for name in CURVE):
+        return most
+    return min(peak(quasi_static_torque(drive, run, before)), most)
 
 
 @dataclass(frozen=True)

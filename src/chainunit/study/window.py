@@ -53,7 +53,7 @@ class Phase(Enum):
 
 @dataclass(frozen=True)
 class Trip:
-    """A safety coupling that opened: the time [s], the energy that passed it before its torque was zero [J],
+    """A torque limiter that opened: the time [s], the energy that passed it before its torque was zero [J],
     and the run of the machine behind it, where that could be followed."""
 
     time: float

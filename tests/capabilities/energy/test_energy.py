@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,9 +19,10 @@ from chainunit.capabilities.energy.efficiency_class import (
     falls_short,
     limit,
     next_class,
+    no_class,
     required,
 )
-from chainunit.capabilities.energy.motor_class import MotorClass, words_of
+from chainunit.capabilities.energy.motor_class import MotorClass, MotorClassAnalysis, words_of
 from chainunit.capabilities.energy.other_motor import other_motor
 from chainunit.capabilities.energy.page import verdict_words
 from chainunit.capabilities.energy.running import PLACES, Losses, scale_faults, scaled, warm
@@ -438,5 +440,35 @@ def test_a_switch_of_the_feed_stays_and_a_factor_keeps_the_bounds():
 
 def test_a_motor_of_eight_poles_is_in_the_scope_without_a_known_class():
     plate = dataclasses.replace(catalogue()[0].nameplate, power=1500.0, poles=8)
-    words = words_of(MotorClass("8", class_of(plate), required(plate), False, 0.8))
-    assert "not known here" in words and "asks IE3" in words
+    words = words_of(MotorClass("8", class_of(plate), required(plate), False, 0.8, no_class(plate)))
+    assert "is not checked: its limits here are those for 2, 4 or 6 poles" in words and "asks IE3" in words
+
+
+@pytest.mark.parametrize(
+    ("name", "poles", "words"),
+    [
+        (
+            "IE3 4-pole 1.1 kW, 90S, 60 Hz",
+            4,
+            "those at 50 Hz, and the motor is one for 60 Hz. EU 2019/1781 asks IE3",
+        ),
+        ("IE3 4-pole 1.1 kW, 90S", 8, "those for 2, 4 or 6 poles and 0.12 to 1000 kW. EU 2019/1781 asks IE3"),
+        ("IE3 4-pole 1.1 kW, 90S", 4, ""),
+    ],
+)
+def test_a_study_tells_that_the_class_of_its_motor_is_not_checked(name, poles, words):
+    motor = next(m for m in catalogue() if m.designation == name)
+    motor = dataclasses.replace(motor, nameplate=dataclasses.replace(motor.nameplate, poles=poles))
+    notes = []
+    study = SimpleNamespace(
+        plate=motor,
+        drive=SimpleNamespace(foreign=None),
+        config=SimpleNamespace(plans={"energy": None}),
+        note=lambda kind, text: notes.append(text),
+    )
+    found = MotorClassAnalysis.find(study, None)
+    if not words:
+        assert found is None
+        return
+    found.remark(study)
+    assert not found.falls_short and words in notes[0]

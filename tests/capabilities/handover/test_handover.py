@@ -268,10 +268,10 @@ def test_order_numbers_of_catalogues_are_handed_over(tmp_path):
     save(tmp_path / "results", tmp_path / "out", aasx=False)
     said = json.loads((tmp_path / "out" / "handover.json").read_text("utf-8"))
     rows = {}
-    for file in ("motors", "gears", "safety_couplings", "flexible_couplings"):
+    for file in ("motors", "gears", "torque_limiters", "flexible_couplings"):
         with (example.parent / "catalogue" / f"{file}.csv").open(newline="", encoding="utf-8") as table:
             rows |= {row["designation"]: row["order_number"] for row in csv.DictReader(table)}
-    parts = {"motor": "MainComponent", "gear": "MainComponent02", "safety coupling": "OtherComponent"}
+    parts = {"motor": "MainComponent", "gear": "MainComponent02", "torque limiter": "OtherComponent"}
     chosen = {each["part"]: each["designation"] for each in numbers(tmp_path)["sizing"]["parts"]["parts"]}
     assert chosen.keys() == parts.keys()
     flexible = numbers(tmp_path)["checks"]["flexible_coupling"]["candidates"][0]["designation"]
@@ -284,7 +284,7 @@ def test_order_numbers_of_catalogues_are_handed_over(tmp_path):
     own, _ = read_by_basyx(tmp_path / "out" / "sizing.json")
     path = f"{ROOT}/SizingResult/OtherComponent/ManufacturerOrderCode"
     codes = [each.value for name, each in walked(own.submodel_element) if name == path]
-    assert codes == [rows[chosen["safety coupling"]], rows[flexible]]
+    assert codes == [rows[chosen["torque limiter"]], rows[flexible]]
     spoilt = numbers(tmp_path)
     spoilt["sizing"]["parts"]["parts"][1]["order_number"] = ""
     (tmp_path / "results" / "result.json").write_text(json.dumps(spoilt), "utf-8")

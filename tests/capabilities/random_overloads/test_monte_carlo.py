@@ -445,15 +445,15 @@ def test_question_and_answer_tell_of_random_overloads(tmp_path):
     opens = shown(quantiles_of["trips"]["share"]["value"], "1", "percent")
     assert quantiles_of["trips"]["share"]["value"] > 0.0
     (warning,) = (each for each in result["warnings"] if each["kind"] == "random overload trips")
-    assert warning["text"] == f"Overloads at random: in {opens} of them the safety coupling opens."
+    assert warning["text"] == f"Overloads at random: in {opens} of them the torque limiter opens."
     text = " ".join((tmp_path / "out" / "result.md").read_text().split())
     _, _, answer = text.partition("## The answer")
     assert "Then come 6 overloads at random, each by itself: a lump jams the left or the right side." in text
-    assert f"the safety coupling opens in {opens} (" in answer.partition("##")[0]
+    assert f"the torque limiter opens in {opens} (" in answer.partition("##")[0]
     peak = shown(quantiles_of["crank_torque_peak"]["q50"]["value"], "N.m")
     assert f"Of 6 overloads at random: 50 % stay below a crank torque of {peak} (" in answer
     said = " ".join(process.stdout.split())
-    assert f"the safety coupling opens in {opens} (" in said
+    assert f"the torque limiter opens in {opens} (" in said
     method, words = (
         ("compiled", "on the compiled system") if compiler() else ("cs", "by co-simulation of the FMUs")
     )

@@ -266,7 +266,7 @@ def test_the_cheapest_that_fits_comes_first_and_drives_without_a_price_last(tmp_
     candidates[-1] = with_checks(candidates[-1], peak_torque=0.95)
     rank(candidates, 2.0, "price")
     assert [c.motor.designation for c in candidates[:2]] == ["cheap", "dear"]
-    assert candidates[0].reason.startswith("the cheapest that fits: 350 without a safety coupling;")
+    assert candidates[0].reason.startswith("the cheapest that fits: 350 without a torque limiter;")
     reasons = {c.motor.designation: c.reason.split(";")[0] for c in candidates[1:]}
     assert reasons == {
         "dear": "dearer: 1100",
@@ -378,7 +378,7 @@ def test_the_example_ends_in_a_list_of_parts(tmp_path):
     assert done.returncode == 0, done.stderr
     result = json.loads((tmp_path / "out" / "result.json").read_text("utf-8"))
     listed = result["sizing"]["parts"]
-    assert [each["part"] for each in listed["parts"]] == ["motor", "gear", "safety coupling"]
+    assert [each["part"] for each in listed["parts"]] == ["motor", "gear", "torque limiter"]
     best = result["sizing"]["candidates"][0]
     prices = [each["price"]["value"] for each in listed["parts"]]
     assert listed["total"]["value"] == sum(prices) and not listed["open"]
@@ -429,7 +429,7 @@ def test_no_cell_of_a_csv_is_a_formula():
 def test_a_gear_that_an_overload_breaks_is_told_with_a_stronger_one(tmp_path):
     text = EXAMPLE.read_text("utf-8")
     line = next(each for each in text.splitlines() if each.startswith("gear_torque"))
-    for name in ("motors", "gears", "safety_couplings", "flexible_couplings"):
+    for name in ("motors", "gears", "torque_limiters", "flexible_couplings"):
         target = tmp_path / "catalogue" / f"{name}.csv"
         target.parent.mkdir(exist_ok=True)
         target.write_text((EXAMPLE.parent / "catalogue" / f"{name}.csv").read_text("utf-8"), encoding="utf-8")

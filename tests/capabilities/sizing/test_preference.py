@@ -365,7 +365,9 @@ def test_a_wish_that_decides_is_named_with_the_choice_without_it(monkeypatch):
     rejected = dataclasses.replace(small, trial=wished("speed"))
     assert cost(best, rejected) == "sizing.fluctuation = 5 % decides: else small with no flywheel would do"
     ((demands, powers),) = searched
-    assert demands.fluctuation == math.inf and set(powers) == {550.0, 1100.0}
+    assert demands.fluctuation == math.inf
+    # a smaller motor that was not tried beside the wish may do without it
+    assert powers == [m.nameplate.power for m in catalogue() if m.nameplate.power <= 1100.0]
     # a motor that misses another limit, too, or that is larger, is not rejected by the wish
     assert not cost(best, dataclasses.replace(small, trial=wished("speed", "rms_torque")))
     assert not cost(best, dataclasses.replace(made("larger", 2200.0), trial=wished("speed")))
@@ -774,6 +776,75 @@ def test_a_motor_that_fails_from_the_worst_angle_makes_room_for_the_next(monkeyp
         c.fits for c in others
     )
     assert all("time to start 5 s" in c.reason for c in others)
+
+
+def searched(monkeypatch, bare, wheeled, *, angles=math.inf, more=""):
+    """The candidates of a search, and the motors that were tried with flywheels, in a machine that runs evenly
+    enough with a motor of the power `bare`, and with a flywheel from `wheeled` on [W]. From the worst angle only
+    motors above the power `angles` do not start."""
+    motors, tried = [m for m in catalogue() if m.nameplate.frequency == 50.0], []
+
+    def checked(c, least, worst_start=False):
+        time = 5.0 if worst_start and c.power > angles else 1.0
+        c.worst_start = worst_start
+        # a motor that does has 0.81 of its limit and less, below the 0.9 of the margin
+        checks = {
+            "start": Check("start", time, 2.0, "s"),
+            "speed": Check("speed", 0.81 * least / c.power, 1.0, "1"),
+        }
+        c.trial = TrialResult(checks)
+        return c
+
+    def judged(self, c, *, worst_start=False):
+        return checked(c, wheeled if c.drive.added_inertia else bare, worst_start)
+
+    def with_flywheel(self, c):
+        tried.append(c.motor)
+        if not checked(c, bare).keeps_margin:
+            c = dataclasses.replace(c, drive=dataclasses.replace(c.drive, added_inertia=0.2))
+        return self.judged(c)
+
+    monkeypatch.setattr(MotorTrials, "judged", judged)
+    monkeypatch.setattr(MotorTrials, "with_flywheel", with_flywheel)
+    config, _ = proposed(f"[sizing]\ncandidates = 1\n{more}")
+    return sizing._search(trials_of(config, evenly_loaded(config)), motors, lambda *said: None), tried
+
+
+STEPS = sorted({m.nameplate.power for m in catalogue() if m.nameplate.frequency == 50.0})
+
+
+@pytest.mark.second
+@pytest.mark.parametrize("n", range(1, len(STEPS) - 2, 2))
+def test_the_smallest_that_fits_has_rejected_neighbours_below(n, monkeypatch):
+    """The power is bisected: all motors one step below were tried, with flywheels, and few of the smaller ones."""
+    candidates, tried = searched(monkeypatch, STEPS[n + 2], STEPS[n], more="larger = 1.0")
+    best = candidates[0]
+    assert best.power == STEPS[n] and best.drive.added_inertia and best.fits and best.worst_start
+    below = [c for c in candidates if c.power == STEPS[n - 1]]
+    assert {c.motor.nameplate.poles for c in below} == {2.0, 4.0, 6.0} and not any(
+        c.keeps_margin for c in below
+    )
+    assert (
+        len({m.nameplate.power for m in tried if m.nameplate.power < STEPS[n]}) <= math.log2(len(STEPS)) + 1.0
+    )
+
+
+def test_motors_that_would_come_after_the_chosen_one_are_not_tried_with_flywheels(monkeypatch):
+    candidates, tried = searched(monkeypatch, 2200.0, 1100.0)
+    best = candidates[0]
+    assert (best.power, best.drive.added_inertia) == (2200.0, 0.0)
+    assert {m.nameplate.power for m in tried} >= {750.0, 1100.0} and not any(
+        m.nameplate.power == 1500.0 for m in tried
+    )
+    (spared, *_) = [c for c in candidates if c.power == 1500.0]
+    assert (
+        spared.verdict is Standing.REJECTED
+        and "no flywheel was tried, as with one it would come" in spared.reason
+    )
+    # unless the motor without one fails from some angle: then their flywheels count
+    candidates, tried = searched(monkeypatch, 2200.0, 1100.0, angles=1500.0)
+    best = candidates[0]
+    assert best.power == 1100.0 and best.drive.added_inertia and best.worst_start
 
 
 @pytest.mark.second

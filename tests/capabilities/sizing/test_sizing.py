@@ -483,7 +483,7 @@ def test_a_motor_at_its_rated_load_is_as_warm_as_its_nameplate_says():
 
 @pytest.mark.second
 def test_above_the_corner_an_inverter_has_less_torque(tmp_path, monkeypatch):
-    """Twice the rated frequency: the breakdown torque of the check is a quarter, roughly, of that at 50 Hz."""
+    """Twice the rated frequency: the pull-out torque of the check is a quarter, roughly, of that at 50 Hz."""
     monkeypatch.setattr(sizing, "catalogue", lambda *files: small(1))
     config = one_candidate("[gear]\nratio = 104\n", fluctuation=0.9)
     config = dataclasses.replace(config, drive=dataclasses.replace(config.drive, start="inverter"))

@@ -16,6 +16,7 @@ from scipy.interpolate import CubicSpline
 from chainunit import InputError
 from chainunit.capabilities.static_inertia import CAPABILITY
 from chainunit.capabilities.static_inertia.analysis import StaticInertiaFindings
+from chainunit.capabilities.static_inertia.choice import ChosenDrive, OtherChoice
 from chainunit.capabilities.static_inertia.runs import numbers_of, obstacle, run_twin, with_machine
 from chainunit.capabilities.static_inertia.twin import SPEED, twin
 from chainunit.capabilities.static_inertia.words import trial_words
@@ -318,20 +319,43 @@ def test_the_page_says_what_differs(given):
     assert f"{100.0 * findings.deviations['static']['gear_torque_rms']:.3g} %" in section[:3000]
     # without [sizing] there is no choice to repeat, and no warning
     assert findings.choice is None and not [each for each in given.warnings if each.kind == "static inertia"]
-    assert "A sizing program with one inertia" in said[: said.index("## What a static inertia gets wrong")]
+    assert (
+        "A constant-inertia calculation takes RMS "
+        in said[: said.index("## What a static inertia gets wrong")]
+    )
 
 
 def test_nothing_is_said_where_nothing_differs(given):
     """A machine whose inertia hardly changes: the numbers stand in the data, and no sentence and no section."""
     findings = StaticInertiaFindings.of_study(given)
-    alike = {model: dict.fromkeys(shares, 0.009) for model, shares in findings.deviations.items()}
-    for deviations, differs in ((alike, False), ({**alike, "static": {"current_rms": -0.011}}, True)):
+    alike = {model: dict.fromkeys(shares, 0.019) for model, shares in findings.deviations.items()}
+    others = {**alike, "static": {**alike["static"], "gear_torque_rms": -0.021}}
+    for deviations, differs in ((alike, False), (others, True)):
         changed = dataclasses.replace(findings, deviations=deviations)
         study = dataclasses.replace(given, findings={**given.findings, "static_inertia": changed})
         said = markdown(report(study, as_dict(study)), {})
         assert changed.differs == differs
-        assert ("What a static inertia gets wrong" in said) == ("A sizing program with" in said) == differs
+        assert (
+            ("What a static inertia gets wrong" in said)
+            == ("A constant-inertia calculation" in said)
+            == differs
+        )
         assert "static_inertia" in as_dict(study)
+
+
+def test_the_same_drive_by_other_numbers_has_a_short_sentence(given):
+    """None if the numbers agree to 2 %, too."""
+    findings = StaticInertiaFindings.of_study(given)
+    drive = ChosenDrive("4 kW, 112M", 19.0, 0.0, 4000.0, False, "it fits")
+    choice = OtherChoice(drive, drive, differs=False)
+    for share, has_line in ((0.019, False), (0.021, True)):
+        static = {**findings.deviations["static"], "gear_torque_rms": share}
+        changed = dataclasses.replace(
+            findings, choice=choice, deviations={**findings.deviations, "static": static}
+        )
+        study = dataclasses.replace(given, findings={**given.findings, "static_inertia": changed})
+        said = markdown(report(study, as_dict(study)), {})
+        assert ("A constant-inertia calculation would have chosen 4 kW, 112M (RMS " in said) == has_line
 
 
 # -- the choice

@@ -35,6 +35,7 @@ from chainunit.capabilities.vouching.domain import domain
 from chainunit.capabilities.vouching.integrity import integrity
 from chainunit.capabilities.vouching.judgement import _difference
 from chainunit.capabilities.vouching.verify import FAILS, HOLDS, OPEN, conclusion, verify
+from chainunit.core import inputs
 from chainunit.core.errors import WriteError
 from chainunit.fmu.backends import export
 from chainunit.fmu.native.export import export as native
@@ -642,6 +643,37 @@ def test_meta_data_beside_that_are_of_another_file(made, tmp_path, data):
     (tmp_path / "it.srmd").write_text(text.replace(f'checksum="{digit}', f'checksum="{other}'))
     found = {each.topic: each for each in verify(tmp_path / "it.fmu", None, run=False, told=silent)}
     assert found["SRMD"].holds is False and "is of another file" in found["SRMD"].words
+
+
+def test_a_check_of_a_machine_imports_few_other_models(made):
+    """The import of all models takes longer than all else of a check."""
+    code = (
+        "import sys\nfrom chainunit.app.cli import app\n"
+        "app(['verify', 'it.fmu', '--key', 'chainunit.key.pub', '--no-run'], standalone_mode=False)\n"
+        "print('imported', *sys.modules)"
+    )
+    run = subprocess.run([sys.executable, "-c", code], cwd=made, capture_output=True, text=True)
+    loaded = run.stdout.split("imported")[-1].split()
+    assert "chainunit.machines.chain_unit" in loaded
+    others = ("models", "machines.linkages.file", "machines.load_observer", "drives.motors", "study.registry")
+    assert not {f"chainunit.{name}" for name in others} & {*loaded}
+
+
+def test_meta_data_with_entities_or_that_are_no_xml_are_refused(made, tmp_path, data):
+    """By the reader of all other XML, even if the checksum in them is right."""
+    (tmp_path / "it.fmu").write_bytes(data)
+    text = (made / "it.srmd").read_text()
+    head, _, rest = text.partition("?>")
+    entities = f'{head}?><!DOCTYPE x [<!ENTITY a "b">]>{rest}'
+    for content, words in ((entities, "has a document type"), (text[:-9], "is no XML that can be read")):
+        (tmp_path / "it.srmd").write_text(content)
+        found = {each.topic: each for each in verify(tmp_path / "it.fmu", None, run=False, told=silent)}
+        assert found["SRMD"].holds is False and f"it.srmd beside the file: {words}" in found["SRMD"].words
+    for content in (entities.encode(), text.encode() + b" " * inputs.XML):
+        with pytest.raises(InputError, match=r"the manifest: .*(document type|more than 8 MiB)"):
+            documents.resource_of(content, "the manifest")
+        with pytest.raises(InputError, match=r"fmi-ls-manifest.xml: .*(document type|more than 8 MiB)"):
+            documents.related(content, ())
 
 
 def test_meta_data_of_another_file_are_no_fault_and_are_not_lost(made, tmp_path, data):

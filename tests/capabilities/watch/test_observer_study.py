@@ -59,7 +59,7 @@ def drive_of(text, folder):
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
-    """The packaged chain unit on its DC motor, with a safety coupling."""
+    """The packaged chain unit on its DC motor, with a torque limiter."""
     folder = tmp_path_factory.mktemp("observer")
     result = run_study(config.parse(TEXT), folder)
     result.folder = folder / "fmu"
@@ -87,7 +87,7 @@ def test_each_device_notices_when_its_variable_says_so(study):
         run, begin = study.runs[name], study.event[name]
         since = run["time"].values - begin
         is_noticed = {
-            "safety_coupling": np.abs(run["motor.tau"].values) >= TRIP / 50.0,
+            "torque_limiter": np.abs(run["motor.tau"].values) >= TRIP / 50.0,
             "current_limit": np.abs(run["motor.armature.i"].values) >= 0.99 * LIMIT,
             "observer": np.abs(run["observer.alarm"].values) == 1.0,
         }
@@ -100,8 +100,8 @@ def test_each_device_notices_when_its_variable_says_so(study):
             assert of[device].carried == pytest.approx(np.max(torque) / normal), (name, device)
     # the shift of the feed is noticed by the observer alone, and within half a turn; the stop by the coupling alone
     of = notices["feed_left"]
-    assert of["observer"].time < 1.05 and of["safety_coupling"].time is of["current_limit"].time is None
-    assert notices["blocked"]["safety_coupling"].time < 0.1 and notices["blocked"]["observer"].time is None
+    assert of["observer"].time < 1.05 and of["torque_limiter"].time is of["current_limit"].time is None
+    assert notices["blocked"]["torque_limiter"].time < 0.1 and notices["blocked"]["observer"].time is None
 
 
 @native

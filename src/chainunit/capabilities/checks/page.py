@@ -27,13 +27,13 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
             yield _coupling_to_order(s, couplings)
         lead = (
             "Each row is a check by the clause or source {place}: the value of the run, the limit, and the share "
-            "of the limit that is used. A check holds up to 100 %. docs/checks.md has each formula with its "
-            "simplifications and an example."
+            "of the limit that is used. A check passes at 100 % use at most. docs/checks.md has each formula "
+            "with its simplifications and an example."
         )
         if study.proposal is not None:
             lead += (
-                " The values are of the runs of this study; the shares of limits under the answer are of the duty "
-                f"of {study.proposal.name}, so that both may differ."
+                " These values are those of the simulated runs; the shares of limits in the answer are those of the "
+                f"duty of {study.proposal.name} (worst start, margins). They may differ."
             )
         yield b.Text(lead.format(place="under it"), "lead", "long")
         yield b.Text(lead.format(place="whose number stands behind it"), "lead", "sheet")

@@ -94,6 +94,11 @@ class EnergyFindings(Findings):
     no_other: str = part("the reason why no other motor is compared; empty where one is")
     given_back: float = quantity("W", "mean power that the motor gives back at moments")
 
+    @property
+    def gear_loss(self) -> float | None:
+        """That of a load with the feed of the study."""
+        return next((load.losses.gear for load in self.loads.values() if load.factor == 1.0), None)
+
     def remark(self, study: StudyRecord) -> None:
         """The assumptions behind the losses."""
         mean = self.own.mean

@@ -73,10 +73,19 @@ def limit(of: str, power: float, poles: float) -> float | None:
     return 0.01 * float(np.interp(math.log(kW), np.log(_SIZES), values))
 
 
+def no_class(plate: Nameplate) -> str:
+    """The reason why a motor has no class here, in words; empty for one that has."""
+    if abs(plate.frequency - 50.0) > 0.5:
+        return f"its limits here are those at 50 Hz, and the motor is one for {plate.frequency:g} Hz"
+    if limit(CLASSES[0], plate.power, plate.poles) is None:
+        return "its limits here are those for 2, 4 or 6 poles and 0.12 to 1000 kW"
+    return ""
+
+
 def class_of(plate: Nameplate) -> str:
     """The class of a motor by its rated efficiency: one of `CLASSES`, "IE1 or less", or empty for one that has no
-    class here: of another frequency than 50 Hz, or without a limit."""
-    if abs(plate.frequency - 50.0) > 0.5 or limit(CLASSES[0], plate.power, plate.poles) is None:
+    class here, see `no_class`."""
+    if no_class(plate):
         return ""
     reached = "IE1 or less"
     for each in CLASSES:

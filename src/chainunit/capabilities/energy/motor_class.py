@@ -6,7 +6,7 @@ from ...core.quantities import quantity
 from ...reading.results import part, result
 from ...study.analysis import Analysis, Findings, Work
 from ...study.record import StudyRecord
-from .efficiency_class import EXEMPTIONS, class_of, falls_short, required
+from .efficiency_class import EXEMPTIONS, class_of, falls_short, no_class, required
 
 
 @result
@@ -20,9 +20,12 @@ class MotorClass(Findings):
     )
     falls_short: bool = part("whether its class is below that")
     efficiency: float = quantity("1", "rated efficiency", kind="percent")
+    no_class: str = part("the reason why its class is not known here; empty where it is", default="")
 
     def remark(self, study: StudyRecord) -> None:
-        """Warn of a motor that may not be sold any more."""
+        """Warn of a motor that may not be sold any more, and tell where that is not known."""
+        if self.no_class and self.required:
+            study.note("efficiency class", words_of(self))
         if self.falls_short:
             study.warn(
                 "efficiency class",
@@ -38,7 +41,8 @@ class MotorClass(Findings):
 
 
 class MotorClassAnalysis(Analysis):
-    """The class, where a motor of the catalogue falls short of what is asked, or the study asks for the energy."""
+    """The class, where a motor of the catalogue falls short of what is asked, or that is not known, or the study asks
+    for the energy."""
 
     name = "motor_class"
 
@@ -49,20 +53,23 @@ class MotorClassAnalysis(Analysis):
         if motor is None or study.drive.foreign is not None:
             return None
         plate = motor.nameplate
-        short = falls_short(plate)
-        if not short and study.config.plans["energy"] is None:
-            return None
-        return MotorClass(motor.designation, class_of(plate), required(plate), short, float(plate.efficiency))
+        found = MotorClass(
+            motor.designation,
+            class_of(plate),
+            required(plate),
+            falls_short(plate),
+            float(plate.efficiency),
+            no_class(plate),
+        )
+        is_asked = found.falls_short or (found.no_class and found.required)
+        return found if is_asked or study.config.plans["energy"] is not None else None
 
 
 def words_of(found: MotorClass) -> str:
     """Class and demand, in a sentence."""
-    if not found.efficiency_class:
-        asked = f"; EU 2019/1781 asks {found.required}" if found.required else ""
-        return (
-            "The class of the motor is not known here: the limits of IEC 60034-30-1 for 50 Hz and 2, 4 or 6 poles "
-            f"do not hold for it{asked}."
-        )
+    if found.no_class:
+        asked = f" EU 2019/1781 asks {found.required}: compare its nameplate." if found.required else ""
+        return f"The class of the motor by IEC 60034-30-1 is not checked: {found.no_class}.{asked}"
     if not found.required:
         return f"The motor is {found.efficiency_class}; EU 2019/1781 does not cover it."
     verb = "asks" if not found.falls_short else "asks more,"

@@ -114,7 +114,7 @@ def warm(drive: Drive, temperature: float) -> Drive:
 
 
 def run_steadily(rig: Rig, drive: Drive, feed: Any, inverter: InverterRating | None) -> SteadyLoad:
-    """The `drive` in steady running with that `feed`, from rest, without its safety coupling.
+    """The `drive` in steady running with that `feed`, from rest, without its torque limiter.
 
     Raises
     ------

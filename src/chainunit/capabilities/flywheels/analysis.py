@@ -164,7 +164,7 @@ def _own(study: StudyRecord, findings: FlywheelFindings) -> Wheel:
 
 
 def _run(study: StudyRecord, rig: Rig, findings: FlywheelFindings, flywheel: float) -> Wheel:
-    """The start-up and steady running of the study with another flywheel [kg m2], without its safety coupling."""
+    """The start-up and steady running of the study with another flywheel [kg m2], without its torque limiter."""
     tables = study.config.drive
     turned = with_inertia(tables, replace(study.drive, observer=None), flywheel)
     assert study.config.motor is not None

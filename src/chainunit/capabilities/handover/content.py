@@ -21,7 +21,7 @@ STUDY, CYCLE, RUN = "study.json", "cycle.csv", "run.csv"
 """Names of the files beside the shell: the numbers of the study, the steady turns and the whole run."""
 MEDIA_TYPES = {STUDY: "application/json", LOAD_CYCLE: "text/csv", CYCLE: "text/csv", RUN: "text/csv"}
 """Media types of these files."""
-_SAFETY = "safety coupling"
+_SAFETY = "torque limiter"
 """The kind of this part in the list of parts that sizing gives."""
 _KELVIN = 273.15
 _JOULE_PER_KWH = 3.6e6

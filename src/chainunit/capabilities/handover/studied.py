@@ -83,8 +83,8 @@ class StudiedDrive:
         return self.candidates[place] if isinstance(place, int) else {}
 
     def ordered(self, kind: str) -> Mapping[str, Any]:
-        """The row of a catalogue that is a part of the drive of sizing, by its kind: "motor", "gear", "safety
-        coupling"; empty where the part is of no catalogue of the user."""
+        """The row of a catalogue that is a part of the drive of sizing, by its kind: "motor", "gear", "torque
+        limiter"; empty where the part is of no catalogue of the user."""
         parts = _at(self.result.data, "sizing", "parts", "parts")
         found = map(as_mapping, parts if isinstance(parts, list) else ())
         return next((each for each in found if each.get("part") == kind), {})

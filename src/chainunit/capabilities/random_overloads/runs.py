@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-OUTCOMES = {"trips": "the safety coupling opens", "stalls": "the {driver} stands at the end"}
+OUTCOMES = {"trips": "the torque limiter opens", "stalls": "the {driver} stands at the end"}
 """By switch of a run, the words on a run that ends so badly."""
 ENDS = {"stalls": f"{OUTCOMES['stalls']} of the run", "trips": OUTCOMES["trips"]}
 """By switch of a run, its meaning."""
@@ -58,7 +58,7 @@ class Sample:
 
     crank_angle: Value = quantity("rad", "{driver} angle at which the event begins")
     event: Value = quantity("s", "time at which the event begins")
-    trip_torque: Value = quantity("N.m", "{driver} torque at which the safety coupling opens in this run")
+    trip_torque: Value = quantity("N.m", "{driver} torque at which the torque limiter opens in this run")
     crank_torque_peak: Value = same_measure("crank_torque_peak")
     motor_torque_peak: Value = same_measure("motor_torque_peak")
     current_peak: Value = same_measure("current_peak")

@@ -1,4 +1,4 @@
-"""The ways to a safety coupling for a drive whose start puts more on it than running does: each is tried in a
+"""The ways to a torque limiter for a drive whose start puts more on it than running does: each is tried in a
 simulation of its own."""
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ def _for_starts(
     )
     ways = []
     for make in makers:
-        progress("ways to a safety coupling", 1.0, 1.0)
+        progress("ways to a torque limiter", 1.0, 1.0)
         try:
             ways.append(make(study, rig, setting))
         except InterruptedRunError:
@@ -287,7 +287,7 @@ def slip_run(rig: Rig, start: StartNumbers, setting: float) -> xr.Dataset | None
     speed; None where it slips on for three times as long as the start takes. The variables of the clutch are
     ``clutch.*``.
 
-    The clutch may slip again near the breakdown torque of the motor: the attribute `slip_time` [s] is the sum of all
+    The clutch may slip again near the pull-out torque of the motor: the attribute `slip_time` [s] is the sum of all
     times in which it slips."""
     rig = from_angle(rig, start.angle)
     drive = rig.drive
@@ -379,7 +379,8 @@ def _before_flywheel(study: StudyRecord, rig: Rig, setting: Setting) -> Alternat
         return None
     events = _loaded_starts(study)
     longest = longest_start(rig.operation.ramp_end, study.start.start_time)
-    starts = starts_from_all(rig, longest, events, on_motor_side)
+    before = rig.drive.added_inertia + rig.drive.gear_inertia
+    starts = starts_from_all(rig, longest, events, on_motor_side, before)
     if any(start.start_time is None for start in starts):
         return None
     running, shocks = _runs(study, dataclasses.replace(rig, fed_from=None), on_motor_side)

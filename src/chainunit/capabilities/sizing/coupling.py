@@ -1,4 +1,4 @@
-"""The recommended setting of the safety coupling of a sized drive, and its effect in the overloads."""
+"""The recommended setting of the torque limiter of a sized drive, and its effect in the overloads."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def recommended_setting(study: StudyRecord, couplings: Sequence[CatalogueCoupling] = ()) -> Setting | None:
-    """The recommended safety coupling of a sized drive, judged by the events of the study. None where no motor fits,
+    """The recommended torque limiter of a sized drive, judged by the events of the study. None where no motor fits,
     where the file gives a coupling, as that one cuts off the peaks from which the setting follows, or where the study
     ended before steady running. One of the `couplings` of a catalogue that can be set so is tried with its own
     release time."""
@@ -54,7 +54,7 @@ def recommended_setting(study: StudyRecord, couplings: Sequence[CatalogueCouplin
 def coupling_of(
     study: StudyRecord, setting: Setting, couplings: Sequence[CatalogueCoupling]
 ) -> CatalogueCoupling | None:
-    """The safety coupling of the catalogues for that setting, see `coupling_for`; it turns with the motor's shaft."""
+    """The torque limiter of the catalogues for that setting, see `coupling_for`; it turns with the motor's shaft."""
     drive = study.drive
     fastest = peak(study.steady[drive.motor_speed].values)
     return coupling_for(couplings, setting.least / drive.ratio, fastest)

@@ -1,4 +1,4 @@
-"""The sentences on the safety coupling of a sized drive, and on the ways to another."""
+"""The sentences on the torque limiter of a sized drive, and on the ways to another."""
 
 from __future__ import annotations
 
@@ -7,14 +7,13 @@ from collections.abc import Mapping, Sequence
 from ...core.descriptions import of_driver
 from ...core.quantities import variables
 from ...reading.text import number
-from ...study.coupling import hardest_start
+from ...study.coupling import TRIPS_IN_TRANSIENT, hardest_start, transient_of_starts
 from ...study.event_torques import running_peak, running_words
 from ...study.record import StudyRecord
 from ...study.sections import Coupling
-from ...study.starts import StartFindings
+from ...study.starts import transient_words
 from .protection import (
     MARGIN,
-    MARKED_START,
     Alternative,
     CouplingEffect,
     Obstacle,
@@ -40,16 +39,17 @@ def _list_of(study: StudyRecord, peaks: Mapping[str, float]) -> str:
 
 
 _OBSTACLES = {
-    Obstacle.START: "No safety coupling protects this drive as it starts now: {start} puts {start_torque} on it, so "
-    "that it has to open above {least}, and {bound}. For running alone {least_in_running} would do.",
-    Obstacle.MOTOR: "No safety coupling protects this drive: it has to open above {above}, and the motor gives at "
+    Obstacle.START: "No torque limiter protects this drive as it starts now: {start} puts {start_torque} on it by "
+    "load and acceleration, so that it has to open above {least}, and {bound}. For running alone {least_in_running} "
+    "would do.",
+    Obstacle.MOTOR: "No torque limiter protects this drive: it has to open above {above}, and the motor gives at "
     "most {motor} at the {driver}.",
-    Obstacle.GEAR: "No safety coupling protects this drive: it has to open above {above}, and the gear may carry "
+    Obstacle.GEAR: "No torque limiter protects this drive: it has to open above {above}, and the gear may carry "
     "{gear} in running.",
-    Obstacle.OVERLOADS: "No safety coupling is recommended: it has to open above {above}, and {bound}.",
-    Obstacle.RELEASE: "No safety coupling is recommended: one that opens at {setting}, opens too late. The largest "
+    Obstacle.OVERLOADS: "No torque limiter is recommended: it has to open above {above}, and {bound}.",
+    Obstacle.RELEASE: "No torque limiter is recommended: one that opens at {setting}, opens too late. The largest "
     "torques until no torque passes it, {release} after its trip: {effects}. That saves nothing.",
-    Obstacle.ENERGY: "No safety coupling is recommended: the energy balance is not kept in {wrong}, so that no "
+    Obstacle.ENERGY: "No torque limiter is recommended: the energy balance is not kept in {wrong}, so that no "
     "setting follows from its numbers.",
 }
 """By obstacle, the sentence on it."""
@@ -76,13 +76,14 @@ def why_none(setting: Setting) -> str:
 
 
 def coupling_sentence(study: StudyRecord, setting: Setting, alternatives: Sequence[Alternative] = ()) -> str:
-    """A sentence on the recommended safety coupling of a sized drive and its effect in the overloads, or on
+    """A sentence on the recommended torque limiter of a sized drive and its effect in the overloads, or on
     the reason why no coupling protects the drive."""
     caveat = f" ({study.verdict.caveat})" if study.verdict and study.verdict.caveat else ""
     hardest, running = hardest_start(study), running_peak(study)
     start = hardest.named(study)
+    by = " by load and acceleration" if setting.is_of_start else ""
     of = f"that {start}" if setting.is_of_start else f"that {running_words(study, running.run)}"
-    above = f"{_torque(setting.least)}, {MARGIN:g} times the {_torque(setting.normal)} {of} puts on it"
+    above = f"{_torque(setting.least)}, {MARGIN:g} times the {_torque(setting.normal)} {of} puts on it{by}"
     if setting.obstacle is not None:
         return of_driver(_OBSTACLES[setting.obstacle], study.driver_noun).format(
             start=start,
@@ -100,8 +101,8 @@ def coupling_sentence(study: StudyRecord, setting: Setting, alternatives: Sequen
         ) + _transient(study, setting)
     shut = {name: peak for name, peak in setting.overloads.items() if name not in setting.opens}
     text = (
-        f"Recommended safety coupling{caveat}: {_at_both(study, setting.least)}; this is {MARGIN:g} times the "
-        f"{_torque(setting.normal)} {of} puts on it, and {'above' if setting.stalls else 'below'} the "
+        f"Recommended torque limiter{caveat}: {_at_both(study, setting.least)}; this is {MARGIN:g} times the "
+        f"{_torque(setting.normal)} {of} puts on it{by}, and {'above' if setting.stalls else 'below'} the "
         f"{_torque(setting.motor)} that the motor gives at the {study.driver_noun}. It opens where "
         f"{_effects(study, setting.effects)}"
     )
@@ -123,19 +124,11 @@ def coupling_sentence(study: StudyRecord, setting: Setting, alternatives: Sequen
 
 
 def _transient(study: StudyRecord, setting: Setting) -> str:
-    """A sentence on the share of the electromagnetic transient in the torque of a start that decides the setting;
-    empty where it has hardly any."""
-    found = StartFindings.found_in(study)
-    if found is None or not setting.is_of_start:
+    """A sentence on the electromagnetic transient of a start, if it puts more on the coupling than its setting."""
+    most = transient_of_starts(study).transient
+    if study.drive.follows or most <= setting.least:
         return ""
-    lasting = found.worst.quasi_static
-    if setting.start <= MARKED_START * lasting:
-        return ""
-    bound = "" if study.drive.line else ", and is an upper bound, as the shafts are rigid"
-    return (
-        f" The electromagnetic transient of that start lasts some milliseconds{bound}; load and acceleration put "
-        f"{_torque(lasting)} on the output of the gear, and {MARGIN:g} times that is {_torque(MARGIN * lasting)}."
-    )
+    return f" The {transient_words(study)}: {_torque(most)}. {TRIPS_IN_TRANSIENT}."
 
 
 def _effects(study: StudyRecord, effects: Mapping[str, CouplingEffect]) -> str:
@@ -209,7 +202,7 @@ _FAILURES = {
 
 
 def way_words(study: StudyRecord, each: Alternative, setting: Setting) -> str:
-    """The sentence on a way to a safety coupling that a start does not open, beside the one of that `setting`."""
+    """The sentence on a way to a torque limiter that a start does not open, beside the one of that `setting`."""
     if each.numbers.start is None:
         return of_driver(_FAILURES[each.way], study.driver_noun)
     numbers = {

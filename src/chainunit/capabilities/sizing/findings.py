@@ -62,9 +62,9 @@ class SizingFindings(Findings):
     tried: int = part("number of motors that were tried", unit="1", default=0)
     gears: Sequence[CatalogueGear] = ()
     couplings: Sequence[CatalogueCoupling] = ()
-    """the gears and safety couplings of catalogues"""
+    """the gears and torque limiters of catalogues"""
     setting: Setting | None = None
-    """the recommended safety coupling, see `chainunit.capabilities.sizing.coupling.recommended_setting`"""
+    """the recommended torque limiter, see `chainunit.capabilities.sizing.coupling.recommended_setting`"""
     alternatives: tuple[Alternative, ...] = ()
     """ways to a coupling that a start does not open, where the start is more than running"""
 
@@ -154,7 +154,7 @@ class SizingFindings(Findings):
         )
 
     def coupling(self, study: StudyRecord) -> Setting | None:
-        """The recommended safety coupling; of a study that ended before it was judged, by the runs up to there."""
+        """The recommended torque limiter; of a study that ended before it was judged, by the runs up to there."""
         return self.setting or recommended_setting(study, self.couplings)
 
     def parts(self, study: StudyRecord, setting: Setting | None) -> PartsList | None:
@@ -166,10 +166,10 @@ class SizingFindings(Findings):
         items, wanted = best.parts, ""
         if setting is not None and setting.torque is not None:
             if sold := coupling_of(study, setting, self.couplings):
-                items = [*items, OrderedPart.of("safety coupling", sold)]
+                items = [*items, OrderedPart.of("torque limiter", sold)]
             else:
                 torque = number(setting.torque / study.drive.ratio, "N.m")
-                wanted = f"a safety coupling that opens at {torque} on the motor's shaft"
+                wanted = f"a torque limiter that opens at {torque} on the motor's shaft"
         unknown = [] if best.sold is None else unknown_limits(best.sold)
         flywheel = f"a flywheel of {best.flywheel_words}" if best.disc else ""
         listed = parts_list(items, unknown, flywheel, wanted)
@@ -254,7 +254,7 @@ class SizingFindings(Findings):
 
 
 class ProtectionAnalysis(Analysis):
-    """The safety coupling of a sized drive, and the ways to another; it completes the findings of sizing."""
+    """The torque limiter of a sized drive, and the ways to another; it completes the findings of sizing."""
 
     name = "protection"
     needs_runs = True

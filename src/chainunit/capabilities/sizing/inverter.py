@@ -57,7 +57,7 @@ def inverter_needs(best: Candidate, is_given: bool) -> Iterator[str]:
     if best.weakened:
         yield (
             f"The motor runs at {number(trial.frequency, 'Hz')}, above its rated "
-            f"{number(best.motor.nameplate.frequency, 'Hz')}: in field weakening, where its breakdown torque falls "
+            f"{number(best.motor.nameplate.frequency, 'Hz')}: in field weakening, where its pull-out torque falls "
             "with the square of the frequency; gear.ratio or sizing.ratios lead there."
         )
     yield (

@@ -194,7 +194,7 @@ def _protection(s: b.Source) -> Iterator[Line]:
     """The reason where there is no coupling, or its setting at the motor's shaft; and the relay."""
     protection = s.result["sizing"]["protection"]
     if protection.get("why_none"):
-        yield line("no safety coupling: ", s.words("sizing.protection.why_none"))
+        yield line("no torque limiter: ", s.words("sizing.protection.why_none"))
     elif "trip_torque_at_motor" in protection:
         yield s.line("{sizing.protection.trip_torque_at_motor} at the motor's shaft")
     yield from _relay(s)
@@ -287,7 +287,7 @@ def _best(s: b.Source, path: str, word: str) -> Iterator[b.Block]:
             sentence += line("; no flywheel")
         elif size is None:
             sentence += line(
-                "; no safety coupling", Aside(s.words("sizing.protection.why_none")) if why else ()
+                "; no torque limiter", Aside(s.words("sizing.protection.why_none")) if why else ()
             )
         else:
             is_relay = name == "protection" and _leading(s.result["sizing"][name]) == "relay_current"
@@ -414,7 +414,9 @@ def _ways(s: b.Source, study: StudyRecord) -> b.Table:
         opens = "; ".join(study.title_of(run) for run in way["opens"]) or "nothing"
         rows.append(b.TableRow((s.words(f"{path}.way"), *numbers, opens)))
     columns = b.heads("way", "set to", "running", "a start", "start-up", "opens or slips where")
-    title = f"Ways to a safety coupling: its setting, and the torques of running and of a start, at the {s.driver}"
+    title = (
+        f"Ways to a torque limiter: its setting, and the torques of running and of a start, at the {s.driver}"
+    )
     return b.Table(tuple(rows), columns, title=title, numeric=False, form="long")
 
 

@@ -16,7 +16,7 @@ from ...reading.results import derived, part, result
 class OrderedPart:
     """A part that is ordered from a catalogue."""
 
-    kind: str = part("motor, gear or safety coupling", name="part")
+    kind: str = part("motor, gear or torque limiter", name="part")
     designation: str = part("its designation")
     order_number: str = part("its order number; empty where the catalogue gives none")
     price: float | None = quantity("1", "its price; none where the catalogue gives none")
@@ -64,7 +64,7 @@ def parts_list(
     Parameters
     ----------
     unknown : limits of the gear that its catalogue does not give, in words
-    flywheel, coupling : words on a flywheel and a safety coupling that no catalogue has; empty where none is needed
+    flywheel, coupling : words on a flywheel and a torque limiter that no catalogue has; empty where none is needed
     """
     lacking = {
         "an order number": [each.kind for each in items if not each.order_number],
@@ -82,7 +82,7 @@ def parts_list(
 def coupling_for(
     couplings: Iterable[CatalogueCoupling], torque: float, speed: float
 ) -> CatalogueCoupling | None:
-    """The cheapest of the safety couplings that can be set to this `torque` [N m] and may turn at this `speed`
+    """The cheapest of the torque limiters that can be set to this `torque` [N m] and may turn at this `speed`
     [rad/s]; of those without a price, which come last, the one with the smallest range. None where there is none."""
     fitting = [each for each in couplings if each.can_be_set(torque, speed)]
     return min(

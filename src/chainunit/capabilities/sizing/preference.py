@@ -17,9 +17,9 @@ a flywheel ends near a limit."""
 STEP = 1.5
 """Ratio of the powers of neighbouring standard motors, at most."""
 
-EVEN, MEAN, UNSTARTED, FAILED = "even", "mean", "unstarted", "failed"
+EVEN, MEAN, UNSTARTED, FAILED, SPARED = "even", "mean", "unstarted", "failed", "spared"
 """What ends the trials of flywheels, beside a check that more inertia makes worse: the torque is even, the mean
-torque alone is too much, the heaviest does not start, or its run fails."""
+torque alone is too much, the heaviest does not start, its run fails, or the drive would not be chosen with one."""
 STOPS: Mapping[str, str] = {
     "start": "of up to {J} were tried; with a heavier one its start takes too long",
     "starts": "of up to {J} were tried, with which too few starts are permitted",
@@ -28,6 +28,7 @@ STOPS: Mapping[str, str] = {
     MEAN: "helps, as the mean torque alone is more than the margin leaves of the rated one",
     UNSTARTED: "of up to {J} were tried; with a heavier one it does not start",
     FAILED: "of up to {J} were tried, with which its run failed",
+    SPARED: "was tried, as with one it would come after the chosen drive, too",
 }
 """By what ended them, the words on the trials of flywheels."""
 
@@ -213,7 +214,7 @@ def _flywheels(c: Candidate) -> str:
         return ""
     limit = c.checks["inertia"].limit if "inertia" in c.checks else math.inf
     words = STOPS[c.stop].format(J=number(c.heaviest, "kg.m2"), limit=limit)
-    return f"; {'no flywheel' if c.stop in ('inertia', MEAN) else 'flywheels'} {words}"
+    return f"; {'no flywheel' if c.stop in ('inertia', MEAN, SPARED) else 'flywheels'} {words}"
 
 
 def _unstarted(c: Candidate) -> str:
@@ -237,7 +238,7 @@ def _chosen(best: Candidate, ranking: Sequence[Candidate], objective: str) -> st
     if objective == PRICE:
         if best.price is None:
             return "the first that fits, of drives of which none has a price for each part"
-        return f"the cheapest that fits: {price_words(best.price)} without a safety coupling"
+        return f"the cheapest that fits: {price_words(best.price)} without a torque limiter"
     smaller = [c for c in ranking[1:] if c.keeps_margin and c.power < best.power]
     if not smaller:
         barely = any(c.power < best.power for c in ranking[1:])

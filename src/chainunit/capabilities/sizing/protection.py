@@ -1,4 +1,4 @@
-"""The protection of a drive by a safety coupling."""
+"""The protection of a drive by a torque limiter."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from enum import StrEnum
 from ...core.quantities import Value, declaration, quantity, variables
 
 MARGIN = 1.25
-"""Ratio of the setting of a safety coupling to the largest torque of normal duty."""
+"""Ratio of the setting of a torque limiter to the largest torque of normal duty."""
 MARKED_START = 1.1
 """Ratio of the torque of a start to that of running from which on the start decides the setting."""
 _ALIKE = 1.01
@@ -18,7 +18,7 @@ _ALIKE = 1.01
 
 
 class Obstacle(StrEnum):
-    """Why no setting of a safety coupling protects a drive."""
+    """Why no setting of a torque limiter protects a drive."""
 
     START = "the start"
     """a start puts more on it than the gear may carry, or than any overload does"""
@@ -42,7 +42,7 @@ _SPARED = 0.05
 
 @dataclass(frozen=True)
 class CouplingEffect:
-    """The effect of a safety coupling in an overload: the largest torque at the output of the gear [N m] without it,
+    """The effect of a torque limiter in an overload: the largest torque at the output of the gear [N m] without it,
     and with it until no torque passes it any more; and the `release` time [s] up to which the gear carries no more
     than `goal` [N m], 0 where it carries more before the trip."""
 
@@ -70,9 +70,10 @@ def spares(effects: Mapping[str, CouplingEffect], gear: float = math.inf) -> boo
 
 @dataclass(frozen=True)
 class Setting:
-    """A safety coupling between motor and gear, judged by the torques in a study; all at the crank [N m].
+    """A torque limiter between motor and gear, judged by the torques in a study; all at the crank [N m].
 
-    A coupling has to carry `running` and every `start`: the setting is `MARGIN` times the larger of the two. It has
+    A coupling has to carry `running` and every `start` by load and acceleration: the setting is `MARGIN` times the
+    larger of the two. It has
     to be below the limit of the `gear`, and below the peak of at least one of the `overloads` (peaks by name), the
     shocks that a coupling is for. Otherwise `obstacle` says why there is no setting. The largest torque of the
     `motor` in steady running may be less than the setting, as rotor and flywheel also give torque in a shock; then a
@@ -169,7 +170,7 @@ class Setting:
 
 
 class Way(StrEnum):
-    """A way to a safety coupling that stays shut in a start which puts more on it than running does, or that saves
+    """A way to a torque limiter that stays shut in a start which puts more on it than running does, or that saves
     what one with the declared release time does not."""
 
     RELEASE = "shorter release time"

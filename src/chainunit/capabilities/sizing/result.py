@@ -1,4 +1,4 @@
-"""The parts to order beside the motor as data: the gear, the safety coupling with the ways to another, the relay."""
+"""The parts to order beside the motor as data: the gear, the torque limiter with the ways to another, the relay."""
 
 from __future__ import annotations
 
@@ -151,7 +151,7 @@ class MotorProtection:
 
 @result
 class TriedWay:
-    """A way to a safety coupling that was tried."""
+    """A way to a torque limiter that was tried."""
 
     way: str = part("the way")
     words: str = part("a sentence on it")
@@ -166,15 +166,17 @@ class TriedWay:
 class DriveProtection:
     """Settings of the protection of the drive."""
 
-    trip_torque: float | None = quantity("N.m", "safety coupling, trip torque at the {driver}")
-    trip_torque_at_motor: float | None = quantity("N.m", "safety coupling, trip torque at the motor's shaft")
+    trip_torque: float | None = quantity("N.m", "torque limiter, trip torque at the {driver}")
+    trip_torque_at_motor: float | None = quantity("N.m", "torque limiter, trip torque at the motor's shaft")
     relay: MotorProtection = part(inline=True)
-    coupling: str = part("a sentence on the recommended safety coupling")
-    obstacle: Obstacle | None = part("why no safety coupling is recommended")
+    coupling: str = part("a sentence on the recommended torque limiter")
+    obstacle: Obstacle | None = part("why no torque limiter is recommended")
     why_none: str = part("a few words on it")
     normal_torque: float = quantity("N.m", "largest torque of normal duty on the coupling, at the {driver}")
     running_torque: float = quantity("N.m", "largest torque of running on the coupling")
-    start_torque: float = quantity("N.m", "largest torque of a start on the coupling")
+    start_torque: float = quantity(
+        "N.m", "largest torque of a start on the coupling by load and acceleration"
+    )
     breakdown_torque: float = quantity("N.m", "most that the motor gives at the {driver}")
     effects: Mapping[str, Mapping[str, InUnit]] = part("peak at the output of the gear, by overload")
     overloads: Mapping[str, InUnit] = part("peak of each overload on the coupling")
@@ -234,7 +236,7 @@ def _peaks(
 
 
 def _effects(study: StudyRecord, effects: Mapping[str, CouplingEffect]) -> dict[str, dict[str, InUnit]]:
-    """The effects of a safety coupling as it was tried, by overload."""
+    """The effects of a torque limiter as it was tried, by overload."""
     titles = {"without": "without a coupling", "with_coupling": "with it"}
     return {
         name: {

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from ...batch.transients import can_run
@@ -30,7 +30,7 @@ from .duty import Duty
 from .findings import SizingFindings
 from .inverter import inverter_needs
 from .motor_trials import EVENED, WORSE_WITH_INERTIA, MotorTrials
-from .preference import STEP, choice, poles_rank, rank
+from .preference import SPARED, STEP, choice, poles_rank, rank
 from .table import PRICE, Sizing
 from .task import SizingTask
 
@@ -218,11 +218,13 @@ def _search(trials: MotorTrials, motors: list[CatalogueMotor], progress: TaskPro
     """The candidates that `size` tries of the `motors`, in the order of their rank. The start of the best one is that
     from the worst crank angle; a candidate that fails in it makes room for the next."""
     demands, objective = trials.plan.demands, trials.plan.objective
-    candidates: list[Candidate] = []
-    tried: set[str] = set()
+    candidates, least = _least_power(trials, motors, progress)
+    tried = {c.motor.designation for c in candidates}
+    spared: list[CatalogueMotor] = []
     gears = [gear.price or math.inf for gear in trials.task.gears]
     cheapest_gear = min(gears, default=0.0)
-    rest = iter(sorted(motors, key=lambda m: m.price or math.inf) if objective == PRICE else motors)
+    left = [m for m in motors if m.nameplate.power >= least and m.designation not in tried]
+    rest = iter(sorted(left, key=lambda m: m.price or math.inf) if objective == PRICE else left)
     following = next(rest, None)
 
     def is_over() -> bool:
@@ -234,13 +236,33 @@ def _search(trials: MotorTrials, motors: list[CatalogueMotor], progress: TaskPro
             return _is_cheapest(candidates, following.price + cheapest_gear)
         return _is_settled(candidates, following, demands.larger)
 
-    while not candidates or not is_over():
+    def says(motor: CatalogueMotor) -> None:
+        progress(f"simulating {motor.designation}", float(len(tried)), float(len(motors)))
+
+    def next_spared() -> CatalogueMotor | None:
+        return next((m for m in spared if not _comes_after(m, candidates, demands.larger)), None)
+
+    while True:
         while following is not None and not is_over():
-            progress(f"simulating {following.designation}", float(len(tried)), float(len(motors)))
-            candidates += trials.candidates_of(following)
+            says(following)
+            # a larger motor may need no flywheel: then none of the others has to be tried with one
+            is_larger = any(c.keeps_margin and c.power < following.nameplate.power for c in candidates)
+            is_bare = is_larger and objective != PRICE and trials.task.tables.start != "inverter"
+            tries = trials.candidates_of(following, trials.with_least_boost if is_bare else None)
+            if is_bare and not any(c.keeps_margin for c in tries):
+                spared.append(following)
+                for c in tries:
+                    c.stop = SPARED
+            candidates += tries
             tried.add(following.designation)
             following = next(rest, None)
+        while (motor := next_spared()) is not None:
+            says(motor)
+            spared.remove(motor)
+            candidates[:] = [c for c in candidates if c.motor is not motor] + trials.candidates_of(motor)
         _from_all_angles(trials, candidates)
+        if is_over() and next_spared() is None:
+            break
     if candidates[0].fits and candidates[0].drive.added_inertia:
         progress("a larger motor without a flywheel", 0.0, 1.0)
         if (larger := _without_flywheel(trials, motors, candidates)) is not None:
@@ -253,6 +275,62 @@ def _search(trials: MotorTrials, motors: list[CatalogueMotor], progress: TaskPro
         best.remedy = _remedy(trials, best)
         rank(candidates, demands.larger, objective)
     return candidates
+
+
+def _least_power(
+    trials: MotorTrials, motors: Sequence[CatalogueMotor], progress: TaskProgress
+) -> tuple[list[Candidate], float]:
+    """The least power [W] of the `motors`, the smallest first, with which one is strong enough, and the candidates
+    that were tried for it: among them are all of the power below. 0 where none suffices.
+
+    A motor that is too weak takes a run for each flywheel. So the power is bisected, as a larger motor is stronger:
+    first without flywheels, and below the power that this gives with them."""
+    powers = sorted({m.nameplate.power for m in motors})
+    candidates: list[Candidate] = []
+
+    def of(power: float) -> list[CatalogueMotor]:
+        same = [m for m in motors if m.nameplate.power == power]
+        return sorted(same, key=lambda m: poles_rank(m.nameplate.poles))
+
+    def suffices_bare(n: int) -> bool:
+        motor = of(powers[n])[0]
+        progress(f"simulating {motor.designation}", 0.0, float(len(motors)))
+        return not _is_weak(trials.candidates_of(motor, trials.with_least_boost)[-1])
+
+    def suffices(n: int) -> bool:
+        for motor in of(powers[n]):
+            progress(f"simulating {motor.designation}", float(len(candidates)), float(len(motors)))
+            tries = trials.candidates_of(motor)
+            candidates.extend(tries)
+            if not all(map(_is_weak, tries)):
+                return True
+        return False
+
+    weak, strong = -1, 0
+    while not suffices_bare(strong):
+        weak = strong
+        if weak == len(powers) - 1:
+            return [], 0.0
+        strong = min(2 * strong + 1, len(powers) - 1)
+    strong = _bisected(suffices_bare, weak, strong)
+    strong = _bisected(suffices, -1, strong)
+    return candidates, powers[strong]
+
+
+def _bisected(suffices: Callable[[int], bool], weak: int, strong: int) -> int:
+    """The least number above `weak` that `suffices`, as `strong` does and `weak` does not."""
+    while strong - weak > 1:
+        middle = (weak + strong + 1) // 2
+        if suffices(middle):
+            strong = middle
+        else:
+            weak = middle
+    return strong
+
+
+def _is_weak(c: Candidate) -> bool:
+    """Whether a candidate exceeds a limit that a larger motor improves, or its run failed."""
+    return not c.checks or any(c.exceeds(name) for name in c.checks if name not in _WORSE_WITH_POWER)
 
 
 def _cost_of_wishes(
@@ -271,8 +349,8 @@ def _cost_of_wishes(
     free = dataclasses.replace(demands, candidates=1, **dict.fromkeys(wishes, math.inf))
     plan = dataclasses.replace(trials.plan, demands=free)
     without = dataclasses.replace(trials, task=dataclasses.replace(trials.task, plan=plan))
-    powers = {c.power for c in rivals}
-    other = _search(without, [m for m in motors if m.nameplate.power in powers], progress)[0]
+    largest = max(c.power for c in rivals)
+    other = _search(without, [m for m in motors if m.nameplate.power <= largest], progress)[0]
     is_same = (other.motor, other.gear) == (best.motor, best.gear)
     if not other.fits or (best.fits and is_same and other.drive.added_inertia >= best.drive.added_inertia):
         return ""
@@ -375,16 +453,29 @@ def _is_settled(candidates: list[Candidate], following: CatalogueMotor, larger: 
     if not keeping:
         return False
     best, _ = choice(keeping, larger)
-    is_light = (
-        best.unit is not None and (best.trial.start_class or 0) <= LIGHT and not best.drive.added_inertia
-    )
-    if (
-        is_light
-        and not best.weakened
-        and poles_rank(best.motor.nameplate.poles) <= poles_rank(following.nameplate.poles)
-    ):
+    if _is_light(best) and not best.drive.added_inertia and _has_poles_as_good(best, following):
         return best.power < following.nameplate.power
     return following.nameplate.power > larger * min(c.power for c in keeping)
+
+
+def _comes_after(motor: CatalogueMotor, candidates: list[Candidate], larger: float) -> bool:
+    """Whether a `motor` that needs a flywheel comes after the best of the candidates that keep the margin."""
+    power = motor.nameplate.power
+    keeping = [c for c in candidates if c.keeps_margin]
+    if not any(c.power < power for c in keeping):
+        return False
+    best, _ = choice(keeping, larger)
+    is_smaller = best.power < power and _has_poles_as_good(best, motor)
+    return _is_light(best) and (is_smaller or not best.drive.added_inertia)
+
+
+def _is_light(c: Candidate) -> bool:
+    """Whether a drive has one gear unit, a light start, and no field weakening: no other one is better in these."""
+    return c.unit is not None and (c.trial.start_class or 0) <= LIGHT and not c.weakened
+
+
+def _has_poles_as_good(c: Candidate, motor: CatalogueMotor) -> bool:
+    return poles_rank(c.motor.nameplate.poles) <= poles_rank(motor.nameplate.poles)
 
 
 def _without_flywheel(
@@ -409,6 +500,5 @@ def _without_flywheel(
         candidate = trials.candidates_of(rest[middle], trials.with_least_boost)[-1]
         if candidate.keeps_margin:
             least = candidate
-        too_weak = any(candidate.exceeds(name) for name in candidate.checks if name not in _WORSE_WITH_POWER)
-        rest = rest[middle + 1 :] if too_weak else rest[:middle]
+        rest = rest[middle + 1 :] if _is_weak(candidate) else rest[:middle]
     return least

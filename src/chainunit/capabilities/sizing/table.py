@@ -46,7 +46,7 @@ class Sizing:
         kind="percent",
     )
     breakdown_margin: Value = quantity(
-        "1", "factor between the peak torque and the breakdown torque", default=1.25, min=1.0, max=10.0
+        "1", "factor between the peak torque and the pull-out torque", default=1.25, min=1.0, max=10.0
     )
     inertia_ratio: Value = quantity(
         "1",

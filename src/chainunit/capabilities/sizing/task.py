@@ -28,7 +28,7 @@ class SizingTask:
     gears: Sequence[CatalogueGear] = ()
     """the gears of catalogues, of which one is chosen; without them any gear of the plan's kind"""
     couplings: Sequence[CatalogueCoupling] = ()
-    """the safety couplings of catalogues"""
+    """the torque limiters of catalogues"""
 
     def of_gear(self, gear: CatalogueGear | None) -> SizingTask:
         """The task with a drive that has this gear, whose values stand in the `tables`."""

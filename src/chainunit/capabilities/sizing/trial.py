@@ -20,6 +20,7 @@ from ...machines.chain_unit import SideName
 from ...study.arrays import peak
 from ...study.drive import Drive
 from ...study.events import one_sided_event
+from ...study.inverter import need_of
 from ...study.limits import Check, heating, keeping_speed, starting
 from ...study.measures import time_to_start
 from ...study.permitted_starts import permitted_starts, starting_data
@@ -139,16 +140,14 @@ class Trial:
 
     @cached_property
     def inverter_current(self) -> float | None:
-        """Least rated current of an inverter [A]: that of the motor, the RMS of the duty, the peak of running and
-        starts over the permitted overload, and the current that a start exceeds for as long as that overload is
-        permitted. None on the line, or without a start."""
+        """Least rated current of an inverter [A] by `need_of`; None on the line, or without a start."""
         if not self.drive.follows or self.start_current is None:
             return None
         name = f"motor.{self.drive.motor.current}"
-        highest = max(self.start_current, *(peak(run[name].values) for run in self._running))
+        peaks = {"start": self.start_current, "running": max(peak(run[name].values) for run in self._running)}
         lasting = [exceeded_for(*self._start_currents, OVERLOADED), *(s.long_current for s in self.starts)]
-        rated = float(self.motor.nameplate.rated_current)
-        return max(rated, self._rms(name), highest / self.task.tables.starter.overload, *lasting)
+        rated, overload = float(self.motor.nameplate.rated_current), self.task.tables.starter.overload
+        return need_of(rated, self._rms(name), lasting, peaks, overload).current
 
     @cached_property
     def speed(self) -> float:
@@ -183,7 +182,7 @@ class Trial:
 
     @cached_property
     def breakdown_torque(self) -> float:
-        """Breakdown torque of the motor [N m] at its permitted temperature and at the frequency at which it
+        """Pull-out torque of the motor [N m] at its permitted temperature and at the frequency at which it
         runs: above the corner frequency the voltage of an inverter does not rise any more."""
         p = self.drive.fmu_parameters
         voltage = float(volts_per_hertz(MATH, p, self.frequency)) if self.drive.follows else 1.0

@@ -30,7 +30,7 @@ from .runs import (
 from .twin import twin
 from .words import KIND, remark_on
 
-_ALIKE = 0.01
+ALIKE = 0.02
 """Relative deviation up to which two numbers are alike."""
 
 
@@ -103,7 +103,7 @@ class StaticInertiaFindings(Findings):
             own, its = (Layout(EventNumbers).values(each) for each in (peaks.machine, peaks.static))
             shares += [x / y - 1.0 for x, y in zip(its, own, strict=True) if y]
         is_other = self.choice is not None and self.choice.differs
-        return is_other or any(abs(share) > _ALIKE for share in shares)
+        return is_other or any(abs(share) > ALIKE for share in shares)
 
     def remark(self, study: StudyRecord) -> None:
         """The warning where another drive would have been chosen."""
@@ -178,7 +178,7 @@ class StaticInertiaAnalysis(Analysis):
 
 
 def _events(study: StudyRecord) -> list[Event]:
-    """The events whose runs can be compared: a safety coupling cuts the peaks off."""
+    """The events whose runs can be compared: a torque limiter cuts the peaks off."""
     if study.config.coupling:
         return []
     return [event for name, event in study.config.events.items() if name in study.answers]

@@ -15,7 +15,7 @@ from ...study.drive import Drive
 from ...study.readings import crank_motion
 from ...study.record import StudyRecord
 from ...study.torques import gear_torque
-from .analysis import StaticInertiaFindings
+from .analysis import ALIKE, StaticInertiaFindings
 from .runs import DutyNumbers, EventNumbers
 from .words import trial_words
 
@@ -37,21 +37,23 @@ _SHORT = (
 
 
 def answer(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
-    """A line where the same drive is chosen, or where the file gives the motor; else the warning says it. Nothing
-    where nothing differs."""
+    """A line if the RMS torque is not that of the machine, and the file gives the motor, or the same one is chosen;
+    another drive has a warning."""
     findings = StaticInertiaFindings.found_in(study)
-    if findings is None or not findings.differs:
+    if findings is None or abs(findings.deviations["static"]["gear_torque_rms"]) <= ALIKE:
         return
-    if findings.choice is not None and findings.choice.differs:
+    choice = findings.choice
+    if choice is not None and choice.differs:
         return
-    same = "" if findings.choice is None else " would have chosen the same drive; it"
-    yield b.Text(
-        s.line(
-            "A sizing program with one inertia, {static_inertia.inertia.mean} at the {driver}, and no terms of "
-            f"inertia in the torque{same} takes {{static_inertia.static.gear_torque_rms}} RMS at the output of the "
-            "gear, where the machine takes {static_inertia.machine.gear_torque_rms}."
+    static = "{static_inertia.static.gear_torque_rms}"
+    machine = "{static_inertia.machine.gear_torque_rms}"
+    if choice is None:
+        words = f"A constant-inertia calculation takes RMS {static} instead of {machine} at the output of the gear."
+    else:
+        words = (
+            f"A constant-inertia calculation would have chosen {{motor}} (RMS {static} instead of {machine})."
         )
-    )
+    yield b.Text(s.line(words, motor="" if choice is None else choice.static.motor))
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:

@@ -63,7 +63,7 @@ class SweepCapability(Capability):
         yield Rule(
             "sweep.measures",
             ~given("coupling"),
-            "coupling_trip_time is of a safety coupling; add [coupling], or leave it out",
+            "coupling_trip_time is of a torque limiter; add [coupling], or leave it out",
             has_entry("sweep.measures", "coupling_trip_time"),
         )
         words = "need a model of the motor, which is an FMU; leave them out"

@@ -11,9 +11,9 @@ import uuid
 from collections.abc import Mapping, Sequence
 from importlib import metadata
 from typing import Any
-from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
+from ...core.inputs import xml_of
 from ...fmu.description import generation_time
 from ...fmu.pack import xml_bytes
 from ...fmu.reference import (
@@ -132,12 +132,16 @@ def srmd(
     return xml_bytes(root)
 
 
-def resource_of(content: bytes) -> str:
-    """The name of the file of which an SRMD tells; empty where it names none, or is no SRMD."""
-    try:
-        return ElementTree.fromstring(content).get("data", "")
-    except ElementTree.ParseError:
-        return ""
+def resource_of(content: bytes, name: str) -> tuple[str, str]:
+    """The name and the checksum of the file of which an SRMD tells; empty where it gives none.
+
+    Raises
+    ------
+    InputError
+        in one line that begins with the `name` of the SRMD.
+    """
+    root = xml_of(content, name)
+    return root.get("data", ""), root.get("checksum", "")
 
 
 def sbom(name: str, version: str, members: Mapping[str, bytes]) -> dict[str, Any]:

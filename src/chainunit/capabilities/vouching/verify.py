@@ -75,13 +75,17 @@ def _beside(found: Integrity, file: Path, data: bytes) -> None:
     text = regular_bytes(file.with_suffix(".srmd"))
     if text is None:
         return
-    name = printable(file.with_suffix(".srmd").name)
-    stated = re.search(rb'\schecksum="([0-9A-Fa-f]{64})"', text[:10_000])
-    if stated is None:
-        found.add(False, "SRMD", f"{name} beside the file: has no checksum of 256 bits")
-    elif stated[1].decode().lower() == sha3(data):
-        found.add(True, "SRMD", f"{name} beside the file has its SHA3-256")
-    elif (of := docs.resource_of(text)) not in ("", file.name):
-        found.add(None, "SRMD", f"{name} beside the file: is that of {printable(of)}")
+    name = f"{printable(file.with_suffix('.srmd').name)} beside the file"
+    try:
+        of, checksum = docs.resource_of(text, name)
+    except InputError as error:
+        found.add(False, "SRMD", str(error))
+        return
+    if not re.fullmatch("[0-9A-Fa-f]{64}", checksum):
+        found.add(False, "SRMD", f"{name}: has no checksum of 256 bits")
+    elif checksum.lower() == sha3(data):
+        found.add(True, "SRMD", f"{name} has its SHA3-256")
+    elif of not in ("", file.name):
+        found.add(None, "SRMD", f"{name}: is that of {printable(of)}")
     else:
-        found.add(False, "SRMD", f"{name} beside the file: is of another file, its SHA3-256 differs")
+        found.add(False, "SRMD", f"{name}: is of another file, its SHA3-256 differs")

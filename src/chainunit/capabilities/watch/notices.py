@@ -1,4 +1,4 @@
-"""Who notices an event: thermal relay, safety coupling, current limit and load observer of a study, and the load that
+"""Who notices an event: thermal relay, torque limiter, current limit and load observer of a study, and the load that
 the rocker has carried by then."""
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ CHAINS_GOOD = 0.72
 from the motion of the chains (docs/identification.md)."""
 DEVICES = {
     "thermal_relay": "thermal relay",
-    "safety_coupling": "safety coupling",
+    "torque_limiter": "torque limiter",
     "current_limit": "current limit",
     "observer": "load observer",
 }
@@ -202,7 +202,7 @@ def _times(
     if drive.rated_current is not None:
         yield "thermal_relay", answers.thermal_trip_time
     if study.config.coupling is not None:
-        yield "safety_coupling", answers.coupling_trip_time
+        yield "torque_limiter", answers.coupling_trip_time
     limit = motor.current_limit(drive.parameters)
     if limit is not None:
         first = _first(run, np.abs(run[f"motor.{motor.current}"].values) >= AT_LIMIT * limit)

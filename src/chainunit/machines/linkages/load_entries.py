@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -13,13 +13,14 @@ from ...core import units
 from ...core.errors import InputError, meant, near_name, shown
 from ...core.inputs import cells_of, file_text, lines_of_table
 from ...mechanism.assur import GROUND
-from ...mechanism.expressions import Expression
+from ...mechanism.expressions import Expression, expression
 from .checks import name_fault
 from .entries import EntryReader, Known, is_among, is_given, within
 from .loads import parts_of_extreme
 
-MOST_POINTS = 1000
-"""Largest number of points of a table: each of them costs time at each step of a run."""
+MOST_POINTS = 200
+"""Largest number of points of a table, and of all tables of a file, each counted as often as a load takes it: each
+point costs an export about 10 ms, and each step of an FMU about 6 ns."""
 _FEWER = f"must have at most {MOST_POINTS}: keep those between which the curve is nearly straight"
 LOADS = {
     "force": ("type", "on", "force"),
@@ -45,6 +46,9 @@ class LoadReader(EntryReader):
         self.folder = folder
         self.table_units: dict[str, str | None] = {}
         self.curve_units: dict[str, tuple[str | None, str | None]] = {}
+        self.sizes: dict[str, int] = {}
+        """numbers of points of the tables"""
+        self.looked_up = 0
 
     # tables
 
@@ -63,6 +67,7 @@ class LoadReader(EntryReader):
                     raise InputError(f"{over} must rise" + ", within less than one turn" * turns)
                 if turns and at[-1] - at[0] >= 2.0 * math.pi:
                     raise InputError("phi must rise, within less than one turn: the table repeats itself")
+                self.sizes[name] = len(at)
                 curves[name] = {"over": over, "places": at, "values": [x for x, _ in values]}
                 if over == "phi":
                     self.table_units[name] = of_value
@@ -162,6 +167,7 @@ class LoadReader(EntryReader):
     def further_units(self, given: Expression, in_load: bool) -> dict[str, str | None]:
         """The units of the extremes and tables of an expression, by name; a load may have them."""
         if not in_load:
+            self.count(given)
             return super().further_units(given, in_load)
         found: dict[str, str | None] = {each: self.extreme(each, given.text) for each in given.extremes}
         for name in given.tables:
@@ -173,6 +179,25 @@ class LoadReader(EntryReader):
             found[f"x of {name}"], found[f"table {name}"] = self.curve_units[name]
             self.used.add(name)
         return found
+
+    def count(self, *given: Expression) -> None:
+        """Count the points of the tables in the expressions of a load or of a parameter.
+
+        Raises
+        ------
+        InputError
+            in one line, where all of the file come to more than `MOST_POINTS` with them.
+        """
+        before = self.looked_up
+        over_phi = {name for each in given for name in each.names} & {*self.table_units}
+        names = [*over_phi, *(name for each in given for name in each.lookups)]
+        self.looked_up += sum(self.sizes.get(name, 0) for name in names)
+        self.looked_up += sum(points for each in given for points in each.points)
+        if before <= MOST_POINTS < self.looked_up:
+            raise InputError(
+                f"brings the points of tables to {self.looked_up}, those of a table as often as a load takes it; "
+                f"{_FEWER}"
+            )
 
     def note(self, name: str, known: Any) -> str:
         """A hint on a name that an expression does not know, such as a table over x."""
@@ -225,10 +250,9 @@ class LoadReader(EntryReader):
                 self.fault(f"{key}.on", f"{is_given(on)}; must be a link{near_name(str(on), self.points)}")
                 return load
             torque = _placed(table.get("torque"), [str(on)])
-            return load | {
-                "on": [on],
-                "torque": self.entry(f"{key}.torque", torque, "N.m", self.known(_OF_LINK), True),
-            }
+            entry = self.entry(f"{key}.torque", torque, "N.m", self.known(_OF_LINK), True)
+            self.count_in(key, [entry])
+            return load | {"on": [on], "torque": entry}
         for each in ("on", "by") if kind == "spring" else ("on",):
             with self.at(f"{key}.{each}"):
                 load[each] = self.end(table.get(each))
@@ -252,7 +276,13 @@ class LoadReader(EntryReader):
         if isinstance(force, list):
             force = [_placed(each, load["on"]) for each in force]
         load["force"] = self.vector(f"{key}.force", force, "N", self.known(_OF_FORCE), True)
+        self.count_in(key, load["force"])
         return load
+
+    def count_in(self, key: str, entries: Sequence[float | str]) -> None:
+        """Count the points of the tables in a load; faults where they are too many."""
+        with self.at(key):
+            self.count(*(expression(each) for each in entries if isinstance(each, str)))
 
     def known(self, motion: Known) -> Known:
         """The units of the names that a load knows beside parameters and inputs."""

@@ -222,7 +222,8 @@ class LinkageDescription(LinkageOutputs):
         kind, link = load["type"], load["on"][0]
         if kind == "torque":
             angle = self._angle_for([load["torque"]], link, parts)
-            return TorqueLaw(link, load["torque"], parts.geometry.values, self.tables, angle)
+            tables = self._tables_for([load["torque"]])
+            return TorqueLaw(link, load["torque"], parts.geometry.values, tables, angle)
         if kind == "spring":
             ends = [
                 (None if link == GROUND else link, parts.pin_on(link, point))
@@ -236,7 +237,8 @@ class LinkageDescription(LinkageOutputs):
         axis = parts.frames[link].axis if kind == "follower" else None
         fx, fy = load["force"]
         angle = self._angle_for([fx, fy], link, parts)
-        return ForceLaw(link, pin, (fx, fy), axis, parts.geometry.values, self.tables, angle)
+        tables = self._tables_for([fx, fy])
+        return ForceLaw(link, pin, (fx, fy), axis, parts.geometry.values, tables, angle)
 
     def check_loads(self, p: Any, speed: float) -> None:
         """Refuse a force or a torque that has no value, or an infinite one, at a place of the way.
@@ -278,6 +280,11 @@ class LinkageDescription(LinkageOutputs):
             return None
         frame = parts.frames[link]
         return lambda xp, m: self.angle(xp, link, description_axis(m.links[link].u, frame), m.q)
+
+    def _tables_for(self, entries: Sequence[float | str]) -> dict[str, TableCurve]:
+        """The tables over the coordinate that a load takes."""
+        names = {name for each in entries if isinstance(each, str) for name in expression(each).names}
+        return {name: curve for name, curve in self.tables.items() if name in names}
 
     # the way of the driver
 

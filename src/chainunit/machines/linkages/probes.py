@@ -134,9 +134,9 @@ def notes_on(driver: DriverEntry, limits: tuple[float, float] | None, angle_coun
         "\n\nFrame and signs: x points right, y up; the angle of a link counts counter-clockwise from the x axis. "
         f"{counts}. The {effort} tau is the one that the machine needs. The reaction of a joint is the force on the "
         "link that its description names first."
-        "\n\nLimits: links are rigid, and joints have no play; a joint pushes and pulls. Friction is smoothed: at "
-        "rest nothing sticks. Lengths are fixed before the initialization, where lengths for which the linkage does "
-        "not close are refused."
+        "\n\nLimits: links are rigid, and joints have no play; a joint pushes and pulls. Static "
+        "friction is not modelled. Lengths are fixed before the initialization, where lengths for which the linkage "
+        "does not close are refused."
     )
 
 

@@ -457,7 +457,8 @@ const liveModel = async (data, bytes) => {
       // as many whole turns as the crank makes, see chainunit.study.readings.only_whole_turns
       const turns = Math.min(this.of.turns, Math.floor((reductions.max(angle) - first) / (TURN * this.crankRatio()) + 1e-9));
       const goal = first + TURN * (turns - 1e-9) * this.crankRatio(), last = angle.findIndex((x) => x >= goal);
-      if (turns < 1) return speed.every((w) => Math.abs(w) < 0.01 * this.speed);
+      // it may creep up to a load, and turn on once it is past it, see chainunit.study.block_runs
+      if (turns < 1) return false;
       const share = (goal - angle[last - 1]) / (angle[last] - angle[last - 1]);
       const end = (x) => x[last - 1] + share * (x[last] - x[last - 1]);
       const inside = speed.slice(0, last + 1), ripple = reductions.max(inside) - reductions.min(inside);

@@ -203,6 +203,6 @@ def _tables(drive: Drive, operation: OperatingConditions) -> Iterator[LiveQuanti
     if operation.coupling is not None:
         for name, role in (("trip_torque", "trip"), ("release_time", "release")):
             own = variable_of(Coupling, name)
-            variable = replace(own, template=f"safety coupling: {own.template}")
+            variable = replace(own, template=f"torque limiter: {own.template}")
             value = float(getattr(operation.coupling, name))
             yield LiveQuantity(("coupling", name), variable, value, "drive", role=role)
