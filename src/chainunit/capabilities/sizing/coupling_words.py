@@ -39,17 +39,15 @@ def _list_of(study: StudyRecord, peaks: Mapping[str, float]) -> str:
 
 
 _OBSTACLES = {
-    Obstacle.START: "No torque limiter protects this drive as it starts now: {start} puts {start_torque} on it by "
-    "load and acceleration, so that it has to open above {least}, and {bound}. For running alone {least_in_running} "
-    "would do.",
-    Obstacle.MOTOR: "No torque limiter protects this drive: it has to open above {above}, and the motor gives at "
-    "most {motor} at the {driver}.",
-    Obstacle.GEAR: "No torque limiter protects this drive: it has to open above {above}, and the gear may carry "
-    "{gear} in running.",
-    Obstacle.OVERLOADS: "No torque limiter is recommended: it has to open above {above}, and {bound}.",
-    Obstacle.RELEASE: "No torque limiter is recommended: one that opens at {setting}, opens too late. The largest "
+    Obstacle.START: "No torque limiter: {start} needs a setting of {least} ({start_torque} by load and "
+    "acceleration); {bound}. For running alone {least_in_running} would do.",
+    Obstacle.MOTOR: "No torque limiter: it has to open above {above}; the motor gives at most {motor} at the "
+    "{driver}.",
+    Obstacle.GEAR: "No torque limiter: it has to open above {above}; the gear may carry {gear} in running.",
+    Obstacle.OVERLOADS: "No torque limiter: it has to open above {above}; {bound}.",
+    Obstacle.RELEASE: "No torque limiter: one that opens at {setting}, opens too late. The largest "
     "torques until no torque passes it, {release} after its trip: {effects}. That saves nothing.",
-    Obstacle.ENERGY: "No torque limiter is recommended: the energy balance is not kept in {wrong}, so that no "
+    Obstacle.ENERGY: "No torque limiter: the energy balance is not kept in {wrong}, so that no "
     "setting follows from its numbers.",
 }
 """By obstacle, the sentence on it."""
@@ -147,7 +145,7 @@ def _bound(setting: Setting) -> str:
     if not setting.overloads:
         return "this study has no jam, lump or block that could open it"
     most = _torque(max(setting.overloads.values()))
-    return f"the jams, lumps and blocks of this study put {most} on it at most"
+    return f"the jams, lumps and blocks of this study give at most {most}"
 
 
 def _too_late(study: StudyRecord, setting: Setting, alternatives: Sequence[Alternative]) -> str:

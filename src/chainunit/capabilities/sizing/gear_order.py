@@ -73,13 +73,13 @@ def gear_order(
     if starts := {name: torque for name, torque in starts.items() if name not in wrong}:
         name = max(starts, key=lambda name: starts[name])
         words = f"a start ({study.title_of(name)})" if name else "a start"
-        rule = f", in which it may carry {factor:g} times its rated torque,{times}"
+        rule = f", permitted {factor:g} x rated,{times}"
         loads["start"] = GearLoad(starts[name], words, factor / service, rule)
     if overloads := {name: torque for name, torque in overloads.items() if name not in wrong}:
         name = max(overloads, key=lambda name: overloads[name])
         with_coupling = setting is not None and setting.torque and name in setting.effects
-        words = f"an overload ({study.title_of(name)}{', with the coupling' if with_coupling else ''})"
-        rule = f", in which it may carry {factor:g} times that"
+        words = f"an overload ({study.title_of(name)}{', with the limiter' if with_coupling else ''})"
+        rule = f", permitted {factor:g} x rated"
         loads["overload"] = GearLoad(overloads[name], words, factor * kept, rule)
     least = max(load.rated for load in loads.values())
     transient = None if found is None else found.transient

@@ -143,7 +143,7 @@ def _data(s: b.Source) -> Iterator[Line]:
 def _gear_torque(s: b.Source) -> Iterator[Line]:
     """The rated torque of the gear to be ordered."""
     if s.result["sizing"].get("gear"):
-        order = s.line("gear with a rated output torque of at least {sizing.gear.rated_torque}")
+        order = s.line("gear with a rated output torque >= {sizing.gear.rated_torque}")
         yield line(order, ", decided by ", s.words("sizing.gear.decided_by"))
 
 
@@ -235,7 +235,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     if best is not None:
         yield from _best(s, best, "Motor" if choice is not None else "Insufficient motor")
     if "coupling" in section.get("protection", {}):
-        yield b.Text(s.words("sizing.protection.coupling"), central=True)
+        yield b.Text(s.words("sizing.protection.coupling"))
         ways = section["protection"]["alternatives"]
         yield from (b.Text(s.words(f"sizing.protection.alternatives.{k}.words")) for k in range(len(ways)))
         if ways:
@@ -310,7 +310,7 @@ def _best(s: b.Source, path: str, word: str) -> Iterator[b.Block]:
     order += _starter(s, path)
     if order and word == "Motor":
         yield b.Text(line("Order: ", join(order, "; "), "."), form="short", central=True)
-    yield b.Text(line(begin, s.words(f"{path}.reason"), doubt, "."))
+    yield b.Text(line(begin, s.words(f"{path}.reason"), doubt, "."), central=True)
 
 
 def _leading(section: Mapping[str, Any] | None) -> str | None:

@@ -50,7 +50,8 @@ def ordered_gear(
     order = gear_order(study, setting, margin, service)
     if order is None or not study.drive.is_geared:
         return None
-    reason = order.decides.words + order.decides.rule
+    decides = order.decides
+    reason = f"{decides.words}: {number(decides.torque, 'N.m')}{decides.rule}"
     if order.left_out:
         names = ", ".join(map(study.title_of, order.left_out))
         reason += (

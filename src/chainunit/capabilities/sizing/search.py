@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import count
 from pathlib import Path
 
 from ...batch.transients import can_run
@@ -218,7 +219,14 @@ def _search(trials: MotorTrials, motors: list[CatalogueMotor], progress: TaskPro
     """The candidates that `size` tries of the `motors`, in the order of their rank. The start of the best one is that
     from the worst crank angle; a candidate that fails in it makes room for the next."""
     demands, objective = trials.plan.demands, trials.plan.objective
-    candidates, least = _least_power(trials, motors, progress)
+    # a bisection without flywheels, one with them, and the candidates
+    expected = 2 * len({m.nameplate.power for m in motors}).bit_length() + int(demands.candidates)
+    simulated = count()
+
+    def says(motor: CatalogueMotor) -> None:
+        progress(f"simulating {motor.designation}", float(min(next(simulated), expected)), float(expected))
+
+    candidates, least = _least_power(trials, motors, says)
     tried = {c.motor.designation for c in candidates}
     spared: list[CatalogueMotor] = []
     gears = [gear.price or math.inf for gear in trials.task.gears]
@@ -235,9 +243,6 @@ def _search(trials: MotorTrials, motors: list[CatalogueMotor], progress: TaskPro
         if objective == PRICE and following.price is not None:
             return _is_cheapest(candidates, following.price + cheapest_gear)
         return _is_settled(candidates, following, demands.larger)
-
-    def says(motor: CatalogueMotor) -> None:
-        progress(f"simulating {motor.designation}", float(len(tried)), float(len(motors)))
 
     def next_spared() -> CatalogueMotor | None:
         return next((m for m in spared if not _comes_after(m, candidates, demands.larger)), None)
@@ -278,7 +283,7 @@ def _search(trials: MotorTrials, motors: list[CatalogueMotor], progress: TaskPro
 
 
 def _least_power(
-    trials: MotorTrials, motors: Sequence[CatalogueMotor], progress: TaskProgress
+    trials: MotorTrials, motors: Sequence[CatalogueMotor], says: Callable[[CatalogueMotor], None]
 ) -> tuple[list[Candidate], float]:
     """The least power [W] of the `motors`, the smallest first, with which one is strong enough, and the candidates
     that were tried for it: among them are all of the power below. 0 where none suffices.
@@ -294,12 +299,12 @@ def _least_power(
 
     def suffices_bare(n: int) -> bool:
         motor = of(powers[n])[0]
-        progress(f"simulating {motor.designation}", 0.0, float(len(motors)))
+        says(motor)
         return not _is_weak(trials.candidates_of(motor, trials.with_least_boost)[-1])
 
     def suffices(n: int) -> bool:
         for motor in of(powers[n]):
-            progress(f"simulating {motor.designation}", float(len(candidates)), float(len(motors)))
+            says(motor)
             tries = trials.candidates_of(motor)
             candidates.extend(tries)
             if not all(map(_is_weak, tries)):
