@@ -1,4 +1,4 @@
-"""What the benches share: least times, tables, and figures as JSON for docs/performance.md and docs/trials.md."""
+"""What the benches share: least times, tables, and figures as JSON for docs/evidence.md."""
 
 from __future__ import annotations
 

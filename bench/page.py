@@ -1,6 +1,6 @@
-"""Writes docs/performance.md and docs/trials.md from bench/figures.json, the figures that the benches print.
+"""Writes docs/evidence.md from bench/figures.json, the figures that the benches print.
 
-`python bench/page.py` writes the pages. `python bench/page.py --measure` runs all benches before that but for the
+`python bench/page.py` writes the page. `python bench/page.py --measure` runs all benches before that but for the
 identification, which takes an hour and a half, and `--measure states accuracy` those that are named; the figures of
 the others stay.
 """
@@ -84,6 +84,8 @@ def own_rates(f: Any) -> str:
     s, rows = f["states"], []
     by_key = {row["key"]: row for row in s["rows"]}
     for row in s["rows"]:
+        if "arithmetic" in row and (row["threads"] < s["cores"] or row["states"] < 1e6):
+            continue
         line = [row["work"], f"{row['states']:,}", threads_of(row), millions(row["rate"])]
         if "arithmetic" in row:
             limit, kind = limit_of(row)
@@ -96,40 +98,6 @@ def own_rates(f: Any) -> str:
         rows.append(line)
     head = ["work", "states of a call", "threads", "million states/s", "limit", "share"]
     return table(head, rows)
-
-
-def limits(f: Any) -> str:
-    s = f["states"]
-    names = {"sum": "sum, product, or both", "division": "division", "root": "root"}
-    costs = table(
-        ["operation on a vector", "ns", f"number for {s['chosen']} outputs", f"for all {s['all']}"],
-        (
-            [
-                names.get(kind, kind),
-                f"{1e9 * x:.2f}",
-                str(s["operations"]["chosen"].get(kind, 0)),
-                str(s["operations"]["all"].get(kind, 0)),
-            ]
-            for kind, x in s["costs"].items()
-        ),
-    )
-    lines = []
-    for row in s["rows"]:
-        if row["key"] == "all":
-            gigabytes = 1e-9 * row["rate"] * row["bytes"]
-            fill = 1e-9 * row["memory"] * row["bytes"]
-            pages = "new from the system" if row["pages"] == "fresh" else "in use"
-            lines.append([f"{row['states']:,}", threads_of(row), pages, f"{gigabytes:.1f}", f"{fill:.1f}"])
-    memory = table(
-        ["states of a call", "threads", "memory", "the engine writes, GB/s", "filling alone, GB/s"], lines
-    )
-    return costs + "\n" + MEMORY.format(**s) + "\n" + memory
-
-
-MEMORY = """\
-A call writes {all} outputs and a reason for each state. The second limit is the rate at which as many threads fill
-arrays of that size and do nothing else:
-"""
 
 
 def engines(f: Any) -> str:
@@ -166,12 +134,6 @@ def engines(f: Any) -> str:
     ]
     works = dict.fromkeys(f"- {row['engine']}: {row['work']}" for row in s["others"])
     return table(head, rows) + "\nAn evaluation is\n\n" + "\n".join([WORK.format(**s), *works]) + "\n"
-
-
-DIVISIONS = {
-    True: "Divisions and roots have a unit of their own; the busier of both units counts.",
-    False: "Divisions and roots are made of products.",
-}
 
 
 WORK = "- native, numpy, jax: {chosen} outputs, the torques and all reactions, stored"
@@ -213,16 +175,6 @@ def step_rows(f: Any) -> str:
     return table(["call", "us"], ([text, f"{us[key]:.3g}"] for text, key in rows))
 
 
-def own_functions(f: Any) -> str:
-    """The cost of the kernels with the own functions and with those of the C library."""
-    rows = [
-        [f"`{name}`, {what}", f"{own:.0f}", f"{libm:.0f}", f"{own / libm:.2f}"]
-        for name, costs in f["step_cost"]["own"].items()
-        for what, (own, libm) in costs.items()
-    ]
-    return table(["equations", "own functions, ns", "C library, ns", "ratio"], rows)
-
-
 def accuracy_rows(f: Any) -> str:
     rows, before = [], None
     for each in f["accuracy"]:
@@ -240,34 +192,10 @@ def accuracy_rows(f: Any) -> str:
     return table(["", "step", "crank torque", "order", "speed", "order", "energy residual"], rows)
 
 
-def chains(f: Any) -> str:
-    c = f["chain_speed"]
-    rows = (
-        [f"{1e3 * r['step']:g} ms", f"{r['rate']:.0f}", f"{r['limit']:.0f}", f"{r['rate'] / r['limit']:.2f}"]
-        for r in c["rows"]
-    )
-    return table(
-        ["communication step", "times real time", "right-hand sides and projections alone", "share"], rows
-    )
-
-
 def reached(c: Any) -> str:
     """The communication steps that reach the rate that is demanded."""
     steps = [f"{1e3 * r['step']:g} ms" for r in c["rows"] if r["rate"] >= c["demanded"]]
     return " and ".join(steps) or "no length"
-
-
-def overloads(f: Any) -> str:
-    m = f["monte_carlo"]
-    rows = [
-        ["compiled system", large(m["compiled"]), f"{large(m['limit_compiled'])} (its native loop alone)"],
-        [
-            "co-simulation of the FMUs",
-            large(m["cosimulation"]),
-            f"{large(m['limit_cosimulation'])} (fmpy's calls alone)",
-        ],
-    ]
-    return table(["way", "runs/s", "limit"], rows)
 
 
 def sweep(f: Any) -> str:
@@ -281,54 +209,38 @@ def sweep(f: Any) -> str:
     )
 
 
-def memory(f: Any) -> str:
-    rows = (
-        [w["way"], f"{w['rows']:,}", str(w["variables"]), f"{w['memory']:.0f}"]
-        for w in f["cosim_memory"]["ways"]
-    )
-    return table(["way", "rows", "variables", "largest memory of the process, MB"], rows)
-
-
-def performance(f: Any) -> str:
-    """The page of speed, memory and accuracy."""
+def evidence(f: Any) -> str:
+    """What was checked against what, with the speed, the accuracy and the trials that the benches measured."""
     s, us = f["states"], f["step_cost"]["us"]
     faster = (
         us["python FMU through fmpy, set + step + get all outputs"]
         / us["native FMU through fmpy, set + step + get all outputs"]
     )
     m, c, t = f["monte_carlo"], f["chain_speed"], f["study_time"]
-    seconds = {w["way"]: w["memory"] for w in f["cosim_memory"]["ways"]}
-    return (HERE / "page.md").read_text("utf-8").format(
-        cores=s["cores"], processor=s["processor"], lanes=s["lanes"], chosen=s["chosen"], all=s["all"],
-        divisions=DIVISIONS[s["divider"]], goals=goals(f),
-        rates=own_rates(f), limits=limits(f), engines=engines(f), missing=missing(f), notes=notes(f),
+    memory = {w["way"]: f"{w['memory']:.0f}" for w in f["cosim_memory"]["ways"]}
+    return (HERE / "evidence.md").read_text("utf-8").format(
+        cores=s["cores"], processor=s["processor"], chosen=s["chosen"], all=s["all"], goals=goals(f),
+        rates=own_rates(f), engines=engines(f), missing=missing(f), notes=notes(f),
         outputs=small(max(each["outputs"] for each in s["errors"].values())),
         points=s["points"]["points"], values=s["points"]["values"], worst=small(s["points"]["worst"]),
-        steps=step_rows(f), own=own_functions(f), faster=large(faster),
+        steps=step_rows(f), faster=large(faster), size=f"{f['step_cost']['size']['native'] / 1000:.0f}",
         study=f"{t['study']:.0f}", again=f"{t['again']:.0f}",
-        importing=f"{t['importing']:.1f}", allowed=f"{t['allowed']:.0f}", accuracy=accuracy_rows(f), chains=chains(f),
+        importing=f"{t['importing']:.1f}", allowed=f"{t['allowed']:.0f}", accuracy=accuracy_rows(f),
         rods=c["rods"], speed=f"{c['speed']:g}", error=f"{c['error']:g}", demanded=f"{c['demanded']:g}",
         reached=reached(c),
         exudyn="exudyn was not installed." if c["exudyn"] is None else
         f"the FMU is {c['exudyn']:.0f} times as fast as exudyn; {c['demanded_exudyn']:g} times are demanded.",
-        overloads=overloads(f), sweep=sweep(f), sweep_angles=f["sweep_time"]["angles"],
-        sweep_parameters=f["sweep_time"]["parameters"], sweep_quantities=f["sweep_time"]["quantities"],
-        workers=m["workers"], ratio=large(m["compiled"] / m["cosimulation"]),
+        ratio=large(m["compiled"] / m["cosimulation"]),
         thousand=f"{1e3 / m['compiled']:.1f}", difference=small(max(m["differences"].values())),
-        memory=memory(f), seconds=f"{f['cosim_memory']['seconds']:.0f}", libraries=f"{seconds['a second']:.0f}",
-        size=f"{f['step_cost']['size']['native'] / 1000:.0f}",
+        seconds=f"{f['cosim_memory']['seconds']:.0f}", whole=memory["all rows, in memory"],
+        file=memory["all rows, to a file"], libraries=memory["a second"],
+        sweep=sweep(f), sweep_angles=f["sweep_time"]["angles"],
+        sweep_parameters=f["sweep_time"]["parameters"], sweep_quantities=f["sweep_time"]["quantities"],
+        **identification.tables(f["identification"]), **observer.tables(f["observer"]),
     )  # fmt: skip
 
 
-def trials(f: Any) -> str:
-    """The page of the trials of identification and observer."""
-    found, watched = f["identification"], f["observer"]
-    return (HERE / "trials.md").read_text("utf-8").format(
-        **identification.tables(found), **observer.tables(watched),
-    )  # fmt: skip
-
-
-PAGES = {"performance.md": performance, "trials.md": trials}
+PAGES = {"evidence.md": evidence}
 
 
 def measure(names: Sequence[str], file: Path) -> None:
@@ -352,7 +264,7 @@ def main() -> None:
         "--measure", nargs="*", choices=(*BENCHES, *LONG), metavar="BENCH", help="run benches before"
     )
     options.add_argument("--figures", type=Path, default=FIGURES, help="file of the figures")
-    options.add_argument("--docs", type=Path, default=DOCS, help="folder of the pages")
+    options.add_argument("--docs", type=Path, default=DOCS, help="folder of the page")
     given = options.parse_args()
     if given.measure is not None:
         measure(given.measure or BENCHES, given.figures)

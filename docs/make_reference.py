@@ -1,9 +1,10 @@
-"""Writes docs/reference.md: every key, every variable of an FMU, every command with its options."""
+"""A hook of mkdocs: the reference of every key, FMU variable and command, written into the site. Run as a script, it
+prints the page."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
+from typing import Any
 
 import typer.main
 
@@ -12,8 +13,6 @@ from chainunit.capabilities import modules
 from chainunit.report import study_task
 from chainunit.report.markdown import markdown
 from chainunit.report.reference import reference
-
-PAGE = Path(__file__).parent / "reference.md"
 
 
 def commands() -> Iterator[tuple[str, str, list[tuple[str, str]]]]:
@@ -42,8 +41,8 @@ def commands() -> Iterator[tuple[str, str, list[tuple[str, str]]]]:
 def text() -> str:
     """The page."""
     head = (
-        "# Reference\n\nMade by `python docs/make_reference.py` from the declarations. A number is in the declared "
-        'SI unit; a text may carry\nany unit of the same kind: `"150 mm"`, `"4 kNm"`, `"30 rev/min"`, `"8 %"`. '
+        "# Reference\n\nThis page is made from the declarations. A number is in the declared "
+        'SI unit; a text may have\nany unit of the same kind: `"150 mm"`, `"4 kNm"`, `"30 rev/min"`, `"8 %"`. '
         "`chainunit keys [TABLE]` shows the same on the terminal;\n`chainunit keys --schema` writes a JSON Schema by "
         "which editors complete and check a study file.\n"
     )
@@ -52,5 +51,13 @@ def text() -> str:
     return head + markdown(reference(commands(), contents), ()).removeprefix("# Reference\n")
 
 
+def on_files(files: Any, config: Any) -> Any:
+    """Add the page to the files of the site."""
+    from mkdocs.structure.files import File
+
+    files.append(File.generated(config, "reference.md", content=text()))
+    return files
+
+
 if __name__ == "__main__":
-    PAGE.write_text(text(), "utf-8")
+    print(text(), end="")

@@ -32,13 +32,15 @@ DOCS = ROOT / "docs"
 FENCE = re.compile(r"^( *)```(\w*)(?: title=\"([^\"]+)\")?\n(.*?)^\1```$", re.DOTALL | re.MULTILINE)
 INCLUDE = re.compile(r'^--8<-- "([^"]+)"\n', re.MULTILINE)
 """A line that stands for a file, as `pymdownx.snippets` has it."""
+GENERATED = re.compile(r"<!-- (?:rows of paper \d+|gallery) -->\n.*?<!-- end -->", re.DOTALL)
+"""A table that `docs/make_tables.py` writes."""
 KEYS_OF = re.compile(r"chainunit keys ([A-Za-z_]+)`")
 INSTALLS = ("pip install", "python3 -m venv")
 """Commands that `.ci/run` runs."""
 README = ROOT / "README.md"
 PAGES = (README, *sorted(DOCS.rglob("*.md")))
 """Whose commands run."""
-QUICK = ("docs/how-to/python.md", "docs/system.md")
+QUICK = ("docs/system.md",)
 """Pages that take some seconds; the others run in `.ci/full`."""
 OWN_TEST = ("docs/python.md",)
 """Of these `test_docs_python` compares every line."""
@@ -143,6 +145,15 @@ def test_a_page_prints_what_stands_there(page, tmp_path):
     for shown in re.findall(r"\]\(([^)]*[.]svg)\)", (ROOT / page).read_text("utf-8")):
         made = tmp_path / Path(shown).name
         assert not made.exists() or made.read_text() == ((ROOT / page).parent / shown).read_text(), shown
+
+
+def test_the_pages_are_few_and_short():
+    """Tables that a script writes are not counted; of docs/evidence.md the text counts into which it puts them."""
+    pages = sorted(DOCS.rglob("*.md"))
+    assert len(pages) <= 25
+    texts = [(ROOT / "bench" if page.name == "evidence.md" else page.parent) / page.name for page in pages]
+    words = [len(GENERATED.sub("", text.read_text("utf-8")).split()) for text in texts]
+    assert sum(words) <= 45_000, dict(zip((page.stem for page in pages), words, strict=True))
 
 
 def test_the_tables_of_keys_that_pages_name_are_there():

@@ -213,12 +213,12 @@ def errors_of(system, signals, stop, rtol=1e-9):
     ],
 )
 def test_from_rest_the_coupling_is_of_first_order(system, speed, ramp, order, of_page):
-    """The table of docs/drives.md."""
+    """The table of docs/physics.md."""
     turning = system.with_values({"motor.w_start": speed, "driveline.w_start": speed})
     rise = {"motor.w_ref": Profile(speed, ((0.0, 0.4, speed + ramp),))}
     errors = np.array(errors_of(turning, rise, 0.2, 1e-10))
     np.testing.assert_allclose(np.log2(errors[:-1] / errors[1:]), order, atol=0.09)
-    page = (Path(__file__).parents[1] / "docs" / "drives.md").read_text()
+    page = (Path(__file__).parents[1] / "docs" / "physics.md").read_text()
     shown = re.findall(r"\S+ %", of_page)
     assert [f"{100.0 * each:.2g} %" for each in errors.max(axis=1)] == shown
     assert all(f"| {each} |" in page for each in shown)
@@ -254,7 +254,7 @@ def test_a_shaft_that_signals_turn_is_followed_to_second_order(tmp_path):
 
 @pytest.mark.compiler
 def test_too_long_a_step_runs_away_and_no_fmu_can_tell(tmp_path):
-    """A rotor on a stiff line, whose k the FMUs do not know: as docs/drives.md says."""
+    """A rotor on a stiff line, whose k the FMUs do not know: as docs/physics.md says."""
     line, motor = CardanDriveline.parameter_layout, DcMotor.parameter_layout
     start = {v.name: v.quantity.start for v in (*line.variables, *motor.variables)}
     stiffness = 1.0 / (1.0 / start["c2"] + 1.0 / start["c3"])

@@ -1,4 +1,4 @@
-"""docs/performance.md is what bench/page.py makes of the committed figures; the benches count and compare rightly."""
+"""docs/evidence.md is what bench/page.py makes of the committed figures; the benches count and compare rightly."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_each_goal_stands_there_with_its_measured_value(bench, figures):
     rows = [line.strip("| \n").split(" | ") for line in page.goals(figures).splitlines()[2:]]
     goals = figures["states"]["goals"]
     assert [row[0] for row in rows] == [each["goal"] for each in goals] and len(goals) >= 5
-    text = (page.DOCS / "performance.md").read_text("utf-8")
+    text = (page.DOCS / "evidence.md").read_text("utf-8")
     for row, each in zip(rows, goals, strict=True):
         assert "| " + " | ".join(row) + " |" in text
         for cell, value in zip(row[1:3], (each["demanded"], each["measured"]), strict=True):
