@@ -11,7 +11,6 @@ DRAWING = Path(__file__).with_name("architecture.svg")
 LAYERS = (
     ("app",),
     ("capabilities",),
-    ("papers",),
     ("report",),
     ("recordings",),
     ("study",),
@@ -88,7 +87,6 @@ def _is_module(base: list[str], name: str) -> bool:
 TEXTS = {
     "app": "the commands, and studies from Python",
     "capabilities": "one folder for each question: table, analysis, section, command",
-    "papers": "the four papers, row by row, and two bars against the catenary",
     "report": "tables, page, figures and files of a study",
     "recordings": "recordings of real machines: files, inspection, fit",
     "study": "a file, events, runs, and measures read from the runs",

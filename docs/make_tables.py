@@ -1,11 +1,14 @@
 """Writes the generated tables into docs/papers.md and docs/linkages.md."""
 
 import re
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from chainunit.papers import PAPERS, reproduce
-from chainunit.papers.output import markdown
+sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
+
+from papers import PAPERS, reproduce
+from papers.output import markdown
 
 HERE = Path(__file__).parent
 GALLERY = HERE.parent / "examples" / "linkages"

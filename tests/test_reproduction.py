@@ -5,19 +5,20 @@ from __future__ import annotations
 import functools
 import json
 import re
+import subprocess
+import sys
+import tomllib
 import types
 from pathlib import Path
 
 import numpy as np
 import pytest
-from command import chainunit
-
-from chainunit.papers import PAPERS, paper000, paper003, reproduce
-from chainunit.papers.output import markdown
-from chainunit.papers.table import _row
-from chainunit.reading.tables import packaged, toml
+from papers import PAPERS, paper000, paper003, reproduce
+from papers.output import markdown
+from papers.table import _row
 
 pytestmark = pytest.mark.second
+EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
 @functools.cache
@@ -117,7 +118,7 @@ def test_known_numbers(paper, item, quantity, text):
 def test_a_table_has_only_keys_that_are_read():
     """A slip in a key would change a verdict without a message."""
     for paper in PAPERS:
-        for item in toml(packaged(f"papers/{paper}.toml"))["item"]:
+        for item in tomllib.loads((EXAMPLES / "papers" / f"{paper}.toml").read_text("utf-8"))["item"]:
             assert set(item) == {"number", "where", "why", "rows"}
             for entry in item["rows"]:
                 needed, known = {"quantity", "computed", "digits"}, {"printed", "rebuilt", "unit", "why"}
@@ -196,7 +197,8 @@ def test_hinge_loading_is_the_limit_of_the_model():
 
 @pytest.mark.slow
 def test_command_line(tmp_path):
-    process = chainunit("reproduce", "-o", "out", cwd=tmp_path)
+    command = [sys.executable, "-m", "papers", tmp_path / "out"]
+    process = subprocess.run(command, cwd=EXAMPLES, capture_output=True, text=True)
     assert process.returncode == 0, process.stderr
     rows = json.loads((tmp_path / "out" / "reproduction.json").read_text())["rows"]
     assert len(rows) == len(every())

@@ -5,16 +5,18 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
-from command import chainunit
+from papers.two_bar import loads, statement, two_bar_error
 
 from chainunit import ChainUnitMachine
-from chainunit.core import ledger
-from chainunit.papers.two_bar import loads, statement, two_bar_error
 
 pytestmark = pytest.mark.second
+EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
 @pytest.fixture(scope="module")
@@ -74,16 +76,14 @@ def test_the_range_of_zeta_has_both_its_ends(comparison):
 
 
 def test_command(tmp_path):
-    process = chainunit("two-bar-error", "-o", "out", cwd=tmp_path)
+    command = [sys.executable, "-m", "papers", "two-bar", tmp_path / "out"]
+    process = subprocess.run(command, cwd=EXAMPLES, capture_output=True, text=True)
     assert process.returncode == 0, process.stderr
     assert {f.name for f in (tmp_path / "out").iterdir()} == {
-        "two_bar_error.json", "two_bar_error.md", "two_bar_error.png", "report.html", ledger.NAME
+        "two_bar_error.json", "two_bar_error.md", "two_bar_error.png", "report.html"
     }  # fmt: skip
     numbers = json.loads((tmp_path / "out" / "two_bar_error.json").read_text())
     assert numbers["error_t"]["unit"] == "1" and numbers["psi"]["unit"] == "rad"
     (low, high), *_ = numbers["good_zeta"]["10 %"]["mu = 0.70"]["value"]
     assert high < 0.85 and "│ 0.70 │" in process.stdout and f"{low:.2f} to {high:.2f}" in process.stdout
     assert all(line in " ".join(process.stdout.split()) for line in numbers["statement"])
-    (tmp_path / "file").write_text("")
-    wrong = chainunit("two-bar-error", "-o", "file", cwd=tmp_path)
-    assert wrong.returncode == 2 and len(wrong.stderr.strip().splitlines()) == 1

@@ -234,32 +234,6 @@ def _write_schema(folder: Path) -> None:
     print(f"{FILE}: schema of study files")
 
 
-@app.command(hidden=True)
-def reproduce(
-    output: OutputFolder = Path("reproduction"),
-) -> None:
-    """Compute every number that the papers print, right or wrong, with the reason; draw their figures.
-
-    Writes report.html, reproduction.json, reproduction.md and the figures into the output folder.
-    """
-    from ..papers.output import TASK
-
-    carry_out(TASK, None, output, png=True)
-
-
-@app.command("two-bar-error", hidden=True)
-def two_bar_error(
-    output: OutputFolder = Path("two-bar"),
-) -> None:
-    """The error of two rigid bars in place of a hanging chain, over zeta, mu and psi, and where they are good enough.
-
-    Writes report.html, two_bar_error.json, two_bar_error.md and two_bar_error.png into the output folder.
-    """
-    from ..papers.two_bar import TASK
-
-    carry_out(TASK, None, output, png=True)
-
-
 @app.command("linkage")
 def linkage_command(
     file: Annotated[Path, typer.Argument(help="Linkage file (TOML).")],

@@ -74,12 +74,6 @@ def export(
             help="Comma-separated, of linux64, win64, darwin64, aarch64-linux, or all; this machine's by default.",
         ),
     ] = None,
-    wasm: Annotated[
-        bool,
-        typer.Option(
-            "--wasm", help="With --fmi 3: for WebAssembly too, by zig, as the draft FMI-LS-WASM says."
-        ),
-    ] = False,
     rods: Annotated[
         int | None,
         typer.Option(
@@ -99,7 +93,7 @@ def export(
     file = output
     whole = is_study_file(name)
     if file and file.suffix == ".ssp" and whole:
-        if config or direct or wasm or platforms or fmi != 2:
+        if config or direct or platforms or fmi != 2:
             raise InputError(
                 f"-o {file}: a package has FMUs 2.0 for this machine; leave the options of one FMU out"
             )
@@ -130,7 +124,6 @@ def export(
             backend=kind,
             fmi=fmi,
             platforms=_platforms(platforms, fmi),
-            wasm=wasm,
             names=names.value,
             progress=status.update,
         )

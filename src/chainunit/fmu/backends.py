@@ -37,7 +37,6 @@ def export(
     backend: Backend | None = None,
     fmi: int = 2,
     platforms: Sequence[str] = (),
-    wasm: bool = False,
     names: Names = "structured",
     progress: Callable[[str], None] = lambda what: None,
 ) -> Origin:
@@ -48,7 +47,7 @@ def export(
     model, file, start, names : see `chainunit.fmu.export.export`
     backend : "native" or "python"; by default native where a C compiler is found and works
     fmi : 2 or 3; 3 only by the native backend
-    platforms, wasm, progress : see `chainunit.fmu.native.export.export`; the first two only by the native backend
+    platforms, progress : see `chainunit.fmu.native.export.export`; platforms only by the native backend
 
     Raises
     ------
@@ -61,21 +60,17 @@ def export(
         raise InputError(f"backend = {shown(backend)}: must be {one_of(backend, get_args(Backend))}")
     if names not in get_args(Names):
         raise InputError(f"names = {shown(names)}: must be {one_of(names, get_args(Names))}")
-    if wasm and backend == "python":
-        raise InputError("--wasm needs the native backend; leave out --backend python")
     if backend == "python":
         return _by_python(model, file, start, names, fmi, platforms, "")
-    if backend is None and not platforms and not wasm and not targets.compiles(fmi):
+    if backend is None and not platforms and not targets.compiles(fmi):
         return _by_python(model, file, start, names, fmi, platforms, ", no C compiler for this machine found")
     built, compiler = targets.choose(platforms, fmi)
     try:
-        native.export(
-            model, file, start, fmi=fmi, platforms=platforms, wasm=wasm, names=names, progress=progress
-        )
+        native.export(model, file, start, fmi=fmi, platforms=platforms, names=names, progress=progress)
     except WriteError:
         raise
     except RunError:
-        if backend or fmi != 2 or platforms or wasm:
+        if backend or fmi != 2 or platforms:
             raise
         return _by_python(
             model, file, start, names, fmi, platforms, f", the C compiler {compiler.name} failed"
@@ -85,8 +80,6 @@ def export(
         words += " for " + ", ".join(f"{name} ({targets.PLATFORMS[name].tests})" for name in built)
     elif backend is None:
         words += ", the C compiler found here"
-    if wasm:
-        words += ", and for WebAssembly (run in wasmtime)"
     return Origin("native", words)
 
 

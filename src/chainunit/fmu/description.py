@@ -19,7 +19,7 @@ from ..core.symbolic_trace import Trace, trace
 from .recipe import Experiment, script_of
 from .script import Script, name_in_fmu, text_in_fmu
 
-RELEASED = "2026-11-21"
+RELEASED = "2026-11-27"
 """The day of this version's release, equal to the one in CITATION.cff."""
 TYPES_3: Mapping[Type, str] = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean"}
 """The names of the types in FMI 3.0."""

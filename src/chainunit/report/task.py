@@ -30,8 +30,6 @@ Writer = Callable[[], list[Path]]
 _OF_BASE = {
     "study": ResultKind("a study", key="answers"),
     "linkage": ResultKind("a linkage", "linkage.json"),
-    "reproduce": ResultKind("the papers", "reproduction.json"),
-    "two-bar-error": ResultKind("the two-bar error", "two_bar_error.json"),
 }
 
 

@@ -92,7 +92,7 @@ def other():
 def signed(members, key, **changes):
     """A file with these members, signed again: manifest and signature anew."""
     rest = {n: x for n, x in members.items() if n not in (manifest.MANIFEST, manifest.SIGNATURE)}
-    given = {"kind": "fmu", "name": "it", "version": __version__, "time": "2026-11-21T00:00:00Z"}
+    given = {"kind": "fmu", "name": "it", "version": __version__, "time": "2026-11-27T00:00:00Z"}
     return manifest.signed(rest, key, **given | changes)
 
 

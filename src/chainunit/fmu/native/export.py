@@ -23,7 +23,6 @@ from ..recipe import recipes, script_with_names
 from ..script import Names
 from .generate import kernels, rules, tables
 from .platforms import build, choose, units_of
-from .wasm import COMPONENT, wasm_compiler, wasm_files
 
 _LAYER = ("model.h", "runtime.c", "fmi.h")
 
@@ -72,7 +71,6 @@ def export(
     *,
     fmi: int = 2,
     platforms: Sequence[str] = (),
-    wasm: bool = False,
     names: Names = "structured",
     progress: Callable[[str], None] = lambda what: None,
 ) -> Path:
@@ -83,18 +81,16 @@ def export(
     model, file, start, names : see `chainunit.fmu.export.export`
     fmi : version of FMI, 2 or 3
     platforms : names from `chainunit.fmu.native.platforms.PLATFORMS`; by default the platform of this machine
-    wasm : whether a component for WebAssembly stands beside the libraries, see `chainunit.fmu.native.wasm`; of FMI 3
     progress : is called with texts on the work
 
     Raises
     ------
     KeyError, InputError
-        see `chainunit.fmu.export.export`; also where there is no compiler for a platform, and for `wasm` with FMI 2.
+        see `chainunit.fmu.export.export`; also where there is no compiler for a platform.
     RunError
         where the compiler fails, with its messages.
     """
     targets, compiler = choose(platforms, fmi)
-    for_wasm = wasm_compiler(fmi) if wasm else None
     interface = interface_of(model, start, script_with_names(model, names))
     file = Path(file)
     folder(file.parent)
@@ -133,11 +129,6 @@ def export(
         slow = ", the first time about a minute" if compiler.zig and name == "win64" else ""
         progress(f"compiling for {name}{slow}")
         contents |= build(compiler, name, fmi, model.name, sources, units)
-    if for_wasm:
-        progress("compiling for WebAssembly")
-        contents |= wasm_files(
-            for_wasm, model.name, sources, (recipes() / "native" / COMPONENT).read_bytes(), units
-        )
     with atomic_file(file) as part:
         pack(contents, part)
     return file

@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from ..core.engines import MATH
-from ..groups.triad import LEGS
-from ..machines.knife_drive import KnifeDrive
-from ..mechanism.machine import MachineState, add_wrenches
+from chainunit.core.engines import MATH
+from chainunit.groups.triad import LEGS
+from chainunit.machines.knife_drive import KnifeDrive
+from chainunit.mechanism.machine import MachineState, add_wrenches
+
 from .table import PICK
 
 W = 4.0

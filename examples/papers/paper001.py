@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from ..core.engines import MATH, numpy_
-from ..machines.api import ChainUnitMachine
-from ..machines.crank_rocker import (
+from chainunit.core.engines import MATH, numpy_
+from chainunit.machines.api import ChainUnitMachine
+from chainunit.machines.crank_rocker import (
     longest_crank,
     parallel_frame,
     pressure_angle,

@@ -14,11 +14,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.engines import MATH
-from ..machines.api import EMPTY, ChainUnitMachine
-from ..machines.chain_unit import Feed
-from ..machines.crank_rocker import half_width_range
-from ..study.load_cases import overload_factors
+from chainunit.core.engines import MATH
+from chainunit.machines.api import EMPTY, ChainUnitMachine
+from chainunit.machines.chain_unit import Feed
+from chainunit.machines.crank_rocker import half_width_range
+from chainunit.study.load_cases import overload_factors
+
 from .table import PICK
 
 RHO, LAM, MU, ZETA = 0.1, 2.0 / 3.0, 0.6, 0.5

@@ -1,17 +1,17 @@
-"""The report of ``chainunit reproduce``: a table of each paper and its figures."""
+"""The report on the papers: a table of each paper and its figures."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from types import ModuleType
 
-from .. import __version__
-from ..reading.results import as_data
-from ..reading.text import DEFAULT_UNITS
-from ..report.blocks import Column, Report, Section, Table, TableRow, Text
-from ..report.markdown import block_lines
-from ..report.task import Task
-from . import PAPERS, reproduce
+from chainunit import __version__
+from chainunit.reading.results import as_data
+from chainunit.reading.text import DEFAULT_UNITS
+from chainunit.report.blocks import Column, Report, Section, Table, TableRow, Text
+from chainunit.report.markdown import block_lines
+
+from . import PAPERS
 from .figures import FIGURES
 from .table import PaperNumber
 
@@ -81,11 +81,3 @@ def report(rows: Sequence[PaperNumber]) -> Report:
         (),
         (*sections, Section("count", "Count", (Text((count,)),))),
     )
-
-
-TASK: Task[None, list[PaperNumber]] = Task(
-    "reproduce",
-    lambda question, folder, progress: reproduce(progress),
-    report,
-    files=tuple(f"{beginning}-*.png" for beginning in (*PAPERS, "two-bar")),
-)

@@ -1,16 +1,18 @@
-"""The table of a paper: its printed numbers beside the computed ones, read from ``data/papers``."""
+"""The table of a paper: its printed numbers beside the computed ones, read from the file of the paper."""
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from ..reading.results import GIVEN, derived, part, result
-from ..reading.tables import packaged, toml
+from chainunit.reading.results import GIVEN, derived, part, result
 
+HERE = Path(__file__).parent
 PICK: dict[str, Callable[[Any], Any]] = {"least": np.min, "largest": np.max, "mean": np.mean}
 """By the word in the table, the function that takes one number of many."""
 
@@ -63,7 +65,7 @@ def rows(paper: str, functions: ModuleType) -> list[PaperNumber]:
     """
     return [
         _row(paper, item, entry, functions)
-        for item in toml(packaged(f"papers/{paper}.toml"))["item"]
+        for item in tomllib.loads((HERE / f"{paper}.toml").read_text("utf-8"))["item"]
         for entry in item["rows"]
     ]
 

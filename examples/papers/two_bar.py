@@ -16,17 +16,16 @@ from typing import Any
 
 import numpy as np
 
-from .. import __version__
-from ..core.errors import GeometryError
-from ..core.quantities import quantity
-from ..machines import hanging
-from ..reading.results import InUnit, as_data, part, result
-from ..report.blocks import Column, Report, Section, Table, TableRow, Text
-from ..report.figure import Axis, Curve, Field, Figure, Item, Panel
-from ..report.print_figures import contours
-from ..report.task import Task, no_check
-from ..study.arrays import stretches
-from ..work.progress import Progress
+from chainunit import __version__
+from chainunit.core.errors import GeometryError
+from chainunit.core.quantities import quantity
+from chainunit.machines import hanging
+from chainunit.reading.results import InUnit, as_data, part, result
+from chainunit.report.blocks import Column, Report, Section, Table, TableRow, Text
+from chainunit.report.figure import Axis, Curve, Field, Figure, Item, Panel
+from chainunit.report.print_figures import contours
+from chainunit.study.arrays import stretches
+from chainunit.work.progress import Progress
 
 PICTURE = "two_bar_error.png"
 MU = tuple(np.round(np.arange(0.30, 0.801, 0.05), 2))
@@ -259,12 +258,3 @@ def _figure(comparison: TwoBarError) -> Figure:
         file=PICTURE,
         widths=(1.2, 1.0),
     )
-
-
-TASK: Task[None, TwoBarError] = Task(
-    "two-bar-error",
-    lambda question, folder, progress: two_bar_error(lambda done: progress("bars and catenaries", done, 1.0)),
-    report,
-    files=(PICTURE,),
-    accept=no_check,
-)

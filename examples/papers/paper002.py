@@ -11,8 +11,9 @@ import math
 
 import numpy as np
 
-from ..core.engines import MATH, numpy_
-from ..drives.cardan import Cardan, frequency_band, frozen_frequency, ratio_of_paper, two_joints
+from chainunit.core.engines import MATH, numpy_
+from chainunit.drives.cardan import Cardan, frequency_band, frozen_frequency, ratio_of_paper, two_joints
+
 from .table import PICK
 
 HEAVY = Cardan(J1=1.0, J4=1000.0, c2=1e4, c3=1e4, alpha1=0.0, alpha2=0.0)

@@ -1,10 +1,11 @@
 """The papers, reproduced and corrected: a row for each printed number, and the curves of each figure.
 
-The tables are in ``data/papers``, one for each paper; the functions that compute their values are in the module of
-the paper. The errors of the papers stand only here, for comparison; the models have the corrected physics.
+The tables are in files beside this one, one for each paper; the functions that compute their values are in the module
+of the paper. The errors of the papers stand only here, for comparison; the models have the corrected physics.
 """
 
-from ..work.progress import TaskProgress, quiet
+from chainunit.work.progress import TaskProgress, quiet
+
 from . import paper000, paper001, paper002, paper003
 from .table import PaperNumber, rows
 

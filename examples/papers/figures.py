@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from ..core.engines import numpy_
-from ..machines.crank_rocker import longest_crank, parallel_frame, pressure_angle_extremes, swing
-from ..report.figure import Axis, Between, Curve, Field, Figure, Item, Label, Mark, Panel
-from ..report.print_figures import contours
+from chainunit.core.engines import numpy_
+from chainunit.machines.crank_rocker import longest_crank, parallel_frame, pressure_angle_extremes, swing
+from chainunit.report.figure import Axis, Between, Curve, Field, Figure, Item, Label, Mark, Panel
+from chainunit.report.print_figures import contours
+
 from . import paper000 as p0
 from . import paper001 as p1
 
