@@ -164,7 +164,7 @@ def test_a_full_disk_is_named_and_costs_no_more_than_the_file(tmp_path):
     assert command.returncode == 1, errors
     assert "out/result.nc: cannot be written" in errors and "Traceback" not in errors
     there = names(tmp_path / "out")
-    assert {"result.json", "load_cycle.csv", "start_up.png", "fmu"} <= set(there)
+    assert {"result.json", "load_cycle.csv", "machine.svg", "fmu"} <= set(there)
     assert not {n for n in there if "part" in n or n in ("result.nc", "report.html", LOCK)}
     assert "crank torque, peak" in message
 

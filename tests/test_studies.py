@@ -60,7 +60,7 @@ def command(tmp_path_factory):
 
 @pytest.mark.second
 def test_python_and_the_command_find_the_same(result, command, tmp_path):
-    written = result.save(tmp_path / "out")
+    written = result.save(tmp_path / "out", png=True)
     assert {file.name for file in written} == {p.name for p in command.iterdir()} - {"fmu", ledger.NAME}
     assert {p.name for p in (tmp_path / "out").iterdir()} == {p.name for p in command.iterdir()}
     for name in ("ChamberForces.fmu", "DcMotor.fmu"):

@@ -315,7 +315,8 @@ def test_refusals_name_key_and_remedy(table, words):
 def test_the_reports_have_the_numbers_of_the_result(tmp_path, monkeypatch, capsys):
     file = tmp_path / "study.toml"
     file.write_text(STUDY.format(start="inverter"))
-    monkeypatch.setattr("sys.argv", ["chainunit", "study", str(file), "-o", str(tmp_path / "out")])
+    arguments = ["chainunit", "study", str(file), "-o", str(tmp_path / "out"), "--all", "--png"]
+    monkeypatch.setattr("sys.argv", arguments)
     with pytest.raises(SystemExit) as ended:
         cli.main()
     assert ended.value.code == 0

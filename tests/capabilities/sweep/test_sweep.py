@@ -810,7 +810,8 @@ def test_a_refused_sweep_leaves_nothing(tmp_path):
 def test_one_parameter_gives_curves(tmp_path):
     text = MAP.split('[[sweep.parameter]]\nname = "machine.r"')[0].replace("to = 1.9", "to = 2.4")
     result = Study.from_text(text).sweep(tmp_path)
-    assert (tmp_path / "sweep_curves.png").exists()
+    assert not list(tmp_path.glob("*.png"))
+    assert tmp_path / "png" / "sweep_curves.png" in result.save(tmp_path / "png", png=True)
     assert repr(result).startswith("13 points, a grid, over machine.l 1 m to 2.4 m; 6 of them have ")
     (figure,) = result._report.figures
     curve = figure.panels[0][0].items[0]

@@ -676,7 +676,7 @@ def test_the_co_simulation_finds_the_steady_motion_of_the_analysis(tmp_path):
 
 
 def run(monkeypatch, capsys, *arguments):
-    monkeypatch.setattr(sys, "argv", ["chainunit", "study", *map(str, arguments)])
+    monkeypatch.setattr(sys, "argv", ["chainunit", "study", *map(str, arguments), "--all", "--png"])
     with pytest.raises(SystemExit) as left:
         cli.main()
     return left.value.code, *capsys.readouterr()
