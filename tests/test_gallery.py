@@ -166,7 +166,7 @@ def test_the_beam_pump_is_that_of_api_11e():
     """By the formulas of the standard, for any dimensions: place of the rod and torque factor over a turn."""
     rng, inch = np.random.default_rng(3), 0.0254
     (stroke,) = said("beam_pump_api", r"by (\S+) in over")
-    sizes = {each: machine("beam_pump_api").by_name[each] / inch for each in "ACIKPR"}
+    sizes = {name: machine("beam_pump_api").by_name[name] / inch for name in "ACIKPR"}
     for factors in (np.ones(6), *rng.uniform(0.95, 1.05, (20, 6))):
         A, C, I, K, P, R = values = factors * list(sizes.values())
         pump = machine("beam_pump_api").replace(dict(zip(sizes, inch * values, strict=True)) | {"g": 0.0})
@@ -196,8 +196,8 @@ def reactions_of_organ(psi, hand, loads, mu=0.6, zeta=0.5):
     way, along = abs(a2), (1.0 + abs(a2) ** 2 - (1.0 - mu) ** 2) / (2.0 * abs(a2))
     b = a2 / way * complex(along, math.sqrt(1.0 - along**2))
     places = [(G, share * b if rod == "wall" else a2 + share * (b - a2), rod) for G, rod, share in loads]
-    about_b = sum(G * (at - b).real for G, at, rod in places if rod == "web")
-    about_a1 = sum(G * at.real for G, at, _ in places)
+    about_b = sum(G * (place - b).real for G, place, rod in places if rod == "web")
+    about_a1 = sum(G * place.real for G, place, _ in places)
     # Y (x2 - xb) + X (y2 - yb) = M_B and Y x2 + X y2 = M_A1, with y down and Y up
     x, y = np.linalg.solve([[(a2 - b).imag, (a2 - b).real], [a2.imag, a2.real]], [about_b, about_a1])
     return x, y, sum(G for G, _, _ in places) - y
@@ -223,7 +223,7 @@ def test_weights_in_the_hinge_and_material_as_points_follow_paper_000():
                 hinge = [(1.4 * in_hinge, "wall", 1.0)]
                 material = [(m1, "wall", 0.75), (m2, "web", 0.75), (m3, "web", 0.25)]
                 loads = rods + hinge + material
-                expected = np.array([reactions_of_organ(each, hand, loads) for each in psi]).T
+                expected = np.array([reactions_of_organ(angle, hand, loads) for angle in psi]).T
                 names = (f"A2_{side}_web.fx", f"A2_{side}_web.fy", f"A1_{side}.fy")
                 computed = np.array([out[name] for name in names]) / weight * [[hand], [1.0], [1.0]]
                 np.testing.assert_allclose(computed, expected, rtol=1e-9, atol=1e-11)
