@@ -14,14 +14,15 @@ from chainunit.machines.machine import Machine
 INCH, LBF, HEADS = 0.0254, 4.4482216152605, ("position [in]", "load [lbf]")
 LINKAGE = Path(__file__).with_name("linkages") / "beam_pump_api.toml"
 USAGE = f"""%(prog)s FILE [--step SECONDS]
-FILE is a CSV file of one stroke of the polished rod, sampled evenly, with the columns "{HEADS[0]}" and
-"{HEADS[1]}". It comes from a dynamometer survey: any well analyser exports position and load. The dimensions
-A, C, I, K, P and R of API 11E, from the data sheet of the pumping unit, go into {LINKAGE.name}."""
+FILE is a CSV file of one stroke of the polished rod, sampled evenly, its first sample not repeated, with the
+columns "{HEADS[0]}" and "{HEADS[1]}". It comes from a dynamometer survey: any well analyser exports both. The
+dimensions A, C, I, K, P and R of API 11E, from the data sheet of the pumping unit, go into {LINKAGE.name}."""
 parser = argparse.ArgumentParser(usage=USAGE)
 parser.add_argument("file", type=Path)
 parser.add_argument("--step", type=float, default=0.0524, help="time from sample to sample [s]")
 args = parser.parse_args()
 try:
+    pump = Machine(read_linkage(LINKAGE), g=0.0)
     rows = list(csv.DictReader(args.file.read_text("utf-8-sig").splitlines())) or [{}]
     if not set(HEADS) <= set(rows[0]):
         raise ValueError(f"the columns are {list(rows[0])}")
@@ -33,7 +34,6 @@ except (OSError, ValueError) as error:
 if np.sum((load + np.roll(load, -1)) * (np.roll(position, -1) - position)) < 0.0:
     print("The samples run backwards in time: the rod would drive the unit. They are taken in reverse.")
     position, load = position[::-1], load[::-1]
-pump = Machine(read_linkage(LINKAGE), g=0.0)
 A, C, I, K, P, R = (pump.by_name[name] / INCH for name in "ACIKPR")
 turn = 2.0 * np.pi * np.arange(len(rows)) / len(rows)
 
