@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from chainunit.papers import paper000
+from papers import paper000
 from scipy.integrate import solve_ivp
 
 from chainunit.core.engines import MATH
