@@ -136,7 +136,7 @@ def test_runs_are_the_tree_in_the_file(result, command):
 def test_verdict_warnings_and_notes_are_texts(result, monkeypatch):
     numbers = json.loads(result.to_json())
     assert result.verdict.split("\n") == [numbers["verdict"][of]["text"] for of in ("model", "motor")]
-    assert "The model of the organs does not hold" in result.verdict
+    assert "Model of the organs, two bars" in result.verdict and "not valid" in result.verdict
     assert result.warnings == [each["text"] for each in numbers["warnings"]] and len(result.warnings) >= 2
     assert any("Friction is smoothed" in note for note in result.notes)
     monkeypatch.setattr(StudyRecord, "insufficient", "All runs are with one which is insufficient.")
