@@ -285,7 +285,7 @@ def test_what_an_exported_study_leaves_out():
         (("--config", "mine.toml"), r"--config mine\.toml: is not of a study file"),
         (("--direct",), r"--direct: is not of a study file"),
         (("--rods", "4"), r"--rods 4: is of ChainUnitFlexible"),
-        (("-o", "x.ssp"), r"-o x\.ssp: must be a file name that ends in \.fmu"),
+        (("-o", "x.zip"), r"-o x\.zip: must be a file name that ends in \.fmu or \.ssp"),
     ],
 )
 def test_what_is_not_of_a_study_is_refused(arguments, words, tmp_path):

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from command import chainunit
 
@@ -165,7 +166,11 @@ FMUS = {
 """By script, what ``chainunit export`` writes before it."""
 
 
-@pytest.mark.parametrize("script", sorted(EXAMPLES.glob("*.py")), ids=lambda script: script.stem)
+SCRIPTS = sorted(set(EXAMPLES.glob("*.py")) - {EXAMPLES / "measured_pump.py"})
+"""The measured pump needs a recording: its tests follow below."""
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.stem)
 def test_the_scripts_run_without_a_warning(script, tmp_path):
     if script.stem in FMUS:
         (tmp_path / "mine.toml").write_text(
@@ -199,3 +204,101 @@ def test_a_motor_that_starts_in_star_is_closed_on_its_field(result):
     # the change to delta takes more current than the start in star
     assert start["current_peak"]["value"] > 2.0 * 11.1 * 0.95
     assert start["start_time"]["value"] < 0.5
+
+
+STROKE = Path(__file__).parent / "data" / "pump_stroke.csv"
+HARMONICS = {1: (0.008, 0.3), 2: (0.004, 1.0), 3: (0.002, 2.0), 4: (0.001, 0.5)}
+"""Amplitude and phase of the harmonics of the crank angle [rad]."""
+NOISE = 0.02
+
+
+def rod_of_pump(phi):
+    """Place of the polished rod [in] of a beam pump with A 136, C 118, I 125.63, K 188.25, P 142.63, R 50 in: two
+    circles, about the crank pin and the saddle bearing."""
+    pin, saddle = 1j * 50.0 * np.exp(-1j * phi), complex(125.63, np.sqrt(188.25**2 - 125.63**2))
+    way = saddle - pin
+    along = (142.63**2 - 118.0**2 + np.abs(way) ** 2) / (2.0 * np.abs(way))
+    bearing = pin + way / np.abs(way) * (along + 1j * np.sqrt(142.63**2 - along**2))
+    return 136.0 * np.angle(saddle - bearing)
+
+
+def pump_stroke(sense=1):
+    """Crank angle, noise-free place and load of 200 samples, and the noise of the place."""
+    turn = 2.0 * np.pi * np.arange(200) / 200.0
+    phi = 0.4 + sense * turn + sum(size * np.sin(k * turn + lag) for k, (size, lag) in HARMONICS.items())
+    place = rod_of_pump(phi) + 57.0
+    rise = np.roll(place, -1) - np.roll(place, 1)
+    load = np.round(11500.0 + 2500.0 * np.tanh(rise) + 300.0 * np.sin(5.0 * turn))
+    return phi, place, load, np.sqrt(2.0) * NOISE * np.sin(np.arange(200.0) ** 2)
+
+
+def rows_of(place, load):
+    lines = (f"{x:.4f},{force:.0f}" for x, force in zip(place, load, strict=True))
+    return "\n".join(["position [in],load [lbf]", *lines]) + "\n"
+
+
+def measured_pump(folder, *arguments):
+    command = [sys.executable, "-W", "error", EXAMPLES / "measured_pump.py", *arguments]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True)
+
+
+def numbers_of(pattern, text):
+    return [float(number) for number in re.search(pattern, text).groups()]
+
+
+@pytest.mark.parametrize("case", ["as stored", "forwards", "counter-clockwise"])
+def test_a_measured_pump_gives_back_what_was_put_in(case, tmp_path):
+    """The stored stroke runs backwards in time, as a real one does."""
+    sense = -1 if case == "counter-clockwise" else 1
+    phi, place, load, noise = pump_stroke(sense)
+    file = STROKE
+    if case == "as stored":
+        stored = np.loadtxt(file, delimiter=",", skiprows=1).T
+        np.testing.assert_allclose(stored, np.array([place + noise, load])[:, ::-1], rtol=0.0, atol=1.0e-4)
+    else:
+        file = tmp_path / "stroke.csv"
+        file.write_text(rows_of(place + noise, load))
+    process = measured_pump(tmp_path, file)
+    assert process.returncode == 0 and not process.stderr, process.stderr
+    assert ("backwards in time" in process.stdout) == (case == "as stored")
+    assert f"crank {'counter-' * (sense < 0)}clockwise, " in process.stdout
+    (other,) = numbers_of(r"other sense: (\S+) in", process.stdout)
+    steady, share = numbers_of(r"steady crank: (\S+) in RMS, (\S+) % of", process.stdout)
+    finer, _ = numbers_of(r"four harmonics: (\S+) in RMS, (\S+) % of", process.stdout)
+    measured, computed = numbers_of(r"stroke (\S+) in measured, (\S+) in computed", process.stdout)
+    turn = sense * 2.0 * np.pi * np.arange(200) / 200.0
+    least = min(np.std(place + noise - rod_of_pump(start + turn)) for start in np.arange(0.35, 0.45, 2e-4))
+    assert steady == pytest.approx(least, abs=1e-3) and share == pytest.approx(least / 1.2014, abs=0.01)
+    assert other > 8.0 * steady
+    # ten values are fitted to 200 samples
+    assert finer == pytest.approx(NOISE * np.sqrt(0.95), rel=0.1)
+    assert computed == pytest.approx(np.ptp(rod_of_pump(np.linspace(0.0, 7.0, 20001))), abs=6e-3)
+    assert measured == pytest.approx(computed, abs=0.15)
+    sizes = numbers_of(r"angle: \[" + r"(\S+) +" * 3 + r"(\S+)\]", process.stdout)
+    assert np.radians(sizes) == pytest.approx([size for size, _ in HARMONICS.values()], abs=3e-4)
+    # the torque factor is the slope of the rod's place over the crank angle
+    torque = load * (rod_of_pump(phi + 1e-5) - rod_of_pump(phi - 1e-5)) / 2e-5
+    least, most, gap = numbers_of(r"torque (\S+) to (\S+) lbf in; .*: (\S+) off", process.stdout)
+    assert (least, most) == pytest.approx((np.min(torque), np.max(torque)), rel=3e-3) and gap < 1e-13
+    assert (tmp_path / "measured_pump.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (None, "the following arguments are required: file"),
+        ("x,y\n1,2\n", "the columns are ['x', 'y']"),
+        ("", "the columns are []"),
+        ("position [in],load [lbf]\n1,2\n", "40 samples or more"),
+        ("position [in],load [lbf]\n" + 50 * "1\n", "all of them numbers"),
+        ("position [in],load [lbf]\n1,two\n", "could not convert string to float: 'two'"),
+    ],
+)
+def test_a_measured_pump_says_what_it_needs(text, message, tmp_path):
+    if text is not None:
+        (tmp_path / "stroke.csv").write_text(text)
+    process = measured_pump(tmp_path, *(["stroke.csv"] if text is not None else []))
+    assert process.returncode == 2 and "Traceback" not in process.stderr and not process.stdout
+    assert message in process.stderr
+    for part in ("CSV", '"position [in]"', '"load [lbf]"', "dynamometer survey", "A, C, I, K, P and R"):
+        assert part in process.stderr

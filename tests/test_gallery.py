@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from papers import paper000
 from scipy.integrate import solve_ivp
 
 from chainunit.core.engines import MATH
@@ -32,8 +33,10 @@ FOLDER = Path(__file__).parents[1] / "examples" / "linkages"
 FILES = sorted(FOLDER.glob("*.toml"))
 KINDS = {
     "andrews_squeezer": ["RRR", "RRR", "RRR"],
+    "beam_pump_api": ["RRR"],
     "blake_jaw_crusher": ["RRR", "RRR"],
     "chain_unit": ["RRR", "RRR", "RRR"],
+    "chain_unit_points": ["RRR", "RRR", "RRR"],
     "crank_shaper": ["RPR", "RRP"],
     "cylinder_lift": ["RRR"],
     "dwell_six_bar": ["RRR", "RRR"],
@@ -141,6 +144,7 @@ def test_the_dwell_is_where_the_file_says():
         ("whitworth_quick_return", r"over (\d+) degrees .* other (\d+)", lambda o: o.ram.C.vx > 0.0),
         ("crank_shaper", r"over (\d+) degrees .* other (\d+)", lambda o: o.ram.C.vx < 0.0),
         ("stephenson_six_bar", r"in (\d+) degrees .* in (\d+)", lambda o: o.output.w > 0.0),
+        ("beam_pump_api", r"over (\d+) degrees .* other (\d+)", lambda o: o.beam.w > 0.0),
     ],
 )
 def test_the_ways_forth_and_back_last_as_the_file_says(name, pattern, forward):
@@ -156,6 +160,83 @@ def test_the_counterweight_halves_the_torque():
     out = turn("pump_jack", 0.84)
     up, down = (np.max(out.tau[sign * out.beam.H.vy > 0.0]) for sign in (1.0, -1.0))
     assert up == pytest.approx(1e3 * balanced, rel=0.05) and down == pytest.approx(1e3 * balanced, rel=0.1)
+
+
+def test_the_beam_pump_is_that_of_api_11e():
+    """By the formulas of the standard, for any dimensions: place of the rod and torque factor over a turn."""
+    rng, inch = np.random.default_rng(3), 0.0254
+    (stroke,) = said("beam_pump_api", r"by (\S+) in over")
+    sizes = {name: machine("beam_pump_api").by_name[name] / inch for name in "ACIKPR"}
+    for factors in (np.ones(6), *rng.uniform(0.95, 1.05, (20, 6))):
+        A, C, I, K, P, R = values = factors * list(sizes.values())
+        pump = machine("beam_pump_api").replace(dict(zip(sizes, inch * values, strict=True)) | {"g": 0.0})
+        theta = TURN - np.arcsin(I / K)
+        J = np.sqrt(K**2 + R**2 - 2.0 * K * R * np.cos(theta))
+        beta = np.arccos((C**2 + P**2 - J**2) / (2.0 * C * P))
+        psi = np.arccos((C**2 + J**2 - P**2) / (2.0 * C * J)) - np.arcsin(R * np.sin(theta) / J)
+        lowest, highest = (np.arccos((C**2 + K**2 - (P + s * R) ** 2) / (2.0 * C * K)) for s in (1.0, -1.0))
+        torque_factor = A * R / C * np.sin(beta + psi - theta) / np.sin(beta)
+        feed = {"rod_load": 1.0, "fluid_load": 0.0, "w": 0.0, "a": 0.0}
+        out = pump.evaluate({"phi": TURN, **feed})
+        # the rod hangs from an arc: its way is A times the angle of the beam
+        assert np.ptp(out["beam.angle"] + psi) < 1e-12
+        assert np.ptp(out["beam.angle"]) == pytest.approx(lowest - highest, rel=1e-4)
+        assert out["tau"] / inch == pytest.approx(torque_factor, rel=1e-12, abs=1e-11)
+        if np.all(factors == 1.0):
+            assert A * (lowest - highest) == pytest.approx(stroke, abs=0.05)
+
+
+def reactions_of_organ(psi, hand, loads, mu=0.6, zeta=0.5):
+    """X, Y_A2 and Y_A1 of an organ at rest by the moments about B and A1, (24) of paper 000 with more loads; in l1.
+    A load is its weight, its rod, and its share of the way from A1 or A2 to B. `hand` is 1 on the left.
+    """
+    z, lean = 2.0 * math.sqrt(1.0 - mu) * zeta, hand * psi
+    a2 = complex(z + mu * math.sin(lean), mu * math.cos(lean))  # from A1, down
+    # B is on both circles
+    way, along = abs(a2), (1.0 + abs(a2) ** 2 - (1.0 - mu) ** 2) / (2.0 * abs(a2))
+    b = a2 / way * complex(along, math.sqrt(1.0 - along**2))
+    places = [(G, share * b if rod == "wall" else a2 + share * (b - a2), rod) for G, rod, share in loads]
+    about_b = sum(G * (place - b).real for G, place, rod in places if rod == "web")
+    about_a1 = sum(G * place.real for G, place, _ in places)
+    # Y (x2 - xb) + X (y2 - yb) = M_B and Y x2 + X y2 = M_A1, with y down and Y up
+    x, y = np.linalg.solve([[(a2 - b).imag, (a2 - b).real], [a2.imag, a2.real]], [about_b, about_a1])
+    return x, y, sum(G for G, _, _ in places) - y
+
+
+def test_weights_in_the_hinge_and_material_as_points_follow_paper_000():
+    """By its equations of equilibrium, with a longer crank up to 12 deg of the rocker, and by its two-force rods."""
+    first, second, before, after = said(
+        "chain_unit_points", r"from (\S+) to (\S+) of .* from (\S+) to ([\d.]+)\."
+    )
+    rng, weight = np.random.default_rng(5), 54.0 * 9.81
+    for in_hinge in (0.0, 0.4, 1.0):
+        unit = machine("chain_unit_points").replace({"in_hinge": in_hinge, "r": 0.21})
+        for filled in (0.0, 1.0):
+            feed = {f"{s}_m{i}": filled * rng.uniform(0.0, 60.0) for s in SIDES for i in (1, 2, 3)}
+            angles = np.linspace(0.0, 2.0 * np.pi, 25)
+            out = unit.evaluate({"phi": angles, "w": 0.0, "a": 0.0, **feed})
+            psi = out["rocker.angle"] + 0.5 * np.pi
+            assert np.max(psi) > math.radians(12.0) and np.min(psi) < -math.radians(11.0)
+            for side, hand in (("left", 1.0), ("right", -1.0)):
+                m1, m2, m3 = (feed[f"{side}_m{i}"] / 54.0 for i in (1, 2, 3))
+                rods = [(1.0 - in_hinge, "wall", 0.5), (0.4 * (1.0 - in_hinge), "web", 0.5)]
+                hinge = [(1.4 * in_hinge, "wall", 1.0)]
+                material = [(m1, "wall", 0.75), (m2, "web", 0.75), (m3, "web", 0.25)]
+                loads = rods + hinge + material
+                expected = np.array([reactions_of_organ(angle, hand, loads) for angle in psi]).T
+                names = (f"A2_{side}_web.fx", f"A2_{side}_web.fy", f"A1_{side}.fy")
+                computed = np.array([out[name] for name in names]) / weight * [[hand], [1.0], [1.0]]
+                np.testing.assert_allclose(computed, expected, rtol=1e-9, atol=1e-11)
+                np.testing.assert_allclose(out[f"A1_{side}.fx"], -out[f"A2_{side}_web.fx"], rtol=1e-9)
+                if side == "left" and filled == 0.0 and in_hinge in (0.0, 1.0):
+                    upright = np.array(reactions_of_organ(0.0, 1.0, loads)) / 1.4
+                    pull, down = (first, before) if in_hinge == 0.0 else (second, after)
+                    assert upright[:2] == pytest.approx([pull, down], abs=5e-4)
+                if side == "left" and filled == 0.0 and in_hinge == 1.0:
+                    theirs = paper000.hinge_loading(psi)
+                    np.testing.assert_allclose(
+                        computed / 1.4, [theirs.X, theirs.Y_A2, theirs.Y_A1], rtol=1e-9
+                    )
 
 
 def test_the_toggles_multiply_the_force():
@@ -346,7 +427,12 @@ def test_each_file_does_the_work_of_its_kind(name):
     """Its loads take power in the mean over a turn, or over the way of a cylinder, of some size against their
     largest; a force that is on in both directions takes none. The packaged machines begin empty. The squeezer has
     nothing but a spring, which gives back what it took."""
-    begun = {"chain_unit": {"left_processing_force": 10.0}, "knife_drive": {"cut_force": 3000.0}}
+    processing = {"left_processing_force": 10.0}
+    begun = {
+        "chain_unit": processing,
+        "chain_unit_points": processing,
+        "knife_drive": {"cut_force": 3000.0},
+    }
     m, q = machine(name), way(name)
     model = m.model
     feed = model.feed_layout.by_name(model.Feed()) | begun.get(name, {})

@@ -60,7 +60,7 @@ def package(tmp_path_factory):
     """A package by the command line, in a folder whose name has spaces."""
     folder = tmp_path_factory.mktemp("ssp")
     (folder / "mine.toml").write_text(MINE)
-    process = chainunit("export-ssp", "mine.toml", "-o", "out dir/mine.ssp", cwd=folder)
+    process = chainunit("export", "mine.toml", "-o", "out dir/mine.ssp", cwd=folder)
     assert (process.returncode, process.stderr) == (0, "")
     assert re.fullmatch(
         r"out dir/mine\.ssp: SSP 1\.0, machine \(ChamberForces\), motor \(DcMotor\), 10 connections; FMI 2\.0.*\n",

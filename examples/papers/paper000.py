@@ -353,6 +353,12 @@ def growth_of_x() -> float:
     return static_load("X", 12.0) / static_load("X", -12.0)
 
 
+def growth_at_a1() -> float:
+    """Item 13: X_A1, on the support, at 12 deg over X_A1 at -12 deg."""
+    low, high = machine().chamber(np.radians([-12.0, 12.0])).left.support.fx
+    return float(high / low)
+
+
 def mean_load(name: str) -> float:
     """Item 13: the mean of a load over -12..12 deg."""
     left, _ = statics(np.radians(np.linspace(-12.0, 12.0, 241)))

@@ -8,19 +8,57 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from typing import Any
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from chainunit.core.engines import MATH, numpy_
-from chainunit.drives.cardan import Cardan, frequency_band, frozen_frequency, ratio_of_paper, two_joints
+from chainunit.drives.cardan import (
+    RIGHT,
+    Cardan,
+    frequency_band,
+    frozen_frequency,
+    hooke,
+    ratio_of_paper,
+    two_joints,
+)
 
 from .table import PICK
 
 HEAVY = Cardan(J1=1.0, J4=1000.0, c2=1e4, c3=1e4, alpha1=0.0, alpha2=0.0)
 
 
+def squares(line: Cardan, i: float, constraint: str) -> Any:
+    """k^2 of the free line with the ratio i23 [rad2/s2] by the paper's equations of motion, phi3 = i23 phi2, and its
+    constraint of the torques with phi1 - phi2 ("right") or phi1 - phi3 ("printed", the second list)."""
+    phi3 = Polynomial([1.0, -line.J4 / line.c3])  # at phi4 = 1, in k^2
+    base = phi3 / i if constraint == "right" else phi3
+    phi1 = base - line.c3 * i / line.c2 * (1.0 - phi3)
+    motion = Polynomial([line.c2, -line.J1]) * phi1 - line.c2 * phi3 / i
+    return np.sort(np.roots(motion.coef[::-1]).real)
+
+
+def least_square(constraint: str) -> float:
+    """Item 1: the least k^2 at i23 = 1/3; it is 0 as the free line can turn."""
+    return float(squares(HEAVY, 1.0 / 3.0, constraint)[0])
+
+
+def joint_ratio(by: str) -> float:
+    """Item 7: i23 at bends of 20 and 40 deg and phi2 = 30 deg, of two joints in space ("right"), as i20/i03 with both
+    indices read alike, or by the formula after it."""
+    p = dataclasses.replace(HEAVY, alpha1=math.radians(20.0), alpha2=math.radians(40.0))
+    gamma = math.radians(30.0)
+    end, ratio, _ = two_joints(MATH, p, gamma)
+    middle, i20, _ = hooke(MATH, p.alpha1, gamma)
+    _, i03, _ = hooke(MATH, p.alpha2, middle - RIGHT)
+    return float(
+        {"right": ratio, "by index": i20 / i03, "by formula": ratio_of_paper(MATH, p, gamma, end)}[by]
+    )
+
+
 def special_case() -> float:
-    """Item 1: k^2 J/c in the special case i = 1/3."""
+    """k^2 J/c in the special case i = 1/3."""
     i = 1.0 / 3.0
     line = Cardan(c2=1.0, c3=1.0 / i, J1=1.0, J4=1.0 / (i * i))
     return float(frozen_frequency(MATH, line, i)) ** 2

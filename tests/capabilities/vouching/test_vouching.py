@@ -1152,7 +1152,7 @@ def test_a_study_becomes_a_certified_system(made, tmp_path):
 def test_an_ssp_package_with_its_fmus(made, tmp_path):
     """Its own FMUs are certified themselves, by the same key; a foreign one by its hash."""
     (tmp_path / "mine.toml").write_text(STUDY)
-    assert chainunit("export-ssp", "mine.toml", "-o", "a.ssp", cwd=tmp_path).returncode == 0
+    assert chainunit("export", "mine.toml", "-o", "a.ssp", cwd=tmp_path).returncode == 0
     read = archive.contents((tmp_path / "a.ssp").read_bytes()).members
     foreign = {"modelDescription.xml": b'<fmiModelDescription generationTool="other"/>'}
     theirs = packed(foreign)
