@@ -16,7 +16,8 @@ from ..study.arrays import rms, stretches
 from .measurands import COUNTS, MEASURANDS, OFFSET_SHARE
 from .plant import MOVING
 from .problem import Problem, likeness, mark_times, measured_speed, speed_column
-from .recording import Recording, name_and_unit
+from .logger_table import name_and_unit
+from .recording import Recording
 
 MISSING = 0.2
 """Largest share of rows that may be missing."""
