@@ -13,10 +13,10 @@ from ..core.errors import Faults, InputError
 from ..core.messages import unit_behind
 from ..core.units import scale
 from ..study.arrays import rms, stretches
+from .logger_table import name_and_unit
 from .measurands import COUNTS, MEASURANDS, OFFSET_SHARE
 from .plant import MOVING
 from .problem import Problem, likeness, mark_times, measured_speed, speed_column
-from .logger_table import name_and_unit
 from .recording import Recording
 
 MISSING = 0.2

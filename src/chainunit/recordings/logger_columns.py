@@ -12,7 +12,7 @@ import numpy as np
 
 from ..core.errors import InputError, printable
 from ..core.units import scale
-from .logger_table import MARKS, MISSING, LoggerTable, date_and_clock, is_time, name_and_unit
+from .logger_table import MARKS, MISSING, WITH_UNIT, LoggerTable, date_and_clock, is_time, name_and_unit
 
 LOST = 0.2
 """Largest share of the rows without a number in a column."""
@@ -35,6 +35,7 @@ _FRACTIONS = {"ms": 1e-3, "msec": 1e-3, "millis": 1e-3, "us": 1e-6, "usec": 1e-6
 _DAY = 86400.0
 _EPOCHS = (("s", 1e9, 3e9), ("ms", 1e12, 3e12), ("µs", 1e15, 3e15), ("ns", 1e18, 3e18))
 """By unit, the numbers of the years 2001 to 2065 since 1970."""
+_SIGN = re.compile(r"^([+-]) +(?=\d)", re.MULTILINE)
 _GROUP = re.compile(r"(?<=\d)[ '’\u00a0\u2009\u202f](?=\d{3}(?!\d))")
 
 
@@ -51,25 +52,23 @@ def numbers(table: LoggerTable, place: int, others: frozenset[str], boolean: boo
     InputError
         for a cell that is no number, and for signs that may be decimal ones or stand between thousands.
     """
-    cells = table.column(place)
-    values: list[float] = []
+    cells = _plain(table, place, others)
     try:
-        # most often plain numbers, and Python takes an underscore for a mark of thousands
         values = list(map(float, cells))
     except ValueError:
-        pass
-    if not values or any("_" in cell for cell in cells):
-        cells, decimal = _plain(table, place, cells, others)
         values = [_number(cell, boolean) for cell in cells]
-    else:
-        _plain(table, place, cells, others)
     x = np.array(values)
-    for k in np.flatnonzero(~(np.abs(x) < _OVERLOAD)):
+    for k in map(int, np.flatnonzero(~(np.abs(x) < _OVERLOAD))):
         cell = table.rows[k][place]
         if not (MISSING.fullmatch(cell) or math.isfinite(x[k])):
-            words = f"{printable(cell, 40)} is no number; delete this row, or write nan for a missing measurement"
+            words = "is no number; delete this row, or write nan for a missing measurement"
+            if with_unit := WITH_UNIT.fullmatch(cell):
+                words = (
+                    f"is no number alone; write [{with_unit[2]}] into the head, and take it out of all cells"
+                )
             raise InputError(
-                f"{table.file}, line {table.lines[k]}, column {place + 1}, {table.heads[place]}: {words}"
+                f"{table.file}, line {table.lines[k]}, column {place + 1}, {table.heads[place]}: "
+                f"{printable(cell, 40)} {words}"
             )
         x[k] = np.nan
     return x
@@ -79,7 +78,7 @@ def _number(cell: str, boolean: bool) -> float:
     if boolean and cell.lower() in _BOOLEANS:
         return _BOOLEANS[cell.lower()]
     try:
-        return math.nan if "_" in cell else float(cell)
+        return float(cell)
     except ValueError:
         return math.nan
 
@@ -105,11 +104,10 @@ def decimal_signs(cells: Sequence[str]) -> frozenset[str]:
     return frozenset(signs)
 
 
-def _plain(
-    table: LoggerTable, place: int, cells: list[str], others: frozenset[str]
-) -> tuple[list[str], str]:
-    """The cells with a decimal point and without marks of thousands, and the decimal sign of the column."""
-    text = "\n".join(cells)
+def _plain(table: LoggerTable, place: int, others: frozenset[str]) -> list[str]:
+    """The cells of a column with a decimal point and without marks of thousands."""
+    # Python takes an underscore for a mark of thousands
+    text = _SIGN.sub(r"\1", "\n".join(table.column(place)).replace("_", "?"))
     if _GROUP.search(text) and not re.search(r"^[+-]?\d{4}", text, re.MULTILINE):
         text = _GROUP.sub("", text)
     own = {sign for sign, (decimal, _, _) in _SHAPES.items() if decimal.search(text)}
@@ -131,14 +129,16 @@ def _plain(
         text = text.replace(".", "").replace(",", ".")
     elif decimal == ".":
         text = text.replace(",", "")
-    return text.split("\n"), decimal
+    return text.split("\n")
 
 
 def _doubtful(table: LoggerTable, place: int, signs: Iterable[str], is_mixed: bool = False) -> InputError:
     """The refusal of a column whose numbers can be read in two ways, by its first such cell with each sign."""
     cells = table.column(place)
     found = {
-        sign: next(k for k, cell in enumerate(cells) if sign in cell and (is_mixed or _SHAPES[sign][2].match(cell)))
+        sign: next(
+            k for k, cell in enumerate(cells) if sign in cell and (is_mixed or _SHAPES[sign][2].match(cell))
+        )
         for sign in sorted(signs)
     }
     k = next(iter(found.values()))
@@ -154,12 +154,12 @@ def _doubtful(table: LoggerTable, place: int, signs: Iterable[str], is_mixed: bo
 
 
 class Times(NamedTuple):
-    """Times of rows [s], NaN where a cell has none, their order in the file (-1 where the last row is the first one),
-    the rows that are kept, and words on them."""
+    """Rising times [s] of the `kept` rows, words on their source, and remarks; `missing` is NaN in each row of the
+    file without a time, else 0."""
 
     time: Any
-    order: int
     kept: Any
+    missing: Any
     source: str
     remarks: list[str]
 
@@ -181,6 +181,11 @@ def time_places(table: LoggerTable, place: int | None) -> list[int]:
     if "clock" in (kinds[k] for k in places) or kinds[first] == "both":
         places += [k for k, head in enumerate(table.heads) if _fraction(table, k, head)][:1]
     return places
+
+
+def has_times(table: LoggerTable, place: int) -> bool:
+    """Whether a column has dates or times of the day."""
+    return bool(_kind(table, place))
 
 
 def _kind(table: LoggerTable, place: int) -> str:
@@ -212,22 +217,22 @@ def _parts(table: LoggerTable) -> list[int]:
     return [heads.index(part) for part in _PARTS if part in heads]
 
 
-def times(table: LoggerTable, places: Sequence[int], unit: str, others: frozenset[str]) -> Times:
-    """The times of the rows by the columns at `places`; `unit` is that of a single column with numbers.
+def times(table: LoggerTable, places: Sequence[int], others: frozenset[str]) -> Times:
+    """The times of the rows by the columns at `places`; `others` are the decimal signs of other columns.
 
     Raises
     ------
     InputError
-        for times that do not rise, and for those that tell rows not apart.
+        for times that do not rise, and for those that do not resolve the rows.
     """
     head = table.heads[places[0]]
-    if _kind(table, places[0]):
+    if has_times(table, places[0]):
         time, source = _of_clock(table, places)
     elif len(places) > 1:
         time, source = _of_parts(table, places, others)
     else:
         x = numbers(table, places[0], others)
-        unit, factor, source = _unit_of_time(table, head, unit, x)
+        factor, source = _unit_of_time(table, head, table.units[places[0]], x)
         x, wraps = unwrapped(x)
         time = x * factor
         if wraps:
@@ -235,15 +240,15 @@ def times(table: LoggerTable, places: Sequence[int], unit: str, others: frozense
     return _ordered(table, time, source, head)
 
 
-def _unit_of_time(table: LoggerTable, head: str, unit: str, x: Any) -> tuple[str, float, str]:
+def _unit_of_time(table: LoggerTable, head: str, unit: str, x: Any) -> tuple[float, str]:
     if unit and not is_time(unit):
-        return unit, scale(unit, "s")[0], f"time in {unit}"
+        return scale(unit, "s")[0], f"time in {unit}"
     for each, low, high in _EPOCHS:
         if np.nanmin(x) >= low and np.nanmax(x) < high:
-            return each, scale(each, "s")[0], f"time in {each} since 1970"
+            return scale(each, "s")[0], f"time in {each} since 1970"
     steps = np.abs(np.diff(x))
-    if 2e4 < np.nanmin(x) and np.nanmax(x) < 8e4 and np.nanmedian(steps) < 2e-5:
-        return "d", _DAY, "time in days of a spreadsheet"
+    if np.nanmin(x) > 2e4 and np.nanmax(x) < 8e4 and np.nanmedian(steps) < 2e-5:
+        return _DAY, "time in days of a spreadsheet"
     raise InputError(
         f"{table.file}, column {head}: has no unit; write [s] behind its name, or its own unit, such as {head} [ms]"
     )
@@ -284,7 +289,8 @@ def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
             if clock["f"] is None:
                 raise InputError(
                     f"{table.file}, line {table.lines[k]}, column {places[0] + 1}, {table.heads[places[0]]}: "
-                    f"{printable(clock[0], 40)} may be hh:mm or mm:ss, and tells the rows not apart; write hh:mm:ss.fff"
+                    f"{printable(clock[0], 40)} may be hh:mm or mm:ss, and does not resolve the rows; write "
+                    "hh:mm:ss.fff"
                 )
         if clock["half"]:
             h = h % 12 + 12 * (clock["half"] in "pP")
@@ -342,8 +348,8 @@ def _day_numbers(table: LoggerTable, days: Sequence[str], place: int) -> list[fl
     spans = [way[days[-1]] - way[days[0]] for way in ways]
     if not ways:
         raise InputError(
-            f"{table.file}, line {table.lines[0]}, column {place + 1}, {table.heads[place]}: {printable(days[0], 40)} is "
-            "no date that can be read; write it as 2023-06-19"
+            f"{table.file}, line {table.lines[0]}, column {place + 1}, {table.heads[place]}: "
+            f"{printable(days[0], 40)} is no date that can be read; write it as 2023-06-19"
         )
     way = ways[min(range(len(ways)), key=lambda k: (spans[k] < 0, abs(spans[k])))]
     return [float(way[day] - way[days[0]]) for day in days]
@@ -372,8 +378,8 @@ def _ordinal(day: str, order: str) -> int:
 
 
 def unwrapped(x: Any) -> tuple[Any, int]:
-    """A counter without the falls at which it begins anew, and their number: it falls by nearly the size of a counter,
-    and goes on as before."""
+    """A counter without the falls at which it begins anew, and their number: it falls by nearly the size of a
+    counter, and goes on as before."""
     steps = np.diff(x)
     falls = np.flatnonzero(steps < 0.0)
     rising = steps[steps > 0.0]
@@ -403,11 +409,8 @@ def _ordered(table: LoggerTable, time: Any, source: str, head: str) -> Times:
     steps = np.diff(t)
     back = np.flatnonzero(steps < 0.0)
     if len(back):
-        k = int(back[0])
-        raise InputError(
-            f"{table.file}, line {table.lines[has_time[k + 1]]}: time = {t[k + 1]:.12g} s: must be later than "
-            f"{t[k]:.12g} s of the line before; delete the rows before this line, or those from it on"
-        )
+        remedy = "delete the rows before this line, or those from it on"
+        raise _not_later(table, int(has_time[back[0] + 1]), t[back[0] : back[0] + 2], remedy)
     still = steps == 0.0
     if np.mean(still) > COARSE:
         t = _spread(table, t, head)
@@ -415,16 +418,20 @@ def _ordered(table: LoggerTable, time: Any, source: str, head: str) -> Times:
         remarks.append(f"a coarse clock, up to {longest} rows at one time: spread evenly")
     elif still.any():
         rows = [table.rows[k] for k in has_time]
-        for k in np.flatnonzero(still):
+        for k in map(int, np.flatnonzero(still)):
             if rows[k] != rows[k + 1]:
-                raise InputError(
-                    f"{table.file}, line {table.lines[has_time[k + 1]]}: time = {t[k + 1]:.12g} s: must be later than "
-                    f"{t[k]:.12g} s of the line before; delete one of the two rows"
-                )
+                raise _not_later(table, int(has_time[k + 1]), t[k : k + 2], "delete one of the two rows")
         keep = np.append(True, ~still)
         remarks.append(f"{int(still.sum())} doubled rows left out")
         has_time, t = has_time[keep], t[keep]
-    return Times(t, order, has_time, source, remarks)
+    return Times(t, has_time, np.where(np.isfinite(time), 0.0, np.nan), source, remarks)
+
+
+def _not_later(table: LoggerTable, row: int, pair: Any, remedy: str) -> InputError:
+    return InputError(
+        f"{table.file}, line {table.lines[row]}: time = {pair[1]:.12g} s: must be later than {pair[0]:.12g} s of the "
+        f"line before; {remedy}"
+    )
 
 
 def _spread(table: LoggerTable, t: Any, head: str) -> Any:
@@ -443,11 +450,13 @@ def _spread(table: LoggerTable, t: Any, head: str) -> Any:
         "all rows have one time" if not len(at) else f"the time goes on after {rows:.3g} rows, and not evenly"
     )
     more = (
-        " (a number of 32 bits does not hold a date in seconds)" if t[0] > 1e9 and t[0] % 2.0**6 == 0.0 else ""
+        " (a number of 32 bits does not hold a date in seconds)"
+        if t[0] > 1e9 and t[0] % 2.0**6 == 0.0
+        else ""
     )
     raise InputError(
-        f"{table.file}, column {head}: {cause}{more}: write the time of each row, from the first one on, to a tenth of "
-        "the time between rows"
+        f"{table.file}, column {head}: {cause}{more}: write the time of each row, from the first one on, to a tenth "
+        "of the time between rows"
     )
 
 
@@ -465,14 +474,16 @@ def lost_rows(table: LoggerTable, columns: Mapping[int, Any]) -> tuple[Any, list
         if np.mean(missing) > LOST:
             kinds = ", ".join(_kinds_of(table, place, missing))
             raise InputError(
-                f"{table.file}, column {table.heads[place]}: {missing.sum()} of {len(x)} rows have no number ({kinds}); "
-                f"must be <= {100.0 * LOST:.0f} %: delete these rows, or give the column another head, so that it is "
-                "left out"
+                f"{table.file}, column {table.heads[place]}: {missing.sum()} of {len(x)} rows have no number "
+                f"({kinds}); must be <= {100.0 * LOST:.0f} %: delete these rows, or give the column another head, so "
+                "that it is left out"
             )
         whole &= ~missing
     lost = ~whole
     places = [place for place, x in columns.items() if np.isnan(x).any()]
-    kinds = ", ".join(dict.fromkeys(each for p in places for each in _kinds_of(table, p, np.isnan(columns[p]))))
+    kinds = ", ".join(
+        dict.fromkeys(each for k in places for each in _kinds_of(table, k, np.isnan(columns[k])))
+    )
     count = int(lost.sum())
     return whole, [f"{count} {'row' if count == 1 else 'rows'} without a number ({kinds})"] if count else []
 

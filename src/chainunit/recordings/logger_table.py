@@ -34,7 +34,9 @@ DATE = re.compile(
     r"|[^\W\d_]{3,9}\.? \d{1,2},? \d{4}"
 )
 _COMPACT = re.compile(r"(\d{4})(\d\d)(\d\d)[T_ ](\d\d)(\d\d)(\d\d)(?=\D|$)")
-_NUMBER = re.compile(r"[+-]?(?:\d[\d.,' \u00a0\u2009\u202f’]*|[.,]\d+)(?:[eE][+-]?\d+)?")
+_NUMBER = re.compile(r"[+-]?\s*(?:\d[\d.,' \u00a0\u2009\u202f’]*|[.,]\d+)(?:[eE][+-]?\d+)?")
+WITH_UNIT = re.compile(rf"({_NUMBER.pattern}) ?([^\W\d][\w/%]{{0,5}}|%)")
+"""A number with its unit in one cell."""
 _COMMENTS = ("#", "%", "//", "!")
 _REMARK = re.compile(r"\s#(?!N/A|NV|VALUE|DIV|NUM|REF|NULL|WERT).*$", re.IGNORECASE)
 _SAMPLE, _FOOTER, _ABOVE = 400, 50, 12
@@ -84,8 +86,8 @@ def read_table(file: Path, text: str, names: Iterable[str]) -> LoggerTable:
     begin = _first_row(sample, mark)
     if begin < 0:
         raise InputError(
-            f"{file}: is no table: its first line must be the heads of the columns, such as time [s],motor.i [A], and "
-            "the next ones must have a number for each of them"
+            f"{file}: is no table: its first line must be the heads of the columns, such as time [s],motor.i [A], "
+            "and the next ones must have a number for each of them"
         )
     names = list(names)
     first = cells_of_line(sample[begin][1], mark)
@@ -129,7 +131,9 @@ def name_and_unit(head: str, names: Iterable[str] = ()) -> tuple[str, str]:
         if begin.lower() != name.lower():
             continue
         if not rest:
-            return begin, ""
+            inside = re.search(r"[\[(]([^\])]*)[\])]$|[_/]([^_/ ]+)$", begin)
+            unit = bare_unit(inside[1] or inside[2] or "") if inside else ""
+            return begin, unit if _is_unit(unit) or "[" in begin else ""
         if not re.match(r"[\[(/,_<:{;]|in ", rest) or (rest[0] == "_" and not _unit_behind(rest)):
             continue
         if unit := _unit_behind(rest):
@@ -142,8 +146,9 @@ def name_and_unit(head: str, names: Iterable[str] = ()) -> tuple[str, str]:
 
 def _unit_behind(rest: str) -> str:
     """The unit in the `rest` of a head behind its name; empty if there is none."""
-    if rest[0] in "[(<{" and (inside := re.match(r"[\[(<{]([^\])>}]*)[\])>}]", rest)):
-        return bare_unit(inside[1])
+    if rest[0] in "[(<{" and (inside := re.findall(r"[\[(<{]([^\])>}]*)[\])>}]", rest)):
+        units = [bare_unit(text) for text in inside]
+        return next((unit for unit in units if _is_unit(unit)), units[0])
     plain = re.sub(r"^(?:[/,_:;]|in )\s*", "", rest)
     for text in (plain, plain.partition("(")[0], plain.replace("_", "/"), plain.replace("_", " ")):
         if (unit := bare_unit(text)) and _is_unit(unit):
@@ -193,7 +198,7 @@ def cells_of_line(line: str, mark: str) -> list[str]:
 
 
 def _is_data(cell: str) -> bool:
-    return bool(_NUMBER.fullmatch(cell)) or is_time(cell)
+    return bool(_NUMBER.fullmatch(cell) or WITH_UNIT.fullmatch(cell)) or is_time(cell)
 
 
 def _is_row(cells: Sequence[str]) -> bool:
@@ -213,13 +218,24 @@ def _mark_of(lines: Sequence[str]) -> str:
 
 
 def _first_row(sample: Sequence[tuple[int, str]], mark: str) -> int:
-    """The place of the first row of measurements, which most of the next lines are like; -1 without one."""
+    """The place of the first row of measurements, which has data where most rows have them; -1 without one."""
     rows = [cells_of_line(line, mark) for _, line in sample]
-    sizes = [len(row) if _is_row(row) and not row[0].startswith(_COMMENTS) else 0 for row in rows]
-    usual = Counter(size for size in sizes if size).most_common(1)
+    shapes = [
+        tuple(map(_is_data, row)) if _is_row(row) and not row[0].startswith(_COMMENTS) else () for row in rows
+    ]
+    usual = Counter(shape for shape in shapes if shape).most_common(1)
     if not usual:
         return -1
-    return next(k for k, size in enumerate(sizes) if size == usual[0][0])
+    wanted = usual[0][0]
+    return next(
+        k
+        for k, (row, shape) in enumerate(zip(rows, shapes, strict=True))
+        if len(shape) == len(wanted)
+        and all(
+            has or not needs or MISSING.fullmatch(cell)
+            for cell, has, needs in zip(row, shape, wanted, strict=True)
+        )
+    )
 
 
 def _head_of(
@@ -233,21 +249,23 @@ def _head_of(
         for comment in _COMMENTS:
             line = line.removeprefix(comment)
         cells = _heads_in(line, mark, len(first))
-        if len(cells) < 2 or _is_row(cells):
-            continue
         matching = sum(
             bool(cell) and any(name_and_unit(cell, [name])[0].lower() == name.lower() for name in names)
             for cell in cells
         )
+        if len(cells) < 2 or (matching == 0 and _is_row(cells)):
+            continue
         if matching > best and not (matching == 0 and _is_of_units(cells, len(cells))):
             best, place, heads = matching, k, cells
     if not heads:
         more = ""
         if any(not _is_data(cell) for cell in first) and any(map(is_time, first)):
-            more = "; a table with the name of the quantity in each row needs a column for each quantity instead"
+            more = (
+                "; a table with the name of the quantity in each row needs a column for each quantity instead"
+            )
         raise InputError(
-            f"{file}: has no head: its first row has values; write the heads of the columns into a line above it, such "
-            f"as time [s],motor.i [A]{more}"
+            f"{file}: has no head: its first row has values; write the heads of the columns into a line above it, "
+            f"such as time [s],motor.i [A]{more}"
         )
     return place, heads
 
@@ -285,9 +303,8 @@ def _body(
             if cells[0].startswith(_COMMENTS):
                 remarks += 1
                 continue
-            if any(_REMARK.search(cell) for cell in cells):
-                cut = cells_of_line(_REMARK.sub("", line), mark)
-                cells, remarks = (cut, remarks + 1) if len(cut) == width else (cells, remarks)
+            if _REMARK.search(line) and len(cut := cells_of_line(_REMARK.sub("", line), mark)) == width:
+                cells, remarks = cut, remarks + 1
             if len(cells) > width and not any(cells[width:]):
                 cells = cells[:width]
             if [each.lower() for each in cells] == [each.lower() for each in heads]:
@@ -296,8 +313,8 @@ def _body(
             if len(cells) != width or not (_is_data(cells[key]) or MISSING.fullmatch(cells[key])):
                 strange.append((len(rows), number, _words(cells, heads, mark)))
                 continue
-        elif "#" in cells[-1] and (cut := _REMARK.sub("", " " + cells[-1]).strip()) != cells[-1]:
-            cells[-1], remarks = cut, remarks + 1
+        elif "#" in cells[-1] and (last := _REMARK.sub("", f" {cells[-1]}").strip()) != cells[-1]:
+            cells[-1], remarks = last, remarks + 1
         rows.append(cells)
         numbers.append(number)
     footer = [each for each in strange if each[0] == len(rows)]
@@ -306,7 +323,7 @@ def _body(
         raise InputError(f"{file}, line {number}: {words}")
     left_out = [
         f"{count} {words}{'s' if count > 1 else ''}"
-        for count, words in ((again, "repeated head"), (remarks, "comment"), (len(footer), "line") )
+        for count, words in ((again, "repeated head"), (remarks, "comment"), (len(footer), "line"))
         if count
     ]
     if footer:
@@ -314,17 +331,17 @@ def _body(
     return rows, numbers, left_out
 
 
-def _cells(
-    file: Path, lines: Sequence[tuple[int, str]], mark: str
-) -> Iterator[tuple[int, str, list[str]]]:
+def _cells(file: Path, lines: Sequence[tuple[int, str]], mark: str) -> Iterator[tuple[int, str, list[str]]]:
     """Each line with its number and its cells."""
     if mark in (" ", "  "):
         yield from ((number, line, cells_of_line(line, mark)) for number, line in lines)
         return
     has_quotes = any('"' in line for _, line in lines)
-    quoting = csv.QUOTE_MINIMAL if has_quotes else csv.QUOTE_NONE
     reader = csv.reader(
-        (line for _, line in lines), delimiter=mark, skipinitialspace=True, quoting=quoting
+        (line for _, line in lines),
+        delimiter=mark,
+        skipinitialspace=True,
+        quoting=csv.QUOTE_MINIMAL if has_quotes else csv.QUOTE_NONE,
     )
     number = 0
     try:
@@ -343,7 +360,10 @@ def _words(cells: Sequence[str], heads: Sequence[str], mark: str) -> str:
                 f"{count}: a comma stands within a number or a text; put semicolons between the columns, write "
                 "decimal points, or put the cell in quotation marks"
             )
-        return f"{count}: {MARKS[mark]} stand within a cell, or a head is missing; put the cell in quotation marks, or write a head for each column"  # fmt: skip
+        return (
+            f"{count}: {MARKS[mark]} stand within a cell, or a head is missing; put the cell in quotation marks, or "
+            "write a head for each column"
+        )
     if len(cells) < len(heads):
         return f"{count}: a mark between columns is left out, or a cell; mend this row, or delete it"
     return f"{printable(cells[0], 40) or 'a text'}: is no row of measurements; delete it, or begin it with #"

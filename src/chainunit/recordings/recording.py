@@ -13,7 +13,15 @@ import numpy as np
 from ..core.errors import Faults, InputError, meant, near_name, printable
 from ..core.inputs import decoded_by_marks, file_bytes, unzipped
 from ..core.units import must_be, of_other_kind, scale
-from .logger_columns import decimal_signs, decimal_words, lost_rows, numbers, time_places, unwrapped
+from .logger_columns import (
+    decimal_signs,
+    decimal_words,
+    has_times,
+    lost_rows,
+    numbers,
+    time_places,
+    unwrapped,
+)
 from .logger_columns import times as times_of
 from .logger_table import FEWEST, LoggerTable, name_and_unit, read_table
 from .measurands import COLUMNS, MEASURANDS, PHASES, SIGNALS, Measurand
@@ -31,6 +39,11 @@ class Recording:
     heads: Mapping[str, str]
     others: Sequence[str] = ()
     understood: str = ""
+
+    @property
+    def sentence(self) -> str:
+        """How the file was read."""
+        return f"{self.source} is read with {self.understood}"
 
     @property
     def step(self) -> float:
@@ -59,9 +72,9 @@ class Recording:
 def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Recording:
     """Read a recording as loggers write it.
 
-    A row of the file has the head of each column, with a name and a unit (``motor.i [A]``). A file whose name ends with
-    ``.gz`` is unpacked. Columns that are none of `MEASURANDS` are left out, but for dates and times of the day, which
-    make the time if no column has its name.
+    A row of the file has the head of each column, with a name and a unit (``motor.i [A]``). A file whose name ends
+    with ``.gz`` is unpacked. Columns that are none of `MEASURANDS` are left out, but for dates and times of the day,
+    which make the time if no column has its name.
 
     Parameters
     ----------
@@ -83,52 +96,54 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
     for name, place in known.items():
         with faults.collected():
             scales[name] = _scale(table, place, COLUMNS[name])
-    if not time_from:
-        words = f"{meant('time', table.heads)} its heads are: {', '.join(table.heads)}"
-        faults.add([InputError(f"{file}: has no column time [s]{words}{remedy('time', table.heads)}")])
-    elif len(time_from) == 1 and (unit := table.units[time_from[0]]):
-        with faults.collected():
-            _scale(table, time_from[0], MEASURANDS["time"])
-    if not known:
-        words = ", ".join(f"{each.name} [{each.unit}]" for each in MEASURANDS.values() if each.name != "time")
-        words += f"; its heads are: {', '.join(table.heads)}{remedy('motor.i', table.heads[::-1])}"
-        faults.add([InputError(f"{file}: has no column of a known quantity, such as {words}")])
-    faults.refuse()
     signs = {place: decimal_signs(table.column(place)) for place in (*time_from, *known.values())}
 
     def others(place: int) -> frozenset[str]:
         return frozenset[str]().union(*(found for other, found in signs.items() if other != place))
 
-    times = times_of(table, time_from, table.units[time_from[0]], others(time_from[0]))
+    if not time_from:
+        words = f"{meant('time', table.heads)} its heads are: {', '.join(table.heads)}"
+        faults.add([InputError(f"{file}: has no column time [s]{words}{remedy('time', table.heads)}")])
+    if not known:
+        words = ", ".join(f"{each.name} [{each.unit}]" for each in MEASURANDS.values() if each.name != "time")
+        words += f"; its heads are: {', '.join(table.heads)}{remedy('motor.i', table.heads[::-1])}"
+        faults.add([InputError(f"{file}: has no column of a known quantity, such as {words}")])
+    with faults.collected():
+        if len(time_from) == 1 and table.units[time_from[0]] and not has_times(table, time_from[0]):
+            _scale(table, time_from[0], MEASURANDS["time"])
+        times = times_of(table, time_from, others(time_from[0])) if time_from else None
+    faults.refuse()
+    assert times is not None
     raw = {place: numbers(table, place, others(place), name == "mark") for name, place in known.items()}
-    whole, lost = lost_rows(table, raw)
+    whole, lost = lost_rows(table, {time_from[0]: times.missing, **raw})
     kept = whole[times.kept]
     rows = times.kept[kept]
     columns, remarks = _quantities(
         {name: raw[place][rows] * scales[name][0] + scales[name][1] for name, place in known.items()}
     )
     used = {*time_from, *known.values()}
-    recording = Recording(
+    rate = f"{len(rows):,} rows, {1.0 / float(np.median(np.diff(times.time[kept]))):.4g} Hz"
+    parts = [times.source, decimal_words(table, others(-1)), rate, *times.remarks, *remarks]
+    left_out = [*table.left_out, *lost]
+    heads = {name: table.heads[place] for name, place in known.items()} | {"time": table.heads[time_from[0]]}
+    if "motor.i" in columns and "motor.i" not in heads:
+        heads["motor.i"] = ", ".join(heads[name] for name in PHASES if name in heads)
+    return Recording(
         str(file),
         times.time[kept],
         columns,
-        {name: table.heads[place] for name, place in known.items()} | {"time": table.heads[time_from[0]]},
-        [head for place, head in enumerate(table.heads) if place not in used],
-    )
-    rate = f"{len(rows):,} rows, {1.0 / recording.step:.4g} Hz"
-    parts = [times.source, decimal_words(table, others(-1)), rate, *times.remarks, *remarks]
-    left_out = [*table.left_out, *lost]
-    return replace(
-        recording, understood=", ".join(parts) + (f"; left out: {', '.join(left_out)}" if left_out else "")
+        heads,
+        [head for place, head in enumerate(table.heads) if head and place not in used],
+        ", ".join(parts) + (f"; left out: {', '.join(left_out)}" if left_out else ""),
     )
 
 
 def remedy(quantity: str, heads: Sequence[str]) -> str:
     """Words for a file without the column of a quantity, with one of its `heads` for example: the key that names
     it."""
-    if not heads:
+    head = printable(next((name for each in heads if (name := name_and_unit(each)[0])), ""))
+    if not head:
         return ""
-    head = printable(name_and_unit(heads[0])[0])
     return f'; name it by the key columns, such as columns = {{ "{quantity}" = "{head}" }}'
 
 
@@ -228,11 +243,14 @@ def _is_named(head: str, name: str) -> bool:
     return name_and_unit(head, [name])[0].lower() == name.lower()
 
 
+_OF_COUNTS = ("", "1", "-", "0/1", "bool", "boolean", "count", "counts", "pulses", "imp", "inc")
+
+
 def _scale(table: LoggerTable, place: int, quantity: Measurand) -> tuple[float, float]:
     """Factor and offset from the unit of the column to that of the quantity."""
     file, head, unit = table.file, table.heads[place], table.units[place]
     if quantity.unit == "1":
-        if unit not in ("", "1", "-"):
+        if unit.lower() not in _OF_COUNTS:
             raise InputError(f"{file}, column {head}: must have the unit [1]")
         return 1.0, 0.0
     if not unit:
@@ -251,14 +269,14 @@ def _scale(table: LoggerTable, place: int, quantity: Measurand) -> tuple[float, 
 
 
 def _quantities(columns: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
-    """The columns with the RMS of phase currents in their place and counters without their jumps, and words on both.
-    """
+    """The columns with the RMS of phase currents in their place, and counters without their jumps; words on both."""
     remarks = list[str]()
     phases = [name for name in PHASES if name in columns]
     found = {name: x for name, x in columns.items() if name not in PHASES}
-    if len(phases) > 1 and "motor.i" not in columns:
-        found = {"motor.i": rms_of_phases([columns[name] for name in phases]), **found}
-        remarks.append(f"motor.i is the RMS of {', '.join(phases)}")
+    if phases and "motor.i" not in columns:
+        currents = [columns[name] for name in phases]
+        found = {"motor.i": rms_of_phases(currents) if len(phases) > 1 else currents[0], **found}
+        remarks.append(f"motor.i is {'the RMS of ' if len(phases) > 1 else ''}{', '.join(phases)}")
     if "motor.count" in found:
         found["motor.count"], wraps = unwrapped(found["motor.count"])
         if wraps:
@@ -271,3 +289,67 @@ def rms_of_phases(currents: Sequence[Any]) -> Any:
     if len(currents) == 2:
         currents = [*currents, -currents[0] - currents[1]]
     return np.sqrt(sum(i**2 for i in currents) / 3.0)
+
+
+_SUPPLY = (15.0, 1000.0)
+"""Range of the frequency of a motor's current [Hz]."""
+
+
+def with_rms(recording: Recording, turn: float) -> Recording:
+    """A recording of which an instantaneous current of one phase is replaced by its RMS over each period of the
+    supply; `turn` is the time of a turn of the crank [s]. Each period makes a row.
+
+    Raises
+    ------
+    InputError
+        for a current whose rows do not resolve its periods.
+    """
+    current = recording.columns.get("motor.i")
+    if current is None:
+        return recording
+    frequency = _alternating(recording.time, current, turn)
+    if not frequency:
+        return recording
+    rows = 1.0 / (frequency * recording.step)
+    if rows < 8.0:
+        raise InputError(
+            f"{recording.source}, column {recording.heads['motor.i']}: is the instantaneous current of a phase, of "
+            f"{frequency:.4g} Hz, with {rows:.2g} rows in a period; must have >= 8, or be the RMS"
+        )
+    period = np.floor((recording.time - recording.time[0]) * frequency).astype(int)
+    # the RMS of a part of a period is another one
+    whole = np.bincount(period) > 0.9 * rows
+    place = (np.cumsum(whole) - 1)[period]
+    inside, count = whole[period], np.bincount(period)[whole]
+
+    def mean(x: Any) -> Any:
+        return np.bincount(place[inside], x[inside]) / count
+
+    time = mean(recording.time)
+    columns = {name: mean(x) for name, x in recording.columns.items()}
+    columns["motor.i"] = np.sqrt(mean((current - np.mean(current)) ** 2))
+    if "mark" in columns:
+        passed = recording.time[recording.columns["mark"] > 0.5]
+        columns["mark"] = np.zeros(len(time))
+        at = np.searchsorted(time, passed)
+        columns["mark"][at[at < len(time)]] = 1.0
+    if "motor.count" in columns:
+        columns["motor.count"] = np.floor(columns["motor.count"])
+    words = f"motor.i is instantaneous, of {frequency:.4g} Hz: its RMS over each of {len(time):,} periods"
+    return replace(recording, time=time, columns=columns, understood=f"{recording.understood}, {words}")
+
+
+def _alternating(time: Any, current: Any, turn: float) -> float:
+    """The frequency of a current without a mean that alternates faster than the crank turns [Hz]; else 0."""
+    size = float(np.sqrt(np.mean(current**2)))
+    if not abs(float(np.mean(current))) < 0.1 * size:
+        return 0.0
+    step = float(np.median(np.diff(time)))
+    even = np.interp(np.arange(time[0], time[-1], step), time, current)
+    power = np.abs(np.fft.rfft((even - np.mean(even)) * np.hanning(len(even)))) ** 2
+    frequencies = np.fft.rfftfreq(len(even), step)
+    peak = float(frequencies[np.argmax(power)])
+    near = np.abs(frequencies - peak) <= 0.1 * peak
+    if not _SUPPLY[0] <= peak <= _SUPPLY[1] or peak * turn < 2.5 or power[near].sum() < 0.7 * power.sum():
+        return 0.0
+    return float(np.average(frequencies[near], weights=power[near]))

@@ -18,7 +18,7 @@ from ..study.conditions import given
 from ..study.entry_values import filled_text
 from ..study.rules import MACHINE_FMU, MOTOR_FMU, Rule, motor_is_chosen, other_models
 from .measurands import COLUMNS as READABLE
-from .recording import Recording, read_signal
+from .recording import Recording, read_signal, with_rms
 
 
 @declaration
@@ -65,7 +65,7 @@ class PlannedRecording:
 
     def read(self) -> Recording:
         """The part that counts; errors are those of `chainunit.recordings.recording.read_signal`."""
-        return read_signal(self.file, self.columns, self.begin, self.end)
+        return with_rms(read_signal(self.file, self.columns, self.begin, self.end), self.turn)
 
 
 def recording_rules(table: str) -> Iterator[Rule]:
