@@ -321,7 +321,7 @@ def test_columns_may_have_other_heads_and_decimal_commas(tmp_path):
         (table("time [s],motor.i [A]").replace("\n0.003,4\n", "\n\n0.003,1e999\n"),
          "line 6, column 2, motor.i [A]: 1e999 is no number"),
         (table("time [s],motor.i [A]").replace("\n0.003,4\n", "\n1_000,4\n"),
-         "line 5: 1_000: is no row of measurements"),
+         "line 5, column 1, time [s]: 1_000 is no number"),
         (table("time [s],motor.i [A]").replace("\n0.003,4\n", "\n0.001,4\n"),
          "line 5: time = 0.001 s: must be later than 0.002 s of the line before"),
         (table("Zeit [s],Strom [A]"),

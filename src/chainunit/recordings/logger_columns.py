@@ -36,7 +36,8 @@ _DAY = 86400.0
 _EPOCHS = (("s", 1e9, 3e9), ("ms", 1e12, 3e12), ("µs", 1e15, 3e15), ("ns", 1e18, 3e18))
 """By unit, the numbers of the years 2001 to 2065 since 1970."""
 _SIGN = re.compile(r"^([+-]) +(?=\d)", re.MULTILINE)
-_GROUP = re.compile(r"(?<=\d)[ '’\u00a0\u2009\u202f](?=\d{3}(?!\d))")
+_BLANKS = " '’\u00a0\u2009\u202f"
+_GROUP = re.compile(rf"(?<=\d)[{_BLANKS}](?=\d{{3}}(?!\d))")
 
 
 def numbers(table: LoggerTable, place: int, others: frozenset[str], boolean: bool = False) -> Any:
@@ -98,7 +99,7 @@ _SHAPES = {sign: _shapes(sign) for sign in ".,"}
 def decimal_signs(cells: Sequence[str]) -> frozenset[str]:
     """The signs that cells certainly have as decimal ones, also behind the seconds of a clock."""
     text = "\n".join(cells)
-    signs = {sign for sign, (decimal, _, _) in _SHAPES.items() if decimal.search(text)}
+    signs = {sign for sign, (decimal, _, _) in _SHAPES.items() if sign in text and decimal.search(text)}
     if clock := re.search(r":\d\d([.,])\d+(?: ?[AaPp]\.?[Mm]\.?)?$", text, re.MULTILINE):
         signs.add(clock[1])
     return frozenset(signs)
@@ -107,12 +108,20 @@ def decimal_signs(cells: Sequence[str]) -> frozenset[str]:
 def _plain(table: LoggerTable, place: int, others: frozenset[str]) -> list[str]:
     """The cells of a column with a decimal point and without marks of thousands."""
     # Python takes an underscore for a mark of thousands
-    text = _SIGN.sub(r"\1", "\n".join(table.column(place)).replace("_", "?"))
-    if _GROUP.search(text) and not re.search(r"^[+-]?\d{4}", text, re.MULTILINE):
+    text = "\n".join(table.column(place)).replace("_", "?")
+    if " " in text:
+        text = _SIGN.sub(r"\1", text)
+    if (
+        any(sign in text for sign in _BLANKS)
+        and _GROUP.search(text)
+        and not re.search(r"^[+-]?\d{4}", text, re.MULTILINE)
+    ):
         text = _GROUP.sub("", text)
-    own = {sign for sign, (decimal, _, _) in _SHAPES.items() if decimal.search(text)}
-    grouped = {sign for sign, (_, thousands, _) in _SHAPES.items() if thousands.search(text)}
-    maybe = {sign for sign, (_, _, either) in _SHAPES.items() if either.search(text)}
+    present = {sign: shapes for sign, shapes in _SHAPES.items() if sign in text}
+    own = {sign for sign, (decimal, _, _) in present.items() if decimal.search(text)}
+    maybe = {sign for sign, (_, _, either) in present.items() if either.search(text)}
+    several = re.search(r"[.,]\d*[.,]", text)
+    grouped = {sign for sign, (_, thousands, _) in present.items() if several and thousands.search(text)}
     own |= {"," if sign == "." else "." for sign in grouped}
     if len(own) > 1:
         raise _doubtful(table, place, own, is_mixed=True)

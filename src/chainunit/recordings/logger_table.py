@@ -35,7 +35,7 @@ DATE = re.compile(
 )
 _COMPACT = re.compile(r"(\d{4})(\d\d)(\d\d)[T_ ](\d\d)(\d\d)(\d\d)(?=\D|$)")
 _NUMBER = re.compile(r"[+-]?\s*(?:\d[\d.,' \u00a0\u2009\u202f’]*|[.,]\d+)(?:[eE][+-]?\d+)?")
-WITH_UNIT = re.compile(rf"({_NUMBER.pattern}) ?([^\W\d][\w/%]{{0,5}}|%)")
+WITH_UNIT = re.compile(rf"({_NUMBER.pattern}) ?([^\W\d_][\w/%]{{0,5}}|%)")
 """A number with its unit in one cell."""
 _COMMENTS = ("#", "%", "//", "!")
 _REMARK = re.compile(r"\s#(?!N/A|NV|VALUE|DIV|NUM|REF|NULL|WERT).*$", re.IGNORECASE)
@@ -346,7 +346,7 @@ def _cells(file: Path, lines: Sequence[tuple[int, str]], mark: str) -> Iterator[
     number = 0
     try:
         for (number, line), cells in zip(lines, reader, strict=True):
-            yield number, line, [cell.strip() for cell in cells]
+            yield number, line, [cell.strip() for cell in cells] if " " in line or "\t" in line else cells
     except csv.Error as error:
         raise InputError(f"{file}, line {number}: no valid CSV ({error})") from error
 
