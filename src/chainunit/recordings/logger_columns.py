@@ -18,8 +18,10 @@ LOST = 0.2
 """Largest share of the rows without a number in a column."""
 COARSE = 0.2
 """Share of rows with the time of the row before, from which on a clock is too coarse for the rows."""
-WRAPS = (2.0**16, 2.0**24, 2.0**31, 2.0**32)
+WRAPS = tuple(2.0**bits for bits in range(10, 33))
 """Sizes of counters that begin anew."""
+LEAST_OF_CLOCKS = 2.0**16
+"""Least size of the counter of a clock."""
 _OVERLOAD = 9.8e37
 """A meter in overload, by IEEE 488.2, gives 9.9e37."""
 _BOOLEANS = {
@@ -36,6 +38,7 @@ _DAY = 86400.0
 _EPOCHS = (("s", 1e9, 3e9), ("ms", 1e12, 3e12), ("µs", 1e15, 3e15), ("ns", 1e18, 3e18))
 """By unit, the numbers of the years 2001 to 2065 since 1970."""
 _SIGN = re.compile(r"^([+-]) +(?=\d)", re.MULTILINE)
+_OF_FORTRAN = re.compile(r"(?<=[\d.,])D(?=[+-]\d)")
 _BLANKS = " '’\u00a0\u2009\u202f"
 _GROUP = re.compile(rf"(?<=\d)[{_BLANKS}](?=\d{{3}}(?!\d))")
 
@@ -111,6 +114,8 @@ def _plain(table: LoggerTable, place: int, others: frozenset[str]) -> list[str]:
     text = "\n".join(table.column(place)).replace("_", "?")
     if " " in text:
         text = _SIGN.sub(r"\1", text)
+    if "D" in text:
+        text = _OF_FORTRAN.sub("e", text)
     if (
         any(sign in text for sign in _BLANKS)
         and _GROUP.search(text)
@@ -187,7 +192,8 @@ def time_places(table: LoggerTable, place: int | None) -> list[int]:
     if place is None and len(kinds) != 1 + len(more):
         return []
     places = [first, *more[:1]]
-    if "clock" in (kinds[k] for k in places) or kinds[first] == "both":
+    cells = (date_and_clock(table.rows[0][k]) for k in places)
+    if any(cell and cell[1] and cell[1]["s"] and not cell[1]["f"] for cell in cells):
         places += [k for k, head in enumerate(table.heads) if _fraction(table, k, head)][:1]
     return places
 
@@ -242,7 +248,7 @@ def times(table: LoggerTable, places: Sequence[int], others: frozenset[str]) -> 
     else:
         x = numbers(table, places[0], others)
         factor, source = _unit_of_time(table, head, table.units[places[0]], x)
-        x, wraps = unwrapped(x)
+        x, wraps = unwrapped(x, LEAST_OF_CLOCKS)
         time = x * factor
         if wraps:
             source += f" (the counter begins anew {wraps} {'time' if wraps == 1 else 'times'})"
@@ -280,7 +286,7 @@ def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
     """The times from the first row on, by dates and times of the day."""
     count = len(table.rows)
     seconds, days = np.full(count, np.nan), list[str]()
-    short, hours, zones = True, set[int](), set[str]()
+    short, has_fraction, hours, zones = True, False, set[int](), set[str]()
     for k, row in enumerate(table.rows):
         parts = [date_and_clock(row[place]) for place in places if not row[place].isdigit()]
         day = "".join(part[0] for part in parts if part)
@@ -292,7 +298,7 @@ def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
             seconds[k] = 0.0 if day and len(places) == 1 else np.nan
             continue
         h, m, s = int(clock["h"]), int(clock["m"]), clock["s"]
-        short = short and s is None
+        short, has_fraction = short and s is None, has_fraction or bool(clock["f"])
         if s is None:
             h, m, s = 0, h, str(m)
             if clock["f"] is None:
@@ -313,7 +319,7 @@ def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
             f"({', '.join(sorted(map(repr, zones)))}); write all in one"
         )
     for place in places:
-        if factor := _fraction(table, place, table.heads[place]):
+        if not has_fraction and (factor := _fraction(table, place, table.heads[place])):
             seconds += factor * np.array([float(row[place]) for row in table.rows])
     if any(days):
         seconds += _DAY * np.array(_day_numbers(table, days, places[0]))
@@ -322,9 +328,11 @@ def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
         source += f", from {days[0]} on, as 0 s" + (f" ({zone})" if zone else "")
     else:
         before = seconds
-        seconds = _over_midnight(seconds, 3600.0 if short else _DAY)
+        order = -1 if np.nanmedian(np.diff(seconds)) < 0.0 else 1
+        seconds = _over_midnight(seconds[::order], 3600.0 if short else _DAY)
         if hours <= set(range(1, 13)) and not short:
             seconds = _over_midnight(seconds, 0.5 * _DAY)
+        seconds = seconds[::order]
         source = "time from a clock, the first row as 0 s"
         if not np.array_equal(before, seconds, equal_nan=True):
             source += f", over {'the full hour' if short else 'midnight'}"
@@ -386,7 +394,7 @@ def _ordinal(day: str, order: str) -> int:
     return date(y if y > 99 else 2000 + y, m, d).toordinal()
 
 
-def unwrapped(x: Any) -> tuple[Any, int]:
+def unwrapped(x: Any, least: float = WRAPS[0]) -> tuple[Any, int]:
     """A counter without the falls at which it begins anew, and their number: it falls by nearly the size of a
     counter, and goes on as before."""
     steps = np.diff(x)
@@ -395,9 +403,9 @@ def unwrapped(x: Any) -> tuple[Any, int]:
     if not len(falls) or len(falls) > 0.2 * len(steps) or not len(rising):
         return x, 0
     largest = float(np.max(rising))
-    for size in WRAPS:
+    for size in (each for each in WRAPS if each >= least):
         inside = np.nanmin(x) >= -0.5 * size and np.nanmax(x) < size
-        if inside and np.all((steps[falls] + size >= 0.0) & (steps[falls] + size <= 2.0 * largest + 1.0)):
+        if inside and np.all((steps[falls] + size >= 0.0) & (steps[falls] + size <= 2.0 * largest)):
             return x + size * np.cumsum(np.diff(x, prepend=x[:1]) < 0.0), len(falls)
     return x, 0
 
@@ -456,7 +464,11 @@ def _spread(table: LoggerTable, t: Any, head: str) -> Any:
             return even + 0.5 * step
     rows = len(t) / (len(at) + 1)
     cause = (
-        "all rows have one time" if not len(at) else f"the time goes on after {rows:.3g} rows, and not evenly"
+        "all rows have one time"
+        if not len(at)
+        else f"the time goes on {len(at)} times in {len(t)} rows"
+        if len(at) < 3
+        else f"the time goes on after {rows:.3g} rows, and not evenly"
     )
     more = (
         " (a number of 32 bits does not hold a date in seconds)"

@@ -26,7 +26,7 @@ MISSING = re.compile(
 """Cells without a measurement, and of a meter whose range is exceeded."""
 CLOCK = re.compile(
     r"(?:(?P<days>\d+) days? |(?P<span>\d+)\.(?=\d\d:\d\d:\d\d))?(?P<h>\d{1,3}):(?P<m>\d{2})(?::(?P<s>\d{2}))?"
-    r"(?:[.,:](?P<f>\d+))?(?: ?(?P<half>[AaPp])\.?[Mm]\.?)?(?P<zone> ?(?:Z|UTC|GMT|[+-]\d\d:?(?:\d\d)?))?"
+    r"(?:[.,:](?P<f>\d+))?(?: ?(?P<half>[AaPp])\.?[Mm]\.?)?(?P<zone> ?(?:[A-Z]{1,5}|[+-]\d\d:?(?:\d\d)?))?"
 )
 """A time of the day, or one that has passed, such as 23:59:40.024, 11:59:40 PM, 59:40.0 and 0 days 00:00:00.024."""
 DATE = re.compile(
@@ -34,7 +34,7 @@ DATE = re.compile(
     r"|[^\W\d_]{3,9}\.? \d{1,2},? \d{4}"
 )
 _COMPACT = re.compile(r"(\d{4})(\d\d)(\d\d)[T_ ](\d\d)(\d\d)(\d\d)(?=\D|$)")
-_NUMBER = re.compile(r"[+-]?\s*(?:\d[\d.,' \u00a0\u2009\u202f’]*|[.,]\d+)(?:[eE][+-]?\d+)?")
+_NUMBER = re.compile(r"[+-]?\s*(?:\d[\d.,' \u00a0\u2009\u202f’]*|[.,]\d+)(?:[eED][+-]?\d+)?")
 WITH_UNIT = re.compile(rf"({_NUMBER.pattern}) ?([^\W\d_][\w/%]{{0,5}}|%)")
 """A number with its unit in one cell."""
 _COMMENTS = ("#", "%", "//", "!")
@@ -45,7 +45,7 @@ _WORDS = {
     "volts": "V", "amps": "A", "amperes": "A", "watts": "W", "msec": "ms", "millisecond": "ms", "milliseconds": "ms",
     "usec": "µs", "microseconds": "µs", "sek": "s", "secs": "s", "sekunden": "s", "newton meter": "N m",
     "newton-meter": "N m", "n-m": "N m", "lb-ft": "lbf ft", "lbf-ft": "lbf ft", "ft-lb": "lbf ft", "ft-lbf": "lbf ft",
-    "lb ft": "lbf ft", "ft lb": "lbf ft", "rev per min": "rev/min",
+    "lb ft": "lbf ft", "ft lb": "lbf ft", "rev per min": "rev/min", "rpm": "rpm",
 }  # fmt: skip
 """Units as loggers write them, and as `chainunit.core.units` reads them."""
 
@@ -92,6 +92,13 @@ def read_table(file: Path, text: str, names: Iterable[str]) -> LoggerTable:
     names = list(names)
     first = cells_of_line(sample[begin][1], mark)
     head, heads = _head_of(file, sample[:begin], first, mark, names)
+    while not heads[-1]:
+        heads.pop()
+    if len(first) < len(heads):
+        raise InputError(
+            f"{file}, line {sample[head][0]}: the head has {len(heads)} cells, and the rows {len(first)}: put a head "
+            f"with {MARKS[mark]} in it into quotation marks, or add the cells that are missing"
+        )
     rows_of_units = [cells_of_line(line, mark) for _, line in sample[head + 1 : begin]]
     units = next((row for row in rows_of_units if _is_of_units(row, len(heads))), [])
     own = [name_and_unit(each, names) for each in heads]
@@ -292,7 +299,7 @@ def _body(
     key = next(k for k, cell in enumerate(first) if _is_data(cell))
     # a date and a clock between blanks are one cell under one head
     parted = mark == " " and len(first) == width + 1 and bool(DATE.fullmatch(first[key]))
-    rows, numbers, strange = list[list[str]](), list[int](), list[tuple[int, int, str]]()
+    rows, numbers, strange = list[list[str]](), list[int](), list[tuple[int, int, list[str]]]()
     again = remarks = 0
     for number, line, cells in _cells(file, lines, mark):
         if parted and len(cells) > key + 1:
@@ -311,23 +318,30 @@ def _body(
                 again += 1
                 continue
             if len(cells) != width or not (_is_data(cells[key]) or MISSING.fullmatch(cells[key])):
-                strange.append((len(rows), number, _words(cells, heads, mark)))
+                strange.append((len(rows), number, cells))
                 continue
         elif "#" in cells[-1] and (last := _REMARK.sub("", f" {cells[-1]}").strip()) != cells[-1]:
             cells[-1], remarks = last, remarks + 1
         rows.append(cells)
         numbers.append(number)
-    footer = [each for each in strange if each[0] == len(rows)]
-    if len(footer) < len(strange) or len(footer) > _FOOTER or not rows:
-        _, number, words = strange[0]
-        raise InputError(f"{file}, line {number}: {words}")
+    # a row that is cut is the last one, and a footer has no number where the rows have one
+    end = max((number for _, number, _ in strange), default=0)
+    wrong = [
+        (number, cells)
+        for begin, number, cells in strange
+        if begin < len(rows)
+        or (key < len(cells) and _is_data(cells[key]) and not (number == end and len(cells) < width))
+    ]
+    if strange and (wrong or len(strange) > _FOOTER or not rows):
+        number, cells = wrong[0] if wrong else strange[0][1:]
+        raise InputError(f"{file}, line {number}: {_words(cells, heads, mark)}")
     left_out = [
         f"{count} {words}{'s' if count > 1 else ''}"
-        for count, words in ((again, "repeated head"), (remarks, "comment"), (len(footer), "line"))
+        for count, words in ((again, "repeated head"), (remarks, "comment"), (len(strange), "line"))
         if count
     ]
-    if footer:
-        left_out[-1] += " at the end that " + ("is no row" if len(footer) == 1 else "are no rows")
+    if strange:
+        left_out[-1] += " at the end that " + ("is no row" if len(strange) == 1 else "are no rows")
     return rows, numbers, left_out
 
 
