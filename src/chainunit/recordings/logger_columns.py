@@ -67,9 +67,14 @@ def numbers(table: LoggerTable, place: int, others: frozenset[str], boolean: boo
         if not (MISSING.fullmatch(cell) or math.isfinite(x[k])):
             words = "is no number; delete this row, or write nan for a missing measurement"
             if with_unit := WITH_UNIT.fullmatch(cell):
-                words = (
-                    f"is no number alone; write [{with_unit[2]}] into the head, and take it out of all cells"
+                found = dict.fromkeys(
+                    each[2] for x in table.column(place) if (each := WITH_UNIT.fullmatch(x))
                 )
+                words = "is no number alone, "
+                if len(found) > 1:
+                    words += f"and the units differ ({', '.join(found)}); write all in one, which stands in the head"
+                else:
+                    words += f"write [{with_unit[2]}] into the head, and take it out of all cells"
             raise InputError(
                 f"{table.file}, line {table.lines[k]}, column {place + 1}, {table.heads[place]}: "
                 f"{printable(cell, 40)} {words}"
