@@ -10,6 +10,7 @@ import csv
 import gzip
 import io
 import json
+import re
 import stat
 import struct
 import zipfile
@@ -136,9 +137,7 @@ def decoded(file: Path, data: bytes) -> str:
     InputError
         in one line that begins with the name of the file.
     """
-    for begin, kind in _OTHER_KINDS.items():
-        if data.startswith(begin):
-            raise InputError(f"{file}: is {kind}; must be a text file")
+    _refuse_other_kinds(file, data)
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -149,6 +148,39 @@ def decoded(file: Path, data: bytes) -> str:
     if "\0" in text:
         raise InputError(f"{file}: is not UTF-8 text; save it as UTF-8")
     return text
+
+
+def _refuse_other_kinds(file: Path, data: bytes) -> None:
+    for begin, kind in _OTHER_KINDS.items():
+        if data.startswith(begin):
+            raise InputError(f"{file}: is {kind}; must be a text file")
+
+
+def decoded_by_marks(file: Path, data: bytes) -> str:
+    """The text in the content of a file of an instrument: in UTF-8 or UTF-16 by its mark, else in UTF-8, else in the
+    code page 1252.
+
+    Raises
+    ------
+    InputError
+        in one line that begins with the name of the file.
+    """
+    _refuse_other_kinds(file, data)
+    # a text in UTF-16 without its mark has zeros in place of every other letter
+    wide = {b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}.get(data[:2])
+    for name, zeros in (("utf-16-le", data[1:80:2]), ("utf-16-be", data[0:80:2])):
+        wide = wide or (name if len(data) > 80 and not any(zeros) and any(data[:80]) else None)
+    for encoding in [wide] if wide else ["utf-8-sig", "cp1252"]:
+        try:
+            text = data.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+        # Ctrl-Z ends a text of DOS
+        text = text.rstrip("\0\x1a")
+        if not re.search(r"[\0-\x08\x0e-\x1b\x7f]", text):
+            return text
+        break
+    raise InputError(f"{file}: is not UTF-8 text; save it as UTF-8")
 
 
 def unzipped(file: Path, data: bytes, most: int = TEXT) -> bytes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -13,10 +14,11 @@ from ..core.errors import Faults, InputError
 from ..core.messages import unit_behind
 from ..core.units import scale
 from ..study.arrays import rms, stretches
+from .logger_table import name_and_unit
 from .measurands import COUNTS, MEASURANDS, OFFSET_SHARE
 from .plant import MOVING
 from .problem import Problem, likeness, mark_times, measured_speed, speed_column
-from .recording import Recording, name_and_unit
+from .recording import Recording
 
 MISSING = 0.2
 """Largest share of rows that may be missing."""
@@ -104,6 +106,7 @@ def inspect_runs(problem: Problem, workers: int) -> None:
         reference = run.values.get("motor.w_ref")
         if not hasattr(reference, "changes"):
             faults.add(inspect_steadiness(run.recording, ratio, run.off, reference is not None))
+            faults.add(inspect_work(run.recording, ratio, run.off))
     faults.refuse()
 
 
@@ -185,6 +188,36 @@ def inspect_steadiness(
             f"run is simulated at a constant speed: {stated}{remedy}",
         )
     ]  # fmt: skip
+
+
+def inspect_work(recording: Recording, ratio: float, off: float | None = None) -> list[InputError]:
+    """That no turn of a steady run takes work of the other sign than the run, by the mean torque or power of each.
+
+    Parameters
+    ----------
+    off : the time at which the motor is switched off [s]
+    """
+    driven = recording if off is None else recording.part(end=off)
+    _, times = _turns(driven, ratio)
+    faults = list[InputError]()
+    for name in ("motor.power", "crank.tau"):
+        if name not in driven.columns or len(times) < FEWEST_TURNS + 1.0:
+            continue
+        x = driven.columns[name]
+        ends = np.searchsorted(driven.time, times)
+        means = np.array([np.mean(x[i:k]) if k > i else np.nan for i, k in itertools.pairwise(ends)])
+        clear = OFFSETS * OFFSET_SHARE * rms(x)
+        wrong = np.flatnonzero(means * np.sign(np.nanmedian(means)) < -clear)
+        if len(wrong) and abs(np.nanmedian(means)) > clear:
+            k = int(wrong[0])
+            size, usual = (_size(name, float(x)) for x in (means[k], np.nanmedian(means)))
+            words = (
+                f"mean of {size} in the turn from {times[k]:.10g} to {times[k + 1]:.10g} s, and of {usual} in most "
+                f"turns: the work of {len(wrong)} of {len(means)} turns has the wrong sign; mend the sign or the "
+                "order of these rows, or name a part without them (begin, end)"
+            )
+            faults.append(_fault(recording, name, words))
+    return faults
 
 
 def _turns(recording: Recording, ratio: float) -> tuple[str, Any]:

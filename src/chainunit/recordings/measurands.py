@@ -33,6 +33,12 @@ _ALL = (
 )
 MEASURANDS = {each.name: each for each in _ALL}
 """By name."""
+PHASES = ("motor.ia", "motor.ib", "motor.ic")
+"""Instantaneous currents of the phases, of which a reader forms `motor.i`."""
+COLUMNS = MEASURANDS | {
+    name: Measurand(name, "A", f"instantaneous current of phase {name[-1]}") for name in PHASES
+}
+"""By name, the quantities that a file may have."""
 OF_TERMINALS = ("motor.i", "motor.u", "motor.power")
 """Signals at the terminals of the motor."""
 SIGNALS = (*OF_TERMINALS, "crank.tau")

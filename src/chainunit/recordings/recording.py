@@ -1,9 +1,9 @@
-"""A recording: columns over time from a CSV file, with names and units in its header."""
+"""A recording: columns over time from the file of a logger."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -11,25 +11,39 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import Faults, InputError, meant, near_name, printable
-from ..core.inputs import decoded, file_bytes, lines_of_table, unzipped
+from ..core.inputs import decoded_by_marks, file_bytes, unzipped
 from ..core.units import must_be, of_other_kind, scale
-from .measurands import MEASURANDS, SIGNALS, Measurand
-
-FEWEST = 100
-"""Fewest rows of a recording."""
+from .logger_columns import (
+    decimal_signs,
+    decimal_words,
+    has_times,
+    lost_rows,
+    numbers,
+    time_places,
+    unwrapped,
+)
+from .logger_columns import times as times_of
+from .logger_table import FEWEST, LoggerTable, name_and_unit, read_table
+from .measurands import COLUMNS, MEASURANDS, PHASES, SIGNALS, Measurand
 
 
 @dataclass(frozen=True)
 class Recording:
     """The rows of a file: `time` [s], shape (n,), and the `columns` by the name of the quantity, each of shape (n,),
     in the unit of the quantity. `heads` are the heads of the columns in the file, `others` those of columns that were
-    left out."""
+    left out. `understood` says in one line how the file was read."""
 
     source: str
     time: Any
     columns: Mapping[str, Any]
     heads: Mapping[str, str]
     others: Sequence[str] = ()
+    understood: str = ""
+
+    @property
+    def sentence(self) -> str:
+        """How the file was read."""
+        return f"{self.source} is read with {self.understood}"
 
     @property
     def step(self) -> float:
@@ -56,90 +70,80 @@ class Recording:
 
 
 def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Recording:
-    """Read a recording.
+    """Read a recording as loggers write it.
 
-    The first row of the file is its head, with a name and a unit for each column (``motor.i [A]``). A file whose name
-    ends with ``.gz`` is unpacked. Columns that are none of `MEASURANDS` are left out.
+    A row of the file has the head of each column, with a name and a unit (``motor.i [A]``). A file whose name ends
+    with ``.gz`` is unpacked. Columns that are none of `MEASURANDS` are left out, but for dates and times of the day,
+    which make the time if no column has its name.
 
     Parameters
     ----------
-    file : the CSV file, with commas or semicolons between the columns; after semicolons, numbers may have a decimal
-        comma
+    file : the text file, see `chainunit.recordings.logger_table`
     names : by the name of a quantity, the head of its column, where that is not the name of the quantity
 
     Raises
     ------
     InputError
         with a line for each fault: the file that cannot be read, a column without unit or with a unit that does not
-        fit, a cell that is no finite number, times that do not rise.
+        fit, cells that are no numbers, numbers that can be read in two ways, times that do not rise.
     """
-    lines = lines_of_table(file, _text(file))
-    if not lines:
-        raise InputError(f"{file}: is empty; must have a head and >= {FEWEST} rows")
-    rows = [(number, line) for number, line in enumerate(lines[1:], 2) if line.partition("#")[0].strip()]
-    if len(rows) < FEWEST:
-        raise InputError(f"{file}: has {len(rows)} rows behind its head; must have >= {FEWEST}")
-    mark = ";" if lines[0].count(";") > lines[0].count(",") else ","
-    heads = [head.strip().strip('"') for head in lines[0].split(mark)]
-    first = [_is_number(cell) for cell in rows[0][1].split(mark)]
-    if len(first) != len(heads) or not any(first):
-        raise InputError(
-            f"{file}: is no table: its first line must be the heads of the columns, such as time [s],motor.i [A], "
-            f"and the next one (line {rows[0][0]}) has to have a number for each of the {len(heads)}"
-        )
-    faults, units = Faults(), dict[str, tuple[int, float, float]]()
-    known = dict(_places(file, heads, names or {}, faults))
-    for name, (place, unit) in known.items():
+    names, faults = names or {}, Faults()
+    own = [quantity for quantity in COLUMNS if quantity not in names]
+    table = read_table(file, _text(file), [*own, *names.values()])
+    known = _places(table, names, faults)
+    time_from = time_places(table, known.pop("time", None))
+    scales = dict[str, tuple[float, float]]()
+    for name, place in known.items():
         with faults.collected():
-            units[name] = (place, *_scale(file, heads[place], MEASURANDS[name], unit))
-    if "time" not in known:
-        words = f"{meant('time', heads)} its heads are: {', '.join(heads)}"
-        faults.add([InputError(f"{file}: has no column time [s]{words}{remedy('time', heads)}")])
-    if not known.keys() - {"time"}:
+            scales[name] = _scale(table, place, COLUMNS[name])
+    signs = {place: decimal_signs(table.column(place)) for place in (*time_from, *known.values())}
+
+    def others(place: int) -> frozenset[str]:
+        return frozenset[str]().union(*(found for other, found in signs.items() if other != place))
+
+    if not time_from:
+        words = f"{meant('time', table.heads)} its heads are: {', '.join(table.heads)}"
+        faults.add([InputError(f"{file}: has no column time [s]{words}{remedy('time', table.heads)}")])
+    if not known:
         words = ", ".join(f"{each.name} [{each.unit}]" for each in MEASURANDS.values() if each.name != "time")
-        words += f"; its heads are: {', '.join(heads)}{remedy('motor.i', heads[::-1])}"
+        words += f"; its heads are: {', '.join(table.heads)}{remedy('motor.i', table.heads[::-1])}"
         faults.add([InputError(f"{file}: has no column of a known quantity, such as {words}")])
+    with faults.collected():
+        if len(time_from) == 1 and table.units[time_from[0]] and not has_times(table, time_from[0]):
+            _scale(table, time_from[0], MEASURANDS["time"])
+        times = times_of(table, time_from, others(time_from[0])) if time_from else None
     faults.refuse()
-    table = _numbers(file, rows, mark, {units[name][0]: heads[units[name][0]] for name in known})
-    columns = {name: table[:, k] * units[name][1] + units[name][2] for k, name in enumerate(known)}
-    time = columns.pop("time")
-    back = np.flatnonzero(np.diff(time) <= 0.0)
-    if len(back):
-        k = int(back[0])
-        raise InputError(
-            f"{file}, line {rows[k + 1][0]}: time = {time[k + 1]:.12g} s: must be later than {time[k]:.12g} s of the "
-            "line before"
-        )
-    used = {place for place, _ in known.values()}
+    assert times is not None
+    raw = {place: numbers(table, place, others(place), name == "mark") for name, place in known.items()}
+    whole, lost = lost_rows(table, {time_from[0]: times.missing, **raw})
+    kept = whole[times.kept]
+    rows = times.kept[kept]
+    columns, remarks = _quantities(
+        {name: raw[place][rows] * scales[name][0] + scales[name][1] for name, place in known.items()}
+    )
+    used = {*time_from, *known.values()}
+    rate = f"{len(rows):,} rows, {1.0 / float(np.median(np.diff(times.time[kept]))):.4g} Hz"
+    parts = [times.source, decimal_words(table, others(-1)), rate, *times.remarks, *remarks]
+    left_out = [*table.left_out, *lost]
+    heads = {name: table.heads[place] for name, place in known.items()} | {"time": table.heads[time_from[0]]}
+    if "motor.i" in columns and "motor.i" not in heads:
+        heads["motor.i"] = ", ".join(heads[name] for name in PHASES if name in heads)
     return Recording(
         str(file),
-        time,
+        times.time[kept],
         columns,
-        {name: heads[place] for name, (place, _) in known.items()},
-        [head for place, head in enumerate(heads) if place not in used],
+        heads,
+        [head for place, head in enumerate(table.heads) if head and place not in used],
+        ", ".join(parts) + (f"; left out: {', '.join(left_out)}" if left_out else ""),
     )
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell.replace(",", "."))
-    except ValueError:
-        return False
-    return True
-
-
-def name_and_unit(head: str) -> tuple[str, str]:
-    """The name of a column and its unit, as its head has them; the unit may be missing."""
-    name, _, rest = head.partition("[")
-    return name.strip(), rest.partition("]")[0].strip()
 
 
 def remedy(quantity: str, heads: Sequence[str]) -> str:
     """Words for a file without the column of a quantity, with one of its `heads` for example: the key that names
     it."""
-    if not heads:
+    head = printable(next((name for each in heads if (name := name_and_unit(each)[0])), ""))
+    if not head:
         return ""
-    head = printable(name_and_unit(heads[0])[0])
     return f'; name it by the key columns, such as columns = {{ "{quantity}" = "{head}" }}'
 
 
@@ -200,32 +204,53 @@ def _text(file: Path) -> str:
     content = file_bytes(file)
     if file.suffix == ".gz":
         content = unzipped(file, content)
-    return decoded(file, content)
+    return decoded_by_marks(file, content)
 
 
-def _places(
-    file: Path, heads: list[str], names: Mapping[str, str], faults: Faults
-) -> Iterator[tuple[str, tuple[int, str]]]:
-    """By quantity, the place of its column and its unit in the head."""
-    plain = [name_and_unit(head)[0] for head in heads]
-    for quantity, head in names.items():
-        if quantity not in MEASURANDS:
-            hint = near_name(quantity, MEASURANDS) or f"; there are {', '.join(MEASURANDS)}"
+def _places(table: LoggerTable, names: Mapping[str, str], faults: Faults) -> dict[str, int]:
+    """By quantity, the place of its column."""
+    file, heads = table.file, table.heads
+    places = dict[str, int]()
+    for quantity in COLUMNS:
+        wanted = names.get(quantity, quantity)
+        whole = [k for k, head in enumerate(heads) if head == wanted]
+        alike = whole or [k for k, head in enumerate(heads) if _is_named(head, wanted)]
+        if quantity not in names:
+            alike = [k for k in alike if not any(_is_named(heads[k], head) for head in names.values())]
+        if len(alike) > 1:
+            columns = " and ".join(str(k + 1) for k in alike)
+            different = len({heads[k] for k in alike}) == len(alike)
+            words = (
+                f'name one by the key columns, such as columns = {{ "{quantity}" = "{printable(heads[alike[0]])}" }}'
+                if different
+                else "give all but one of them another head"
+            )
+            faults.add([InputError(f"{file}: columns {columns} have the head {printable(wanted)}; {words}")])
+        elif alike:
+            places[quantity] = alike[0]
+        elif quantity in names:
+            hint = near_name(wanted, [name_and_unit(head)[0] for head in heads])
+            hint = hint or f"; its heads are: {', '.join(heads)}"
+            faults.add([InputError(f"columns.{quantity} = {wanted!r}: no such column of {file}{hint}")])
+    for quantity in names:
+        if quantity not in COLUMNS:
+            hint = near_name(quantity, COLUMNS) or f"; there are {', '.join(COLUMNS)}"
             faults.add([InputError(f"columns.{quantity}: no such quantity{hint}")])
-        elif head not in plain and head not in heads:
-            hint = near_name(head, plain) or f"; its heads are: {', '.join(heads)}"
-            faults.add([InputError(f"columns.{quantity} = {head!r}: no such column of {file}{hint}")])
-    taken = {head: quantity for quantity, head in names.items()}
-    for place, (head, name) in enumerate(zip(heads, plain, strict=True)):
-        quantity = taken.get(head, taken.get(name, name if name not in names else ""))
-        if quantity in MEASURANDS:
-            yield quantity, (place, name_and_unit(head)[1])
+    return places
 
 
-def _scale(file: Path, head: str, quantity: Measurand, unit: str) -> tuple[float, float]:
+def _is_named(head: str, name: str) -> bool:
+    return name_and_unit(head, [name])[0].lower() == name.lower()
+
+
+_OF_COUNTS = ("", "1", "-", "0/1", "bool", "boolean", "count", "counts", "pulses", "imp", "inc")
+
+
+def _scale(table: LoggerTable, place: int, quantity: Measurand) -> tuple[float, float]:
     """Factor and offset from the unit of the column to that of the quantity."""
+    file, head, unit = table.file, table.heads[place], table.units[place]
     if quantity.unit == "1":
-        if unit not in ("", "1"):
+        if unit.lower() not in _OF_COUNTS:
             raise InputError(f"{file}, column {head}: must have the unit [1]")
         return 1.0, 0.0
     if not unit:
@@ -243,30 +268,88 @@ def _scale(file: Path, head: str, quantity: Measurand, unit: str) -> tuple[float
         ) from error
 
 
-def _numbers(file: Path, rows: Sequence[tuple[int, str]], mark: str, heads: Mapping[int, str]) -> Any:
-    """The cells of the columns whose `heads` are given by place, shape (rows, columns), of lines with their
-    numbers."""
-    if mark == ";":
-        rows = [(number, line.replace(",", ".")) for number, line in rows]
-    try:
-        table = np.loadtxt(
-            [line for _, line in rows], delimiter=mark, usecols=list(heads), ndmin=2, comments=None
+def _quantities(columns: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
+    """The columns with the RMS of phase currents in their place, and counters without their jumps; words on both."""
+    remarks = list[str]()
+    phases = [name for name in PHASES if name in columns]
+    found = {name: x for name, x in columns.items() if name not in PHASES}
+    if phases and "motor.i" not in columns:
+        currents = [columns[name] for name in phases]
+        found = {"motor.i": rms_of_phases(currents) if len(phases) > 1 else currents[0], **found}
+        remarks.append(f"motor.i is {'the RMS of ' if len(phases) > 1 else ''}{', '.join(phases)}")
+    if "motor.count" in found:
+        found["motor.count"], wraps = unwrapped(found["motor.count"])
+        if wraps:
+            remarks.append(f"the count begins anew {wraps} {'time' if wraps == 1 else 'times'}: joined")
+    return found, remarks
+
+
+def rms_of_phases(currents: Sequence[Any]) -> Any:
+    """The RMS of a phase by the instantaneous currents of two or three phases, whose sum is zero."""
+    if len(currents) == 2:
+        currents = [*currents, -currents[0] - currents[1]]
+    return np.sqrt(sum(i**2 for i in currents) / 3.0)
+
+
+_SUPPLY = (15.0, 1000.0)
+"""Range of the frequency of a motor's current [Hz]."""
+
+
+def with_rms(recording: Recording, turn: float) -> Recording:
+    """A recording of which an instantaneous current of one phase is replaced by its RMS over each period of the
+    supply; `turn` is the time of a turn of the crank [s]. Each period makes a row.
+
+    Raises
+    ------
+    InputError
+        for a current whose rows do not resolve its periods.
+    """
+    current = recording.columns.get("motor.i")
+    if current is None:
+        return recording
+    frequency = _alternating(recording.time, current, turn)
+    if not frequency:
+        return recording
+    rows = 1.0 / (frequency * recording.step)
+    if rows < 8.0:
+        raise InputError(
+            f"{recording.source}, column {recording.heads['motor.i']}: is the instantaneous current of a phase, of "
+            f"{frequency:.4g} Hz, with {rows:.2g} rows in a period; must have >= 8, or be the RMS"
         )
-        # it takes nan and inf for numbers
-        if np.isfinite(table).all():
-            return table
-    except (ValueError, IndexError):
-        pass
-    for number, line in rows:
-        cells = line.split(mark)
-        for place, head in heads.items():
-            cell = cells[place].strip() if place < len(cells) else ""
-            try:
-                if not math.isfinite(float(cell)):
-                    raise ValueError
-            except ValueError:
-                words = (
-                    f"{printable(cell) or 'an empty cell'} is no number; leave out rows without measurement"
-                )
-                raise InputError(f"{file}, line {number}, column {place + 1}, {head}: {words}") from None
-    raise InputError(f"{file}: is no table of numbers")
+    period = np.floor((recording.time - recording.time[0]) * frequency).astype(int)
+    # the RMS of a part of a period is another one
+    whole = np.bincount(period) > 0.9 * rows
+    place = (np.cumsum(whole) - 1)[period]
+    inside, count = whole[period], np.bincount(period)[whole]
+
+    def mean(x: Any) -> Any:
+        return np.bincount(place[inside], x[inside]) / count
+
+    time = mean(recording.time)
+    columns = {name: mean(x) for name, x in recording.columns.items()}
+    columns["motor.i"] = np.sqrt(mean((current - np.mean(current)) ** 2))
+    if "mark" in columns:
+        passed = recording.time[recording.columns["mark"] > 0.5]
+        columns["mark"] = np.zeros(len(time))
+        at = np.searchsorted(time, passed)
+        columns["mark"][at[at < len(time)]] = 1.0
+    if "motor.count" in columns:
+        columns["motor.count"] = np.floor(columns["motor.count"])
+    words = f"motor.i is instantaneous, of {frequency:.4g} Hz: its RMS over each of {len(time):,} periods"
+    return replace(recording, time=time, columns=columns, understood=f"{recording.understood}, {words}")
+
+
+def _alternating(time: Any, current: Any, turn: float) -> float:
+    """The frequency of a current without a mean that alternates faster than the crank turns [Hz]; else 0."""
+    size = float(np.sqrt(np.mean(current**2)))
+    if not abs(float(np.mean(current))) < 0.1 * size:
+        return 0.0
+    step = float(np.median(np.diff(time)))
+    even = np.interp(np.arange(time[0], time[-1], step), time, current)
+    power = np.abs(np.fft.rfft((even - np.mean(even)) * np.hanning(len(even)))) ** 2
+    frequencies = np.fft.rfftfreq(len(even), step)
+    peak = float(frequencies[np.argmax(power)])
+    near = np.abs(frequencies - peak) <= 0.1 * peak
+    if not _SUPPLY[0] <= peak <= _SUPPLY[1] or peak * turn < 2.5 or power[near].sum() < 0.7 * power.sum():
+        return 0.0
+    return float(np.average(frequencies[near], weights=power[near]))

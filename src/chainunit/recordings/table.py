@@ -17,8 +17,8 @@ from ..reading.tables import instance
 from ..study.conditions import given
 from ..study.entry_values import filled_text
 from ..study.rules import MACHINE_FMU, MOTOR_FMU, Rule, motor_is_chosen, other_models
-from .measurands import MEASURANDS
-from .recording import Recording, read_signal
+from .measurands import COLUMNS as READABLE
+from .recording import Recording, read_signal, with_rms
 
 
 @declaration
@@ -65,7 +65,7 @@ class PlannedRecording:
 
     def read(self) -> Recording:
         """The part that counts; errors are those of `chainunit.recordings.recording.read_signal`."""
-        return read_signal(self.file, self.columns, self.begin, self.end)
+        return with_rms(read_signal(self.file, self.columns, self.begin, self.end), self.turn)
 
 
 def recording_rules(table: str) -> Iterator[Rule]:
@@ -112,8 +112,8 @@ def _read_heads(entry: Entry) -> dict[str, str]:
     columns: dict[str, str] = {}
     for quantity_name, head in leaves(entry.given.get("columns", {})):
         key = f"columns.{quantity_name}"
-        if quantity_name not in MEASURANDS:
-            hint = near_name(quantity_name, MEASURANDS) or f"; there are {', '.join(MEASURANDS)}"
+        if quantity_name not in READABLE:
+            hint = near_name(quantity_name, READABLE) or f"; there are {', '.join(READABLE)}"
             entry.fault(key, f"no such quantity{hint}")
         elif not isinstance(head, str):
             entry.wrong(key, head, "must be the head of its column")

@@ -168,6 +168,7 @@ def test_one_run_does_not_tell_web_from_feed(tmp_path):
     done = chainunit("identify", "mine.toml", "-o", "out", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     before = " ".join(done.stderr.split())
+    assert "loaded.csv.gz is read with time in s, commas between columns, decimal point, " in before
     assert (
         "Before the fit: these recordings can determine 2 of 4 numbers (feed.right.material_mass to" in before
     )

@@ -33,7 +33,19 @@ def identify(
     def before_fit(*information: Any) -> None:
         errors.print(sentence_before_fit(*information), soft_wrap=True)
 
-    carry_out(TASK, question, output, errors, before_fit=before_fit, whole=whole, png=png)
+    def after_reading(sentence: str) -> None:
+        errors.print(f"{sentence}.", soft_wrap=True, markup=False)
+
+    carry_out(
+        TASK,
+        question,
+        output,
+        errors,
+        before_fit=before_fit,
+        after_reading=after_reading,
+        whole=whole,
+        png=png,
+    )
 
 
 COMMANDS = (identify,)

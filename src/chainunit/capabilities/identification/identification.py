@@ -173,12 +173,14 @@ def identify(
     config: Config,
     progress: TaskProgress = quiet,
     before_fit: Callable[[IdentificationPlan, Information], None] = lambda *_: None,
+    after_reading: Callable[[str], None] = lambda _: None,
 ) -> IdentifiedMachine:
     """Identify the machine of a study from the recordings of its table [identify].
 
     Parameters
     ----------
     before_fit : gets the plan and the information of the recordings, before anything is fitted
+    after_reading : gets a sentence on each recording, how its file was read
 
     Raises
     ------
@@ -191,6 +193,8 @@ def identify(
     workers = min(2, os.cpu_count() or 1)
     progress("reading recordings", 0.0, 1.0)
     recordings = read_runs(plan.runs)
+    for recording in recordings.values():
+        after_reading(recording.sentence)
     check_motor_is_known(recordings, is_known=config.knows_motor)
     drive = drive_of(config)
     progress("simulating", 0.1, 1.0)
@@ -345,6 +349,7 @@ def remarks(machine: IdentifiedMachine) -> Iterator[str]:
             " % within a turn, as most of it magnetises the motor: record the power, too, which tells far more"
         )
     for run in runs:
+        yield run.recording.sentence
         for name in sorted(
             each for each in columns - run.recording.columns.keys() if MEASURANDS[each].analog
         ):

@@ -42,6 +42,7 @@ class IdentifiedRun:
     """A run, and its recording."""
 
     file: str = part("the recording")
+    understood: str = part("how the file of the recording was read")
     columns: list[str] = part("columns of the recording")
     rows: int = quantity("1", "number of rows")
     duration: float = quantity("s", "time from the first to the last row")
@@ -186,6 +187,7 @@ def _run(machine: IdentifiedMachine, k: int) -> IdentifiedRun:
     run, recording = machine.plan.runs[k], machine.problem.runs[k].recording
     return IdentifiedRun(
         file=str(run.file),
+        understood=recording.understood,
         columns=list(recording.columns),
         rows=len(recording.time),
         duration=float(recording.time[-1] - recording.time[0]),

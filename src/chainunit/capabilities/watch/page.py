@@ -92,6 +92,7 @@ def _opening(s: b.Source) -> Iterator[b.Block]:
     for each in s.lines("constant_parts"):
         more = ": a sensor that is stuck, a stop or a limit. An alarm in this time may be false."
         yield b.Judgement("warning", line(each, more))
+    yield b.Judgement("remark", s.line("{file} is read with {understood}."))
     for k in range(len(s.result["gaps"])):
         words = f"No rows from {{gaps.{k}.from:4}} to {{gaps.{k}.to:4}}: the observer starts anew behind this gap."
         yield b.Judgement("remark", s.line(words))

@@ -25,6 +25,7 @@ class WatchedFile:
     """The recording, and the time of learning."""
 
     file: str = part("the recording")
+    understood: str = part("how the file of the recording was read")
     columns: list[str] = part("columns of the recording")
     duration: float = quantity("s", "time from the first to the last row")
     turns: float = quantity("1", "turns of the crank")
@@ -123,6 +124,7 @@ def _summary(watched: WatchedRecording) -> WatchSummary:
         heading=Heading.of(watched.config.title, watched.config.file),
         recording=WatchedFile(
             file=str(plan.file),
+            understood=recording.understood,
             columns=list(recording.columns),
             duration=duration,
             turns=duration / plan.turn,

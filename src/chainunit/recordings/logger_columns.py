@@ -1,0 +1,526 @@
+"""The numbers and the times in the columns of a logger's table."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from datetime import date
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..core.errors import InputError, printable
+from ..core.units import scale
+from .logger_table import MARKS, MISSING, WITH_UNIT, LoggerTable, date_and_clock, is_time, name_and_unit
+
+LOST = 0.2
+"""Largest share of the rows without a number in a column."""
+COARSE = 0.2
+"""Share of rows with the time of the row before, from which on a clock is too coarse for the rows."""
+WRAPS = tuple(2.0**bits for bits in range(10, 33))
+"""Sizes of counters that begin anew."""
+LEAST_OF_CLOCKS = 2.0**16
+"""Least size of the counter of a clock."""
+_OVERLOAD = 9.8e37
+"""A meter in overload, by IEEE 488.2, gives 9.9e37."""
+_BOOLEANS = {
+    word: float(k)
+    for k, words in enumerate(("false off no low falsch aus nein", "true on yes high wahr ein ja"))
+    for word in words.split()
+}
+_FRACTIONS = {"ms": 1e-3, "msec": 1e-3, "millis": 1e-3, "us": 1e-6, "usec": 1e-6, "µs": 1e-6, "ns": 1e-9} | {
+    f"{prefix}{word}": factor
+    for prefix, factor in (("milli", 1e-3), ("micro", 1e-6), ("nano", 1e-9))
+    for word in ("second", "seconds", "sekunden")
+}
+_DAY = 86400.0
+_EPOCHS = (("s", 1e9, 3e9), ("ms", 1e12, 3e12), ("µs", 1e15, 3e15), ("ns", 1e18, 3e18))
+"""By unit, the numbers of the years 2001 to 2065 since 1970."""
+_SIGN = re.compile(r"^([+-]) +(?=\d)", re.MULTILINE)
+_OF_FORTRAN = re.compile(r"(?<=[\d.,])D(?=[+-]\d)")
+_BLANKS = " '’\u00a0\u2009\u202f"
+_GROUP = re.compile(rf"(?<=\d)[{_BLANKS}](?=\d{{3}}(?!\d))")
+
+
+def numbers(table: LoggerTable, place: int, others: frozenset[str], boolean: bool = False) -> Any:
+    """The numbers of a column, NaN where a cell has none.
+
+    Parameters
+    ----------
+    others : the decimal signs that other columns show
+    boolean : whether words such as "on" are numbers
+
+    Raises
+    ------
+    InputError
+        for a cell that is no number, and for signs that may be decimal ones or stand between thousands.
+    """
+    cells = _plain(table, place, others)
+    try:
+        values = list(map(float, cells))
+    except ValueError:
+        values = [_number(cell, boolean) for cell in cells]
+    x = np.array(values)
+    for k in map(int, np.flatnonzero(~(np.abs(x) < _OVERLOAD))):
+        cell = table.rows[k][place]
+        if not (MISSING.fullmatch(cell) or math.isfinite(x[k])):
+            words = "is no number; delete this row, or write nan for a missing measurement"
+            if with_unit := WITH_UNIT.fullmatch(cell):
+                found = dict.fromkeys(
+                    each[2] for x in table.column(place) if (each := WITH_UNIT.fullmatch(x))
+                )
+                words = "is no number alone, "
+                if len(found) > 1:
+                    words += f"and the units differ ({', '.join(found)}); write all in one, which stands in the head"
+                else:
+                    words += f"write [{with_unit[2]}] into the head, and take it out of all cells"
+            raise InputError(
+                f"{table.file}, line {table.lines[k]}, column {place + 1}, {table.heads[place]}: "
+                f"{printable(cell, 40)} {words}"
+            )
+        x[k] = np.nan
+    return x
+
+
+def _number(cell: str, boolean: bool) -> float:
+    if boolean and cell.lower() in _BOOLEANS:
+        return _BOOLEANS[cell.lower()]
+    try:
+        return float(cell)
+    except ValueError:
+        return math.nan
+
+
+def _shapes(sign: str) -> tuple[re.Pattern[str], re.Pattern[str], re.Pattern[str]]:
+    """Patterns of cells in which a `sign` is certainly a decimal one, certainly one of thousands, and maybe each."""
+    s, o = re.escape(sign), re.escape("," if sign == "." else ".")
+    may_be = rf"[+-]?[1-9]\d{{0,2}}{s}\d{{3}}"
+    decimal = rf"^(?!{may_be}$)[+-]?(?:\d{{1,3}}(?:{o}\d{{3}})+{s}\d*|\d*{s}\d*)(?:[eE][+-]?\d+)?$"
+    thousands = rf"^[+-]?[1-9]\d{{0,2}}(?:(?:{s}\d{{3}}){{2,}}(?:{o}\d*)?|{s}\d{{3}}{o}\d*)$"
+    return tuple(re.compile(each, re.MULTILINE) for each in (decimal, thousands, rf"^{may_be}$"))  # type: ignore[return-value]
+
+
+_SHAPES = {sign: _shapes(sign) for sign in ".,"}
+
+
+def decimal_signs(cells: Sequence[str]) -> frozenset[str]:
+    """The signs that cells certainly have as decimal ones, also behind the seconds of a clock."""
+    text = "\n".join(cells)
+    signs = {sign for sign, (decimal, _, _) in _SHAPES.items() if sign in text and decimal.search(text)}
+    if clock := re.search(r":\d\d([.,])\d+(?: ?[AaPp]\.?[Mm]\.?)?$", text, re.MULTILINE):
+        signs.add(clock[1])
+    return frozenset(signs)
+
+
+def _plain(table: LoggerTable, place: int, others: frozenset[str]) -> list[str]:
+    """The cells of a column with a decimal point and without marks of thousands."""
+    # Python takes an underscore for a mark of thousands
+    text = "\n".join(table.column(place)).replace("_", "?")
+    if " " in text:
+        text = _SIGN.sub(r"\1", text)
+    if "D" in text:
+        text = _OF_FORTRAN.sub("e", text)
+    if (
+        any(sign in text for sign in _BLANKS)
+        and _GROUP.search(text)
+        and not re.search(r"^[+-]?\d{4}", text, re.MULTILINE)
+    ):
+        text = _GROUP.sub("", text)
+    present = {sign: shapes for sign, shapes in _SHAPES.items() if sign in text}
+    own = {sign for sign, (decimal, _, _) in present.items() if decimal.search(text)}
+    maybe = {sign for sign, (_, _, either) in present.items() if either.search(text)}
+    several = re.search(r"[.,]\d*[.,]", text)
+    grouped = {sign for sign, (_, thousands, _) in present.items() if several and thousands.search(text)}
+    own |= {"," if sign == "." else "." for sign in grouped}
+    if len(own) > 1:
+        raise _doubtful(table, place, own, is_mixed=True)
+    if not own and maybe:
+        # commas, bars and blanks between columns come with decimal points
+        usual = frozenset(".") if table.mark in (",", "|", " ", "  ") else frozenset()
+        if len(maybe) > 1 or maybe != (others or usual):
+            raise _doubtful(table, place, maybe)
+        own = maybe
+    if own and (maybe - own) - grouped:
+        raise _doubtful(table, place, maybe - own)
+    decimal = next(iter(own), "")
+    if decimal == ",":
+        text = text.replace(".", "").replace(",", ".")
+    elif decimal == ".":
+        text = text.replace(",", "")
+    return text.split("\n")
+
+
+def _doubtful(table: LoggerTable, place: int, signs: Iterable[str], is_mixed: bool = False) -> InputError:
+    """The refusal of a column whose numbers can be read in two ways, by its first such cell with each sign."""
+    cells = table.column(place)
+    found = {
+        sign: next(
+            k for k, cell in enumerate(cells) if sign in cell and (is_mixed or _SHAPES[sign][2].match(cell))
+        )
+        for sign in sorted(signs)
+    }
+    k = next(iter(found.values()))
+    where = f"{table.file}, line {table.lines[k]}, column {place + 1}, {table.heads[place]}: {cells[k]}"
+    if is_mixed:
+        other = " and ".join(f"{cells[j]} (line {table.lines[j]})" for j in list(found.values())[1:])
+        return InputError(f"{where} and {other} have different decimal signs; write all with the same one")
+    point, whole = cells[k].replace(",", "."), re.sub(r"[.,]", "", cells[k])
+    return InputError(
+        f"{where} may be {point} or {whole}: write the numbers of this column without a mark of thousands ({whole}), "
+        f"or with another number of decimals ({cells[k]}0)"
+    )
+
+
+class Times(NamedTuple):
+    """Rising times [s] of the `kept` rows, words on their source, and remarks; `missing` is NaN in each row of the
+    file without a time, else 0."""
+
+    time: Any
+    kept: Any
+    missing: Any
+    source: str
+    remarks: list[str]
+
+
+def time_places(table: LoggerTable, place: int | None) -> list[int]:
+    """The columns of the time: the one of the given `place`, and beside it one with the date or the time of the day;
+    without it those that hold times."""
+    kinds = {k: kind for k, cell in enumerate(table.rows[0]) if (kind := _kind(table, k))}
+    if place is not None and place not in kinds:
+        return [place]
+    if place is None and not kinds:
+        return _parts(table)
+    wanted = {"date": "clock", "clock": "date"}
+    first = place if place is not None else next(iter(kinds))
+    more = [k for k, kind in kinds.items() if k != first and wanted.get(kinds[first]) == kind]
+    if place is None and len(kinds) != 1 + len(more):
+        return []
+    places = [first, *more[:1]]
+    cells = (date_and_clock(table.rows[0][k]) for k in places)
+    if any(cell and cell[1] and cell[1]["s"] and not cell[1]["f"] for cell in cells):
+        places += [k for k, head in enumerate(table.heads) if _fraction(table, k, head)][:1]
+    return places
+
+
+def has_times(table: LoggerTable, place: int) -> bool:
+    """Whether a column has dates or times of the day."""
+    return bool(_kind(table, place))
+
+
+def _kind(table: LoggerTable, place: int) -> str:
+    """Whether a column has dates, times of the day, or both; empty for other cells."""
+    cells = [row[place] for row in table.rows[:20] if not MISSING.fullmatch(row[place])]
+    found = [date_and_clock(cell) for cell in cells]
+    if not found or None in found:
+        return ""
+    first = found[0]
+    assert first is not None
+    return "clock" if not first[0] else "both" if first[1] else "date"
+
+
+def _fraction(table: LoggerTable, place: int, head: str) -> float:
+    """The unit of a column with parts of a second beside a clock [s]; 0 for another column."""
+    factor = _FRACTIONS.get(name_and_unit(head)[0].lower(), 0.0)
+    cells = table.column(place) if factor else []
+    return factor if cells and all(cell.isdigit() and int(cell) * factor < 1.0 for cell in cells) else 0.0
+
+
+_PARTS = ("hour", "minute", "second", "day", "month", "year")
+
+
+def _parts(table: LoggerTable) -> list[int]:
+    """The columns of hour, minute and second, and of a date."""
+    heads = [name_and_unit(head)[0].lower().rstrip("s") for head in table.heads]
+    if not {"hour", "minute", "second"} <= set(heads):
+        return []
+    return [heads.index(part) for part in _PARTS if part in heads]
+
+
+def times(table: LoggerTable, places: Sequence[int], others: frozenset[str]) -> Times:
+    """The times of the rows by the columns at `places`; `others` are the decimal signs of other columns.
+
+    Raises
+    ------
+    InputError
+        for times that do not rise, and for those that do not resolve the rows.
+    """
+    head = table.heads[places[0]]
+    if has_times(table, places[0]):
+        time, source = _of_clock(table, places)
+    elif len(places) > 1:
+        time, source = _of_parts(table, places, others)
+    else:
+        x = numbers(table, places[0], others)
+        factor, source = _unit_of_time(table, head, table.units[places[0]], x)
+        x, wraps = unwrapped(x, LEAST_OF_CLOCKS)
+        time = x * factor
+        if wraps:
+            source += f" (the counter begins anew {wraps} {'time' if wraps == 1 else 'times'})"
+    return _ordered(table, time, source, head)
+
+
+def _unit_of_time(table: LoggerTable, head: str, unit: str, x: Any) -> tuple[float, str]:
+    if unit and not is_time(unit):
+        return scale(unit, "s")[0], f"time in {unit}"
+    for each, low, high in _EPOCHS:
+        if np.nanmin(x) >= low and np.nanmax(x) < high:
+            return scale(each, "s")[0], f"time in {each} since 1970"
+    steps = np.abs(np.diff(x))
+    if np.nanmin(x) > 2e4 and np.nanmax(x) < 8e4 and np.nanmedian(steps) < 2e-5:
+        return _DAY, "time in days of a spreadsheet"
+    raise InputError(
+        f"{table.file}, column {head}: has no unit; write [s] behind its name, or its own unit, such as {head} [ms]"
+    )
+
+
+def _of_parts(table: LoggerTable, places: Sequence[int], others: frozenset[str]) -> tuple[Any, str]:
+    names = [name_and_unit(table.heads[k])[0].lower().rstrip("s") for k in places]
+    columns = {name: numbers(table, k, others) for name, k in zip(names, places, strict=True)}
+    time = 3600.0 * columns["hour"] + 60.0 * columns["minute"] + columns["second"]
+    if {"year", "month", "day"} <= columns.keys():
+        parts = zip(columns["year"], columns["month"], columns["day"], strict=True)
+        days = np.array([date(int(y), int(m), int(d)).toordinal() for y, m, d in parts], float)
+        time = time + _DAY * (days - days[0])
+    else:
+        time = _over_midnight(time, _DAY)
+    return time - time[0], f"time from {len(places)} columns"
+
+
+def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
+    """The times from the first row on, by dates and times of the day."""
+    count = len(table.rows)
+    seconds, days = np.full(count, np.nan), list[str]()
+    short, has_fraction, hours, zones = True, False, set[int](), set[str]()
+    for k, row in enumerate(table.rows):
+        parts = [date_and_clock(row[place]) for place in places if not row[place].isdigit()]
+        day = "".join(part[0] for part in parts if part)
+        clock = next((part[1] for part in parts if part and part[1]), None)
+        days.append(day)
+        if clock is None:
+            if not all(MISSING.fullmatch(row[place]) for place in places) and not (day and all(parts)):
+                raise _no_time(table, k, places)
+            seconds[k] = 0.0 if day and len(places) == 1 else np.nan
+            continue
+        h, m, s = int(clock["h"]), int(clock["m"]), clock["s"]
+        short, has_fraction = short and s is None, has_fraction or bool(clock["f"])
+        if s is None:
+            h, m, s = 0, h, str(m)
+            if clock["f"] is None:
+                raise InputError(
+                    f"{table.file}, line {table.lines[k]}, column {places[0] + 1}, {table.heads[places[0]]}: "
+                    f"{printable(clock[0], 40)} may be hh:mm or mm:ss, and does not resolve the rows; write "
+                    "hh:mm:ss.fff"
+                )
+        if clock["half"]:
+            h = h % 12 + 12 * (clock["half"] in "pP")
+        hours.add(h)
+        zones.add((clock["zone"] or "").strip())
+        passed = int(clock["days"] or clock["span"] or 0)
+        seconds[k] = _DAY * passed + 3600.0 * h + 60.0 * m + int(s) + float(f"0.{clock['f'] or 0}")
+    if len(zones) > 1:
+        raise InputError(
+            f"{table.file}, column {table.heads[places[0]]}: has times of {len(zones)} zones "
+            f"({', '.join(sorted(map(repr, zones)))}); write all in one"
+        )
+    for place in places:
+        if not has_fraction and (factor := _fraction(table, place, table.heads[place])):
+            seconds += factor * np.array([float(row[place]) for row in table.rows])
+    if any(days):
+        seconds += _DAY * np.array(_day_numbers(table, days, places[0]))
+        zone = next(iter(zones), "")
+        source = f"time from {len(places)} columns" if len(places) > 1 else "time from dates and clock"
+        source += f", from {days[0]} on, as 0 s" + (f" ({zone})" if zone else "")
+    else:
+        before = seconds
+        order = -1 if np.nanmedian(np.diff(seconds)) < 0.0 else 1
+        seconds = _over_midnight(seconds[::order], 3600.0 if short else _DAY)
+        if hours <= set(range(1, 13)) and not short:
+            seconds = _over_midnight(seconds, 0.5 * _DAY)
+        seconds = seconds[::order]
+        source = "time from a clock, the first row as 0 s"
+        if not np.array_equal(before, seconds, equal_nan=True):
+            source += f", over {'the full hour' if short else 'midnight'}"
+    return seconds - seconds[np.flatnonzero(np.isfinite(seconds))[0]], source
+
+
+def _no_time(table: LoggerTable, row: int, places: Sequence[int]) -> InputError:
+    cells = " ".join(table.rows[row][place] for place in places)
+    return InputError(
+        f"{table.file}, line {table.lines[row]}, column {places[0] + 1}, {table.heads[places[0]]}: "
+        f"{printable(cells, 40)} is no time as in the rows before; mend this row, or delete it"
+    )
+
+
+def _over_midnight(seconds: Any, period: float) -> Any:
+    """Times of a clock that begins anew after a `period` [s]: it falls by most of it."""
+    falls = np.diff(seconds, prepend=seconds[:1]) < -0.9 * period
+    return seconds + period * np.cumsum(falls)
+
+
+def _day_numbers(table: LoggerTable, days: Sequence[str], place: int) -> list[float]:
+    """The days since the first one; of the orders of day and month the one with the shortest recording counts."""
+    different = list(dict.fromkeys(days))
+    ways: list[dict[str, int]] = []
+    for order in ("ymd", "dmy", "mdy"):
+        try:
+            ways.append({day: _ordinal(day, order) for day in different})
+        except (ValueError, OverflowError):
+            continue
+    spans = [way[days[-1]] - way[days[0]] for way in ways]
+    if not ways:
+        raise InputError(
+            f"{table.file}, line {table.lines[0]}, column {place + 1}, {table.heads[place]}: "
+            f"{printable(days[0], 40)} is no date that can be read; write it as 2023-06-19"
+        )
+    way = ways[min(range(len(ways)), key=lambda k: (spans[k] < 0, abs(spans[k])))]
+    return [float(way[day] - way[days[0]]) for day in days]
+
+
+_MONTHS = {
+    name: 1 + k
+    for k, names in enumerate("jan feb mar,mär,mrz apr may,mai jun jul aug sep oct,okt nov dec,dez".split())
+    for name in names.split(",")
+}
+
+
+def _ordinal(day: str, order: str) -> int:
+    """The number of a day whose date has year, month and day in this `order`; a year of four digits, and a month with
+    a name, are known by themselves."""
+    parts = re.split(r"[-/., ]+", day)
+    if named := [part for part in parts if not part.isdigit()]:
+        numbers = [part for part in parts if part.isdigit()]
+        first, last = sorted(numbers, key=len) if len(numbers[0]) == 4 else numbers
+        d, m, y = int(first), _MONTHS.get(named[0][:3].lower(), 0), int(last)
+    else:
+        if (len(parts[0]) == 4) != (order == "ymd") and max(map(len, parts)) == 4:
+            raise ValueError
+        y, m, d = (int(parts[order.index(each)]) for each in "ymd")
+    return date(y if y > 99 else 2000 + y, m, d).toordinal()
+
+
+def unwrapped(x: Any, least: float = WRAPS[0]) -> tuple[Any, int]:
+    """A counter without the falls at which it begins anew, and their number: it falls by nearly the size of a
+    counter, and goes on as before."""
+    steps = np.diff(x)
+    falls = np.flatnonzero(steps < 0.0)
+    rising = steps[steps > 0.0]
+    if not len(falls) or len(falls) > 0.2 * len(steps) or not len(rising):
+        return x, 0
+    largest = float(np.max(rising))
+    for size in (each for each in WRAPS if each >= least):
+        inside = np.nanmin(x) >= -0.5 * size and np.nanmax(x) < size
+        if inside and np.all((steps[falls] + size >= 0.0) & (steps[falls] + size <= 2.0 * largest)):
+            return x + size * np.cumsum(np.diff(x, prepend=x[:1]) < 0.0), len(falls)
+    return x, 0
+
+
+def _ordered(table: LoggerTable, time: Any, source: str, head: str) -> Times:
+    """Rising times; those of a coarse clock are spread evenly."""
+    remarks: list[str] = []
+    has_time = np.flatnonzero(np.isfinite(time))
+    if len(has_time) < 2:
+        raise InputError(f"{table.file}, column {head}: has no times")
+    order = -1 if np.all(np.diff(time[has_time]) <= 0.0) and time[has_time[0]] > time[has_time[-1]] else 1
+    if order < 0:
+        remarks.append("the last row is the first one in time")
+    has_time = has_time[::order]
+    t = time[has_time]
+    if order < 0 and not source.startswith("time in"):
+        t = t - t[0]
+    steps = np.diff(t)
+    back = np.flatnonzero(steps < 0.0)
+    if len(back):
+        remedy = "delete the rows before this line, or those from it on"
+        raise _not_later(table, int(has_time[back[0] + 1]), t[back[0] : back[0] + 2], remedy)
+    still = steps == 0.0
+    if np.mean(still) > COARSE:
+        t = _spread(table, t, head)
+        longest = int(np.max(np.diff(np.flatnonzero(np.concatenate([[True], ~still, [True]])))))
+        remarks.append(f"a coarse clock, up to {longest} rows at one time: spread evenly")
+    elif still.any():
+        rows = [table.rows[k] for k in has_time]
+        for k in map(int, np.flatnonzero(still)):
+            if rows[k] != rows[k + 1]:
+                raise _not_later(table, int(has_time[k + 1]), t[k : k + 2], "delete one of the two rows")
+        keep = np.append(True, ~still)
+        remarks.append(f"{int(still.sum())} doubled rows left out")
+        has_time, t = has_time[keep], t[keep]
+    return Times(t, has_time, np.where(np.isfinite(time), 0.0, np.nan), source, remarks)
+
+
+def _not_later(table: LoggerTable, row: int, pair: Any, remedy: str) -> InputError:
+    return InputError(
+        f"{table.file}, line {table.lines[row]}: time = {pair[1]:.12g} s: must be later than {pair[0]:.12g} s of the "
+        f"line before; {remedy}"
+    )
+
+
+def _spread(table: LoggerTable, t: Any, head: str) -> Any:
+    """Even times of rows whose clock is coarse: they lie on a line through the rows at which the clock goes on."""
+    at = 1 + np.flatnonzero(np.diff(t) > 0.0)
+    tick = float(np.median(np.diff(t[at]))) if len(at) > 1 else 0.0
+    if len(at) >= 3:
+        line = np.polynomial.Polynomial.fit(at, t[at], 1)
+        even = line(np.arange(len(t)))
+        step = float(even[1] - even[0])
+        # the clock goes on up to one row before, by half a row on average
+        if step > 0.0 and np.max(np.abs(even[at] - t[at])) <= max(tick, step):
+            return even + 0.5 * step
+    rows = len(t) / (len(at) + 1)
+    cause = (
+        "all rows have one time"
+        if not len(at)
+        else f"the time goes on {len(at)} times in {len(t)} rows"
+        if len(at) < 3
+        else f"the time goes on after {rows:.3g} rows, and not evenly"
+    )
+    more = (
+        " (a number of 32 bits does not hold a date in seconds)"
+        if t[0] > 1e9 and t[0] % 2.0**6 == 0.0
+        else ""
+    )
+    raise InputError(
+        f"{table.file}, column {head}: {cause}{more}: write the time of each row, from the first one on, to a tenth "
+        "of the time between rows"
+    )
+
+
+def lost_rows(table: LoggerTable, columns: Mapping[int, Any]) -> tuple[Any, list[str]]:
+    """Which rows have a number in all columns, and words on the others.
+
+    Raises
+    ------
+    InputError
+        for a column in which more than a share `LOST` of the numbers is missing.
+    """
+    whole = np.ones(len(table.rows), bool)
+    for place, x in columns.items():
+        missing = np.isnan(x)
+        if np.mean(missing) > LOST:
+            kinds = ", ".join(_kinds_of(table, place, missing))
+            raise InputError(
+                f"{table.file}, column {table.heads[place]}: {missing.sum()} of {len(x)} rows have no number "
+                f"({kinds}); must be <= {100.0 * LOST:.0f} %: delete these rows, or give the column another head, so "
+                "that it is left out"
+            )
+        whole &= ~missing
+    lost = ~whole
+    places = [place for place, x in columns.items() if np.isnan(x).any()]
+    kinds = ", ".join(
+        dict.fromkeys(each for k in places for each in _kinds_of(table, k, np.isnan(columns[k])))
+    )
+    count = int(lost.sum())
+    return whole, [f"{count} {'row' if count == 1 else 'rows'} without a number ({kinds})"] if count else []
+
+
+def _kinds_of(table: LoggerTable, place: int, missing: Any) -> Iterator[str]:
+    """The different cells without a number."""
+    yield from dict.fromkeys(printable(table.rows[k][place], 20) or "empty" for k in np.flatnonzero(missing))
+
+
+def decimal_words(table: LoggerTable, signs: Iterable[str]) -> str:
+    """Words on the mark between columns and on decimal signs."""
+    names = {".": "decimal point", ",": "decimal comma"}
+    found = " and ".join(names[sign] for sign in sorted(signs, reverse=True))
+    return f"{MARKS[table.mark]} between columns{', ' if found else ''}{found}"
