@@ -138,7 +138,7 @@ def test_verdict_warnings_and_notes_are_texts(result, monkeypatch):
     assert result.verdict.split("\n") == [numbers["verdict"][of]["text"] for of in ("model", "motor")]
     assert "Model of the organs, two bars" in result.verdict and "not valid" in result.verdict
     assert result.warnings == [each["text"] for each in numbers["warnings"]] and len(result.warnings) >= 2
-    assert any("Friction is smoothed" in note for note in result.notes)
+    assert any("Static friction is not modelled" in note for note in result.notes)
     monkeypatch.setattr(StudyRecord, "insufficient", "All runs are with one which is insufficient.")
     assert result.verdict.endswith("which is insufficient.")
 
