@@ -4,6 +4,8 @@ Make the FMU first: `chainunit export ChamberForces -o ChamberForces.fmu`.
 """
 
 import shutil
+import sys
+from pathlib import Path
 
 import fmpy
 import numpy as np
@@ -36,6 +38,8 @@ class Motor:
             self.integral += dt * error * (abs(i_ref) < 4.4)
 
 
+if not Path("ChamberForces.fmu").exists():
+    sys.exit("ChamberForces.fmu is missing: chainunit export ChamberForces -o ChamberForces.fmu")
 description, folder = fmpy.read_model_description("ChamberForces.fmu"), fmpy.extract("ChamberForces.fmu")
 references = {v.name: v.valueReference for v in description.modelVariables}
 identifier = description.coSimulation.modelIdentifier

@@ -528,7 +528,7 @@ def test_default_name_and_what_the_command_refuses(tmp_path, monkeypatch, capsys
         (["none.toml"], "none.toml: cannot be read"),
         (["wrong.toml"], "wrong.toml:2: machine: r = 0.9 m: the crank cannot turn"),
         (["--backend", "fortran"], "'fortran' is not one of"),
-        (["--backend", "python", "-o", "wrong.toml/x.ssp"], "wrong.toml: cannot be written to"),
+        (["--backend", "python", "-o", "wrong.toml/x.ssp"], "wrong.toml: is a file; must be a folder"),
     ):
         status, out, error = command(*arguments)
         assert (status, out, error.count("\n")) == (2, "", 1) and messages in error

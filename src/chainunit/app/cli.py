@@ -17,7 +17,6 @@ import typer
 import typer.core
 
 from ..capabilities import modules
-from ..capabilities.vouching.command import COMMANDS as VOUCHING
 from ..core.errors import InputError, InterruptedRunError, RunError, printable
 from ..core.files import full, written
 from ..report.command_options import AllOption, BackendOption, OutputFolder, PicturesOption
@@ -193,13 +192,14 @@ def study(
     )
 
 
-vouch = typer.Typer(rich_markup_mode=None, no_args_is_help=True)
-app.add_typer(vouch, name="vouch", help="Certify an FMU or SSP package, verify a certified one, make a key.")
 for module in modules("command"):
+    if (group := getattr(module, "GROUP", None)) is not None:
+        below = typer.Typer(rich_markup_mode=None, no_args_is_help=True)
+        app.add_typer(below, name=group, help=module.__doc__)
+        for command in module.COMMANDS:
+            below.command()(command)
     for command in module.COMMANDS:
-        app.command(hidden=command in VOUCHING)(command)
-for command in VOUCHING:
-    vouch.command()(command)
+        app.command(hidden=group is not None)(command)
 app.command(cls=ExportCommand)(export)
 app.command("export-ssp", hidden=True)(export_ssp)
 app.command()(catalogue)

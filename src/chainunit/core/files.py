@@ -165,6 +165,8 @@ def folder(path: Path) -> Path:
     InputError
         where it cannot be made or written to.
     """
+    if path.is_file():
+        raise InputError(f"{path}: is a file; must be a folder")
     try:
         path.mkdir(parents=True, exist_ok=True)
         probe = path / f".{secrets.token_hex(8)}.part"

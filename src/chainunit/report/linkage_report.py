@@ -288,6 +288,7 @@ def _forces(s: b.Source, f: LinkageFindings) -> Iterator[b.Block]:
     yield b.Text(
         s.line(f"Inverse dynamics at {{=speed:4}} of the driver{there}, with the loads of normal running."),
         "lead",
+        central=True,
     )
     slides = f.machine.model.slides
     effort, inertia_word = ("force", "mass") if slides else ("torque", "inertia")

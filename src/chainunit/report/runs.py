@@ -27,6 +27,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
             yield from _begin(s, study, run, phase)
     if s.result["pins"]:
         yield _pins(s, study)
+        yield _largest_pin(s, study)
     if loops := s.result.get("speed_loop"):
         title = "The linearised speed loop; deviation and settling are those after a step of the load torque"
         rows = {loop: spoken(loop) if len(loops) > 1 else "constant inertia" for loop in loops}
@@ -106,11 +107,21 @@ def _beside_the_worst(s: b.Source, study: StudyRecord) -> b.Table:
     title = whole.title
     if peaks:
         shown.append(max(peaks, key=lambda run: abs(peaks[run])))
-        title = f"Steady running beside the worst overload: {run_names.title(study, shown[-1])}"
+        bare = " (without torque limiter)" if study.proposal is not None else ""
+        title = f"Steady running beside the worst overload{bare}: {run_names.title(study, shown[-1])}"
     places = [0, *(1 + runs.index(run) for run in shown)]
     rows = (replace(row, cells=tuple(row.cells[i] for i in places)) for row in whole.rows)
     columns = tuple(whole.columns[i] for i in places)
     return replace(whole, rows=tuple(rows), columns=columns, groups=(), title=title, form="screen")
+
+
+def _largest_pin(s: b.Source, study: StudyRecord) -> b.Text:
+    """The pin with the largest force of all runs, for one screen."""
+    runs = {pin: hardest_run(study.pins, pin) for pin in next(iter(s.result["pins"].values()))}
+    pin = max(runs, key=lambda pin: s.value(f"pins.{runs[pin]}.{pin}.peak") or 0.0)
+    run = runs[pin]
+    size = s.number(f"pins.{run}.{pin}.peak")
+    return b.Text(line(f"Largest force in a pin: {pin} ", size, f" ({study.title_of(run)})."), form="screen")
 
 
 def _pins(s: b.Source, study: StudyRecord) -> b.Table:

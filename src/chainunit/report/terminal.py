@@ -88,7 +88,7 @@ def screen(report: Report, console: Console, rest: str) -> None:
     ]
     warnings = [each for each in last if each.startswith(_LAST["warning"])][:_WARNINGS]
     if len(last) > len(warnings):
-        rest = f"{len(last) - len(warnings)} more warnings and notes, {rest[0].lower()}{rest[1:]}"
+        rest = f"Warnings and notes not shown: {len(last) - len(warnings)}. {rest}"
     end = [shorten(each, console.width - 1, placeholder=" ...") + "\n" for each in warnings]
     end.append(_printed(console, lambda: console.print(rest)))
     room = _LINES - _count(end)
@@ -158,15 +158,21 @@ def _show_table(table: Table, console: Console, units: Units) -> None:
     widest = console.options.update(width=10_000)
     title = plain_line(table.title, units)
     count = len(table.columns) or len(table.rows[0].cells)
-    whole = _grid(table, range(count), units, title)
+    whole = _grid(table, range(count), units)
     if console.measure(whole, options=widest).maximum <= console.width:
-        console.print(whole)
+        _show_grid(console, title, whole)
         return
     group_columns = {i for group in table.groups for i in group}
     for group in table.groups if len(table.groups) > 1 else [range(count)]:
         places = [i for i in range(count) if i not in group_columns or i in group or len(table.groups) < 2]
         for part in _parted(table, places, units, console.width):
-            console.print(_grid(table, part, units, title, console.width))
+            _show_grid(console, title, _grid(table, part, units, console.width))
+
+
+def _show_grid(console: Console, title: str, grid: Grid) -> None:
+    if title:
+        console.print(Styled(title, "italic"))
+    console.print(grid)
 
 
 def _parted(table: Table, places: Sequence[int], units: Units, room: int) -> list[list[int]]:
@@ -199,7 +205,7 @@ def _parted(table: Table, places: Sequence[int], units: Units, room: int) -> lis
     return parts
 
 
-def _grid(table: Table, places: Sequence[int], units: Units, title: str, room: int | None = None) -> Grid:
+def _grid(table: Table, places: Sequence[int], units: Units, room: int | None = None) -> Grid:
     """The table with its columns at `places`, narrowed to the width `room` [letters] where this is given."""
     if table.columns:
         places = [i for i in places if table.columns[i].form != "long"]
@@ -211,7 +217,7 @@ def _grid(table: Table, places: Sequence[int], units: Units, title: str, room: i
     if table.note_title:
         heads.append(table.note_title)
         columns.append([table.note_title, *(row.note for row in rows)])
-    grid = Grid(title=Styled(title) if title else None, title_justify="left", show_header=bool(table.columns))
+    grid = Grid(show_header=bool(table.columns))
     widths = _widths(columns, units, room) if room else [None] * len(columns)
     of_text = [bool(table.columns) and table.columns[i].of_text for i in places]
     for k, (head, width) in enumerate(zip(heads, widths, strict=True)):

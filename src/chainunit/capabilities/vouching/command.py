@@ -1,4 +1,4 @@
-"""The commands that make a key, certify a file, and verify a certified one."""
+"""Certify an FMU or SSP package, verify a certified one, make a key."""
 
 from __future__ import annotations
 
@@ -130,5 +130,7 @@ def _exported(file: Path, folder: Path, progress: Any) -> tuple[Any, Path]:
     return model, target
 
 
+GROUP = "vouch"
+"""The command below which these stand."""
 COMMANDS = (key, certify, verify)
 KINDS: dict[str, ResultKind] = {}
