@@ -63,7 +63,7 @@ def package(tmp_path_factory):
     process = chainunit("export", "mine.toml", "-o", "out dir/mine.ssp", cwd=folder)
     assert (process.returncode, process.stderr) == (0, "")
     assert re.fullmatch(
-        r"out dir/mine\.ssp: SSP 1\.0, machine \(ChamberForces\), motor \(DcMotor\), 10 connections; FMI 2\.0.*\n",
+        r"out dir/mine\.ssp: SSP 1\.0, machine \(ChamberForces\), motor \(DcMotor\), 10 connections; FMI 2\.0.*\n(Rocker.*\n)?",
         process.stdout,
     )
     return folder / "out dir" / "mine.ssp"
@@ -520,7 +520,11 @@ def test_default_name_and_what_the_command_refuses(tmp_path, monkeypatch, capsys
 
     status, out, _ = command("--backend", "python")
     assert not status and out.startswith("ChainUnitDrive.ssp: SSP 1.0, ")
-    assert out.count("\n") == 2 and "\nNot in it: the events " in out
+    assert out.count("\n") == 3 and "\nNot in it: the events " in out
+    assert (
+        "\nRocker torque of two bars: 10 % up to a crank speed of 2.03 rad/s; this study turns at 3.00 rad/s;"
+        in out
+    )
     before = Path("ChainUnitDrive.ssp").read_bytes()
     Path("wrong.toml").write_text("[machine]\nr = 0.9")
     for arguments, messages in (

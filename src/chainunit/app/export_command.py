@@ -88,7 +88,7 @@ def export(
 ) -> None:
     """Write a model as an FMU; of a study file its whole system as one FMU, or as an SSP package of FMUs."""
     from ..fmu.backends import export as write
-    from ..study.package import is_study_file, left_out, model_and_start
+    from ..study.package import beyond_two_bars, is_study_file, left_out, model_and_start
 
     file = output
     whole = is_study_file(name)
@@ -128,8 +128,11 @@ def export(
             progress=status.update,
         )
     print(f"{file}: {model.name}, {made}")
-    if whole and loaded and (words := left_out(loaded.operation, loaded.given_events)):
-        print(words)
+    if whole and loaded:
+        for words in filter(
+            None, (left_out(loaded.operation, loaded.given_events), *beyond_two_bars(loaded))
+        ):
+            print(words)
 
 
 def export_ssp(
@@ -142,7 +145,7 @@ def export_ssp(
     names: NamesOption = VariableNames.structured,
 ) -> None:
     """Write motor and machine, connected, with their parameter sets, as an SSP 1.0 package of FMUs 2.0."""
-    from ..study.package import export_study, left_out
+    from ..study.package import beyond_two_bars, export_study, left_out
 
     if output.suffix != ".ssp":
         raise InputError(f"-o {output}: must be a file name that ends in .ssp")
@@ -157,7 +160,7 @@ def export_ssp(
             progress=status.update,
         )
     print(f"{output}: {made}")
-    if words := left_out(loaded.operation, loaded.given_events):
+    for words in filter(None, (left_out(loaded.operation, loaded.given_events), *beyond_two_bars(loaded))):
         print(words)
 
 

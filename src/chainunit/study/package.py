@@ -21,6 +21,7 @@ from ..machines.machine import Machine
 from ..mechanism.models import DirectMachine
 from ..models import model_named
 from ..reading.tables import toml
+from ..reading.text import number
 from ..system import ModelComponent, System, compiled
 from ..system.compiled import input_starts
 from ..system.ssp import export
@@ -29,7 +30,9 @@ from .config import Config
 from .cycle import cycle
 from .drive import Drive
 from .operation import OperatingConditions
+from .organ_limits import limits_of_organs
 from .registry import parts_of_line
+from .verdict import Reason, passed_limits
 
 
 def study_system(drive: Drive, operation: OperatingConditions) -> System:
@@ -161,6 +164,19 @@ def left_out(operation: OperatingConditions, events: Iterable[str]) -> str:
     if not names:
         return ""
     return f"Not in it: {'; '.join(names)}. Its loads are those of normal running."
+
+
+def beyond_two_bars(config: Config) -> list[str]:
+    """A line for each limit of the crank speed that a study with two bars an organ passes, see `study.verdict`."""
+    speed, bars = config.run.crank_speed, config.file.tables.get("organ") != "chain"
+    limits = limits_of_organs(config.machine, config.feed, ("N.m",)) if bars else ()
+    reasons = [
+        Reason(each.topic, "crank_speed", speed, each.speed, "rad/s", kind="speed")
+        for each in passed_limits(limits, speed)
+    ]
+    at = number(speed, "rad/s", "speed", beside=False)
+    remedy = 'for chains put organ = "chain" at the top of the file'
+    return [f"{reason.speed_limit}; this study turns at {at}; {remedy}." for reason in reasons]
 
 
 def _is_of(model: type[Model], drive: Drive) -> bool:
