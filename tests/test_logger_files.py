@@ -621,6 +621,21 @@ def test_a_remedy_that_is_printed_leads_to_the_goal(name, tmp_path):
     check(recording, keep.get(name, slice(None)))
 
 
+def test_a_clock_that_stands_at_some_rows(tmp_path):
+    """Rows at 1.1 kHz by a clock of 1 ms: a tenth of them has the time of the row before."""
+    time = np.arange(1000) / 1100.0
+    lines = ["time [ms],motor.i [A]", *(f"{np.floor(1000.0 * t):.0f},{np.sin(t):.4f}" for t in time)]
+    recording = read_recording(written(tmp_path, "\n".join(lines)))
+    np.testing.assert_allclose(recording.time - recording.time[0], time, atol=1e-4)
+    assert "a coarse clock, up to 2 rows at one time: spread evenly" in recording.understood
+
+
+@pytest.mark.parametrize("name", ["Swiss thousands", "French thousands", "US thousands in quotes"])
+def test_marks_of_thousands_are_said(name, tmp_path):
+    assert "marks of thousands" in read_recording(written(tmp_path, FORMATS[name][0])).understood
+    assert "thousands" not in read_recording(written(tmp_path, FORMATS["bars"][0])).understood
+
+
 def test_a_count_of_16_bits_that_begins_anew(tmp_path):
     count = 65000 + 97 * np.arange(COUNT)
     text = table(lambda k: [*plain(k), str(count[k] % 65536)], (HEADS[0], "motor.count [counts]", *HEADS[1:]))

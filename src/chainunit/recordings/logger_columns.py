@@ -16,8 +16,8 @@ from .logger_table import MARKS, MISSING, WITH_UNIT, LoggerTable, date_and_clock
 
 LOST = 0.2
 """Largest share of the rows without a number in a column."""
-COARSE = 0.2
-"""Share of rows with the time of the row before, from which on a clock is too coarse for the rows."""
+SOME, COARSE = 0.02, 0.2
+"""Shares of rows with the time of the row before: from which on a clock may be coarse, and from which on it is."""
 WRAPS = tuple(2.0**bits for bits in range(10, 33))
 """Sizes of counters that begin anew."""
 LEAST_OF_CLOCKS = 2.0**16
@@ -433,18 +433,22 @@ def _ordered(table: LoggerTable, time: Any, source: str, head: str) -> Times:
     if len(back):
         remedy = "delete the rows before this line, or those from it on"
         raise _not_later(table, int(has_time[back[0] + 1]), t[back[0] : back[0] + 2], remedy)
-    still = steps == 0.0
-    if np.mean(still) > COARSE:
-        t = _spread(table, t, head)
-        longest = int(np.max(np.diff(np.flatnonzero(np.concatenate([[True], ~still, [True]])))))
+    still = np.flatnonzero(steps == 0.0)
+    rows = [table.rows[k] for k in has_time] if len(still) else []
+    different = [int(k) for k in still if rows[k] != rows[k + 1]]
+    share, even = len(still) / len(steps), _even(t)
+    if share > SOME and even is not None and (different or share > COARSE):
+        t = even
+        longest = 1 + _longest(steps == 0.0)
         remarks.append(f"a coarse clock, up to {longest} rows at one time: spread evenly")
-    elif still.any():
-        rows = [table.rows[k] for k in has_time]
-        for k in map(int, np.flatnonzero(still)):
-            if rows[k] != rows[k + 1]:
-                raise _not_later(table, int(has_time[k + 1]), t[k : k + 2], "delete one of the two rows")
-        keep = np.append(True, ~still)
-        remarks.append(f"{int(still.sum())} doubled rows left out")
+    elif share > COARSE:
+        raise _coarse(table, t, head)
+    elif different:
+        k = different[0]
+        raise _not_later(table, int(has_time[k + 1]), t[k : k + 2], "delete one of the two rows")
+    elif len(still):
+        keep = np.append(True, steps > 0.0)
+        remarks.append(f"{len(still)} doubled rows left out")
         has_time, t = has_time[keep], t[keep]
     return Times(t, has_time, np.where(np.isfinite(time), 0.0, np.nan), source, remarks)
 
@@ -456,33 +460,38 @@ def _not_later(table: LoggerTable, row: int, pair: Any, remedy: str) -> InputErr
     )
 
 
-def _spread(table: LoggerTable, t: Any, head: str) -> Any:
-    """Even times of rows whose clock is coarse: they lie on a line through the rows at which the clock goes on."""
+def _longest(are: Any) -> int:
+    """The length of the longest series of true values."""
+    ends = np.flatnonzero(np.concatenate([[True], ~are, [True]]))
+    return int(np.max(np.diff(ends))) - 1
+
+
+def _even(t: Any) -> Any:
+    """Even times of rows whose clock is coarse: they lie on a line through the rows at which the clock goes on. None
+    for rows that are not even."""
     at = 1 + np.flatnonzero(np.diff(t) > 0.0)
-    tick = float(np.median(np.diff(t[at]))) if len(at) > 1 else 0.0
-    if len(at) >= 3:
-        line = np.polynomial.Polynomial.fit(at, t[at], 1)
-        even = line(np.arange(len(t)))
-        step = float(even[1] - even[0])
-        # the clock goes on up to one row before, by half a row on average
-        if step > 0.0 and np.max(np.abs(even[at] - t[at])) <= max(tick, step):
-            return even + 0.5 * step
-    rows = len(t) / (len(at) + 1)
+    if len(at) < 3:
+        return None
+    even = np.polynomial.Polynomial.fit(at, t[at], 1)(np.arange(len(t)))
+    step, tick = float(even[1] - even[0]), float(np.median(np.diff(t[at])))
+    is_near = step > 0.0 and np.max(np.abs(even[at] - t[at])) <= max(tick, step)
+    # the clock goes on up to one row before, by half a row on average
+    return even + 0.5 * step if is_near else None
+
+
+def _coarse(table: LoggerTable, t: Any, head: str) -> InputError:
+    """The refusal of times that do not resolve the rows."""
+    steps = int(np.sum(np.diff(t) > 0.0))
     cause = (
-        "all rows have one time"
-        if not len(at)
-        else f"the time goes on {len(at)} times in {len(t)} rows"
-        if len(at) < 3
-        else f"the time goes on after {rows:.3g} rows, and not evenly"
+        f"the time goes on {steps} times in {len(t)} rows, and not evenly"
+        if steps
+        else "all rows have one time"
     )
-    more = (
-        " (a number of 32 bits does not hold a date in seconds)"
-        if t[0] > 1e9 and t[0] % 2.0**6 == 0.0
-        else ""
-    )
-    raise InputError(
-        f"{table.file}, column {head}: {cause}{more}: write the time of each row, from the first one on, to a tenth "
-        "of the time between rows"
+    if t[0] > 1e9 and t[0] % 2.0**6 == 0.0:
+        cause += " (a number of 32 bits does not hold a date in seconds)"
+    return InputError(
+        f"{table.file}, column {head}: {cause}: write the time of each row, from the first one on, to a tenth of the "
+        "time between rows"
     )
 
 
@@ -519,8 +528,16 @@ def _kinds_of(table: LoggerTable, place: int, missing: Any) -> Iterator[str]:
     yield from dict.fromkeys(printable(table.rows[k][place], 20) or "empty" for k in np.flatnonzero(missing))
 
 
-def decimal_words(table: LoggerTable, signs: Iterable[str]) -> str:
-    """Words on the mark between columns and on decimal signs."""
+def decimal_words(table: LoggerTable, signs: Iterable[str], places: Iterable[int]) -> str:
+    """Words on the mark between columns, and on decimal signs and marks of thousands in the columns at `places`."""
     names = {".": "decimal point", ",": "decimal comma"}
     found = " and ".join(names[sign] for sign in sorted(signs, reverse=True))
-    return f"{MARKS[table.mark]} between columns{', ' if found else ''}{found}"
+    words = f"{MARKS[table.mark]} between columns{', ' if found else ''}{found}"
+    return f"{words}, marks of thousands" if any(_has_thousands(table.column(k)) for k in places) else words
+
+
+def _has_thousands(cells: Sequence[str]) -> bool:
+    text = "\n".join(cells)
+    if re.search(r"[.,]\d*[.,]", text) and any(shape.search(text) for _, shape, _ in _SHAPES.values()):
+        return True
+    return any(sign in text for sign in _BLANKS) and bool(_GROUP.search(text))
