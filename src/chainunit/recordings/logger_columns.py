@@ -136,8 +136,8 @@ def _plain(table: LoggerTable, place: int, others: frozenset[str]) -> list[str]:
     if len(own) > 1:
         raise _doubtful(table, place, own, is_mixed=True)
     if not own and maybe:
-        # commas, bars and blanks between columns come with decimal points
-        usual = frozenset(".") if table.mark in (",", "|", " ", "  ") else frozenset()
+        # semicolons between columns come with decimal commas; commas, bars and blanks with decimal points
+        usual = frozenset({";": ",", "\t": ""}.get(table.mark, "."))
         if len(maybe) > 1 or maybe != (others or usual):
             raise _doubtful(table, place, maybe)
         own = maybe
