@@ -543,6 +543,12 @@ REMEDIES = {
         "write nan for a missing measurement",
         lambda text: replaced(text, ("high", "nan")),
     ),
+    "a decimal sign left out": (
+        table(lambda k: [*plain(k), f"{TAU[k]:.2f}".replace(".", "" if k == 30 else ".")]),
+        "line 32, column 2, crank.tau [N m]: 1343590 has no decimal sign",
+        "mend it, or write nan",
+        lambda _: table(plain),
+    ),
     "an event between rows": (
         replaced(table(plain), (r"^0\.100,", "Logger restarted\n0.100,")),
         "line 7: has 1 cell",
@@ -765,3 +771,45 @@ def test_what_is_written_is_read(
     recording = read_recording(file)
     exact = [float(f"{x:.{digits}f}") * UNITS[name][of] for x in series * 9]
     np.testing.assert_allclose(recording.columns[name], exact, rtol=1e-15)
+
+
+MARKS = ",;\t|. "
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    name=st.sampled_from(sorted(FORMATS)),
+    row=st.integers(3, COUNT - 3),
+    at=st.floats(0.0, 0.999),
+    change=st.sampled_from(["left out", "added", "another one", "cut", "quote"]),
+    mark=st.sampled_from(MARKS),
+)
+def test_one_wrong_mark_is_never_misread_in_silence(name, row, at, change, mark, tmp_path_factory):
+    """Of each file, all rows that are read are right, or it is refused."""
+    text, names = FORMATS[name]
+    lines = text.splitlines()
+    k = len(lines) - COUNT + row - 3
+    line = lines[k]
+    marks = [i for i, sign in enumerate(line) if sign in MARKS]
+    i = (
+        int(at * len(line))
+        if change in ("added", "cut", "quote") or not marks
+        else marks[int(at * len(marks))]
+    )
+    lines[k] = {
+        "left out": line[:i] + line[i + 1 :],
+        "added": line[:i] + mark + line[i:],
+        "another one": line[:i] + mark + line[i + 1 :],
+        "cut": line[:i],
+        "quote": line[:i] + '"' + line[i:],
+    }[change]
+    file = tmp_path_factory.getbasetemp() / "marks.csv"
+    file.write_bytes("\n".join(lines).encode())
+    try:
+        recording = read_recording(file, names)
+    except InputError:
+        return
+    true = set(zip(TAU.tolist(), W.tolist(), MARK.tolist(), strict=True))
+    columns = (recording.columns[name].round(6).tolist() for name in ("crank.tau", "crank.w", "mark"))
+    assert set(zip(*columns, strict=True)) <= true
+    np.testing.assert_allclose(np.ptp(recording.time), T[-1], atol=0.1)

@@ -22,6 +22,8 @@ WRAPS = tuple(2.0**bits for bits in range(10, 33))
 """Sizes of counters that begin anew."""
 LEAST_OF_CLOCKS = 2.0**16
 """Least size of the counter of a clock."""
+LEFT_OUT = 0.01
+"""Largest share of numbers without a decimal sign from which it was left out."""
 _OVERLOAD = 9.8e37
 """A meter in overload, by IEEE 488.2, gives 9.9e37."""
 _BOOLEANS = {
@@ -144,11 +146,27 @@ def _plain(table: LoggerTable, place: int, others: frozenset[str]) -> list[str]:
     if own and (maybe - own) - grouped:
         raise _doubtful(table, place, maybe - own)
     decimal = next(iter(own), "")
-    if decimal == ",":
-        text = text.replace(".", "").replace(",", ".")
-    elif decimal == ".":
-        text = text.replace(",", "")
-    return text.split("\n")
+    if grouped:
+        text = re.sub(r"(?<=\d)\.(?=\d{3}(?!\d))" if decimal == "," else r"(?<=\d),(?=\d{3}(?!\d))", "", text)
+    plain = (text.replace(",", ".") if decimal == "," else text).split("\n")
+    _refuse_left_out(table, place, plain)
+    return plain
+
+
+def _refuse_left_out(table: LoggerTable, place: int, cells: Sequence[str]) -> None:
+    """Refuse a long number without a decimal sign where all others have one with the same number of decimals."""
+    digits = [re.split("[eE]", cell)[0].lstrip("+-") for cell in cells]
+    whole = [k for k, cell in enumerate(digits) if cell.isdigit()]
+    if not 0 < len(whole) <= max(1.0, LEFT_OUT * len(cells)):
+        return
+    decimals = {len(cell.partition(".")[2]) for cell in digits if "." in cell}
+    for k in whole:
+        if len(decimals) == 1 and len(digits[k]) > max(decimals) > 0:
+            raise InputError(
+                f"{table.file}, line {table.lines[k]}, column {place + 1}, {table.heads[place]}: {cells[k]} has no "
+                f"decimal sign, and the other numbers have {max(decimals)} decimals: a sign is left out; mend it, or "
+                "write nan"
+            )
 
 
 def _doubtful(table: LoggerTable, place: int, signs: Iterable[str], is_mixed: bool = False) -> InputError:
@@ -289,21 +307,27 @@ def _of_parts(table: LoggerTable, places: Sequence[int], others: frozenset[str])
 
 def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
     """The times from the first row on, by dates and times of the day."""
-    count = len(table.rows)
-    seconds, days = np.full(count, np.nan), list[str]()
-    short, has_fraction, hours, zones = True, False, set[int](), set[str]()
+    seconds, days = np.full(len(table.rows), np.nan), list[str]()
+    short, has_fraction, hours, zones = False, False, set[int](), set[str]()
+    beside = [place for place in places if _fraction(table, place, table.heads[place])]
+    places = [place for place in places if place not in beside]
+    shape = (False, False, False)
     for k, row in enumerate(table.rows):
-        parts = [date_and_clock(row[place]) for place in places if not row[place].isdigit()]
+        parts = [date_and_clock(row[place]) for place in places]
         day = "".join(part[0] for part in parts if part)
         clock = next((part[1] for part in parts if part and part[1]), None)
-        days.append(day)
+        own = bool(day), clock is not None, clock is not None and clock["s"] is None
+        shape = own if k == 0 else shape
+        days.append(day or (days[-1] if days else ""))
+        if None in parts and all(MISSING.fullmatch(row[place]) for place in places):
+            continue
+        if None in parts or own != shape or (clock and (int(clock["m"]) > 59 or int(clock["s"] or 0) > 60)):
+            raise _no_time(table, k, places)
         if clock is None:
-            if not all(MISSING.fullmatch(row[place]) for place in places) and not (day and all(parts)):
-                raise _no_time(table, k, places)
-            seconds[k] = 0.0 if day and len(places) == 1 else np.nan
+            seconds[k] = 0.0
             continue
         h, m, s = int(clock["h"]), int(clock["m"]), clock["s"]
-        short, has_fraction = short and s is None, has_fraction or bool(clock["f"])
+        short, has_fraction = s is None, has_fraction or bool(clock["f"])
         if s is None:
             h, m, s = 0, h, str(m)
             if clock["f"] is None:
@@ -323,13 +347,14 @@ def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
             f"{table.file}, column {table.heads[places[0]]}: has times of {len(zones)} zones "
             f"({', '.join(sorted(map(repr, zones)))}); write all in one"
         )
-    for place in places:
-        if not has_fraction and (factor := _fraction(table, place, table.heads[place])):
-            seconds += factor * np.array([float(row[place]) for row in table.rows])
+    for place in beside if not has_fraction else ():
+        factor = _fraction(table, place, table.heads[place])
+        seconds += factor * np.array([float(row[place]) for row in table.rows])
     if any(days):
         seconds += _DAY * np.array(_day_numbers(table, days, places[0]))
         zone = next(iter(zones), "")
-        source = f"time from {len(places)} columns" if len(places) > 1 else "time from dates and clock"
+        count = len(places) + len(beside)
+        source = f"time from {count} columns" if count > 1 else "time from dates and clock"
         source += f", from {days[0]} on, as 0 s" + (f" ({zone})" if zone else "")
     else:
         before = seconds
@@ -389,8 +414,10 @@ def _ordinal(day: str, order: str) -> int:
     a name, are known by themselves."""
     parts = re.split(r"[-/., ]+", day)
     if named := [part for part in parts if not part.isdigit()]:
-        numbers = [part for part in parts if part.isdigit()]
-        first, last = sorted(numbers, key=len) if len(numbers[0]) == 4 else numbers
+        digits = [part for part in parts if part.isdigit()]
+        if len(digits) != 2:
+            raise ValueError
+        last, first = digits if len(digits[0]) == 4 else digits[::-1]
         d, m, y = int(first), _MONTHS.get(named[0][:3].lower(), 0), int(last)
     else:
         if (len(parts[0]) == 4) != (order == "ymd") and max(map(len, parts)) == 4:
@@ -407,10 +434,10 @@ def unwrapped(x: Any, least: float = WRAPS[0]) -> tuple[Any, int]:
     rising = steps[steps > 0.0]
     if not len(falls) or len(falls) > 0.2 * len(steps) or not len(rising):
         return x, 0
-    largest = float(np.max(rising))
+    largest = 5.0 * float(np.median(rising))
     for size in (each for each in WRAPS if each >= least):
         inside = np.nanmin(x) >= -0.5 * size and np.nanmax(x) < size
-        if inside and np.all((steps[falls] + size >= 0.0) & (steps[falls] + size <= 2.0 * largest)):
+        if inside and np.all((steps[falls] + size >= 0.0) & (steps[falls] + size <= largest)):
             return x + size * np.cumsum(np.diff(x, prepend=x[:1]) < 0.0), len(falls)
     return x, 0
 
