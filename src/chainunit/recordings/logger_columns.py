@@ -297,12 +297,17 @@ def _of_parts(table: LoggerTable, places: Sequence[int], others: frozenset[str])
     columns = {name: numbers(table, k, others) for name, k in zip(names, places, strict=True)}
     time = 3600.0 * columns["hour"] + 60.0 * columns["minute"] + columns["second"]
     if {"year", "month", "day"} <= columns.keys():
-        parts = zip(columns["year"], columns["month"], columns["day"], strict=True)
-        days = np.array([date(int(y), int(m), int(d)).toordinal() for y, m, d in parts], float)
-        time = time + _DAY * (days - days[0])
+        days = np.full(len(time), np.nan)
+        for k, parts in enumerate(zip(columns["year"], columns["month"], columns["day"], strict=True)):
+            if np.isfinite(parts).all():
+                try:
+                    days[k] = date(*map(int, parts)).toordinal()
+                except ValueError as error:
+                    raise _no_time(table, k, places) from error
+        time = time + _DAY * (days - np.nanmin(days))
     else:
         time = _over_midnight(time, _DAY)
-    return time - time[0], f"time from {len(places)} columns"
+    return time - np.nanmin(time), f"time from {len(places)} columns"
 
 
 def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
