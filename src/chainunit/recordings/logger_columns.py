@@ -16,12 +16,14 @@ from .logger_table import MARKS, MISSING, WITH_UNIT, LoggerTable, date_and_clock
 
 LOST = 0.2
 """Largest share of the rows without a number in a column."""
-COARSE = 0.2
-"""Share of rows with the time of the row before, from which on a clock is too coarse for the rows."""
+SOME, COARSE = 0.02, 0.2
+"""Shares of rows with the time of the row before: from which on a clock may be coarse, and from which on it is."""
 WRAPS = tuple(2.0**bits for bits in range(10, 33))
 """Sizes of counters that begin anew."""
 LEAST_OF_CLOCKS = 2.0**16
 """Least size of the counter of a clock."""
+LEFT_OUT = 0.01
+"""Largest share of numbers without a decimal sign from which it was left out."""
 _OVERLOAD = 9.8e37
 """A meter in overload, by IEEE 488.2, gives 9.9e37."""
 _BOOLEANS = {
@@ -136,19 +138,35 @@ def _plain(table: LoggerTable, place: int, others: frozenset[str]) -> list[str]:
     if len(own) > 1:
         raise _doubtful(table, place, own, is_mixed=True)
     if not own and maybe:
-        # commas, bars and blanks between columns come with decimal points
-        usual = frozenset(".") if table.mark in (",", "|", " ", "  ") else frozenset()
+        # semicolons between columns come with decimal commas; commas, bars and blanks with decimal points
+        usual = frozenset({";": ",", "\t": ""}.get(table.mark, "."))
         if len(maybe) > 1 or maybe != (others or usual):
             raise _doubtful(table, place, maybe)
         own = maybe
     if own and (maybe - own) - grouped:
         raise _doubtful(table, place, maybe - own)
     decimal = next(iter(own), "")
-    if decimal == ",":
-        text = text.replace(".", "").replace(",", ".")
-    elif decimal == ".":
-        text = text.replace(",", "")
-    return text.split("\n")
+    if grouped:
+        text = re.sub(r"(?<=\d)\.(?=\d{3}(?!\d))" if decimal == "," else r"(?<=\d),(?=\d{3}(?!\d))", "", text)
+    plain = (text.replace(",", ".") if decimal == "," else text).split("\n")
+    _refuse_left_out(table, place, plain)
+    return plain
+
+
+def _refuse_left_out(table: LoggerTable, place: int, cells: Sequence[str]) -> None:
+    """Refuse a long number without a decimal sign where all others have one with the same number of decimals."""
+    digits = [re.split("[eE]", cell)[0].lstrip("+-") for cell in cells]
+    whole = [k for k, cell in enumerate(digits) if cell.isdigit()]
+    if not 0 < len(whole) <= max(1.0, LEFT_OUT * len(cells)):
+        return
+    decimals = {len(cell.partition(".")[2]) for cell in digits if "." in cell}
+    for k in whole:
+        if len(decimals) == 1 and len(digits[k]) > max(decimals) > 0:
+            raise InputError(
+                f"{table.file}, line {table.lines[k]}, column {place + 1}, {table.heads[place]}: {cells[k]} has no "
+                f"decimal sign, and the other numbers have {max(decimals)} decimals: a sign is left out; mend it, or "
+                "write nan"
+            )
 
 
 def _doubtful(table: LoggerTable, place: int, signs: Iterable[str], is_mixed: bool = False) -> InputError:
@@ -279,31 +297,42 @@ def _of_parts(table: LoggerTable, places: Sequence[int], others: frozenset[str])
     columns = {name: numbers(table, k, others) for name, k in zip(names, places, strict=True)}
     time = 3600.0 * columns["hour"] + 60.0 * columns["minute"] + columns["second"]
     if {"year", "month", "day"} <= columns.keys():
-        parts = zip(columns["year"], columns["month"], columns["day"], strict=True)
-        days = np.array([date(int(y), int(m), int(d)).toordinal() for y, m, d in parts], float)
-        time = time + _DAY * (days - days[0])
+        days = np.full(len(time), np.nan)
+        for k, parts in enumerate(zip(columns["year"], columns["month"], columns["day"], strict=True)):
+            if np.isfinite(parts).all():
+                try:
+                    days[k] = date(*map(int, parts)).toordinal()
+                except ValueError as error:
+                    raise _no_time(table, k, places) from error
+        time = time + _DAY * (days - np.nanmin(days))
     else:
         time = _over_midnight(time, _DAY)
-    return time - time[0], f"time from {len(places)} columns"
+    return time - np.nanmin(time), f"time from {len(places)} columns"
 
 
 def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
     """The times from the first row on, by dates and times of the day."""
-    count = len(table.rows)
-    seconds, days = np.full(count, np.nan), list[str]()
-    short, has_fraction, hours, zones = True, False, set[int](), set[str]()
+    seconds, days = np.full(len(table.rows), np.nan), list[str]()
+    short, has_fraction, hours, zones = False, False, set[int](), set[str]()
+    beside = [place for place in places if _fraction(table, place, table.heads[place])]
+    places = [place for place in places if place not in beside]
+    shape = (False, False, False)
     for k, row in enumerate(table.rows):
-        parts = [date_and_clock(row[place]) for place in places if not row[place].isdigit()]
+        parts = [date_and_clock(row[place]) for place in places]
         day = "".join(part[0] for part in parts if part)
         clock = next((part[1] for part in parts if part and part[1]), None)
-        days.append(day)
+        own = bool(day), clock is not None, clock is not None and clock["s"] is None
+        shape = own if k == 0 else shape
+        days.append(day or (days[-1] if days else ""))
+        if None in parts and all(MISSING.fullmatch(row[place]) for place in places):
+            continue
+        if None in parts or own != shape or (clock and (int(clock["m"]) > 59 or int(clock["s"] or 0) > 60)):
+            raise _no_time(table, k, places)
         if clock is None:
-            if not all(MISSING.fullmatch(row[place]) for place in places) and not (day and all(parts)):
-                raise _no_time(table, k, places)
-            seconds[k] = 0.0 if day and len(places) == 1 else np.nan
+            seconds[k] = 0.0
             continue
         h, m, s = int(clock["h"]), int(clock["m"]), clock["s"]
-        short, has_fraction = short and s is None, has_fraction or bool(clock["f"])
+        short, has_fraction = s is None, has_fraction or bool(clock["f"])
         if s is None:
             h, m, s = 0, h, str(m)
             if clock["f"] is None:
@@ -323,13 +352,14 @@ def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
             f"{table.file}, column {table.heads[places[0]]}: has times of {len(zones)} zones "
             f"({', '.join(sorted(map(repr, zones)))}); write all in one"
         )
-    for place in places:
-        if not has_fraction and (factor := _fraction(table, place, table.heads[place])):
-            seconds += factor * np.array([float(row[place]) for row in table.rows])
+    for place in beside if not has_fraction else ():
+        factor = _fraction(table, place, table.heads[place])
+        seconds += factor * np.array([float(row[place]) for row in table.rows])
     if any(days):
         seconds += _DAY * np.array(_day_numbers(table, days, places[0]))
         zone = next(iter(zones), "")
-        source = f"time from {len(places)} columns" if len(places) > 1 else "time from dates and clock"
+        count = len(places) + len(beside)
+        source = f"time from {count} columns" if count > 1 else "time from dates and clock"
         source += f", from {days[0]} on, as 0 s" + (f" ({zone})" if zone else "")
     else:
         before = seconds
@@ -389,8 +419,10 @@ def _ordinal(day: str, order: str) -> int:
     a name, are known by themselves."""
     parts = re.split(r"[-/., ]+", day)
     if named := [part for part in parts if not part.isdigit()]:
-        numbers = [part for part in parts if part.isdigit()]
-        first, last = sorted(numbers, key=len) if len(numbers[0]) == 4 else numbers
+        digits = [part for part in parts if part.isdigit()]
+        if len(digits) != 2:
+            raise ValueError
+        last, first = digits if len(digits[0]) == 4 else digits[::-1]
         d, m, y = int(first), _MONTHS.get(named[0][:3].lower(), 0), int(last)
     else:
         if (len(parts[0]) == 4) != (order == "ymd") and max(map(len, parts)) == 4:
@@ -407,10 +439,10 @@ def unwrapped(x: Any, least: float = WRAPS[0]) -> tuple[Any, int]:
     rising = steps[steps > 0.0]
     if not len(falls) or len(falls) > 0.2 * len(steps) or not len(rising):
         return x, 0
-    largest = float(np.max(rising))
+    largest = 5.0 * float(np.median(rising))
     for size in (each for each in WRAPS if each >= least):
         inside = np.nanmin(x) >= -0.5 * size and np.nanmax(x) < size
-        if inside and np.all((steps[falls] + size >= 0.0) & (steps[falls] + size <= 2.0 * largest)):
+        if inside and np.all((steps[falls] + size >= 0.0) & (steps[falls] + size <= largest)):
             return x + size * np.cumsum(np.diff(x, prepend=x[:1]) < 0.0), len(falls)
     return x, 0
 
@@ -433,18 +465,22 @@ def _ordered(table: LoggerTable, time: Any, source: str, head: str) -> Times:
     if len(back):
         remedy = "delete the rows before this line, or those from it on"
         raise _not_later(table, int(has_time[back[0] + 1]), t[back[0] : back[0] + 2], remedy)
-    still = steps == 0.0
-    if np.mean(still) > COARSE:
-        t = _spread(table, t, head)
-        longest = int(np.max(np.diff(np.flatnonzero(np.concatenate([[True], ~still, [True]])))))
+    still = np.flatnonzero(steps == 0.0)
+    rows = [table.rows[k] for k in has_time] if len(still) else []
+    different = [int(k) for k in still if rows[k] != rows[k + 1]]
+    share, even = len(still) / len(steps), _even(t)
+    if share > SOME and even is not None and (different or share > COARSE):
+        t = even
+        longest = 1 + _longest(steps == 0.0)
         remarks.append(f"a coarse clock, up to {longest} rows at one time: spread evenly")
-    elif still.any():
-        rows = [table.rows[k] for k in has_time]
-        for k in map(int, np.flatnonzero(still)):
-            if rows[k] != rows[k + 1]:
-                raise _not_later(table, int(has_time[k + 1]), t[k : k + 2], "delete one of the two rows")
-        keep = np.append(True, ~still)
-        remarks.append(f"{int(still.sum())} doubled rows left out")
+    elif share > COARSE:
+        raise _coarse(table, t, head)
+    elif different:
+        k = different[0]
+        raise _not_later(table, int(has_time[k + 1]), t[k : k + 2], "delete one of the two rows")
+    elif len(still):
+        keep = np.append(True, steps > 0.0)
+        remarks.append(f"{len(still)} doubled rows left out")
         has_time, t = has_time[keep], t[keep]
     return Times(t, has_time, np.where(np.isfinite(time), 0.0, np.nan), source, remarks)
 
@@ -456,33 +492,38 @@ def _not_later(table: LoggerTable, row: int, pair: Any, remedy: str) -> InputErr
     )
 
 
-def _spread(table: LoggerTable, t: Any, head: str) -> Any:
-    """Even times of rows whose clock is coarse: they lie on a line through the rows at which the clock goes on."""
+def _longest(are: Any) -> int:
+    """The length of the longest series of true values."""
+    ends = np.flatnonzero(np.concatenate([[True], ~are, [True]]))
+    return int(np.max(np.diff(ends))) - 1
+
+
+def _even(t: Any) -> Any:
+    """Even times of rows whose clock is coarse: they lie on a line through the rows at which the clock goes on. None
+    for rows that are not even."""
     at = 1 + np.flatnonzero(np.diff(t) > 0.0)
-    tick = float(np.median(np.diff(t[at]))) if len(at) > 1 else 0.0
-    if len(at) >= 3:
-        line = np.polynomial.Polynomial.fit(at, t[at], 1)
-        even = line(np.arange(len(t)))
-        step = float(even[1] - even[0])
-        # the clock goes on up to one row before, by half a row on average
-        if step > 0.0 and np.max(np.abs(even[at] - t[at])) <= max(tick, step):
-            return even + 0.5 * step
-    rows = len(t) / (len(at) + 1)
+    if len(at) < 3:
+        return None
+    even = np.polynomial.Polynomial.fit(at, t[at], 1)(np.arange(len(t)))
+    step, tick = float(even[1] - even[0]), float(np.median(np.diff(t[at])))
+    is_near = step > 0.0 and np.max(np.abs(even[at] - t[at])) <= max(tick, step)
+    # the clock goes on up to one row before, by half a row on average
+    return even + 0.5 * step if is_near else None
+
+
+def _coarse(table: LoggerTable, t: Any, head: str) -> InputError:
+    """The refusal of times that do not resolve the rows."""
+    steps = int(np.sum(np.diff(t) > 0.0))
     cause = (
-        "all rows have one time"
-        if not len(at)
-        else f"the time goes on {len(at)} times in {len(t)} rows"
-        if len(at) < 3
-        else f"the time goes on after {rows:.3g} rows, and not evenly"
+        f"the time goes on {steps} times in {len(t)} rows, and not evenly"
+        if steps
+        else "all rows have one time"
     )
-    more = (
-        " (a number of 32 bits does not hold a date in seconds)"
-        if t[0] > 1e9 and t[0] % 2.0**6 == 0.0
-        else ""
-    )
-    raise InputError(
-        f"{table.file}, column {head}: {cause}{more}: write the time of each row, from the first one on, to a tenth "
-        "of the time between rows"
+    if t[0] > 1e9 and t[0] % 2.0**6 == 0.0:
+        cause += " (a number of 32 bits does not hold a date in seconds)"
+    return InputError(
+        f"{table.file}, column {head}: {cause}: write the time of each row, from the first one on, to a tenth of the "
+        "time between rows"
     )
 
 
@@ -519,8 +560,16 @@ def _kinds_of(table: LoggerTable, place: int, missing: Any) -> Iterator[str]:
     yield from dict.fromkeys(printable(table.rows[k][place], 20) or "empty" for k in np.flatnonzero(missing))
 
 
-def decimal_words(table: LoggerTable, signs: Iterable[str]) -> str:
-    """Words on the mark between columns and on decimal signs."""
+def decimal_words(table: LoggerTable, signs: Iterable[str], places: Iterable[int]) -> str:
+    """Words on the mark between columns, and on decimal signs and marks of thousands in the columns at `places`."""
     names = {".": "decimal point", ",": "decimal comma"}
     found = " and ".join(names[sign] for sign in sorted(signs, reverse=True))
-    return f"{MARKS[table.mark]} between columns{', ' if found else ''}{found}"
+    words = f"{MARKS[table.mark]} between columns{', ' if found else ''}{found}"
+    return f"{words}, marks of thousands" if any(_has_thousands(table.column(k)) for k in places) else words
+
+
+def _has_thousands(cells: Sequence[str]) -> bool:
+    text = "\n".join(cells)
+    if re.search(r"[.,]\d*[.,]", text) and any(shape.search(text) for _, shape, _ in _SHAPES.values()):
+        return True
+    return any(sign in text for sign in _BLANKS) and bool(_GROUP.search(text))

@@ -260,7 +260,7 @@ def _head_of(
             bool(cell) and any(name_and_unit(cell, [name])[0].lower() == name.lower() for name in names)
             for cell in cells
         )
-        if len(cells) < 2 or (matching == 0 and _is_row(cells)):
+        if not any(cells) or len(cells) < 2 or (matching == 0 and _is_row(cells)):
             continue
         if matching > best and not (matching == 0 and _is_of_units(cells, len(cells))):
             best, place, heads = matching, k, cells

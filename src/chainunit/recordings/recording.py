@@ -103,7 +103,9 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
 
     if not time_from:
         words = f"{meant('time', table.heads)} its heads are: {', '.join(table.heads)}"
-        faults.add([InputError(f"{file}: has no column time [s]{words}{remedy('time', table.heads)}")])
+        faults.add(
+            [InputError(f"{file}: has no column time [s]{words}{remedy('time', table.heads)}, or add it")]
+        )
     if not known:
         words = ", ".join(f"{each.name} [{each.unit}]" for each in MEASURANDS.values() if each.name != "time")
         words += f"; its heads are: {', '.join(table.heads)}{remedy('motor.i', table.heads[::-1])}"
@@ -123,7 +125,7 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
     )
     used = {*time_from, *known.values()}
     rate = f"{len(rows):,} rows, {1.0 / float(np.median(np.diff(times.time[kept]))):.4g} Hz"
-    parts = [times.source, decimal_words(table, others(-1)), rate, *times.remarks, *remarks]
+    parts = [times.source, decimal_words(table, others(-1), known.values()), rate, *times.remarks, *remarks]
     left_out = [*table.left_out, *lost]
     heads = {name: table.heads[place] for name, place in known.items()} | {"time": table.heads[time_from[0]]}
     if "motor.i" in columns and "motor.i" not in heads:
