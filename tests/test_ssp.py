@@ -63,7 +63,8 @@ def package(tmp_path_factory):
     process = chainunit("export", "mine.toml", "-o", "out dir/mine.ssp", cwd=folder)
     assert (process.returncode, process.stderr) == (0, "")
     assert re.fullmatch(
-        r"out dir/mine\.ssp: SSP 1\.0, machine \(ChamberForces\), motor \(DcMotor\), 10 connections; FMI 2\.0.*\n(Rocker.*\n)?",
+        r"out dir/mine\.ssp: SSP 1\.0, machine \(ChamberForces\), motor \(DcMotor\), 10 connections; "
+        r"FMI 2\.0.*\n(Rocker.*\n)?",
         process.stdout,
     )
     return folder / "out dir" / "mine.ssp"
