@@ -80,8 +80,12 @@ def carry_out(
         if shortfall:
             errors.print(shortfall)
         raise typer.Exit(1)
+    if task.alarmed(outcome):
+        raise typer.Exit(ALARM)
 
 
+ALARM = 3
+"""Exit status of a command whose outcome is an alarm."""
 _MOST_NAMES = 8
 """Largest number of files that one screen names."""
 

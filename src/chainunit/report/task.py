@@ -72,6 +72,8 @@ class Task(Generic[Question, Outcome]):
     """the error that ended the computation early; what was computed before this error is reported and written"""
     shortfall: Callable[[Outcome], str | None] = lambda outcome: None
     """None where the outcome is what was sought, else a sentence for the terminal, or "": the exit status is 1"""
+    alarmed: Callable[[Outcome], bool] = lambda outcome: False
+    """whether the outcome, as it was sought, is an alarm: the exit status is 3"""
     content: type | None = None
     """the declared content of its result.json"""
     tells_remarks: bool = False
