@@ -606,7 +606,7 @@ def test_the_command(tmp_path, best):
     assert done.returncode == 0, done.stderr
     assert "more of crank.m.min raises peak(crank_torque) by" in done.stdout
     words = " ".join(done.stdout.split())
-    assert "The best machine has r 0.17522 m (today 0.15000 m), h" in words and "and crank.s" in words
+    assert "The best machine has r 0.17522 m (today 0.15000 m), h" in words and "crank.s -0.264" in words
     folder = tmp_path / "out" / "deep"
     names = {"best.toml", "result.json", "result.md", "report.html", "torque.png", ledger.NAME}
     assert {file.name for file in folder.iterdir()} == names

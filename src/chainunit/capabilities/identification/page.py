@@ -118,11 +118,11 @@ def _numbers(s: b.Source) -> Iterator[b.Block]:
     yield b.Table(tuple(rows), columns)
     yield b.Text(
         f"A value is that of the best fit, as {FILE} has it. Its interval is that of the distribution which the "
-        "recordings leave. A number is determined where the recordings alone give it with less than half the standard "
-        "deviation that was known before. The interval of 95 % of a number that is not determined is that of bounds, weighing and "
-        "recordings together: it is only as right as the weighing. Before the fit, a number is at its start, such "
-        "as the middle of its bounds, and the noise is as stated: so the expected deviation may differ from the "
-        "reached one.",
+        "recordings leave. A number is determined where the recordings alone give it with less than half the "
+        "standard deviation that was known before. The interval of 95 % of a number that is not determined is that "
+        "of bounds, weighing and recordings together: it is only as right as the weighing. Before the fit, a number "
+        "is at its start, such as the middle of its bounds, and the noise is as stated: so the expected deviation "
+        "may differ from the reached one.",
         "note",
     )
     rows = [
