@@ -56,7 +56,7 @@ def carry_out(
         with progress_bar(errors) as progress:
             outcome = task.outcome(question, output, progress, **options)
         report = task.report(outcome)
-        written, unwritten = task.write(outcome, report, output, png)
+        written, unwritten = task.write(question, outcome, report, output, png)
         from . import terminal
 
         console = terminal_console()

@@ -62,6 +62,9 @@ crank.s = { min = -0.3, max = 0.3 }
 """
 
 
+OF_STUDY = ("provenance.json", "study_copy.toml")
+
+
 def wishes(text=TABLE, **changes):
     for before, after in changes.items():
         assert before in text
@@ -608,7 +611,7 @@ def test_the_command(tmp_path, best):
     words = " ".join(done.stdout.split())
     assert "The best machine has r 0.17522 m (today 0.15000 m), h" in words and "crank.s -0.264" in words
     folder = tmp_path / "out" / "deep"
-    names = {"best.toml", "result.json", "result.md", "report.html", "torque.png", ledger.NAME}
+    names = {"best.toml", "result.json", "result.md", "report.html", "torque.png", ledger.NAME, *OF_STUDY}
     assert {file.name for file in folder.iterdir()} == names
     result = json.loads((folder / "result.json").read_text("utf-8"))
     assert result["quantities"]["peak(crank_torque)"]["best"]["value"] == pytest.approx(

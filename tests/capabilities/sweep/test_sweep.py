@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import pickle
@@ -816,8 +817,13 @@ def test_the_command(tmp_path):
     assert "the organs cannot follow the rocker over its swing" in done.stdout
     names = {"report.html", "result.json", "result.md", "sweep_peak_crank_torque.png", "sweep_min_margin.png"}
     written = {p.name for p in (tmp_path / "map").iterdir()}
-    # and the store, and the list of files
-    assert names <= written and len(written) == len(names) + 2
+    # and the store, the list of files, the provenance and the copy of the study file
+    assert names <= written and len(written) == len(names) + 4
+    assert (tmp_path / "map" / "study_copy.toml").read_bytes() == (tmp_path / "map.toml").read_bytes()
+    about = json.loads((tmp_path / "map" / "provenance.json").read_text("utf-8"))
+    assert about["study"]["sha256"] == hashlib.sha256((tmp_path / "map.toml").read_bytes()).hexdigest()
+    assert about["seeds"]["sweep.seed"] == 1 and about["libraries"]["numpy"] == np.__version__
+    assert about["chainunit"] and about["platform"] and set(about["commit"] or "a") <= set("0123456789abcdef")
     numbers = json.loads((tmp_path / "map" / "result.json").read_text("utf-8"))
     page = (tmp_path / "map" / "report.html").read_text("utf-8")
     assert "A. Nonymous" in page and "Map of min(margin)" in page and numbers["store"] in page

@@ -78,7 +78,7 @@ def shares_of_points(parameters: Sequence[SweptParameter], x: Any, y: Any) -> li
     return rows
 
 
-def _estimate(phi: Any, fit: _Fit, some: Any, most: float) -> Estimate:
+def _estimate(phi: Any, fit: _Polynomial, some: Any, most: float) -> Estimate:
     """The share of the terms `some` in the variance. Their parameter may have the share `most` in the rest, and what
     the rest lacks may be in its terms."""
     c, e = fit.coefficients, fit.errors
@@ -164,7 +164,7 @@ def _of_one(parameter: SweptParameter, x: Any, degree: int) -> Any:
     return q[order][np.searchsorted(values[order], x)]
 
 
-class _Fit(NamedTuple):
+class _Polynomial(NamedTuple):
     """The polynomial that fits the points: its `coefficients`, shape (terms,), and the `errors` at each point of the
     one that fits the points of the other folds, shape (points,)."""
 
@@ -172,7 +172,7 @@ class _Fit(NamedTuple):
     errors: Any
 
 
-def _fitted(phi: Any, y: Any) -> _Fit:
+def _fitted(phi: Any, y: Any) -> _Polynomial:
     """The least-squares fit with the number of terms that has the least error at points which it does not know."""
     fold = np.random.default_rng(0).permutation(len(y)) % _FOLDS
     parts = [(phi[fold == k], y[fold == k]) for k in range(_FOLDS)]
@@ -187,7 +187,7 @@ def _fitted(phi: Any, y: Any) -> _Fit:
     whole = _path(gram, moment, phi[:0], y[:0], best + 1)
     coefficients = np.zeros(len(gram))
     coefficients[whole.chosen] = np.linalg.solve(whole.basis[whole.chosen].T, whole.along)
-    return _Fit(coefficients, errors)
+    return _Polynomial(coefficients, errors)
 
 
 class _Path(NamedTuple):
