@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 from pathlib import Path
@@ -14,10 +15,12 @@ from records import record_of
 from chainunit.capabilities.blade.analysis import BladeAnalysis
 from chainunit.core.quantities import Value, declaration, group, quantity
 from chainunit.reading.results import OWN, Estimate, InUnit, as_data, derived, documented, part, result
+from chainunit.study import config as study_files
 from chainunit.study import parts
 from chainunit.study.analysis import Work
 from chainunit.study.choice import choose
 from chainunit.study.config import parse
+from chainunit.study.provenance import provenance, study_text
 from chainunit.study.rig import Rig
 from chainunit.study.turn import TurnAnalysis
 
@@ -135,3 +138,21 @@ def test_the_data_of_an_analysis_have_the_documented_names(analysis):
         Work(Rig(config.operation, drive, {}), print),
     )
     assert set(as_data(found)) == {name.split(".")[0] for name, _, _ in documented(type(found))}
+
+
+def test_the_provenance_has_the_digest_of_each_file():
+    """A study with a linkage file and a catalogue of its own; it is the same each time, and reads back."""
+    root = Path(__file__).parents[1] / "examples"
+    for name, file in (
+        ("own_catalogue.toml", "catalogue/motors.csv"),
+        ("beam_pump.toml", "linkages/pump_jack.toml"),
+    ):
+        about = provenance(study_files.load(root / name))
+        assert about == provenance(study_files.load(root / name)) and json.dumps(about)
+        assert about["study"]["sha256"] == hashlib.sha256((root / name).read_bytes()).hexdigest()
+        assert about["files"][file] == hashlib.sha256((root / file).read_bytes()).hexdigest()
+    tables = study_files.of_tables({"machine": {"r": 0.14}}, "tables")
+    assert (
+        provenance(tables)["seeds"]
+        and study_files.parse(study_text(tables.file)).machine.by_name["r"] == 0.14
+    )

@@ -56,7 +56,7 @@ def carry_out(
         with progress_bar(errors) as progress:
             outcome = task.outcome(question, output, progress, **options)
         report = task.report(outcome)
-        written, unwritten = task.write(outcome, report, output, png)
+        written, unwritten = task.write(question, outcome, report, output, png)
         from . import terminal
 
         console = terminal_console()
@@ -80,8 +80,12 @@ def carry_out(
         if shortfall:
             errors.print(shortfall)
         raise typer.Exit(1)
+    if task.alarmed(outcome):
+        raise typer.Exit(ALARM)
 
 
+ALARM = 3
+"""Exit status of a command whose outcome is an alarm."""
 _MOST_NAMES = 8
 """Largest number of files that one screen names."""
 

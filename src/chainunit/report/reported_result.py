@@ -91,7 +91,7 @@ class ReportedResult(Generic[Question, Outcome]):
             return self._write(place, png)
 
     def _write(self, folder: Path, png: bool = False) -> list[Path]:
-        paths, failure = self._task.write(self._outcome, self._report, folder, png)
+        paths, failure = self._task.write(self._question, self._outcome, self._report, folder, png)
         if failure is not None:
             raise WriteError(str(failure)) from failure
         return paths

@@ -6,14 +6,18 @@ it: they claim the folder, clear it, compute, report and write.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from ..core.errors import RunError, WriteError
-from ..core.files import ResultKind, claim, clear, write_all
+from ..core.files import ResultKind, atomic_file, claim, clear, write_all
+from ..study import provenance
+from ..study.config import Config
 from ..study.registry import command_modules
 from ..work.progress import TaskProgress
 from . import files
@@ -70,6 +74,8 @@ class Task(Generic[Question, Outcome]):
     """the error that ended the computation early; what was computed before this error is reported and written"""
     shortfall: Callable[[Outcome], str | None] = lambda outcome: None
     """None where the outcome is what was sought, else a sentence for the terminal, or "": the exit status is 1"""
+    alarmed: Callable[[Outcome], bool] = lambda outcome: False
+    """whether the outcome, as it was sought, is an alarm: the exit status is 3"""
     content: type | None = None
     """the declared content of its result.json"""
     tells_remarks: bool = False
@@ -82,13 +88,15 @@ class Task(Generic[Question, Outcome]):
     def claimed(self, question: Question, folder: Path) -> AbstractContextManager[Path]:
         """The folder, for this process alone. Errors are those of `chainunit.core.files.claim`."""
         names = [name for name in self.files if "*" not in name]
+        if isinstance(question, Config):
+            names += [provenance.FILE, provenance.COPY]
         kinds = dict(result_kinds())
         kind = kinds.pop(self.name)
         return claim(folder, *names, *self.replaced(question), kind=kind, others=kinds.values())
 
     def clear(self, folder: Path) -> None:
         """Remove the files of an earlier result from a folder, see `chainunit.core.files.clear`."""
-        names: list[str] = []
+        names: list[str] = [provenance.FILE, provenance.COPY]
         for name in self.files:
             names += sorted(file.name for file in folder.glob(name)) if "*" in name else [name]
         clear(folder, *files.names(self._stem, tuple(names)))
@@ -119,10 +127,23 @@ class Task(Generic[Question, Outcome]):
             self.clear(folder)
 
     def write(
-        self, outcome: Outcome, report: Report, folder: Path, png: bool = False
+        self, question: Question, outcome: Outcome, report: Report, folder: Path, png: bool = False
     ) -> tuple[list[Path], WriteError | None]:
-        """Write all files, figures as PNG with `png`. Returns the files, and the first error of a file that could not
-        be written, or None."""
+        """Write all files, figures as PNG with `png`; of a study also its provenance and a copy of its file. Returns
+        the files, and the first error of a file that could not be written, or None."""
+        of_task = self.writers(outcome, report, folder, files.writers(report, folder, self._stem, png))
+        texts: dict[str, Callable[[], str]] = {}
+        if isinstance(question, Config):
+            texts = {
+                provenance.FILE: lambda: json.dumps(provenance.provenance(question), indent=1) + "\n",
+                provenance.COPY: lambda: provenance.study_text(question.file),
+            }
         return write_all(
-            self.writers(outcome, report, folder, files.writers(report, folder, self._stem, png))
+            [*of_task, *(partial(_written, folder / name, text) for name, text in texts.items())]
         )
+
+
+def _written(file: Path, text: Callable[[], str]) -> list[Path]:
+    with atomic_file(file) as part:
+        part.write_bytes(text().encode())
+    return [file]

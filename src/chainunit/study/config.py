@@ -82,6 +82,8 @@ class FileContents:
     """the tables and keys as the file has them"""
     lines: Mapping[str, int] = dataclasses.field(default_factory=dict)
     """the line of each key in the file"""
+    text: str = dataclasses.field(default="", repr=False)
+    """the file as it was read; empty for tables from Python"""
     linkage: str = ""
     """name of the linkage file of its machine, if it names one"""
     linkage_lines: Mapping[str, int] = dataclasses.field(default_factory=dict)
@@ -201,7 +203,7 @@ def parse(text: str, source: str = "config") -> Config:
     InputError
         see `load`.
     """
-    return of_tables(toml(text), source).with_file(lines=lines_of(text))
+    return of_tables(toml(text), source).with_file(lines=lines_of(text), text=text)
 
 
 def of_tables(data: Mapping[str, Any], source: str) -> Config:

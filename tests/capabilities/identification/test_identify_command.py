@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import tomllib
 from types import SimpleNamespace
 
@@ -135,6 +136,10 @@ def test_the_numbers_are_found_and_written(folder):
     assert "identify" not in tables and tables["title"] == "A mill: identified"
     own = result["numbers"]["feed.left.material_mass"]
     assert tables["feed"]["left"]["material_mass"] == pytest.approx(own["fitted"]["value"], rel=1e-5)
+    # the page has the values of the file
+    for name, each in result["numbers"].items():
+        value = re.search(rf"{re.escape(name)} \S ([-.0-9]+)", (folder / "stdout.txt").read_text("utf-8"))
+        assert value and float(value[1]) == pytest.approx(each["fitted"]["value"], rel=5e-4)
     # the best fit is near the mean of the distribution
     assert abs(own["fitted"]["value"] - own["value"]["value"]) < 0.3 * own["deviation"]["value"]
     config = study_files.load(folder / "identified" / "identified.toml")

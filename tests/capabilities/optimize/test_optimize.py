@@ -62,6 +62,9 @@ crank.s = { min = -0.3, max = 0.3 }
 """
 
 
+OF_STUDY = ("provenance.json", "study_copy.toml")
+
+
 def wishes(text=TABLE, **changes):
     for before, after in changes.items():
         assert before in text
@@ -528,6 +531,11 @@ def test_a_genetic_search_finds_nothing_better():
         ({"[optimize.limits]": '[optimize.limits]\n"min(margn)" = { min = 1 }'}, 'was "margin" meant?'),
         ({'{ max = "4 kN" }': "3000"}, "must be a table with min, max, or both"),
         ({"16 deg": "21 deg"}, "must be >= min"),
+        (
+            {'"20 deg"': "14"},
+            "range(rocker.psi).max: is more than a turn; a number without a unit is in radians; "
+            'was "14 deg" meant?',
+        ),
         ({"starts = 4": "starts = 0.5"}, "mine.toml:6: optimize.starts = 0.5: must be a whole number >= 1"),
     ],
 )
@@ -600,8 +608,10 @@ def test_the_command(tmp_path, best):
     done = chainunit("optimize", "mine.toml", "-o", "out/deep", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "more of crank.m.min raises peak(crank_torque) by" in done.stdout
+    words = " ".join(done.stdout.split())
+    assert "The best machine has r 0.17522 m (today 0.15000 m), h" in words and "crank.s -0.264" in words
     folder = tmp_path / "out" / "deep"
-    names = {"best.toml", "result.json", "result.md", "report.html", "torque.png", ledger.NAME}
+    names = {"best.toml", "result.json", "result.md", "report.html", "torque.png", ledger.NAME, *OF_STUDY}
     assert {file.name for file in folder.iterdir()} == names
     result = json.loads((folder / "result.json").read_text("utf-8"))
     assert result["quantities"]["peak(crank_torque)"]["best"]["value"] == pytest.approx(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import pickle
@@ -27,10 +28,13 @@ from chainunit.capabilities.sweep import figures as sweep_figures
 from chainunit.capabilities.sweep import page as sweep_page
 from chainunit.capabilities.sweep import points as sweep
 from chainunit.capabilities.sweep import runs as sweep_runs
-from chainunit.capabilities.sweep.summary import _correlation, _explained
+from chainunit.capabilities.sweep.plan import SweptParameter
+from chainunit.capabilities.sweep.shares import shares_of_points, shares_on_grid
+from chainunit.capabilities.sweep.summary import _correlation
 from chainunit.core.errors import InputError as Refusal
 from chainunit.core.ledger import Ledger
 from chainunit.core.native.compilers import compiler
+from chainunit.core.quantities import Quantity, Variable
 from chainunit.reading.results import as_data
 from chainunit.report.figure import Hatch, hatch_lines
 from chainunit.report.terminal import plain
@@ -589,12 +593,6 @@ def test_points_beyond_the_limits_of_two_bars_are_counted():
     assert json.loads(motion.to_json())["organs"] == []
 
 
-def _between(x, y):
-    """The share of the variance between 16 classes of x, as it is."""
-    means = np.array([np.mean(y[part]) for part in np.array_split(np.argsort(x), 16)])
-    return np.var(means) / np.var(y)
-
-
 def test_shares_are_left_out_where_they_are_not_defined(grid, spread):
     """In the grid most cranks cannot turn: those that do are no independent parameters."""
     numbers = json.loads(grid.to_json())
@@ -604,15 +602,12 @@ def test_shares_are_left_out_where_they_are_not_defined(grid, spread):
     for name, of in numbers["influences"].items():
         assert numbers["gaps"][name]["value"] == pytest.approx(gap)
         assert all(
-            each["share"]["value"] is None and abs(each["rank"]["value"]) <= 1.0 for each in of.values()
+            each["share"] is None is each["total"] and abs(each["rank"]["value"]) <= 1.0
+            for each in of.values()
         )
     words = "of the points have no value, and the parameters of the others are not independent"
     assert words in repr(grid) and words not in repr(spread)
     assert "moves it most" not in grid._repr_html_() and "moves it most" in spread._repr_html_()
-    # within their error
-    torque = spread.summary.influences["peak(crank_torque)"]
-    assert torque["machine.r"].share > 0.9 and torque["machine.crank.m"].share is None
-    assert "within their error" in repr(spread)
 
 
 def test_the_spread_names_the_ranges_that_are_no_tolerances(spread):
@@ -657,25 +652,130 @@ def test_influences(spread):
         for each, influence in of.items():
             assert influence.rank == pytest.approx(spearmanr(table[each], table[name]).statistic, abs=1e-12)
     torque = spread.summary.influences["peak(crank_torque)"]
-    assert (
-        torque["machine.r"].rank > 0.99
-        and torque["machine.r"].share > 0.97
-        and torque["machine.crank.m"].share is None
-    )
+    assert torque["machine.r"].rank > 0.99 and torque["machine.r"].share.value > 0.97
+    # shares by classes took it for an error
+    assert 0.019 < torque["machine.crank.m"].share.low < torque["machine.crank.m"].share.high < 0.021
     x = qmc.Sobol(2, rng=np.random.default_rng(0)).random(4096) - 0.5
-    y = x[:, 0] ** 2 + 0.1 * x[:, 1]
-    # Var(x^2) = 1/180, Var(0.1 x) = 1/1200: neither rank nor slope tells of the first
-    assert abs(_correlation(x[:, 0], y)) < 0.02
-    assert _explained(x[:, 0], y)[0] == pytest.approx((1 / 180) / (1 / 180 + 1 / 1200), abs=0.02)
-    assert _explained(x[:, 1], y)[0] == pytest.approx((1 / 1200) / (1 / 180 + 1 / 1200), abs=0.02)
-    assert _explained(np.random.default_rng(1).random(4096), y)[0] < 0.01
-    # an x that explains nothing is within its error nearly always, and that is its deviation, twice
-    shares, errors = np.array(
-        [_explained(x[:, 0], np.random.default_rng(k).random(4096)) for k in range(200)]
-    ).T
-    assert np.mean(shares < errors) > 0.9
-    raw = np.array([_between(x[:, 0], np.random.default_rng(k).random(4096)) for k in range(200)])
-    assert errors[0] == pytest.approx(2.0 * np.std(raw), rel=0.2)
+    # neither rank nor slope tells of the first
+    assert abs(_correlation(x[:, 0], x[:, 0] ** 2 + 0.1 * x[:, 1])) < 0.02
+
+
+def _swept(ends, values=()):
+    return SweptParameter(Variable("x", "x", Quantity("1", "x")), 0.5 * sum(ends), values, *ends)
+
+
+A_OF_G = np.array([0.0, 1.0, 4.5, 9.0])
+V_OF_G = 1.0 / 3.0 / (1.0 + A_OF_G) ** 2
+WHOLE_OF_G = np.prod(1.0 + V_OF_G) - 1.0
+V_OF_ISHIGAMI = np.array([0.5 * (1.0 + 0.02 * np.pi**4) ** 2, 6.125, 0.0])
+BOTH_OF_ISHIGAMI = 0.01 * np.pi**8 * (1 / 18 - 1 / 50)
+WEIGHTS = np.array([0.86, 0.10, 0.025, 0.015])
+EXACT_SHARES = {
+    "linear": (lambda x: x @ np.sqrt(WEIGHTS), (0.0, 1.0), WEIGHTS, WEIGHTS),
+    "g-function": (
+        lambda x: np.prod((np.abs(4.0 * x - 2.0) + A_OF_G) / (1.0 + A_OF_G), axis=1),
+        (0.0, 1.0),
+        V_OF_G / WHOLE_OF_G,
+        V_OF_G * (1.0 + WHOLE_OF_G) / (1.0 + V_OF_G) / WHOLE_OF_G,
+    ),
+    "Ishigami": (
+        lambda x: np.sin(x[:, 0]) * (1.0 + 0.1 * x[:, 2] ** 4) + 7.0 * np.sin(x[:, 1]) ** 2,
+        (-np.pi, np.pi),
+        V_OF_ISHIGAMI / (np.sum(V_OF_ISHIGAMI) + BOTH_OF_ISHIGAMI),
+        (V_OF_ISHIGAMI + BOTH_OF_ISHIGAMI * np.array([1, 0, 1])) / (np.sum(V_OF_ISHIGAMI) + BOTH_OF_ISHIGAMI),
+    ),
+}
+
+
+def _misses(name, points, seeds, method):
+    """The number of seeds with an exact share outside its interval, and the widest interval."""
+    function, ends, alone, in_all = EXACT_SHARES[name]
+    d, misses, widest = len(alone), 0, 0.0
+    for seed in range(seeds):
+        x = ends[0] + (ends[1] - ends[0]) * method(d, rng=np.random.default_rng(seed)).random(points)
+        shares = shares_of_points([_swept(ends)] * d, x, function(x))
+        estimates = [estimate for each in shares for estimate in (each.alone, each.in_all)]
+        assert all(each.low <= each.value <= each.high for each in estimates)
+        widest = max(widest, *(each.high - each.low for each in estimates))
+        held = [
+            each.alone.low <= a <= each.alone.high and each.in_all.low <= b <= each.in_all.high
+            for each, a, b in zip(shares, alone, in_all, strict=True)
+        ]
+        misses += not all(held)
+    return misses, widest
+
+
+@pytest.mark.parametrize("name", EXACT_SHARES)
+@pytest.mark.parametrize("method", [qmc.Sobol, qmc.LatinHypercube])
+def test_shares_of_the_variance_hold_the_exact_ones(name, method):
+    """Shares by classes, less the chance share of independent points, were 1.5 points too low at 1024 points."""
+    misses, widest = _misses(name, 256, 3, method)
+    assert misses == 0 and widest < (0.08 if name == "g-function" else 1e-4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", EXACT_SHARES)
+@pytest.mark.parametrize("points", [256, 1024, 4096])
+def test_all_shares_hold_the_exact_ones_in_95_of_100_seeds(name, points):
+    misses, widest = _misses(name, points, 100, qmc.Sobol)
+    assert misses <= 5 and widest < 20.0 / points
+
+
+def test_shares_on_a_grid_are_exact():
+    """y = a + b + ab of factors -1 and 1: each of three parts has a third of the variance."""
+    a, b = np.meshgrid([-1.0, 1.0], [-1.0, 1.0], indexing="ij")
+    for each in shares_on_grid(a + b + a * b):
+        assert each.alone.value == pytest.approx(1 / 3) and each.in_all.value == pytest.approx(2 / 3)
+    x = np.random.default_rng(0).choice([2.0, 5.0], (64, 2))
+    y = np.prod((2.0 * x - 7.0) / 3.0 + 1.0, axis=1)
+    for each in shares_of_points([_swept((2.0, 5.0), (5.0, 2.0))] * 2, x, y):
+        assert each.alone.value == pytest.approx(1 / 3) and each.in_all.value == pytest.approx(2 / 3)
+
+
+def test_shares_of_a_sweep_are_those_of_other_estimators(tmp_path):
+    """Saltelli's estimator of the share alone and Jansen's of the one in all, of the same machine at other points."""
+    text = """[sweep]
+points = 256
+angles = 90
+quantities = ["peak(crank_torque)"]
+[[sweep.parameter]]
+name = "machine.r"
+tolerance = "2 mm"
+[[sweep.parameter]]
+name = "feed.left.material_mass"
+from = "10 kg"
+to = "50 kg"
+[[sweep.parameter]]
+name = "feed.right.material_mass"
+from = "10 kg"
+to = "50 kg"
+[[sweep.parameter]]
+name = "machine.crank.s"
+tolerance = "10 mm"
+distribution = "normal"
+"""
+    study = Study.from_text(text)
+    task = sweep.task_of(study.config)
+    size, of = 4096, task.plan.parameters
+    u = qmc.Sobol(2 * len(of), rng=np.random.default_rng(5)).random(size)
+
+    def values(u):
+        own = {each.name: each.of_share(column) for each, column in zip(of, u.T, strict=True)}
+        return task.turns(own)["peak(crank_torque)"].values
+
+    one, other = u[:, : len(of)], u[:, len(of) :]
+    y, z = values(one), values(other)
+    whole = np.var(np.concatenate([y, z]))
+    influences = study.sweep(workers=1).summary.influences["peak(crank_torque)"]
+    for k, each in enumerate(of):
+        mixed = one.copy()
+        mixed[:, k] = other[:, k]
+        m = values(mixed)
+        alone, in_all = np.mean(z * (m - y)) / whole, 0.5 * np.mean((y - m) ** 2) / whole
+        found = influences[each.name]
+        assert found.share.low - 0.01 < alone < found.share.high + 0.01
+        assert found.total.low - 0.01 < in_all < found.total.high + 0.01
+        assert found.total.high - found.share.low < 0.03
 
 
 def test_the_spread_has_quantiles_and_the_values_of_the_study(spread):
@@ -717,8 +817,13 @@ def test_the_command(tmp_path):
     assert "the organs cannot follow the rocker over its swing" in done.stdout
     names = {"report.html", "result.json", "result.md", "sweep_peak_crank_torque.png", "sweep_min_margin.png"}
     written = {p.name for p in (tmp_path / "map").iterdir()}
-    # and the store, and the list of files
-    assert names <= written and len(written) == len(names) + 2
+    # and the store, the list of files, the provenance and the copy of the study file
+    assert names <= written and len(written) == len(names) + 4
+    assert (tmp_path / "map" / "study_copy.toml").read_bytes() == (tmp_path / "map.toml").read_bytes()
+    about = json.loads((tmp_path / "map" / "provenance.json").read_text("utf-8"))
+    assert about["study"]["sha256"] == hashlib.sha256((tmp_path / "map.toml").read_bytes()).hexdigest()
+    assert about["seeds"]["sweep.seed"] == 1 and about["libraries"]["numpy"] == np.__version__
+    assert about["chainunit"] and about["platform"] and set(about["commit"] or "a") <= set("0123456789abcdef")
     numbers = json.loads((tmp_path / "map" / "result.json").read_text("utf-8"))
     page = (tmp_path / "map" / "report.html").read_text("utf-8")
     assert "A. Nonymous" in page and "Map of min(margin)" in page and numbers["store"] in page

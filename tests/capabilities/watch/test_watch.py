@@ -13,6 +13,7 @@ from command import chainunit
 from synthetic import HiddenRun, Logger, synthetic, write_recording
 
 from chainunit import InputError, Study
+from chainunit.capabilities.watch import page as watch_page
 from chainunit.capabilities.watch import watch as watching
 from chainunit.capabilities.watch.crank_motion import crank_motion
 from chainunit.core.native.compilers import compiler
@@ -64,7 +65,8 @@ def watched(tmp_path_factory):
     folder = tmp_path_factory.mktemp("watch")
     (folder / "mine.toml").write_text(study_text(TRUTH["machine"]), "utf-8")
     done = chainunit("watch", "mine.toml", cwd=folder)
-    assert done.returncode == 0, done.stderr
+    # an alarm
+    assert done.returncode == 3, done.stderr
     return folder / "watched", " ".join(done.stdout.split())
 
 
@@ -127,7 +129,7 @@ def test_a_machine_that_does_not_describe_the_begin(tmp_path):
     wrong = TRUTH["machine"] | {"left.wall_mass": 81.0}
     (tmp_path / "mine.toml").write_text(study_text(wrong, end=40), "utf-8")
     found = Study.from_file(tmp_path / "mine.toml").watch()
-    assert not found.watched.is_described
+    assert not found.watched.is_described and watch_page.TASK.shortfall(found.watched) == ""
     assert "does not describe the begin of the recording" in " ".join(repr(found).split())
     doubts = json.loads(found.to_json())["doubts"]
     assert any("remains in motor.i" in each for each in doubts)

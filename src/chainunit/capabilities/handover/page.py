@@ -207,7 +207,7 @@ def save(results: str | Path, folder: str | Path, *, aasx: bool = True) -> list[
     question, out = HandoverQuestion(Path(results), aasx), Path(folder)
     with TASK.claimed(question, out):
         found = TASK.outcome(question, out, lambda *said: None)
-        written, unwritten = TASK.write(found, TASK.report(found), out)
+        written, unwritten = TASK.write(question, found, TASK.report(found), out)
     if unwritten is not None:
         raise unwritten
     return written

@@ -99,7 +99,7 @@ def _numbers(s: b.Source) -> Iterator[b.Block]:
         path = f"numbers.{name}"
         estimate: tuple[Line, ...] = ("not determined", "")
         if each["told"]:
-            estimate = s.number(f"{path}.value", digits=4), s.number(f"{path}.deviation", digits=2)
+            estimate = s.number(f"{path}.fitted", digits=4), s.number(f"{path}.deviation", digits=2)
         ends = (s.number(f"{path}.{end}", digits=4) for end in ("from", "to"))
         rows.append(
             b.TableRow(
@@ -117,11 +117,12 @@ def _numbers(s: b.Source) -> Iterator[b.Block]:
     )
     yield b.Table(tuple(rows), columns)
     yield b.Text(
-        "A number is determined where the recordings alone give it with less than half the standard deviation that "
-        "was known before. The interval of 95 % of a number that is not determined is that of bounds, weighing and "
-        "recordings together: it is only as right as the weighing. Before the fit, a number is at its start, such "
-        "as the middle of its bounds, and the noise is as stated: so the expected deviation may differ from the "
-        "reached one.",
+        f"A value is that of the best fit, as {FILE} has it. Its interval is that of the distribution which the "
+        "recordings leave. A number is determined where the recordings alone give it with less than half the "
+        "standard deviation that was known before. The interval of 95 % of a number that is not determined is that "
+        "of bounds, weighing and recordings together: it is only as right as the weighing. Before the fit, a number "
+        "is at its start, such as the middle of its bounds, and the noise is as stated: so the expected deviation "
+        "may differ from the reached one.",
         "note",
     )
     rows = [

@@ -15,7 +15,7 @@ from ...reading.results import as_data
 from ...reading.text import Units, shown_in
 from ...report import blocks as b
 from ...report import figure as fig
-from ...report.lines import Line, Name, line
+from ...report.lines import Aside, Line, Name, join, line
 from ...report.live.page import live_of_config
 from ...report.live_block import Live, LiveMachine
 from ...report.task import Task, Writer
@@ -157,6 +157,9 @@ def _opening(s: b.Source, best: Best) -> Iterator[b.Block]:
             f"{name}: ", s.number(f"{path}.best"), ", today ", s.number(f"{path}.today"), _share(s, path), "."
         )
         yield b.Judgement("good", words) if k == 0 else b.Text(words)
+    yield b.Text(
+        line("The best machine has ", join(_best_of(s, name) for name in s.result["parameters"]), ".")
+    )
     for i in range(len(s.result["organs"])):
         path = f"organs.{i}"
         words = s.line(f"{{{path}.text}}: the crank turns at {{speed}}")
@@ -164,6 +167,12 @@ def _opening(s: b.Source, best: Best) -> Iterator[b.Block]:
             "warning", line(words, s.line(f", and the limit of the best machine is {{{path}.limit}}."))
         )
     yield _turns(best)
+
+
+def _best_of(s: b.Source, name: str) -> Line:
+    path = f"parameters.{name}"
+    best, today = (s.number(f"{path}.{key}", digits=5) for key in ("best", "today"))
+    return line(Name(name), " ", best, Aside(line("today ", today)))
 
 
 def _share(s: b.Source, path: str) -> Line:

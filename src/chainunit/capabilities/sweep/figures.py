@@ -178,10 +178,10 @@ def tornado(summary: SweepSummary) -> Iterator[fig.Figure]:
     for k, some in enumerate(_pieces(summary.influences.items(), _MOST_PANELS)):
         panels = []
         for name, table in some:
-            size = {each: (of.share or 0.0, abs(of.rank)) for each, of in table.items()}
+            size = {each: (of.share.value if of.share else 0.0, abs(of.rank)) for each, of in table.items()}
             order = sorted(table, key=size.__getitem__, reverse=True)
             shares = [table[each].share for each in order]
-            words = tuple("" if x is None else f"{100.0 * x:.0f} %" for x in shares)
+            words = tuple("" if x is None else f"{100.0 * x.value:.0f} %" for x in shares)
             ranks = [table[each].rank for each in order]
             bars = fig.Bars("rank correlation", np.arange(len(order)), ranks, 0.7, 1, words=words)
             # beside the longest bars there is room for the words

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from numbers import Integral
 from pathlib import Path
+from typing import Any
 
 from ...core.errors import InputError, shown
 from ...reading.results import as_data
@@ -153,9 +154,9 @@ def _influences(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
     if not table or len(parameters) < 2:
         return
     for name, of in table.items():
-        most = max(of, key=lambda each: of[each]["share"]["value"] or 0.0)
-        if of[most]["share"]["value"] is None:
+        if not all(each["share"] for each in of.values()):
             continue
+        most = max(of, key=lambda each: of[each]["share"]["value"])
         path = f"influences.{name}.{most}"
         words = f"{{name}}: {{most}} moves it most; alone it explains {{{path}.share}} of the variance."
         yield b.Text(s.line(words, name=Name(name), most=Name(most)), form="long")
@@ -164,14 +165,14 @@ def _influences(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
         if each not in table[name]:
             return "-"
         path = f"influences.{name}.{each}"
-        if table[name][each]["share"]["value"] is None:
+        if table[name][each]["share"] is None:
             return s.line(f"{{{path}.rank:2}}")
         return s.line(f"{{{path}.rank:2}} ({{{path}.share:2}})")
 
     rows = (b.TableRow((Name(each), *(cell(name, each) for name in table))) for each in parameters)
-    shares = [each["share"]["value"] is not None for of in table.values() for each in of.values()]
+    has_shares = any(each["share"] for of in table.values() for each in of.values())
     title = "Rank correlation"
-    if any(shares):
+    if has_shares:
         title += "; in brackets the share of the variance that the parameter explains alone"
     yield b.Table(tuple(rows), (b.Column("parameter"), *_columns(list(table))), title=title)
     wide = [name for name, gap in summary.gaps.items() if gap > MOST_GAPS]
@@ -179,8 +180,8 @@ def _influences(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
         worst = max(wide, key=lambda name: summary.gaps[name])
         words = "No shares of the variance: up to {gap} of the points have no value, and the parameters of the others"
         yield b.Text(s.line(f"{words} are not independent.", gap=s.number(f"gaps.{worst}")), "note")
-    elif not all(shares):
-        yield b.Text("Shares of the variance that are within their error are left out.", "fine")
+    if has_shares:
+        yield _shares(s, parameters, table)
     yield b.Text(
         "A rank correlation of 1 or -1: the result only rises or only falls with the parameter. Near 0 with a large "
         "share: it rises and falls. Shares that add up to less than 100 %: the parameters act together.",
@@ -189,6 +190,23 @@ def _influences(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
     )
     if len(parameters) > 2:
         yield from sweep_figures.tornado(summary)
+
+
+def _shares(s: b.Source, parameters: list[str], table: Mapping[str, Any]) -> b.Table:
+    """The shares of the variance with their intervals."""
+
+    def cell(name: str, each: str, key: str) -> Line:
+        if each not in table[name] or table[name][each][key] is None:
+            return "-"
+        return s.estimate(f"influences.{name}.{each}.{key}", ".low", ".high")
+
+    rows = (
+        b.TableRow((line(Name(each), f", {words}"), *(cell(name, each, key) for name in table)))
+        for each in parameters
+        for key, words in (("share", "alone"), ("total", "in all"))
+    )
+    title = "Shares of the variance: of a parameter alone, and in all with what it does together with others"
+    return b.Table(tuple(rows), (b.Column("parameter"), *_columns(list(table))), title=title, form="long")
 
 
 def _spread_heading(summary: SweepSummary) -> str:

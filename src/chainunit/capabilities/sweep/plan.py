@@ -44,14 +44,25 @@ class SweptParameter:
         """Least and largest value; of a normal distribution nearly all values are between them."""
         return (min(self.values), max(self.values)) if self.values else (self.low, self.high)
 
+    @property
+    def is_normal(self) -> bool:
+        """Whether its values are normally distributed."""
+        return self.distribution == "normal" and self.tolerance is not None and not self.values
+
+    @property
+    def deviation(self) -> float:
+        """The standard deviation of normally distributed values."""
+        assert self.tolerance is not None
+        return self.tolerance / _SIGMAS
+
     def of_share(self, u: Any) -> Any:
         """The values below which the shares `u` of all values lie, shape of `u`, between 0 and 1."""
         if self.values:
             return np.array(self.values)[np.minimum((u * len(self.values)).astype(int), len(self.values) - 1)]
-        if self.distribution == "normal" and self.tolerance is not None:
+        if self.is_normal:
             from scipy.special import ndtri
 
-            return self.centre + self.tolerance / _SIGMAS * ndtri(u)
+            return self.centre + self.deviation * ndtri(u)
         return self.low + (self.high - self.low) * u
 
 

@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -26,14 +27,13 @@ from ...study.verdict import SpeedLimit, passed_limits
 from ...work.store import made_anew
 from .plan import SweptParameter
 from .points import SweepFindings
+from .shares import LEAST_POINTS, Shares, shares_of_points, shares_on_grid
 from .table import SPEED
 
 SAMPLE = 2**20
 """Largest number of points behind correlations and quantiles."""
 QUANTILES = (0.01, 0.05, 0.5, 0.95, 0.99)
 _METHODS = {"grid": "a grid", "latin_hypercube": "a Latin hypercube", "sobol": "Sobol's sequence"}
-_BINS = 16
-_MOST_CLASSES = 64
 MOST_GAPS = 0.05
 """Share of points without a value from which on the shares of the variance are not defined."""
 _LEAST = 8
@@ -74,15 +74,15 @@ class SweptRange:
 
 @result
 class Influence:
-    """What a parameter does to a result. The share is None where it is within its own error, and where it is not
-    defined: with many points without a value the others are no independent parameters any more."""
+    """What a parameter does to a result. Shares are None where they are not defined: with few points, and with many
+    points without a value, as the others are no independent parameters any more."""
 
     rank: float = quantity("1", "rank correlation (Spearman)")
-    share: float | None = part(
-        "share of the variance of the result that the parameter explains alone (the correlation ratio over classes "
-        "of the parameter, less its bias)",
-        unit="1",
-        kind="percent",
+    share: Estimate | None = part(
+        "share of the variance of the result that the parameter explains alone (first order), with its interval"
+    )
+    total: Estimate | None = part(
+        "share that it explains alone and together with other parameters (total order), with its interval"
     )
 
 
@@ -280,8 +280,9 @@ def _influences(
     """By result and parameter the influence; only results that vary."""
     from scipy.stats import rankdata
 
-    names = [each.name for each in findings.plan.parameters]
-    ranks = {name: rankdata(sample[name]) for name in names}
+    plan = findings.plan
+    parameters = {each.name: each for each in plan.parameters}
+    ranks = {name: rankdata(sample[name]) for name in parameters}
     table: dict[str, dict[str, Influence]] = {}
     for name in findings.results:
         y = sample[name]
@@ -289,16 +290,22 @@ def _influences(
         if has.sum() < _LEAST or np.ptp(y[has]) <= 1e-12 * np.max(np.abs(y[has])):
             continue
         order = rankdata(y[has])
-        defined = gaps[name] <= MOST_GAPS
+        varying = [each for each in parameters if np.ptp(sample[each][has]) > 0.0]
+        shares: list[Shares] = []
+        if plan.is_grid and len(y) == plan.points and has.all():
+            shares = shares_on_grid(y.reshape([n for n in plan.shape if n > 1]))
+        elif gaps[name] <= MOST_GAPS and has.sum() >= LEAST_POINTS:
+            x = np.stack([sample[each][has] for each in varying], axis=1)
+            shares = shares_of_points([parameters[each] for each in varying], x, y[has])
         table[name] = {
-            each: Influence(
-                _correlation(ranks[each][has], order),
-                _sure_share(sample[each][has], y[has]) if defined else None,
-            )
-            for each in names
-            if np.ptp(sample[each][has]) > 0.0
+            each: Influence(_correlation(ranks[each][has], order), *map(_in_percent, own or (None, None)))
+            for each, own in zip_longest(varying, shares)
         }
     return table
+
+
+def _in_percent(share: Estimate | None) -> Estimate | None:
+    return share and replace(share, unit="1", kind="percent")
 
 
 def _nominal(findings: SweepFindings) -> dict[str, float]:
@@ -359,29 +366,3 @@ def _correlation(a: Any, b: Any) -> float:
     a, b = a - np.mean(a), b - np.mean(b)
     size = np.sqrt(np.sum(a * a) * np.sum(b * b))
     return float(np.sum(a * b) / size) if size > 0.0 else 0.0
-
-
-def _sure_share(x: Any, y: Any) -> float | None:
-    """The share of `_explained`; None where it is within its error."""
-    share, error = _explained(x, y)
-    return share if share > error else None
-
-
-def _explained(x: Any, y: Any) -> tuple[float, float]:
-    """The share of the variance of `y` that is one of classes of `x`, between 0 and 1, corrected for the number of
-    classes; and its error: two standard deviations of the share of an `x` that explains nothing."""
-    values, bins = np.unique(x), min(_BINS, round(math.sqrt(len(x))))
-    # the values of a grid are classes themselves
-    repeat = len(values) <= max(bins, len(x) // 4) and len(values) <= _MOST_CLASSES
-    edges = values if repeat else np.quantile(x, np.arange(bins) / bins)
-    place = np.searchsorted(edges, x, "right") - 1
-    count = np.bincount(place, minlength=len(edges))
-    used = count > 0
-    means = np.bincount(place, y, len(edges))[used] / count[used]
-    between = np.sum(count[used] * (means - np.mean(y)) ** 2) / np.sum((y - np.mean(y)) ** 2)
-    freedom, count_less_one = np.count_nonzero(used) - 1, max(1, len(y) - 1)
-    chance = freedom / count_less_one
-    if chance >= 1.0:
-        return 0.0, 1.0
-    share = min(1.0, max(0.0, (between - chance) / (1.0 - chance)))
-    return float(share), 2.0 * math.sqrt(2.0 * freedom) / count_less_one / (1.0 - chance)

@@ -20,7 +20,8 @@ def watch(
 ) -> None:
     """Run the load observer over a recording: feed and force of each side over time, and alarms with their grounds.
 
-    Writes report.html, result.json, result.md and pictures into the output folder.
+    Writes report.html, result.json, result.md and pictures into the output folder. The exit status is 0 without an
+    alarm, 3 with one, and 1 if the machine of the study does not describe the beginning of the recording.
     """
     question = study_file(config)
     from .page import TASK

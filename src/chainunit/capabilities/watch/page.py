@@ -61,6 +61,8 @@ TASK: Task[Config, WatchedRecording] = Task(
     watch_report,
     files=PICTURES,
     content=WatchSummary,
+    shortfall=lambda watched: None if watched.is_described else "",
+    alarmed=lambda watched: bool(watched.alarms),
 )
 
 

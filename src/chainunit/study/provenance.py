@@ -1,0 +1,100 @@
+"""Where a result comes from: version, libraries and platform, the files of the study by their digests, and seeds."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import platform
+import re
+import subprocess
+from collections.abc import Iterator
+from functools import cache
+from hashlib import sha256
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from .. import __version__
+from ..core.errors import InputError
+from ..core.ledger import digest
+from .config import Config, FileContents
+from .parts import beside
+from .registry import registered
+from .study_file import toml_text
+
+FILE, COPY = "provenance.json", "study_copy.toml"
+"""Names of the provenance of a result and of the copy of its study file, in the folder of the result."""
+
+
+def study_text(file: FileContents) -> str:
+    """The study file as it was read; tables from Python as a file has them."""
+    return file.text or toml_text(file.tables)
+
+
+def provenance(config: Config) -> dict[str, Any]:
+    """The provenance of the results of a study, ready for JSON. It is the same for the same study on one machine."""
+    return {
+        "chainunit": __version__,
+        "commit": _commit(),
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        "libraries": _libraries(),
+        "study": {
+            "file": Path(config.file.source).name,
+            "sha256": sha256(study_text(config.file).encode()).hexdigest(),
+        },
+        "files": dict(_digests(config.file)),
+        "seeds": {
+            f"{name}.seed": int(table.seed) for name, table in config.values.items() if hasattr(table, "seed")
+        },
+    }
+
+
+def _digests(file: FileContents) -> Iterator[tuple[str, str]]:
+    """The digests of all files that the study names: linkage, catalogues, motors and machines, recordings."""
+    catalogue = file.tables.get("catalogue", [])
+    names = [catalogue] if isinstance(catalogue, str) else list(catalogue)
+    for table, key in (("system", "motor"), ("system", "machine"), ("machine", "linkage")):
+        name = str(file.tables.get(table, {}).get(key, ""))
+        names += [name] if name.lower().endswith((".toml", ".fmu")) else []
+    of_parts = (each for part in registered() for each in part.files(file.tables))
+    names += [str(each.table.get(each.name, "")) for each in of_parts]
+    for name in dict.fromkeys(name for name in names if name):
+        with contextlib.suppress(InputError, OSError):
+            yield name, digest(beside(name, file.source))
+
+
+@cache
+def _libraries() -> dict[str, str]:
+    """The versions of the libraries that the package needs."""
+    required = [
+        re.split(r"[^\w.-]", line)[0]
+        for line in metadata.requires("chainunit") or ()
+        if "extra ==" not in line
+    ]
+    versions = {}
+    for name in sorted(required, key=str.lower):
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            versions[name] = metadata.version(name)
+    return versions
+
+
+@cache
+def _commit() -> str | None:
+    """The commit of the package, if it was installed from a repository or lies in its own."""
+    installed = metadata.distribution("chainunit").read_text("direct_url.json")
+    if installed and (commit := json.loads(installed).get("vcs_info", {}).get("commit_id")):
+        return str(commit)
+    root = Path(__file__).parents[3]
+    if not (root / ".git").exists() or not (root / "src" / "chainunit").is_dir():
+        return None
+    with contextlib.suppress(OSError, subprocess.SubprocessError):
+        done = subprocess.run(
+            ["git", "-C", str(root), "rev-parse", "HEAD"],
+            capture_output=True,
+            text=True,
+            timeout=10,
+            check=True,
+        )
+        return done.stdout.strip() or None
+    return None
