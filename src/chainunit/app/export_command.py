@@ -88,7 +88,7 @@ def export(
 ) -> None:
     """Write a model as an FMU; of a study file its whole system as one FMU, or as an SSP package of FMUs."""
     from ..fmu.backends import export as write
-    from ..study.package import beyond_two_bars, is_study_file, left_out, model_and_start
+    from ..study.package import is_study_file, model_and_start
 
     file = output
     whole = is_study_file(name)
@@ -129,10 +129,7 @@ def export(
         )
     print(f"{file}: {model.name}, {made}")
     if whole and loaded:
-        for words in filter(
-            None, (left_out(loaded.operation, loaded.given_events), *beyond_two_bars(loaded))
-        ):
-            print(words)
+        _show_remarks(loaded)
 
 
 def export_ssp(
@@ -145,7 +142,7 @@ def export_ssp(
     names: NamesOption = VariableNames.structured,
 ) -> None:
     """Write motor and machine, connected, with their parameter sets, as an SSP 1.0 package of FMUs 2.0."""
-    from ..study.package import beyond_two_bars, export_study, left_out
+    from ..study.package import export_study
 
     if output.suffix != ".ssp":
         raise InputError(f"-o {output}: must be a file name that ends in .ssp")
@@ -160,8 +157,18 @@ def export_ssp(
             progress=status.update,
         )
     print(f"{output}: {made}")
-    for words in filter(None, (left_out(loaded.operation, loaded.given_events), *beyond_two_bars(loaded))):
+    _show_remarks(loaded)
+
+
+def _show_remarks(loaded: Any) -> None:
+    """Print the parts of a study that its FMU or package does not have, and the limits of its model."""
+    from ..study.package import beyond_two_bars, left_out
+
+    if words := left_out(loaded.operation, loaded.given_events):
         print(words)
+    if loaded.file.tables.get("organ") != "chain":
+        for words in beyond_two_bars(loaded.machine, loaded.feed, loaded.run.crank_speed):
+            print(words)
 
 
 def _platforms(choice: str | None, fmi: int) -> list[str]:

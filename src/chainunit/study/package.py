@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from ..core.errors import InputError, RunError, printable
 from ..core.inputs import TOML, file_text
@@ -166,10 +167,9 @@ def left_out(operation: OperatingConditions, events: Iterable[str]) -> str:
     return f"Not in it: {'; '.join(names)}. Its loads are those of normal running."
 
 
-def beyond_two_bars(config: Config) -> list[str]:
-    """A line for each limit of the crank speed that a study with two bars an organ passes, see `study.verdict`."""
-    speed, bars = config.run.crank_speed, config.file.tables.get("organ") != "chain"
-    limits = limits_of_organs(config.machine, config.feed, ("N.m",)) if bars else ()
+def beyond_two_bars(machine: Machine, feed: Any, speed: float) -> list[str]:
+    """A line for each limit of two bars an organ that a crank speed [rad/s] passes, see `study.verdict`."""
+    limits = limits_of_organs(machine, feed, ("N.m",))
     reasons = [
         Reason(each.topic, "crank_speed", speed, each.speed, "rad/s", kind="speed")
         for each in passed_limits(limits, speed)
