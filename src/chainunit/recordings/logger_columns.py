@@ -155,18 +155,21 @@ def _plain(table: LoggerTable, place: int, others: frozenset[str]) -> list[str]:
 
 def _refuse_left_out(table: LoggerTable, place: int, cells: Sequence[str]) -> None:
     """Refuse a long number without a decimal sign where all others have one with the same number of decimals."""
-    digits = [re.split("[eE]", cell)[0].lstrip("+-") for cell in cells]
-    whole = [k for k, cell in enumerate(digits) if cell.isdigit()]
+    whole = [k for k, cell in enumerate(cells) if "." not in cell and _mantissa(cell).isdigit()]
     if not 0 < len(whole) <= max(1.0, LEFT_OUT * len(cells)):
         return
-    decimals = {len(cell.partition(".")[2]) for cell in digits if "." in cell}
+    decimals = {len(_mantissa(cell).partition(".")[2]) for cell in cells if "." in cell}
     for k in whole:
-        if len(decimals) == 1 and len(digits[k]) > max(decimals) > 0:
+        if len(decimals) == 1 and len(_mantissa(cells[k])) > max(decimals) > 0:
             raise InputError(
                 f"{table.file}, line {table.lines[k]}, column {place + 1}, {table.heads[place]}: {cells[k]} has no "
                 f"decimal sign, and the other numbers have {max(decimals)} decimals: a sign is left out; mend it, or "
                 "write nan"
             )
+
+
+def _mantissa(cell: str) -> str:
+    return re.split("[eE]", cell)[0].lstrip("+-")
 
 
 def _doubtful(table: LoggerTable, place: int, signs: Iterable[str], is_mixed: bool = False) -> InputError:

@@ -296,7 +296,9 @@ def _body(
 ) -> tuple[list[list[str]], list[int], list[str]]:
     """The rows of measurements with the numbers of their lines, and words on what was left out."""
     width = len(heads)
-    key = next(k for k, cell in enumerate(first) if _is_data(cell))
+    key = next((k for k, cell in enumerate(first[:width]) if _is_data(cell)), -1)
+    if key < 0:
+        raise InputError(f"{file}: no column with numbers has a head; write a head for each column")
     # a date and a clock between blanks are one cell under one head
     parted = mark == " " and len(first) == width + 1 and bool(DATE.fullmatch(first[key]))
     rows, numbers, strange = list[list[str]](), list[int](), list[tuple[int, int, list[str]]]()
@@ -304,7 +306,7 @@ def _body(
     for number, line, cells in _cells(file, lines, mark):
         if parted and len(cells) > key + 1:
             cells[key : key + 2] = [f"{cells[key]} {cells[key + 1]}"]
-        if len(cells) != width or key >= width or not cells[key][-1:].isdigit():
+        if len(cells) != width or not cells[key][-1:].isdigit():
             if not any(cells):
                 continue
             if cells[0].startswith(_COMMENTS):
