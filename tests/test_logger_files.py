@@ -425,6 +425,12 @@ def test_cells_without_a_number_are_left_out_and_counted(tmp_path, cell):
     assert f"left out: 3 rows without a number ({cell or 'empty'})" in recording.understood
 
 
+def test_a_line_has_a_largest_length(tmp_path):
+    """Before it is searched for marks and heads."""
+    with pytest.raises(InputError, match=r"line 2: has more than 50000 characters"):
+        read_recording(written(tmp_path, "time [s] motor.i [A]\n" + 2 * (30_000 * "1 " + "\n")))
+
+
 def test_a_time_without_a_number_is_counted(tmp_path):
     recording = read_recording(written(tmp_path, table(plain).replace("\n0.400,", "\nnan,")))
     check(recording, np.arange(COUNT) != 20)

@@ -39,8 +39,9 @@ WITH_UNIT = re.compile(rf"({_NUMBER.pattern}) ?([^\W\d_][\w/%]{{0,5}}|%)")
 """A number with its unit in one cell."""
 _COMMENTS = ("#", "%", "//", "!")
 _REMARK = re.compile(r"\s#(?!N/A|NV|VALUE|DIV|NUM|REF|NULL|WERT).*$", re.IGNORECASE)
-_SAMPLE, _FOOTER, _ABOVE = 400, 50, 12
-"""Lines by which mark and head are found, most lines of a footer, and most lines above the rows that may be heads."""
+_SAMPLE, _FOOTER, _ABOVE, _LONGEST = 400, 50, 12, 50_000
+"""Lines by which mark and head are found, most lines of a footer, most lines above the rows that may be heads, and
+most characters of a line."""
 _WORDS = {
     "volts": "V", "amps": "A", "amperes": "A", "watts": "W", "msec": "ms", "millisecond": "ms", "milliseconds": "ms",
     "usec": "µs", "microseconds": "µs", "sek": "s", "secs": "s", "sekunden": "s", "newton meter": "N m",
@@ -77,11 +78,17 @@ def read_table(file: Path, text: str, names: Iterable[str]) -> LoggerTable:
         for a text that is no table, and for rows that do not fit the head.
     """
     lines = _joined(file, lines_of_table(file, text.replace("\u2212", "-")))
+    long = next((number for number, line in lines if len(line) > _LONGEST), 0)
+    if long:
+        raise InputError(f"{file}, line {long}: has more than {_LONGEST} characters, the most that are read")
     if not any(line.strip() for _, line in lines):
         raise InputError(f"{file}: is empty; must have a head and >= {FEWEST} rows")
     stated = re.fullmatch(r'"?sep=(.)"?', lines[0][1].strip("\r\n"))
     lines = lines[1:] if stated else lines
-    sample = [each for each in lines[: 2 * _SAMPLE] if each[1].strip()][:_SAMPLE]
+    sample = [each for each in lines[: 2 * _SAMPLE] if each[1].strip()]
+    sample = sample[
+        : max(20, min(_SAMPLE, _SAMPLE * 1000 // max((len(line) for _, line in sample), default=1)))
+    ]
     mark = stated[1] if stated and stated[1] in MARKS else _mark_of([line for _, line in sample])
     begin = _first_row(sample, mark)
     if begin < 0:
@@ -281,7 +288,7 @@ def _heads_in(line: str, mark: str, count: int) -> list[str]:
     """The heads in a line; between blanks those of as many columns, if blanks within heads allow it."""
     if mark not in (" ", "  "):
         return cells_of_line(line, mark)
-    outside = [part.strip() for part in re.split(r"\s+(?![^\[(]*[\])])(?![\[(])", line.strip())]
+    outside = [part.strip() for part in re.split(r"\s+(?![^\[(]{0,99}[\])])(?![\[(])", line.strip())]
     ways = [cells_of_line(line, "  "), cells_of_line(line, " "), outside]
     return next((way for way in ways if len(way) == count), outside)
 
