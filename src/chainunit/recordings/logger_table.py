@@ -85,7 +85,7 @@ def read_table(file: Path, text: str, names: Iterable[str]) -> LoggerTable:
         raise InputError(f"{file}: is empty; must have a head and >= {FEWEST} rows")
     stated = re.fullmatch(r'"?sep=(.)"?', lines[0][1].strip("\r\n"))
     lines = lines[1:] if stated else lines
-    sample = [each for each in lines[: 2 * _SAMPLE] if each[1].strip()]
+    sample = [numbered for numbered in lines[: 2 * _SAMPLE] if numbered[1].strip()]
     sample = sample[
         : max(20, min(_SAMPLE, _SAMPLE * 1000 // max((len(line) for _, line in sample), default=1)))
     ]
@@ -108,10 +108,10 @@ def read_table(file: Path, text: str, names: Iterable[str]) -> LoggerTable:
         )
     rows_of_units = [cells_of_line(line, mark) for _, line in sample[head + 1 : begin]]
     units = next((row for row in rows_of_units if _is_of_units(row, len(heads))), [])
-    own = [name_and_unit(each, names) for each in heads]
-    units = [unit or bare_unit(units[k]) if k < len(units) else unit for k, (_, unit) in enumerate(own)]
-    at = next(k for k, (number, _) in enumerate(lines) if number == sample[begin][0])
-    rows, numbers, left_out = _body(file, lines[at:], mark, heads, first)
+    named = [name_and_unit(head_cell, names) for head_cell in heads]
+    units = [unit or bare_unit(units[k]) if k < len(units) else unit for k, (_, unit) in enumerate(named)]
+    start = next(k for k, (number, _) in enumerate(lines) if number == sample[begin][0])
+    rows, numbers, left_out = _body(file, lines[start:], mark, heads, first)
     if head > 0:
         left_out.insert(0, f"{head} {'line' if head == 1 else 'lines'} before the head")
     if len(rows) < FEWEST:
@@ -207,7 +207,7 @@ def _joined(file: Path, lines: list[str]) -> list[tuple[int, str]]:
 def cells_of_line(line: str, mark: str) -> list[str]:
     """The cells of a line, with quotation marks by RFC 4180."""
     if mark in (" ", "  "):
-        return [each for each in re.split(r"\s+" if mark == " " else r"\s{2,}|\t", line.strip()) if each]
+        return [cell for cell in re.split(r"\s+" if mark == " " else r"\s{2,}|\t", line.strip()) if cell]
     return [cell.strip() for cell in next(csv.reader([line], delimiter=mark, skipinitialspace=True), [])]
 
 
@@ -323,7 +323,7 @@ def _body(
                 cells, remarks = cut, remarks + 1
             if len(cells) > width and not any(cells[width:]):
                 cells = cells[:width]
-            if [each.lower() for each in cells] == [each.lower() for each in heads]:
+            if [cell.lower() for cell in cells] == [cell.lower() for cell in heads]:
                 again += 1
                 continue
             if len(cells) != width or not (_is_data(cells[key]) or MISSING.fullmatch(cells[key])):
@@ -345,8 +345,8 @@ def _body(
         number, cells = wrong[0] if wrong else strange[0][1:]
         raise InputError(f"{file}, line {number}: {_words(cells, heads, mark)}")
     left_out = [
-        f"{count} {words}{'s' if count > 1 else ''}"
-        for count, words in ((again, "repeated head"), (remarks, "comment"), (len(strange), "line"))
+        f"{count} {noun}{'s' if count > 1 else ''}"
+        for count, noun in ((again, "repeated head"), (remarks, "comment"), (len(strange), "line"))
         if count
     ]
     if strange:
