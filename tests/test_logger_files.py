@@ -92,7 +92,7 @@ START = datetime(2023, 6, 19, 23, 59, 59)
 HEADS = "time [s]", "crank.tau [N m]", "crank.w [rad/s]", "mark [1]"
 
 
-def at(k):
+def moment(k):
     return START + timedelta(milliseconds=20 * k)
 
 
@@ -137,7 +137,7 @@ TOA5 = '"TOA5","CR1000","CR1000","1234","CR1000.Std.32","CPU:drive.CR1","5","Tab
 FORMATS = {
     "TOA5 of Campbell loggers": (
         table(
-            lambda k: [f'"{at(k):%Y-%m-%d %H:%M:%S.%f}"'[:-4] + '"'],
+            lambda k: [f'"{moment(k):%Y-%m-%d %H:%M:%S.%f}"'[:-4] + '"'],
             ("TIMESTAMP", "crank.tau", "crank.w", "mark"),
             before=TOA5,
             units=("TS", "N m", "rad/s", ""),
@@ -148,8 +148,8 @@ FORMATS = {
         table(
             lambda k: [
                 str(k + 1),
-                f"{at(k):%Y/%m/%d %H:%M:%S}",
-                f"{at(k).microsecond // 1000:03d}",
+                f"{moment(k):%Y/%m/%d %H:%M:%S}",
+                f"{moment(k).microsecond // 1000:03d}",
                 f"+ {TAU[k]:.2f}",
             ],
             ("Number", "Date&Time", "ms", "crank.tau", "crank.w", "mark"),
@@ -183,7 +183,10 @@ FORMATS = {
     "HOBO, heads with commas and serial numbers": (
         '"Plot Title: pump"\n'
         + table(
-            lambda k: [str(k + 1), f"{at(k):%m/%d/%y %I:%M:%S}.{at(k).microsecond // 1000:03d} {at(k):%p}"],
+            lambda k: [
+                str(k + 1),
+                f"{moment(k):%m/%d/%y %I:%M:%S}.{moment(k).microsecond // 1000:03d} {moment(k):%p}",
+            ],
             (
                 '"#"',
                 '"Date Time, GMT+02:00"',
@@ -230,7 +233,7 @@ FORMATS = {
     ),
     "ibaAnalyzer, dates with points": (
         table(
-            lambda k: [f"{at(k):%d.%m.%Y %H:%M:%S.%f}"],
+            lambda k: [f"{moment(k):%d.%m.%Y %H:%M:%S.%f}"],
             ("clock", "crank.tau", "crank.w", "mark"),
             "\t",
             units=("", "Nm", "rad/s", ""),
@@ -239,17 +242,17 @@ FORMATS = {
     ),
     "RFC 3339 with a zone and as many digits as needed": (
         table(
-            lambda k: [f"{at(k):%Y-%m-%dT%H:%M:%S.%f}".rstrip("0").rstrip(".") + "+02:00"],
+            lambda k: [f"{moment(k):%Y-%m-%dT%H:%M:%S.%f}".rstrip("0").rstrip(".") + "+02:00"],
             ("time", *HEADS[1:]),
         ),
         {},
     ),
-    "basic ISO 8601": (table(lambda k: [f"{at(k):%Y%m%dT%H%M%S.%f}"], ("time", *HEADS[1:])), {}),
+    "basic ISO 8601": (table(lambda k: [f"{moment(k):%Y%m%dT%H%M%S.%f}"], ("time", *HEADS[1:])), {}),
     "German columns of date and clock": (
         table(
             lambda k: [
-                f"{at(k):%d.%m.%Y}",
-                f"{at(k):%H:%M:%S},{at(k).microsecond // 1000:03d}",
+                f"{moment(k):%d.%m.%Y}",
+                f"{moment(k):%H:%M:%S},{moment(k).microsecond // 1000:03d}",
                 *german(k)[1:],
             ],
             ("Datum", "Uhrzeit", *HEADS[1:]),
@@ -260,9 +263,9 @@ FORMATS = {
     "columns of date, clock and ms": (
         table(
             lambda k: [
-                f"{at(k):%d.%m.%y}",
-                f"{at(k):%H:%M:%S}",
-                str(at(k).microsecond // 1000),
+                f"{moment(k):%d.%m.%y}",
+                f"{moment(k):%H:%M:%S}",
+                str(moment(k).microsecond // 1000),
                 *german(k)[1:],
             ],
             ("Datum", "Zeit", "Millisekunden", *HEADS[1:]),
@@ -272,30 +275,36 @@ FORMATS = {
     ),
     "columns of year to second": (
         table(
-            lambda k: [*f"{at(k):%Y %m %d %H %M} {at(k).second + at(k).microsecond / 1e6:.3f}".split()],
+            lambda k: [
+                *f"{moment(k):%Y %m %d %H %M} {moment(k).second + moment(k).microsecond / 1e6:.3f}".split()
+            ],
             ("Year", "Month", "Day", "Hour", "Minute", "Second", *HEADS[1:]),
         ),
         {},
     ),
     "clock with a colon before ms, over midnight": (
-        table(lambda k: [f"{at(k):%H:%M:%S}:{at(k).microsecond // 1000:03d}"], ("Time", *HEADS[1:])),
+        table(lambda k: [f"{moment(k):%H:%M:%S}:{moment(k).microsecond // 1000:03d}"], ("Time", *HEADS[1:])),
         {},
     ),
     "12 hours with AM and PM, over midnight": (
         table(
-            lambda k: [f"{at(k):%I:%M:%S}.{at(k).microsecond // 1000:03d} {at(k):%p}"], ("Time", *HEADS[1:])
+            lambda k: [f"{moment(k):%I:%M:%S}.{moment(k).microsecond // 1000:03d} {moment(k):%p}"],
+            ("Time", *HEADS[1:]),
         ),
         {},
     ),
     "Excel shows mm:ss.000, over the hour": (
-        table(lambda k: [f"{at(k):%M:%S}.{at(k).microsecond // 1000:03d}"], ("Time", *HEADS[1:])),
+        table(lambda k: [f"{moment(k):%M:%S}.{moment(k).microsecond // 1000:03d}"], ("Time", *HEADS[1:])),
         {},
     ),
-    "US dates over midnight": (table(lambda k: [f"{at(k):%m/%d/%Y %H:%M:%S.%f}"], ("time", *HEADS[1:])), {}),
-    "month by its name": (table(lambda k: [f"{at(k):%d-%b-%Y %H:%M:%S.%f}"], ("time", *HEADS[1:])), {}),
+    "US dates over midnight": (
+        table(lambda k: [f"{moment(k):%m/%d/%Y %H:%M:%S.%f}"], ("time", *HEADS[1:])),
+        {},
+    ),
+    "month by its name": (table(lambda k: [f"{moment(k):%d-%b-%Y %H:%M:%S.%f}"], ("time", *HEADS[1:])), {}),
     "newest row first": (
         "\n".join([lines[0], *lines[:0:-1]])
-        if (lines := table(lambda k: [f"{at(k)}.000"[:23]], ("time", *HEADS[1:])).splitlines())
+        if (lines := table(lambda k: [f"{moment(k)}.000"[:23]], ("time", *HEADS[1:])).splitlines())
         else "",
         {},
     ),
@@ -331,7 +340,7 @@ FORMATS = {
     "US thousands in quotes": (table(lambda k: [*plain(k), f'"{TAU[k]:,.2f}"']), {}),
     "bars": (table(plain, mark="|"), {}),
     "blanks, date and clock": (
-        table(lambda k: [f"{at(k):%Y-%m-%d %H:%M:%S.%f}"], ("time", *HEADS[1:]), " "),
+        table(lambda k: [f"{moment(k):%Y-%m-%d %H:%M:%S.%f}"], ("time", *HEADS[1:]), " "),
         {},
     ),
     "signs of Unicode": (table(lambda k: [*plain(k), f"{TAU[k]:.2f}".replace("-", "\u2212")]), {}),
@@ -351,17 +360,23 @@ FORMATS = {
     ),
     "clock backwards over midnight": (
         "\n".join([*lines[:1], *lines[:0:-1]])
-        if (lines := table(lambda k: [f"{at(k):%H:%M:%S.%f}"], ("Time", *HEADS[1:])).splitlines())
+        if (lines := table(lambda k: [f"{moment(k):%H:%M:%S.%f}"], ("Time", *HEADS[1:])).splitlines())
         else "",
         {},
     ),
-    "the name of a zone": (table(lambda k: [f"{at(k):%Y-%m-%d %H:%M:%S.%f} CEST"], ("time", *HEADS[1:])), {}),
+    "the name of a zone": (
+        table(lambda k: [f"{moment(k):%Y-%m-%d %H:%M:%S.%f} CEST"], ("time", *HEADS[1:])),
+        {},
+    ),
     "days of a spreadsheet without a unit": (
         table(lambda k: [f"{45096.99 + T[k] / 86400.0:.12f}"], ("Time", *HEADS[1:])),
         {},
     ),
     "ms beside a clock that has them": (
-        table(lambda k: [f"{at(k):%H:%M:%S.%f}", str(at(k).microsecond // 1000)], ("Time", "ms", *HEADS[1:])),
+        table(
+            lambda k: [f"{moment(k):%H:%M:%S.%f}", str(moment(k).microsecond // 1000)],
+            ("Time", "ms", *HEADS[1:]),
+        ),
         {},
     ),
     "sep of tabs": (table(plain, mark="\t", before="sep=\t"), {}),
@@ -423,6 +438,12 @@ def test_cells_without_a_number_are_left_out_and_counted(tmp_path, cell):
     recording = read_recording(written(tmp_path, "\n".join(lines)))
     check(recording, ~np.isin(np.arange(COUNT), (10, 50, 51)))
     assert f"left out: 3 rows without a number ({cell or 'empty'})" in recording.understood
+
+
+def test_a_line_has_a_largest_length(tmp_path):
+    """Before it is searched for marks and heads."""
+    with pytest.raises(InputError, match=r"line 2: has more than 50000 characters"):
+        read_recording(written(tmp_path, "time [s] motor.i [A]\n" + 2 * (30_000 * "1 " + "\n")))
 
 
 def test_a_time_without_a_number_is_counted(tmp_path):
@@ -506,7 +527,9 @@ REMEDIES = {
         lambda text: f"{','.join(HEADS)}\n{text}",
     ),
     "a long table": (
-        "\n".join(f"{name},{at(k)},{x}" for k in range(COUNT) for name, x in (("tau", TAU[k]), ("w", W[k]))),
+        "\n".join(
+            f"{name},{moment(k)},{x}" for k in range(COUNT) for name, x in (("tau", TAU[k]), ("w", W[k]))
+        ),
         "has no head",
         "needs a column for each quantity",
         lambda _: table(plain),
@@ -580,10 +603,10 @@ REMEDIES = {
         lambda _: table(plain),
     ),
     "hours and minutes": (
-        table(lambda k: [f"{at(k):%H:%M}"], ("time", *HEADS[1:])),
+        table(lambda k: [f"{moment(k):%H:%M}"], ("time", *HEADS[1:])),
         "may be hh:mm or mm:ss",
         "write hh:mm:ss.fff",
-        lambda _: table(lambda k: [f"{at(k):%H:%M:%S.%f}"], ("time", *HEADS[1:])),
+        lambda _: table(lambda k: [f"{moment(k):%H:%M:%S.%f}"], ("time", *HEADS[1:])),
     ),
     "many cells without a number": (
         table(
@@ -594,7 +617,9 @@ REMEDIES = {
         lambda text: replaced(text, (r"motor\.i", "other")),
     ),
     "two zones": (
-        table(lambda k: [f"{at(k):%Y-%m-%dT%H:%M:%S.%f}{'Z' if k < 60 else '+02:00'}"], ("time", *HEADS[1:])),
+        table(
+            lambda k: [f"{moment(k):%Y-%m-%dT%H:%M:%S.%f}{'Z' if k < 60 else '+02:00'}"], ("time", *HEADS[1:])
+        ),
         "has times of 2 zones",
         "write all in one",
         lambda text: replaced(text, (r"\+02:00", "Z")),
@@ -624,7 +649,7 @@ REMEDIES = {
         lambda _: table(plain),
     ),
     "two columns of times": (
-        table(lambda k: [f"{at(k)}.000"[:23], f"{at(k)}.000"[:23]], ("start", "end", *HEADS[1:])),
+        table(lambda k: [f"{moment(k)}.000"[:23], f"{moment(k)}.000"[:23]], ("start", "end", *HEADS[1:])),
         "has no column time [s]",
         'columns = { "time" = "start" }',
         {"time": "start"},
@@ -714,8 +739,8 @@ def test_an_instantaneous_current_makes_a_row_for_each_period(tmp_path):
     recording = with_rms(read_recording(written(tmp_path, "\n".join(lines))), TURN)
     assert len(recording.time) == pytest.approx(SUPPLY * time[-1], abs=1.0)
     np.testing.assert_allclose(recording.columns["motor.i"], np.interp(recording.time, time, size), rtol=0.02)
-    found, passes = recording.time[recording.columns["mark"] > 0.5], time[mark > 0.5]
-    assert len(found) == len(passes) and np.all((found >= passes) & (found < passes + 1.01 / SUPPLY))
+    marked, passes = recording.time[recording.columns["mark"] > 0.5], time[mark > 0.5]
+    assert len(marked) == len(passes) and np.all((marked >= passes) & (marked < passes + 1.01 / SUPPLY))
     assert "motor.i is instantaneous, of 50 Hz: its RMS over each of 600 periods" in recording.understood
     slow = recording.part()
     assert with_rms(slow, TURN) is slow
@@ -780,11 +805,11 @@ MARKS = ",;\t|. "
 @given(
     name=st.sampled_from(sorted(FORMATS)),
     row=st.integers(3, COUNT - 3),
-    at=st.floats(0.0, 0.999),
+    share=st.floats(0.0, 0.999),
     change=st.sampled_from(["left out", "added", "another one", "cut", "quote"]),
     mark=st.sampled_from(MARKS),
 )
-def test_one_wrong_mark_is_never_misread_in_silence(name, row, at, change, mark, tmp_path_factory):
+def test_one_wrong_mark_is_never_misread_in_silence(name, row, share, change, mark, tmp_path_factory):
     """Of each file, all rows that are read are right, or it is refused."""
     text, names = FORMATS[name]
     lines = text.splitlines()
@@ -792,9 +817,9 @@ def test_one_wrong_mark_is_never_misread_in_silence(name, row, at, change, mark,
     line = lines[k]
     marks = [i for i, sign in enumerate(line) if sign in MARKS]
     i = (
-        int(at * len(line))
+        int(share * len(line))
         if change in ("added", "cut", "quote") or not marks
-        else marks[int(at * len(marks))]
+        else marks[int(share * len(marks))]
     )
     lines[k] = {
         "left out": line[:i] + line[i + 1 :],

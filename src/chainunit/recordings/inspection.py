@@ -211,12 +211,12 @@ def inspect_work(recording: Recording, ratio: float, off: float | None = None) -
         if len(wrong) and abs(np.nanmedian(means)) > clear:
             k = int(wrong[0])
             size, usual = (_size(name, float(x)) for x in (means[k], np.nanmedian(means)))
-            words = (
+            text = (
                 f"mean of {size} in the turn from {times[k]:.10g} to {times[k + 1]:.10g} s, and of {usual} in most "
                 f"turns: the work of {len(wrong)} of {len(means)} turns has the wrong sign; mend the sign or the "
                 "order of these rows, or name a part without them (begin, end)"
             )
-            faults.append(_fault(recording, name, words))
+            faults.append(_fault(recording, name, text))
     return faults
 
 

@@ -28,8 +28,8 @@ _OVERLOAD = 9.8e37
 """A meter in overload, by IEEE 488.2, gives 9.9e37."""
 _BOOLEANS = {
     word: float(k)
-    for k, words in enumerate(("false off no low falsch aus nein", "true on yes high wahr ein ja"))
-    for word in words.split()
+    for k, column in enumerate(("false off no low falsch aus nein", "true on yes high wahr ein ja"))
+    for word in column.split()
 }
 _FRACTIONS = {"ms": 1e-3, "msec": 1e-3, "millis": 1e-3, "us": 1e-6, "usec": 1e-6, "µs": 1e-6, "ns": 1e-9} | {
     f"{prefix}{word}": factor
@@ -67,19 +67,20 @@ def numbers(table: LoggerTable, place: int, others: frozenset[str], boolean: boo
     for k in map(int, np.flatnonzero(~(np.abs(x) < _OVERLOAD))):
         cell = table.rows[k][place]
         if not (MISSING.fullmatch(cell) or math.isfinite(x[k])):
-            words = "is no number; delete this row, or write nan for a missing measurement"
+            refusal = "is no number; delete this row, or write nan for a missing measurement"
             if with_unit := WITH_UNIT.fullmatch(cell):
-                found = dict.fromkeys(
-                    each[2] for x in table.column(place) if (each := WITH_UNIT.fullmatch(x))
+                unit_texts = dict.fromkeys(
+                    match[2] for x in table.column(place) if (match := WITH_UNIT.fullmatch(x))
                 )
-                words = "is no number alone, "
-                if len(found) > 1:
-                    words += f"and the units differ ({', '.join(found)}); write all in one, which stands in the head"
+                refusal = "is no number alone, "
+                if len(unit_texts) > 1:
+                    units = ", ".join(unit_texts)
+                    refusal += f"and the units differ ({units}); write all in one, which stands in the head"
                 else:
-                    words += f"write [{with_unit[2]}] into the head, and take it out of all cells"
+                    refusal += f"write [{with_unit[2]}] into the head, and take it out of all cells"
             raise InputError(
                 f"{table.file}, line {table.lines[k]}, column {place + 1}, {table.heads[place]}: "
-                f"{printable(cell, 40)} {words}"
+                f"{printable(cell, 40)} {refusal}"
             )
         x[k] = np.nan
     return x
@@ -100,7 +101,7 @@ def _shapes(sign: str) -> tuple[re.Pattern[str], re.Pattern[str], re.Pattern[str
     may_be = rf"[+-]?[1-9]\d{{0,2}}{s}\d{{3}}"
     decimal = rf"^(?!{may_be}$)[+-]?(?:\d{{1,3}}(?:{o}\d{{3}})+{s}\d*|\d*{s}\d*)(?:[eE][+-]?\d+)?$"
     thousands = rf"^[+-]?[1-9]\d{{0,2}}(?:(?:{s}\d{{3}}){{2,}}(?:{o}\d*)?|{s}\d{{3}}{o}\d*)$"
-    return tuple(re.compile(each, re.MULTILINE) for each in (decimal, thousands, rf"^{may_be}$"))  # type: ignore[return-value]
+    return tuple(re.compile(pattern, re.MULTILINE) for pattern in (decimal, thousands, rf"^{may_be}$"))  # type: ignore[return-value]
 
 
 _SHAPES = {sign: _shapes(sign) for sign in ".,"}
@@ -130,22 +131,22 @@ def _plain(table: LoggerTable, place: int, others: frozenset[str]) -> list[str]:
     ):
         text = _GROUP.sub("", text)
     present = {sign: shapes for sign, shapes in _SHAPES.items() if sign in text}
-    own = {sign for sign, (decimal, _, _) in present.items() if decimal.search(text)}
+    decimals = {sign for sign, (decimal, _, _) in present.items() if decimal.search(text)}
     maybe = {sign for sign, (_, _, either) in present.items() if either.search(text)}
     several = re.search(r"[.,]\d*[.,]", text)
     grouped = {sign for sign, (_, thousands, _) in present.items() if several and thousands.search(text)}
-    own |= {"," if sign == "." else "." for sign in grouped}
-    if len(own) > 1:
-        raise _doubtful(table, place, own, is_mixed=True)
-    if not own and maybe:
+    decimals |= {"," if sign == "." else "." for sign in grouped}
+    if len(decimals) > 1:
+        raise _doubtful(table, place, decimals, is_mixed=True)
+    if not decimals and maybe:
         # semicolons between columns come with decimal commas; commas, bars and blanks with decimal points
         usual = frozenset({";": ",", "\t": ""}.get(table.mark, "."))
         if len(maybe) > 1 or maybe != (others or usual):
             raise _doubtful(table, place, maybe)
-        own = maybe
-    if own and (maybe - own) - grouped:
-        raise _doubtful(table, place, maybe - own)
-    decimal = next(iter(own), "")
+        decimals = maybe
+    if decimals and (maybe - decimals) - grouped:
+        raise _doubtful(table, place, maybe - decimals)
+    decimal = next(iter(decimals), "")
     if grouped:
         text = re.sub(r"(?<=\d)\.(?=\d{3}(?!\d))" if decimal == "," else r"(?<=\d),(?=\d{3}(?!\d))", "", text)
     plain = (text.replace(",", ".") if decimal == "," else text).split("\n")
@@ -155,13 +156,12 @@ def _plain(table: LoggerTable, place: int, others: frozenset[str]) -> list[str]:
 
 def _refuse_left_out(table: LoggerTable, place: int, cells: Sequence[str]) -> None:
     """Refuse a long number without a decimal sign where all others have one with the same number of decimals."""
-    digits = [re.split("[eE]", cell)[0].lstrip("+-") for cell in cells]
-    whole = [k for k, cell in enumerate(digits) if cell.isdigit()]
+    whole = [k for k, cell in enumerate(cells) if "." not in cell and _mantissa(cell).isdigit()]
     if not 0 < len(whole) <= max(1.0, LEFT_OUT * len(cells)):
         return
-    decimals = {len(cell.partition(".")[2]) for cell in digits if "." in cell}
+    decimals = {len(_mantissa(cell).partition(".")[2]) for cell in cells if "." in cell}
     for k in whole:
-        if len(decimals) == 1 and len(digits[k]) > max(decimals) > 0:
+        if len(decimals) == 1 and len(_mantissa(cells[k])) > max(decimals) > 0:
             raise InputError(
                 f"{table.file}, line {table.lines[k]}, column {place + 1}, {table.heads[place]}: {cells[k]} has no "
                 f"decimal sign, and the other numbers have {max(decimals)} decimals: a sign is left out; mend it, or "
@@ -169,19 +169,23 @@ def _refuse_left_out(table: LoggerTable, place: int, cells: Sequence[str]) -> No
             )
 
 
+def _mantissa(cell: str) -> str:
+    return re.split("[eE]", cell)[0].lstrip("+-")
+
+
 def _doubtful(table: LoggerTable, place: int, signs: Iterable[str], is_mixed: bool = False) -> InputError:
     """The refusal of a column whose numbers can be read in two ways, by its first such cell with each sign."""
     cells = table.column(place)
-    found = {
+    first_rows = {
         sign: next(
             k for k, cell in enumerate(cells) if sign in cell and (is_mixed or _SHAPES[sign][2].match(cell))
         )
         for sign in sorted(signs)
     }
-    k = next(iter(found.values()))
+    k = next(iter(first_rows.values()))
     where = f"{table.file}, line {table.lines[k]}, column {place + 1}, {table.heads[place]}: {cells[k]}"
     if is_mixed:
-        other = " and ".join(f"{cells[j]} (line {table.lines[j]})" for j in list(found.values())[1:])
+        other = " and ".join(f"{cells[j]} (line {table.lines[j]})" for j in list(first_rows.values())[1:])
         return InputError(f"{where} and {other} have different decimal signs; write all with the same one")
     point, whole = cells[k].replace(",", "."), re.sub(r"[.,]", "", cells[k])
     return InputError(
@@ -229,10 +233,10 @@ def has_times(table: LoggerTable, place: int) -> bool:
 def _kind(table: LoggerTable, place: int) -> str:
     """Whether a column has dates, times of the day, or both; empty for other cells."""
     cells = [row[place] for row in table.rows[:20] if not MISSING.fullmatch(row[place])]
-    found = [date_and_clock(cell) for cell in cells]
-    if not found or None in found:
+    times = [date_and_clock(cell) for cell in cells]
+    if not times or None in times:
         return ""
-    first = found[0]
+    first = times[0]
     assert first is not None
     return "clock" if not first[0] else "both" if first[1] else "date"
 
@@ -281,9 +285,9 @@ def times(table: LoggerTable, places: Sequence[int], others: frozenset[str]) -> 
 def _unit_of_time(table: LoggerTable, head: str, unit: str, x: Any) -> tuple[float, str]:
     if unit and not is_time(unit):
         return scale(unit, "s")[0], f"time in {unit}"
-    for each, low, high in _EPOCHS:
+    for unit_text, low, high in _EPOCHS:
         if np.nanmin(x) >= low and np.nanmax(x) < high:
-            return scale(each, "s")[0], f"time in {each} since 1970"
+            return scale(unit_text, "s")[0], f"time in {unit_text} since 1970"
     steps = np.abs(np.diff(x))
     if np.nanmin(x) > 2e4 and np.nanmax(x) < 8e4 and np.nanmedian(steps) < 2e-5:
         return _DAY, "time in days of a spreadsheet"
@@ -321,12 +325,16 @@ def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
         parts = [date_and_clock(row[place]) for place in places]
         day = "".join(part[0] for part in parts if part)
         clock = next((part[1] for part in parts if part and part[1]), None)
-        own = bool(day), clock is not None, clock is not None and clock["s"] is None
-        shape = own if k == 0 else shape
+        row_shape = bool(day), clock is not None, clock is not None and clock["s"] is None
+        shape = row_shape if k == 0 else shape
         days.append(day or (days[-1] if days else ""))
         if None in parts and all(MISSING.fullmatch(row[place]) for place in places):
             continue
-        if None in parts or own != shape or (clock and (int(clock["m"]) > 59 or int(clock["s"] or 0) > 60)):
+        if (
+            None in parts
+            or row_shape != shape
+            or (clock and (int(clock["m"]) > 59 or int(clock["s"] or 0) > 60))
+        ):
             raise _no_time(table, k, places)
         if clock is None:
             seconds[k] = 0.0
@@ -427,7 +435,7 @@ def _ordinal(day: str, order: str) -> int:
     else:
         if (len(parts[0]) == 4) != (order == "ymd") and max(map(len, parts)) == 4:
             raise ValueError
-        y, m, d = (int(parts[order.index(each)]) for each in "ymd")
+        y, m, d = (int(parts[order.index(part)]) for part in "ymd")
     return date(y if y > 99 else 2000 + y, m, d).toordinal()
 
 
@@ -440,7 +448,7 @@ def unwrapped(x: Any, least: float = WRAPS[0]) -> tuple[Any, int]:
     if not len(falls) or len(falls) > 0.2 * len(steps) or not len(rising):
         return x, 0
     largest = 5.0 * float(np.median(rising))
-    for size in (each for each in WRAPS if each >= least):
+    for size in (wrap for wrap in WRAPS if wrap >= least):
         inside = np.nanmin(x) >= -0.5 * size and np.nanmax(x) < size
         if inside and np.all((steps[falls] + size >= 0.0) & (steps[falls] + size <= largest)):
             return x + size * np.cumsum(np.diff(x, prepend=x[:1]) < 0.0), len(falls)
@@ -501,12 +509,12 @@ def _longest(are: Any) -> int:
 def _even(t: Any) -> Any:
     """Even times of rows whose clock is coarse: they lie on a line through the rows at which the clock goes on. None
     for rows that are not even."""
-    at = 1 + np.flatnonzero(np.diff(t) > 0.0)
-    if len(at) < 3:
+    ticks = 1 + np.flatnonzero(np.diff(t) > 0.0)
+    if len(ticks) < 3:
         return None
-    even = np.polynomial.Polynomial.fit(at, t[at], 1)(np.arange(len(t)))
-    step, tick = float(even[1] - even[0]), float(np.median(np.diff(t[at])))
-    is_near = step > 0.0 and np.max(np.abs(even[at] - t[at])) <= max(tick, step)
+    even = np.polynomial.Polynomial.fit(ticks, t[ticks], 1)(np.arange(len(t)))
+    step, tick = float(even[1] - even[0]), float(np.median(np.diff(t[ticks])))
+    is_near = step > 0.0 and np.max(np.abs(even[ticks] - t[ticks])) <= max(tick, step)
     # the clock goes on up to one row before, by half a row on average
     return even + 0.5 * step if is_near else None
 
@@ -549,7 +557,7 @@ def lost_rows(table: LoggerTable, columns: Mapping[int, Any]) -> tuple[Any, list
     lost = ~whole
     places = [place for place, x in columns.items() if np.isnan(x).any()]
     kinds = ", ".join(
-        dict.fromkeys(each for k in places for each in _kinds_of(table, k, np.isnan(columns[k])))
+        dict.fromkeys(kind for k in places for kind in _kinds_of(table, k, np.isnan(columns[k])))
     )
     count = int(lost.sum())
     return whole, [f"{count} {'row' if count == 1 else 'rows'} without a number ({kinds})"] if count else []
@@ -563,9 +571,9 @@ def _kinds_of(table: LoggerTable, place: int, missing: Any) -> Iterator[str]:
 def decimal_words(table: LoggerTable, signs: Iterable[str], places: Iterable[int]) -> str:
     """Words on the mark between columns, and on decimal signs and marks of thousands in the columns at `places`."""
     names = {".": "decimal point", ",": "decimal comma"}
-    found = " and ".join(names[sign] for sign in sorted(signs, reverse=True))
-    words = f"{MARKS[table.mark]} between columns{', ' if found else ''}{found}"
-    return f"{words}, marks of thousands" if any(_has_thousands(table.column(k)) for k in places) else words
+    sign_names = " and ".join(names[sign] for sign in sorted(signs, reverse=True))
+    text = f"{MARKS[table.mark]} between columns{', ' if sign_names else ''}{sign_names}"
+    return f"{text}, marks of thousands" if any(_has_thousands(table.column(k)) for k in places) else text
 
 
 def _has_thousands(cells: Sequence[str]) -> bool:

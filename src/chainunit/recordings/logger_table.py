@@ -39,8 +39,9 @@ WITH_UNIT = re.compile(rf"({_NUMBER.pattern}) ?([^\W\d_][\w/%]{{0,5}}|%)")
 """A number with its unit in one cell."""
 _COMMENTS = ("#", "%", "//", "!")
 _REMARK = re.compile(r"\s#(?!N/A|NV|VALUE|DIV|NUM|REF|NULL|WERT).*$", re.IGNORECASE)
-_SAMPLE, _FOOTER, _ABOVE = 400, 50, 12
-"""Lines by which mark and head are found, most lines of a footer, and most lines above the rows that may be heads."""
+_SAMPLE, _FOOTER, _ABOVE, _LONGEST = 400, 50, 12, 50_000
+"""Lines by which mark and head are found, most lines of a footer, most lines above the rows that may be heads, and
+most characters of a line."""
 _WORDS = {
     "volts": "V", "amps": "A", "amperes": "A", "watts": "W", "msec": "ms", "millisecond": "ms", "milliseconds": "ms",
     "usec": "µs", "microseconds": "µs", "sek": "s", "secs": "s", "sekunden": "s", "newton meter": "N m",
@@ -77,11 +78,17 @@ def read_table(file: Path, text: str, names: Iterable[str]) -> LoggerTable:
         for a text that is no table, and for rows that do not fit the head.
     """
     lines = _joined(file, lines_of_table(file, text.replace("\u2212", "-")))
+    long = next((number for number, line in lines if len(line) > _LONGEST), 0)
+    if long:
+        raise InputError(f"{file}, line {long}: has more than {_LONGEST} characters, the most that are read")
     if not any(line.strip() for _, line in lines):
         raise InputError(f"{file}: is empty; must have a head and >= {FEWEST} rows")
     stated = re.fullmatch(r'"?sep=(.)"?', lines[0][1].strip("\r\n"))
     lines = lines[1:] if stated else lines
-    sample = [each for each in lines[: 2 * _SAMPLE] if each[1].strip()][:_SAMPLE]
+    sample = [numbered for numbered in lines[: 2 * _SAMPLE] if numbered[1].strip()]
+    sample = sample[
+        : max(20, min(_SAMPLE, _SAMPLE * 1000 // max((len(line) for _, line in sample), default=1)))
+    ]
     mark = stated[1] if stated and stated[1] in MARKS else _mark_of([line for _, line in sample])
     begin = _first_row(sample, mark)
     if begin < 0:
@@ -101,10 +108,10 @@ def read_table(file: Path, text: str, names: Iterable[str]) -> LoggerTable:
         )
     rows_of_units = [cells_of_line(line, mark) for _, line in sample[head + 1 : begin]]
     units = next((row for row in rows_of_units if _is_of_units(row, len(heads))), [])
-    own = [name_and_unit(each, names) for each in heads]
-    units = [unit or bare_unit(units[k]) if k < len(units) else unit for k, (_, unit) in enumerate(own)]
-    at = next(k for k, (number, _) in enumerate(lines) if number == sample[begin][0])
-    rows, numbers, left_out = _body(file, lines[at:], mark, heads, first)
+    named = [name_and_unit(head_cell, names) for head_cell in heads]
+    units = [unit or bare_unit(units[k]) if k < len(units) else unit for k, (_, unit) in enumerate(named)]
+    start = next(k for k, (number, _) in enumerate(lines) if number == sample[begin][0])
+    rows, numbers, left_out = _body(file, lines[start:], mark, heads, first)
     if head > 0:
         left_out.insert(0, f"{head} {'line' if head == 1 else 'lines'} before the head")
     if len(rows) < FEWEST:
@@ -200,7 +207,7 @@ def _joined(file: Path, lines: list[str]) -> list[tuple[int, str]]:
 def cells_of_line(line: str, mark: str) -> list[str]:
     """The cells of a line, with quotation marks by RFC 4180."""
     if mark in (" ", "  "):
-        return [each for each in re.split(r"\s+" if mark == " " else r"\s{2,}|\t", line.strip()) if each]
+        return [cell for cell in re.split(r"\s+" if mark == " " else r"\s{2,}|\t", line.strip()) if cell]
     return [cell.strip() for cell in next(csv.reader([line], delimiter=mark, skipinitialspace=True), [])]
 
 
@@ -281,7 +288,7 @@ def _heads_in(line: str, mark: str, count: int) -> list[str]:
     """The heads in a line; between blanks those of as many columns, if blanks within heads allow it."""
     if mark not in (" ", "  "):
         return cells_of_line(line, mark)
-    outside = [part.strip() for part in re.split(r"\s+(?![^\[(]*[\])])(?![\[(])", line.strip())]
+    outside = [part.strip() for part in re.split(r"\s+(?![^\[(]{0,99}[\])])(?![\[(])", line.strip())]
     ways = [cells_of_line(line, "  "), cells_of_line(line, " "), outside]
     return next((way for way in ways if len(way) == count), outside)
 
@@ -296,7 +303,9 @@ def _body(
 ) -> tuple[list[list[str]], list[int], list[str]]:
     """The rows of measurements with the numbers of their lines, and words on what was left out."""
     width = len(heads)
-    key = next(k for k, cell in enumerate(first) if _is_data(cell))
+    key = next((k for k, cell in enumerate(first[:width]) if _is_data(cell)), -1)
+    if key < 0:
+        raise InputError(f"{file}: no column with numbers has a head; write a head for each column")
     # a date and a clock between blanks are one cell under one head
     parted = mark == " " and len(first) == width + 1 and bool(DATE.fullmatch(first[key]))
     rows, numbers, strange = list[list[str]](), list[int](), list[tuple[int, int, list[str]]]()
@@ -304,7 +313,7 @@ def _body(
     for number, line, cells in _cells(file, lines, mark):
         if parted and len(cells) > key + 1:
             cells[key : key + 2] = [f"{cells[key]} {cells[key + 1]}"]
-        if len(cells) != width or key >= width or not cells[key][-1:].isdigit():
+        if len(cells) != width or not cells[key][-1:].isdigit():
             if not any(cells):
                 continue
             if cells[0].startswith(_COMMENTS):
@@ -314,7 +323,7 @@ def _body(
                 cells, remarks = cut, remarks + 1
             if len(cells) > width and not any(cells[width:]):
                 cells = cells[:width]
-            if [each.lower() for each in cells] == [each.lower() for each in heads]:
+            if [cell.lower() for cell in cells] == [cell.lower() for cell in heads]:
                 again += 1
                 continue
             if len(cells) != width or not (_is_data(cells[key]) or MISSING.fullmatch(cells[key])):
@@ -336,8 +345,8 @@ def _body(
         number, cells = wrong[0] if wrong else strange[0][1:]
         raise InputError(f"{file}, line {number}: {_words(cells, heads, mark)}")
     left_out = [
-        f"{count} {words}{'s' if count > 1 else ''}"
-        for count, words in ((again, "repeated head"), (remarks, "comment"), (len(strange), "line"))
+        f"{count} {noun}{'s' if count > 1 else ''}"
+        for count, noun in ((again, "repeated head"), (remarks, "comment"), (len(strange), "line"))
         if count
     ]
     if strange:

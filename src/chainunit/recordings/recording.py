@@ -88,46 +88,46 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
         fit, cells that are no numbers, numbers that can be read in two ways, times that do not rise.
     """
     names, faults = names or {}, Faults()
-    own = [quantity for quantity in COLUMNS if quantity not in names]
-    table = read_table(file, _text(file), [*own, *names.values()])
-    known = _places(table, names, faults)
-    time_from = time_places(table, known.pop("time", None))
+    unnamed = [quantity for quantity in COLUMNS if quantity not in names]
+    table = read_table(file, _text(file), [*unnamed, *names.values()])
+    places = _places(table, names, faults)
+    time_from = time_places(table, places.pop("time", None))
     scales = dict[str, tuple[float, float]]()
-    for name, place in known.items():
+    for name, place in places.items():
         with faults.collected():
             scales[name] = _scale(table, place, COLUMNS[name])
-    signs = {place: decimal_signs(table.column(place)) for place in (*time_from, *known.values())}
+    signs = {place: decimal_signs(table.column(place)) for place in (*time_from, *places.values())}
 
     def others(place: int) -> frozenset[str]:
-        return frozenset[str]().union(*(found for other, found in signs.items() if other != place))
+        return frozenset[str]().union(*(shown for other, shown in signs.items() if other != place))
 
     if not time_from:
-        words = f"{meant('time', table.heads)} its heads are: {', '.join(table.heads)}"
+        text = f"{meant('time', table.heads)} its heads are: {', '.join(table.heads)}"
         faults.add(
-            [InputError(f"{file}: has no column time [s]{words}{remedy('time', table.heads)}, or add it")]
+            [InputError(f"{file}: has no column time [s]{text}{remedy('time', table.heads)}, or add it")]
         )
-    if not known:
-        words = ", ".join(f"{each.name} [{each.unit}]" for each in MEASURANDS.values() if each.name != "time")
-        words += f"; its heads are: {', '.join(table.heads)}{remedy('motor.i', table.heads[::-1])}"
-        faults.add([InputError(f"{file}: has no column of a known quantity, such as {words}")])
+    if not places:
+        text = ", ".join(f"{each.name} [{each.unit}]" for each in MEASURANDS.values() if each.name != "time")
+        text += f"; its heads are: {', '.join(table.heads)}{remedy('motor.i', table.heads[::-1])}"
+        faults.add([InputError(f"{file}: has no column of a known quantity, such as {text}")])
     with faults.collected():
         if len(time_from) == 1 and table.units[time_from[0]] and not has_times(table, time_from[0]):
             _scale(table, time_from[0], MEASURANDS["time"])
         times = times_of(table, time_from, others(time_from[0])) if time_from else None
     faults.refuse()
     assert times is not None
-    raw = {place: numbers(table, place, others(place), name == "mark") for name, place in known.items()}
+    raw = {place: numbers(table, place, others(place), name == "mark") for name, place in places.items()}
     whole, lost = lost_rows(table, {time_from[0]: times.missing, **raw})
     kept = whole[times.kept]
     rows = times.kept[kept]
     columns, remarks = _quantities(
-        {name: raw[place][rows] * scales[name][0] + scales[name][1] for name, place in known.items()}
+        {name: raw[place][rows] * scales[name][0] + scales[name][1] for name, place in places.items()}
     )
-    used = {*time_from, *known.values()}
+    used = {*time_from, *places.values()}
     rate = f"{len(rows):,} rows, {1.0 / float(np.median(np.diff(times.time[kept]))):.4g} Hz"
-    parts = [times.source, decimal_words(table, others(-1), known.values()), rate, *times.remarks, *remarks]
+    parts = [times.source, decimal_words(table, others(-1), places.values()), rate, *times.remarks, *remarks]
     left_out = [*table.left_out, *lost]
-    heads = {name: table.heads[place] for name, place in known.items()} | {"time": table.heads[time_from[0]]}
+    heads = {name: table.heads[place] for name, place in places.items()} | {"time": table.heads[time_from[0]]}
     if "motor.i" in columns and "motor.i" not in heads:
         heads["motor.i"] = ", ".join(heads[name] for name in PHASES if name in heads)
     return Recording(
@@ -222,12 +222,12 @@ def _places(table: LoggerTable, names: Mapping[str, str], faults: Faults) -> dic
         if len(alike) > 1:
             columns = " and ".join(str(k + 1) for k in alike)
             different = len({heads[k] for k in alike}) == len(alike)
-            words = (
+            advice = (
                 f'name one by the key columns, such as columns = {{ "{quantity}" = "{printable(heads[alike[0]])}" }}'
                 if different
                 else "give all but one of them another head"
             )
-            faults.add([InputError(f"{file}: columns {columns} have the head {printable(wanted)}; {words}")])
+            faults.add([InputError(f"{file}: columns {columns} have the head {printable(wanted)}; {advice}")])
         elif alike:
             places[quantity] = alike[0]
         elif quantity in names:
@@ -274,16 +274,16 @@ def _quantities(columns: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
     """The columns with the RMS of phase currents in their place, and counters without their jumps; words on both."""
     remarks = list[str]()
     phases = [name for name in PHASES if name in columns]
-    found = {name: x for name, x in columns.items() if name not in PHASES}
+    quantities = {name: x for name, x in columns.items() if name not in PHASES}
     if phases and "motor.i" not in columns:
         currents = [columns[name] for name in phases]
-        found = {"motor.i": rms_of_phases(currents) if len(phases) > 1 else currents[0], **found}
+        quantities = {"motor.i": rms_of_phases(currents) if len(phases) > 1 else currents[0], **quantities}
         remarks.append(f"motor.i is {'the RMS of ' if len(phases) > 1 else ''}{', '.join(phases)}")
-    if "motor.count" in found:
-        found["motor.count"], wraps = unwrapped(found["motor.count"])
+    if "motor.count" in quantities:
+        quantities["motor.count"], wraps = unwrapped(quantities["motor.count"])
         if wraps:
             remarks.append(f"the count begins anew {wraps} {'time' if wraps == 1 else 'times'}: joined")
-    return found, remarks
+    return quantities, remarks
 
 
 def rms_of_phases(currents: Sequence[Any]) -> Any:
@@ -333,12 +333,12 @@ def with_rms(recording: Recording, turn: float) -> Recording:
     if "mark" in columns:
         passed = recording.time[recording.columns["mark"] > 0.5]
         columns["mark"] = np.zeros(len(time))
-        at = np.searchsorted(time, passed)
-        columns["mark"][at[at < len(time)]] = 1.0
+        rows_after = np.searchsorted(time, passed)
+        columns["mark"][rows_after[rows_after < len(time)]] = 1.0
     if "motor.count" in columns:
         columns["motor.count"] = np.floor(columns["motor.count"])
-    words = f"motor.i is instantaneous, of {frequency:.4g} Hz: its RMS over each of {len(time):,} periods"
-    return replace(recording, time=time, columns=columns, understood=f"{recording.understood}, {words}")
+    remark = f"motor.i is instantaneous, of {frequency:.4g} Hz: its RMS over each of {len(time):,} periods"
+    return replace(recording, time=time, columns=columns, understood=f"{recording.understood}, {remark}")
 
 
 def _alternating(time: Any, current: Any, turn: float) -> float:
