@@ -66,6 +66,8 @@ def test_study_writes_numbers_series_plots_and_fmus(done):
         "load_cycle.csv",
         "fmu",
         "result.md",
+        "provenance.json",
+        "study_copy.toml",
         NAME,
         *study_report.pictures(),
     } - {
