@@ -143,7 +143,8 @@ class House:
         self.touched.append(name)
 
     def run(self, *command: str, status: int = 0) -> str:
-        return self.python("from chainunit.app.cli import main; main()", *command, status=status)
+        pictures = ("--png",) if command[0] == "study" else ()
+        return self.python("from chainunit.app.cli import main; main()", *command, *pictures, status=status)
 
     def python(self, code: str, *arguments: str, status: int = 0) -> str:
         env = os.environ | {"PYTHONPATH": str(self.package.parent)}

@@ -230,8 +230,8 @@ def test_motor_and_machine_of_somebody_else(folder, burst):
     for shares in study.certificate.values():
         assert all(share < 2e-3 for share in shares.values())
     assert study.verdict.holds == "true" and study.verdict.text == (
-        f"The machine is an FMU whose own model is not known; its energy balance holds: the crank at "
-        f"{text_of(study.answers['steady'].speed_mean, 'rad/s')}."
+        f"Energy balance of a machine that is an FMU, crank at "
+        f"{text_of(study.answers['steady'].speed_mean, 'rad/s')}: valid."
     )
     # a row of dashes tells only what the motor does not: nobody knows whether the machine has a rocker or a web
     assert "torque_reserve" in study.not_known
@@ -416,4 +416,4 @@ def test_python_runs_and_shows_it_too(folder):
         float(np.max(np.abs(turn.crank_torque))), rel=0.05
     )
     assert result.runs["start_up"]["machine.tau_bias"].units == "N.m"
-    assert "its energy balance holds" in repr(result)
+    assert "Energy balance of a machine that is an FMU" in repr(result)

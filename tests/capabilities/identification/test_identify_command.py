@@ -138,7 +138,7 @@ def test_the_numbers_are_found_and_written(folder):
     assert tables["feed"]["left"]["material_mass"] == pytest.approx(own["fitted"]["value"], rel=1e-5)
     # the page has the values of the file
     for name, each in result["numbers"].items():
-        value = re.search(rf"{re.escape(name)} \S ([-.0-9]+)", (folder / "stdout.txt").read_text("utf-8"))
+        value = re.search(rf"{re.escape(name)} +\S +([-.0-9]+)", (folder / "stdout.txt").read_text("utf-8"))
         assert value and float(value[1]) == pytest.approx(each["fitted"]["value"], rel=5e-4)
     # the best fit is near the mean of the distribution
     assert abs(own["fitted"]["value"] - own["value"]["value"]) < 0.3 * own["deviation"]["value"]

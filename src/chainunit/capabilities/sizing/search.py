@@ -123,7 +123,8 @@ def size(
     trials = MotorTrials(task, duty)
     if task.plan.objective == PRICE:
         notes += _without_price(strong, task.gears)
-    candidates = _search(_with_files(trials, strong[0], folder, progress, backend), strong, progress)
+    trials = _with_files(trials, strong[0], folder, progress, backend)
+    candidates = _search(trials, strong, progress)
     best = candidates[0]
     if best.drive.gear_friction:
         notes.append(
