@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from reports import screen_of
 from rich.console import Console
 
 import chainunit.report
@@ -143,6 +144,18 @@ def test_what_the_file_does_not_give_is_marked():
 def test_a_remark_that_was_printed_before_is_not_repeated():
     remark = "Remark: the *motor* <b>"
     assert told(a_report()).count(remark) == 1 and remark not in told(a_report(), remarks=False)
+
+
+@pytest.mark.parametrize("count", [3, 200, 5000])
+def test_one_screen_counts_the_rows_that_it_leaves_out(count):
+    """Rows of the long form alone are none of it; a long table is printed a few times, not once for each row."""
+    rows = [b.TableRow((f"row {k}", S.number("power"))) for k in range(count)]
+    hidden = [b.TableRow(("of the page", ""), form="long")] * 7
+    table = b.Table((*rows, *hidden), (b.Column("row"), b.Column("power")))
+    lines = screen_of(b.Report("A title", "kind", RESULT, (), (b.Section("answer", "", (table,)),)))
+    shown = sum("row " in line for line in lines if line.startswith("│"))
+    left = sum(int(number) for line in lines for number in re.findall(r"^[.]{3} and (\d+) more rows$", line))
+    assert shown + left == count and len(lines) <= 45 and "of the page" not in "".join(lines)
 
 
 def test_the_chosen_units_are_everywhere():

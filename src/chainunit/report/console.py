@@ -61,9 +61,9 @@ def carry_out(
 
         console = terminal_console()
         has_remarks = task.tells_remarks and errors.is_terminal and console.is_terminal
-        words = ", ".join(printable(str(path), 500) for path in written)
         if whole:
             terminal.show(report, console, remarks=not has_remarks)
+            words = ", ".join(printable(str(path), 500) for path in written)
             console.print(f"Written: {words}", soft_wrap=True)
         else:
             names = ", ".join(printable(str(path.relative_to(output)), 500) for path in written[:_MOST_NAMES])

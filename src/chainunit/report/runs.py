@@ -20,8 +20,9 @@ from .terminal import plain_line
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """Tables of the answers of every run, the forces in the bearings and the speed loop."""
     if s.result["answers"]:
-        yield table_of_runs(s, study)
-        yield _beside_the_worst(s, study)
+        whole = table_of_runs(s, study)
+        yield whole
+        yield _beside_the_worst(s, study, whole)
     for run, phase in (("start_up", Phase.START_UP), ("settling", Phase.SETTLING)):
         if s.result.get(run):
             yield from _begin(s, study, run, phase)
@@ -92,14 +93,17 @@ def table_of_runs(s: b.Source, study: StudyRecord) -> b.Table:
     head = "{driver} at {answers.steady.speed_mean}" if "steady" in answers else ""
     if not study.reaches:
         head += "; {=run.crank_speed:4} NOT reached"
-    title = f"Demands of each run on the drive{'; the motor is insufficient' if study.insufficient else ''}"
+    title = f"Demands of each run on the drive{_doubt(study)}"
     return over_runs(study, runs, rows, title, plain_line(s.line(head), study.config.units))
 
 
-def _beside_the_worst(s: b.Source, study: StudyRecord) -> b.Table:
-    """Steady running beside the overload with the largest crank torque, for one screen."""
-    whole, answers = table_of_runs(s, study), s.result["answers"]
-    runs = by_side(study, answers)
+def _doubt(study: StudyRecord) -> str:
+    return "; the motor is insufficient" if study.insufficient else ""
+
+
+def _beside_the_worst(s: b.Source, study: StudyRecord, whole: b.Table) -> b.Table:
+    """Of the table of all runs, steady running beside the overload with the largest crank torque, for one screen."""
+    runs = by_side(study, s.result["answers"])
     shown = [run for run in ("steady",) if run in runs] or runs[:1]
     peaks = {
         run: s.value(f"answers.{run}.crank_torque_peak") or 0.0 for run in study.overloads if run in runs
@@ -108,7 +112,7 @@ def _beside_the_worst(s: b.Source, study: StudyRecord) -> b.Table:
     if peaks:
         shown.append(max(peaks, key=lambda run: abs(peaks[run])))
         bare = " (without torque limiter)" if study.proposal is not None else ""
-        title = f"Steady running beside the worst overload{bare}: {run_names.title(study, shown[-1])}"
+        title = f"Steady running beside the worst overload{bare}: {run_names.title(study, shown[-1])}{_doubt(study)}"
     places = [0, *(1 + runs.index(run) for run in shown)]
     rows = (replace(row, cells=tuple(row.cells[i] for i in places)) for row in whole.rows)
     columns = tuple(whole.columns[i] for i in places)

@@ -120,11 +120,13 @@ def _fitted(block: Block, console: Console, units: Units, room: int) -> str:
     if not isinstance(block, Table):
         text = _printed(console, lambda: console.print("\n".join(_sentences(block, units))))
         return text if text.strip() and _count([text]) <= room else ""
-    for count in range(len(block.rows), min(_ROWS, len(block.rows)) - 1, -1):
-        part = replace(block, rows=block.rows[:count])
+    rows = [row for row in block.rows if row.form != "long"]
+    # a row takes a line at least
+    for count in range(min(len(rows), room), max(1, min(_ROWS, len(rows))) - 1, -1):
+        part = replace(block, rows=tuple(rows[:count]))
         text = _printed(console, partial(_show_table, part, console, units))
-        if count < len(block.rows):
-            text += f"... and {len(block.rows) - count} more rows\n"
+        if count < len(rows):
+            text += f"... and {len(rows) - count} more rows\n"
         if _count([text]) <= room:
             return text
     return ""
