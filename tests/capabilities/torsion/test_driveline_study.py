@@ -708,7 +708,7 @@ def test_the_command_writes_everything(monkeypatch, capsys, tmp_path):
     assert {"order near line", "peak of a shaft", "natural frequency", "uneven joints"} <= kinds
     text = (folder / "result.md").read_text()
     assert (
-        "| torsion.bend_high | 35 deg | largest bend of the map | file |" in text
+        "| torsion.bend_high | 35 deg | largest bend of the map | mine.toml, line 21 |" in text
         and "](campbell.png)" in text
     )
     page = (folder / "report.html").read_text()
