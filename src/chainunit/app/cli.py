@@ -218,18 +218,17 @@ def keys(
     from ..report import reference, terminal
 
     if schema:
-        _write_schema(Path())
+        _write_schema()
         return
-
     terminal.show(reference.keys_of(table) if table else reference.overview(), terminal_console())
 
 
-def _write_schema(folder: Path) -> None:
-    """The JSON Schema of study files, in a folder."""
+def _write_schema() -> None:
+    """Write the JSON Schema of study files."""
     from ..core.files import atomic_file
     from ..study.schema import FILE, json_schema
 
-    with atomic_file(folder / FILE) as part:
+    with atomic_file(Path(FILE)) as part:
         part.write_text(json.dumps(json_schema(), indent=1, ensure_ascii=False) + "\n", "utf-8")
     print(f"{FILE}: schema of study files")
 

@@ -54,14 +54,26 @@ def _tuned_margin(share: float) -> tuple[float, float]:
 
         c (s + c/5)/s^2 w_c/(s + w_c)        c = share w_c
 
-    whatever the motor, and X = (w/w_c)^2 at its crossover is the positive root of X^3 + X^2 - share^2 X - share^4/25.
-    A test has the same of python-control, whose import takes a second.
+    whatever the motor.
     """
+    return _margin([share, share**2 / 5.0], [1.0, 1.0, 0.0, 0.0])
+
+
+def _margin(rise: Any, plant: Any) -> tuple[float, float]:
+    """Phase margin [deg] and crossover of the open loop that is the quotient of these polynomials in s, the highest
+    power first. A test has the same of python-control, whose import takes a second."""
     import numpy as np
 
-    roots = np.roots([1.0, 1.0, -(share**2), -(share**4) / 25.0])
-    at = math.sqrt(max(float(root.real) for root in roots if abs(root.imag) < 1e-9 * abs(root)))
-    return math.degrees(math.atan2(5.0 * at, share) - math.atan(at)), at
+    # |rise|^2 = |plant|^2 in X = -w^2, as a polynomial times its mirror is even
+    squares = [
+        np.polymul(each, each * (-1.0) ** np.arange(len(each))[::-1]) for each in map(np.array, (rise, plant))
+    ]
+    roots = np.roots(np.polysub(*squares)[::2])
+    crossings = [math.sqrt(-x.real) for x in roots if x.real < 0.0 and abs(x.imag) < 1e-9 * abs(x)]
+    margins = ((-np.polyval(rise, 1j * w) / np.polyval(plant, 1j * w), w) for w in crossings)
+    return min(
+        ((float(np.degrees(np.angle(turned))), w) for turned, w in margins), key=lambda each: abs(each[0])
+    )
 
 
 @result
@@ -95,7 +107,7 @@ def loop(motor: Any, inertia: float) -> Loop:
 
         G = k (kp s + ki) C/(J s^2 D),    w/T_load = -s D/(J s^2 D + k (kp s + ki) C)
 
-    A test has both of python-control, whose import takes a second.
+    A test has the same of python-control.
     """
     import numpy as np
     from scipy.linalg import expm
@@ -105,17 +117,7 @@ def loop(motor: Any, inertia: float) -> Loop:
     closed = np.polyadd(np.array([armature.L, armature.R, 0.0]), control)
     rise = armature.k * np.polymul([motor.speed_control.kp, motor.speed_control.ki], control)
     plant = inertia * np.polymul([1.0, 0.0, 0.0], closed)
-    squares = [np.polymul(gain, gain * (-1.0) ** np.arange(gain.size)[::-1]) for gain in (rise, plant)]
-    crossings = np.roots(np.polysub(*squares)[::2])  # in -w^2, as a gain times its mirror is even
-    crossings = np.sqrt(
-        [-root.real for root in crossings if root.real < 0.0 and abs(root.imag) < 1e-9 * abs(root)]
-    )
-
-    def answer(w: Any) -> Any:
-        return np.polyval(rise, 1j * w) / np.polyval(plant, 1j * w)
-
-    margins = [(float(np.degrees(np.angle(-answer(w)))), float(w)) for w in crossings]
-    phase, at = min(margins, key=lambda margin: abs(margin[0]))
+    phase, at = _margin(rise, plant)
     time = np.linspace(0.0, 40.0 / at, 2001)
     deviation = np.zeros(time.size)
     poles = np.polyadd(plant, rise)
@@ -127,7 +129,7 @@ def loop(motor: Any, inertia: float) -> Loop:
     dip = float(np.max(np.abs(deviation)))
     outside = np.flatnonzero(np.abs(deviation) > 0.05 * dip)
     frequency = np.logspace(-2.0, 1.5, 200) * at
-    gain = answer(frequency)
+    gain = np.polyval(rise, 1j * frequency) / np.polyval(plant, 1j * frequency)
     return Loop(
         inertia,
         phase,

@@ -221,7 +221,7 @@ def time_places(table: LoggerTable, place: int | None) -> list[int]:
     places = [first, *more[:1]]
     cells = (date_and_clock(table.rows[0][k]) for k in places)
     if any(cell and cell[1] and cell[1]["s"] and not cell[1]["f"] for cell in cells):
-        places += [k for k, head in enumerate(table.heads) if _fraction(table, k, head)][:1]
+        places += [k for k in range(len(table.heads)) if _fraction(table, k)][:1]
     return places
 
 
@@ -241,9 +241,9 @@ def _kind(table: LoggerTable, place: int) -> str:
     return "clock" if not first[0] else "both" if first[1] else "date"
 
 
-def _fraction(table: LoggerTable, place: int, head: str) -> float:
+def _fraction(table: LoggerTable, place: int) -> float:
     """The unit of a column with parts of a second beside a clock [s]; 0 for another column."""
-    factor = _FRACTIONS.get(name_and_unit(head)[0].lower(), 0.0)
+    factor = _FRACTIONS.get(name_and_unit(table.heads[place])[0].lower(), 0.0)
     cells = table.column(place) if factor else []
     return factor if cells and all(cell.isdigit() and int(cell) * factor < 1.0 for cell in cells) else 0.0
 
@@ -318,7 +318,7 @@ def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
     """The times from the first row on, by dates and times of the day."""
     seconds, days = np.full(len(table.rows), np.nan), list[str]()
     short, has_fraction, hours, zones = False, False, set[int](), set[str]()
-    beside = [place for place in places if _fraction(table, place, table.heads[place])]
+    beside = {place: factor for place in places if (factor := _fraction(table, place))}
     places = [place for place in places if place not in beside]
     shape = (False, False, False)
     for k, row in enumerate(table.rows):
@@ -360,8 +360,7 @@ def _of_clock(table: LoggerTable, places: Sequence[int]) -> tuple[Any, str]:
             f"{table.file}, column {table.heads[places[0]]}: has times of {len(zones)} zones "
             f"({', '.join(sorted(map(repr, zones)))}); write all in one"
         )
-    for place in beside if not has_fraction else ():
-        factor = _fraction(table, place, table.heads[place])
+    for place, factor in beside.items() if not has_fraction else ():
         seconds += factor * np.array([float(row[place]) for row in table.rows])
     if any(days):
         seconds += _DAY * np.array(_day_numbers(table, days, places[0]))

@@ -9,7 +9,6 @@ from __future__ import annotations
 import base64
 import logging
 import re
-import struct
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
@@ -110,10 +109,10 @@ class _PrintedPage(Page):
         file = self._pictures.get(figure.file or "")
         if file is None:
             return 0.0
-        # the head of a PNG
-        with file.open("rb") as picture:
-            width, height = struct.unpack(">II", picture.read(24)[16:])
-        return float(height / width)
+        from PIL import Image
+
+        with Image.open(file) as picture:
+            return float(picture.height / picture.width)
 
     def _printed(self, figure: Figure) -> str:
         file = self._pictures.get(figure.file or "")

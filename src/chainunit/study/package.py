@@ -33,7 +33,7 @@ from .drive import Drive
 from .operation import OperatingConditions
 from .organ_limits import limits_of_organs
 from .registry import parts_of_line
-from .verdict import Reason, passed_limits
+from .verdict import at_speed, passed_limits
 
 
 def study_system(drive: Drive, operation: OperatingConditions) -> System:
@@ -170,10 +170,7 @@ def left_out(operation: OperatingConditions, events: Iterable[str]) -> str:
 def beyond_two_bars(machine: Machine, feed: Any, speed: float) -> list[str]:
     """A line for each limit of two bars an organ that a crank speed [rad/s] passes, see `study.verdict`."""
     limits = limits_of_organs(machine, feed, ("N.m",))
-    reasons = [
-        Reason(each.topic, "crank_speed", speed, each.speed, "rad/s", kind="speed")
-        for each in passed_limits(limits, speed)
-    ]
+    reasons = [at_speed(each.topic, speed, each.speed) for each in passed_limits(limits, speed)]
     at = number(speed, "rad/s", "speed", beside=False)
     remedy = 'for chains put organ = "chain" at the top of the file'
     return [f"{reason.speed_limit}; this study turns at {at}; {remedy}." for reason in reasons]

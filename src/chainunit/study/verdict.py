@@ -278,7 +278,7 @@ def _speed(speed: float) -> str:
     return number(speed, "rad/s", "speed", beside=False)
 
 
-def _at_speed(topic: str, speed: float, limit: float, run: str = "", grave: bool = False) -> Reason:
+def at_speed(topic: str, speed: float, limit: float, run: str = "", grave: bool = False) -> Reason:
     """A crank speed [rad/s] that passes a limit."""
     return Reason(topic, "crank_speed", speed, limit, "rad/s", run, "speed", grave)
 
@@ -375,11 +375,11 @@ def two_bars(
                     Reason("end pushed", f"{rod}_pull", pull.end, 0.0, "N", run, rod=rod, place=pull.pin)
                 )
     passed = passed_limits(speed_limits(slack_speed, mode), speed)
-    reasons += [_at_speed(each.topic, speed, each.speed, grave=each.grave) for each in passed]
+    reasons += [at_speed(each.topic, speed, each.speed, grave=each.grave) for each in passed]
     if all(each.topic == "slack speed" for each in passed):
         runs = [""] if "" in empty else sorted(empty)
         of_empty = passed_limits(speed_limits(math.inf, mode, empty=True), speed)
-        reasons += [_at_speed(each.topic, speed, each.speed, run) for each in of_empty for run in runs]
+        reasons += [at_speed(each.topic, speed, each.speed, run) for each in of_empty for run in runs]
     return Verdict("organs", BARS, speed, (*reasons, *balance_faults(residuals)), actual, finer=finer)
 
 
