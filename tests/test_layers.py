@@ -79,7 +79,7 @@ DOORS = {
     # the registry: capabilities have their hooks in the folder's own module, or in `capability`
     "study.capability": {"faults", "drive", "take_estimates"},
     # the run of a study, from Python and as a task
-    "study.provenance": {"provenance"},
+    "study.provenance": {"provenance", "writers"},
     "study.choice": {"choose", "choose_for", "drive_of"},
     "study.run": {"run_study"},
     "report.study_task": {"_accept", "_compute", "_fmus"},

@@ -49,7 +49,7 @@ def _write_templates(folder: Path) -> None:
     InputError
         where one of the files is there already.
     """
-    from ..core.files import atomic_file
+    from ..core.files import write_file
     from ..drives.catalogue import KINDS
 
     names = {folder / f"{kind.plural.replace(' ', '_')}.csv": kind for kind in KINDS}
@@ -57,8 +57,7 @@ def _write_templates(folder: Path) -> None:
         raise InputError(f"{', '.join(there)}: is there already; name another folder by -o")
     folder.mkdir(parents=True, exist_ok=True)
     for file, kind in names.items():
-        with atomic_file(file) as part:
-            part.write_text(kind.template(), "utf-8")
+        write_file(file, kind.template())
         needed = ", ".join(kind.required)
         print(f"{file}: {kind.plural}; each row needs {needed}, all else may be left out")
     print("The rows are made up: put your own in their place. chainunit catalogue FILE checks them.")

@@ -225,11 +225,10 @@ def keys(
 
 def _write_schema() -> None:
     """Write the JSON Schema of study files."""
-    from ..core.files import atomic_file
+    from ..core.files import write_file
     from ..study.schema import FILE, json_schema
 
-    with atomic_file(Path(FILE)) as part:
-        part.write_text(json.dumps(json_schema(), indent=1, ensure_ascii=False) + "\n", "utf-8")
+    write_file(Path(FILE), json.dumps(json_schema(), indent=1, ensure_ascii=False) + "\n")
     print(f"{FILE}: schema of study files")
 
 
@@ -276,7 +275,7 @@ def live(
 
     Makes no run: the page computes by itself, in any browser, without a network.
     """
-    from ..core.files import atomic_file
+    from ..core.files import write_file
     from ..core.temporary_folders import scratch
     from ..report.html import render
     from ..report.live.page import live_page
@@ -285,8 +284,7 @@ def live(
         raise InputError(f"-o {output}: is the file that is shown; name another file for the page")
     with scratch() as folder:
         page = render(live_page(file, speed, folder))
-    with atomic_file(output) as part:
-        part.write_text(page, "utf-8")
+    write_file(output, page)
     print(f"{output}: the live page")
 
 

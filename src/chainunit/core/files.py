@@ -82,6 +82,14 @@ def atomic_file(file: Path, *, is_result: bool = True) -> Iterator[Path]:
         part.unlink(missing_ok=True)
 
 
+def write_file(file: Path, content: str | bytes) -> list[Path]:
+    """Write a text, in UTF-8, or bytes into a file, whole or not at all; returns the file, as a writer of `write_all`
+    does. Errors are those of `atomic_file`."""
+    with atomic_file(file) as part:
+        part.write_bytes(content.encode() if isinstance(content, str) else content)
+    return [file]
+
+
 _FOREIGN = "as chainunit did not write it, or it was changed since; move it, or name another folder"
 
 

@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
-from ..core.files import atomic_file
+from ..core.files import write_file
 from . import html, print_figures
 from .blocks import Report
 from .markdown import markdown
@@ -19,25 +19,17 @@ def writers(report: Report, folder: Path, name: str, png: bool = False) -> list[
     pictures: list[Path] = []
 
     def numbers() -> list[Path]:
-        file = folder / f"{name}.json"
-        with atomic_file(file) as part:
-            part.write_text(numbers_text(report), "utf-8")
-        return [file]
+        return write_file(folder / f"{name}.json", numbers_text(report))
 
     def draw() -> list[Path]:
         for drawing in report.drawings:
-            with atomic_file(folder / drawing.file) as part:
-                part.write_text(drawing.svg, "utf-8")
-            pictures.append(folder / drawing.file)
+            pictures.extend(write_file(folder / drawing.file, drawing.svg))
         if png:
             pictures.extend(print_figures.write(report.figures, folder, report.units))
         return pictures
 
     def text() -> list[Path]:
-        file = folder / f"{name}.md"
-        with atomic_file(file) as part:
-            part.write_text(markdown(report, [picture.name for picture in pictures]), "utf-8")
-        return [file]
+        return write_file(folder / f"{name}.md", markdown(report, [picture.name for picture in pictures]))
 
     return [numbers, draw, text, lambda: [html.write(report, folder)]]
 

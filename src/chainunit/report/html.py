@@ -17,7 +17,7 @@ from typing import Any
 
 from .. import __version__
 from ..core.errors import InputError
-from ..core.files import PAGE, atomic_file
+from ..core.files import PAGE, write_file
 from ..reading.text import Units, forms
 from . import blocks as b
 from . import motion
@@ -49,10 +49,7 @@ _ORIGIN = {
 
 def write(report: b.Report, folder: Path) -> Path:
     """Write the page into `folder`; returns the file."""
-    file = folder / NAME
-    page = render(report)
-    with atomic_file(file) as part:
-        part.write_text(page, "utf-8")
+    (file,) = write_file(folder / NAME, render(report))
     return file
 
 

@@ -6,16 +6,14 @@ it: they claim the folder, clear it, compute, report and write.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from ..core.errors import RunError, WriteError
-from ..core.files import ResultKind, atomic_file, claim, clear, write_all
+from ..core.files import ResultKind, claim, clear, write_all
 from ..study import provenance
 from ..study.config import Config
 from ..study.registry import command_modules
@@ -132,18 +130,5 @@ class Task(Generic[Question, Outcome]):
         """Write all files, figures as PNG with `png`; of a study also its provenance and a copy of its file. Returns
         the files, and the first error of a file that could not be written, or None."""
         of_task = self.writers(outcome, report, folder, files.writers(report, folder, self._stem, png))
-        texts: dict[str, Callable[[], str]] = {}
-        if isinstance(question, Config):
-            texts = {
-                provenance.FILE: lambda: json.dumps(provenance.provenance(question), indent=1) + "\n",
-                provenance.COPY: lambda: provenance.study_text(question.file),
-            }
-        return write_all(
-            [*of_task, *(partial(_written, folder / name, text) for name, text in texts.items())]
-        )
-
-
-def _written(file: Path, text: Callable[[], str]) -> list[Path]:
-    with atomic_file(file) as part:
-        part.write_bytes(text().encode())
-    return [file]
+        of_study = provenance.writers(question, folder) if isinstance(question, Config) else []
+        return write_all([*of_task, *of_study])

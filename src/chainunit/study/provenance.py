@@ -7,7 +7,7 @@ import json
 import platform
 import re
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 from hashlib import sha256
 from importlib import metadata
@@ -16,6 +16,7 @@ from typing import Any
 
 from .. import __version__
 from ..core.errors import InputError
+from ..core.files import write_file
 from ..core.ledger import digest
 from .config import Config, FileContents
 from .parts import beside
@@ -29,6 +30,14 @@ FILE, COPY = "provenance.json", "study_copy.toml"
 def study_text(file: FileContents) -> str:
     """The study file as it was read; tables from Python as a file has them."""
     return file.text or toml_text(file.tables)
+
+
+def writers(config: Config, folder: Path) -> list[Callable[[], list[Path]]]:
+    """The functions that write the provenance of the results of a study, and the copy of its file, into a folder."""
+    return [
+        lambda: write_file(folder / FILE, json.dumps(provenance(config), indent=1) + "\n"),
+        lambda: write_file(folder / COPY, study_text(config.file)),
+    ]
 
 
 def provenance(config: Config) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ... import __version__
-from ...core.files import atomic_file
+from ...core.files import atomic_file, write_file
 from ...report import blocks as b
 from ...report.lines import Name, Words
 from ...report.task import Task, Writer
@@ -155,12 +155,6 @@ def _left_open(s: b.Source) -> Iterator[b.Block]:
     yield b.Text(f"{absent} other elements of the template are not in the files; handover.json names them.")
 
 
-def _write(name: str, content: bytes, folder: Path) -> list[Path]:
-    with atomic_file(folder / name) as part:
-        part.write_bytes(content)
-    return [folder / name]
-
-
 def _write_aasx(found: Handover, folder: Path) -> list[Path]:
     with atomic_file(folder / AASX) as part:
         write_aasx(found.content, found.identity, found.title, found.files, MEDIA_TYPES, part)
@@ -174,7 +168,7 @@ def _writers(found: Handover, report: b.Report, folder: Path, of_report: list[Wr
         files[CANDIDATES] = candidates_csv(found.study.candidates).encode("utf-8")
     if found.study.checks:
         files[CHECKS] = checks_csv(found.study.checks).encode("utf-8")
-    own: list[Writer] = [partial(_write, name, content, folder) for name, content in files.items()]
+    own: list[Writer] = [partial(write_file, folder / name, content) for name, content in files.items()]
     if found.aasx:
         own.insert(0, partial(_write_aasx, found, folder))
     return [*own, *of_report]

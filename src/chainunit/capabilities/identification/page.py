@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from ...core.files import atomic_file
+from ...core.files import write_file
 from ...reading.results import as_data
 from ...reading.text import shown_in
 from ...recordings.measurands import MEASURANDS
@@ -59,11 +59,9 @@ def _writers(
     """With the study file of the identified values."""
 
     def study_file() -> list[Path]:
-        with atomic_file(folder / FILE) as part:
-            head = "" if machine.is_described else WRONG
-            text = toml_text(identified_tables(machine, folder), identified_notes(machine), head)
-            part.write_text(text, "utf-8")
-        return [folder / FILE]
+        head = "" if machine.is_described else WRONG
+        text = toml_text(identified_tables(machine, folder), identified_notes(machine), head)
+        return write_file(folder / FILE, text)
 
     return [study_file, *of_report]
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.files import atomic_file
+from ...core.files import write_file
 from ...core.temporary_folders import scratch
 from ...fmu.backends import Backend
 from ...reading.results import as_data
@@ -124,10 +124,7 @@ def _writers(
     """With the study file of the best machine, where there is one."""
 
     def study_file() -> list[Path]:
-        text = toml_text(outcome.tables(folder))
-        with atomic_file(folder / FILE) as part:
-            part.write_text(text, "utf-8")
-        return [folder / FILE]
+        return write_file(folder / FILE, toml_text(outcome.tables(folder)))
 
     return [*([study_file] if outcome.best.met else []), *of_report]
 
