@@ -6,6 +6,7 @@ Its equations are those of `chainunit.drives.dc_motor` with the start values the
 from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
 
 NAMES = {}  # what it calls otherwise
+LEFT_OUT = ()  # outputs that it does not have
 R, L, K, ALPHA, HEAT, COOLING, AMBIENT = 9.5, 0.11, 1.27, 0.00393, 2000.0, 0.9, 293.15
 INERTIA, DRAG = 0.0035, 0.001
 MOST_CURRENT, MOST_VOLTAGE = 4.4, 240.0
@@ -26,7 +27,18 @@ class ForeignMotor(Fmi2Slave):
         self.declare("phi", Fmi2Causality.output, lambda: self.x[0])
         self.declare("w", Fmi2Causality.output, lambda: self.x[1])
         self.declare("a", Fmi2Causality.output, lambda: self.rates(self.x)[1])
-        self.declare("tau", Fmi2Causality.output, self.torque)
+        if "tau" not in LEFT_OUT:
+            self.declare("tau", Fmi2Causality.output, self.torque)
+        self.drag = DRAG
+        drag = Real(
+            "drag",
+            causality=Fmi2Causality.parameter,
+            variability=Fmi2Variability.tunable,
+            start=DRAG,
+            getter=lambda: self.drag,
+        )
+        self.register_variable(drag, nested=False)
+        drag.setter = lambda value: setattr(self, "drag", value)
 
     def declare(self, name, causality, getter):
         start = {"start": 0.0} if causality == Fmi2Causality.input else {}
@@ -59,7 +71,7 @@ class ForeignMotor(Fmi2Slave):
         torque, inertia = self.load(x)
         return [
             w,
-            (K * i - DRAG * w - torque) / (INERTIA + inertia),
+            (K * i - self.drag * w - torque) / (INERTIA + inertia),
             (v - hot * i - K * w) / L,
             (hot * i * i - (T - AMBIENT) / COOLING) / HEAT,
             SPEED_I * (behind + (i_ref - wanted_i) / SPEED_P),

@@ -374,3 +374,23 @@ def test_another_model_of_states():
     np.testing.assert_allclose(out["d(air_gap_tau)/d(armature.i)"], k)
     np.testing.assert_allclose(out["d(air_gap_tau)/d(armature.k)"], [1.0, 2.0])
     assert isinstance(Machine(ChamberForces).batch({"phi": 0.0}, ["tau"], engine="numpy"), xr.Dataset)
+
+
+def test_values_with_units_and_coordinates():
+    """Texts have units; an array over its own dimension is its coordinate, in the declared unit."""
+    machine = ChainUnitMachine()
+    angles = np.linspace(0.0, 90.0, 4)
+    phi = xr.DataArray(angles, dims="phi", attrs={"units": "deg"})
+    for x in (phi, phi.assign_coords(phi=angles), "90 deg", np.pi / 2):
+        out = machine.batch({"phi": x, "w": "30 rpm", "r": "150 mm"}, ["tau"], engine="numpy")
+        one = machine.batch({"phi": np.pi / 2, "w": np.pi, "r": 0.15}, ["tau"], engine="numpy")
+        assert float(out.tau.values.flat[-1]) == pytest.approx(float(one.tau), rel=1e-12)
+        if out.tau.dims:
+            np.testing.assert_allclose(out.phi, np.radians(angles))
+            assert out.phi.attrs["units"] == "rad"
+    for wrong in ("150 kg", "long", None, {"a": 1}, [1.0, "x"]):
+        with pytest.raises(
+            InputError, match=r"^r = .*: must be a number in m, a text with a unit"
+        ) as refusal:
+            machine.batch({"phi": 0.0, "r": wrong}, ["tau"], engine="numpy")
+        assert "\n" not in str(refusal.value)

@@ -79,7 +79,8 @@ def driven(machine, motor):
 
 def test_it_has_the_terminals_variables_alone(file):
     motor = foreign_component(file, "motor")
-    assert set(motor.connectors) == {
+    # and a parameter
+    assert set(motor.connectors) - {"drag"} == {
         "phi",
         "w",
         "a",
@@ -493,6 +494,35 @@ def test_what_needs_a_model_of_the_motor_is_refused(command, said, folder):
 def test_the_machine_of_such_a_study_can_be_exported(folder):
     done = chainunit("export", "ChamberForces", "--config", "foreign.toml", "--backend", "python", cwd=folder)
     assert done.returncode == 0 and (folder / "ChamberForces.fmu").is_file(), done.stderr
+
+
+def test_a_motor_without_a_torque_whose_parameters_are_set(folder, tmp_path):
+    """The torque of its shaft is that which the machine takes; with another drag it runs as ours with that drag."""
+    # a process has one Python module of a name
+    script = tmp_path / "script.py"
+    script.write_text(SCRIPT.read_text().replace("class ForeignMotor", "class QuietMotor"))
+    build(tmp_path, OTHER, ["tau"], script)
+    text = (folder / "foreign.toml").read_text().replace(
+        "ForeignMotor", "QuietMotor"
+    ) + "[coupling]\ntrip_torque = 120\n"
+    other = "[system]\nmotor_parameters = { drag = 0.01 }\n"
+    given = config.parse(text.replace("[system]\n", other), str(tmp_path / "x.toml"))
+    study = run.run_study(given, tmp_path / "out")
+    assert study.failure is None and study.answers["jam_left"].coupling_trip_time is not None
+    own = (folder / "own.toml").read_text().replace("rotor.d = 0.001", "rotor.d = 0.01")
+    assert own != (folder / "own.toml").read_text()
+    own = run.run_study(config.parse(f"{own}[coupling]\ntrip_torque = 120\n"), tmp_path / "own")
+    for name in ("steady", "jam_left"):
+        for measure in ("crank_torque_peak", "speed_least", "coupling_trip_time"):
+            value = getattr(own.answers[name], measure)
+            assert value is not None or name == "steady"
+            assert value is None or getattr(study.answers[name], measure) == pytest.approx(value, rel=1e-4), (
+                name,
+                measure,
+            )
+    wrong = text.replace("[system]\n", other.replace("drag", "drg"))
+    with pytest.raises(InputError, match=r"system\.motor_parameters\.drg: unknown key; was \"drag\" meant"):
+        run.run_study(config.parse(wrong, str(tmp_path / "x.toml")), tmp_path / "out")
 
 
 def test_a_block_has_no_peaks_of_what_is_not_known(folder):

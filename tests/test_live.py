@@ -537,3 +537,14 @@ def test_a_crank_that_makes_no_turn_is_not_steady(share, packaged):
     columns |= {"motor.phi": speed * ratio * time, "motor.w": np.full_like(time, speed * ratio)}
     run = xr.Dataset({name: ("time", x) for name, x in columns.items()}, {"time": time})
     assert not _settles(RunPoint(rig, config.events["feed_left"], 1.0), run)
+
+
+def test_a_study_of_chains_names_the_model_of_the_page(tmp_path):
+    """The page has two bars, whose numbers are not those of the study."""
+    for organ, organs in (("chain", "two bars"), ("two-bar", "")):
+        (tmp_path / "x.toml").write_text(f'organ = "{organ}"\n[motor]\nrotor.J = 0.004\n', "utf-8")
+        report = live_page(tmp_path / "x.toml", None, tmp_path)
+        ((live,),) = (section.blocks for section in report.sections)
+        assert live.make().data["organs"] == organs
+        words = "of the study's machine with two bars in place of its chains"
+        assert (words in live.lead) == bool(organs) and "those of the study" in live.lead

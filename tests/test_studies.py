@@ -123,7 +123,7 @@ def test_answers_are_a_table_with_units(result):
 
 def test_runs_are_the_tree_in_the_file(result, command):
     with xr.open_datatree(command / "result.nc") as tree:
-        assert list(result.runs.children) == list(tree.children) == ["start_up", "jam_left"]
+        assert list(result.runs.children) == [*tree.children, "steady"] == ["start_up", "jam_left", "steady"]
         for name in tree.children:
             assert result.runs[name].to_dataset().drop_attrs().equals(tree[name].to_dataset().drop_attrs())
     force = result.runs["jam_left"]["machine.left.processing_force"]

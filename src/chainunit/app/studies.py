@@ -274,9 +274,12 @@ class StudyResult(ReportedResult[Config, StudyRecord]):
 
     @cached_property
     def runs(self) -> xr.DataTree:
-        """The time series of every run: ``runs["jam_left"]["machine.tau"]``, with units in ``attrs``. The
-        file result.nc holds the same."""
-        return series.tree(self.record)
+        """The time series of every run: ``runs["jam_left"]["machine.tau"]``, with units in ``attrs``, and of the
+        turns in steady running: ``runs["steady"]``. The file result.nc holds the runs."""
+        import xarray as xr
+
+        runs, record = series.tree(self.record), self.record
+        return runs.assign({"steady": xr.DataTree(record.steady)}) if "steady" in record.answers else runs
 
     @property
     def verdict(self) -> str:

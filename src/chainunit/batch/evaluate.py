@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.errors import InputError, RemarkWarning, RunError
+from ..core.errors import InputError, RemarkWarning, RunError, shown
 from ..core.model import Model
 from ..core.native.compilers import COMPILERS
 from ..core.native.operations import ARGUMENT
 from ..core.quantities import Variable
 from ..core.symbolic_trace import outputs_of
-from ..core.units import scale
+from ..core.units import convert, scale, split
 from . import arrays
 from .equations import Equations, Result, equations, find, names_of
 from .native import Reductions, aligned, native_kernel
@@ -358,21 +358,35 @@ class Grid:
 
 
 def _array(variable: Variable, x: Any) -> xr.DataArray:
-    """The values of an argument as a DataArray in the declared unit."""
+    """The values of an argument as a DataArray in the declared unit; over its own dimension they are coordinates."""
     import xarray as xr
 
     if isinstance(x, xr.DataArray):
         unit = x.attrs.get("units")
-        if unit is None or unit == variable.unit:
-            return x
-        try:
-            factor, offset = scale(str(unit), variable.unit, variable.kind)
-        except ValueError as error:
-            raise InputError(f"{variable.name} in {unit}: {error}") from error
-        return x * factor + offset
-    values = np.asarray(x, float)
+        if unit is not None and unit != variable.unit:
+            try:
+                factor, offset = scale(str(unit), variable.unit, variable.kind)
+            except ValueError as error:
+                raise InputError(f"{variable.name} in {unit}: {error}") from error
+            x = x * factor + offset
+        return _array(variable, x.values) if x.dims == (variable.name,) else x
+    try:
+        # numpy takes None for a number that is not finite
+        values = np.asarray(_in_unit(variable, x) if isinstance(x, str | None) else x, float)
+    except (TypeError, ValueError):
+        words = f"must be a number in {variable.unit}, a text with a unit, an array or a DataArray"
+        raise InputError(f"{variable.name} = {shown(x)}: {words}") from None
     if values.ndim > 1:
         raise InputError(f"{variable.name}: has {values.ndim} dimensions; give them names, in a DataArray")
     attributes = {"units": variable.unit, "long_name": variable.description}
     coords = {variable.name: (variable.name, values, attributes)} if values.ndim else {}
     return xr.DataArray(values, coords, [variable.name] if values.ndim else [])
+
+
+def _in_unit(variable: Variable, text: str | None) -> float:
+    """The number of a text such as "150 mm", in the declared unit; a ValueError for a text that is none."""
+    parts = None if text is None else split(text)
+    if parts is None:
+        raise ValueError(text)
+    number, unit = parts
+    return convert(number, unit, variable.unit, variable.kind) if unit else number

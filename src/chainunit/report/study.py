@@ -20,6 +20,7 @@ from .analyses import analysis_sections
 from .capability import Contents, capabilities
 from .drawing import drawing
 from .lines import Line, capital, join, line, spoken
+from .live.runs import stand_in, whole_of
 from .live.study import of_study
 from .live_block import Live
 from .study_motion import motion
@@ -161,7 +162,8 @@ def _live(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         return
     config = study.config
     yield Live(
-        lambda: of_study(config, study.drive, config.drive, study.proposal, study.verdict), "the study"
+        lambda: of_study(config, study.drive, config.drive, study.proposal, study.verdict),
+        whole_of(stand_in(study.drive)),
     )
 
 

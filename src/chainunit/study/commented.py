@@ -13,7 +13,7 @@ from ..reading.toml_lines import Statement, statements
 from .keys import NAME, Key, KeyTable, entry_tables, key_tables
 from .schema import FILE
 
-_OF_OTHERS = ("motor_names.", "machine_names.")
+_OF_OTHERS = ("motor_names.", "machine_names.", "motor_parameters")
 """Prefixes of keys for foreign FMUs, which an example does not have."""
 _COLUMN = 34
 """The column at which comments begin, if the line is not longer."""

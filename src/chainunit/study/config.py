@@ -380,7 +380,8 @@ def _motor(
     if motor_is_left(tables):
         return None
     if parts.file:
-        return ForeignMotor(beside(parts.file, source), given_values(checked.system.motor_names))
+        names = given_values(checked.system.motor_names)
+        return ForeignMotor(beside(parts.file, source), names, checked.system.motor_parameters)
     if plate is not None:
         return NamedMotor(plate)
     return OwnMotor(parts.motor, own)

@@ -27,6 +27,7 @@ from ..system import (
     Profile,
     System,
     in_line,
+    torque_names,
 )
 from ..system.graph import Connection
 from .foreign_machine import ForeignMachine
@@ -222,7 +223,9 @@ class Drive:
     @property
     def motor_torque(self) -> str:
         """Name of the torque that the motor gives to its shaft in a run."""
-        return f"motor.{self.motor_bond.flanges[0].members.get('tau', 'tau')}"
+        # an FMU may leave it out: then it is the torque that the next part takes
+        *_, name = torque_names(self.motor_bond)
+        return name
 
     @cached_property
     def machine_bond(self) -> Bond:

@@ -66,6 +66,11 @@ def foreign_model(file: Path, names: Mapping[str, str]) -> type[ForeignModel]:
     return type("ForeignModel", (ForeignModel,), members)
 
 
+def declared_parameters(component: FmuComponent) -> type:
+    """The declaration of the parameters of an FMU."""
+    return _declared("Parameters", [c for c in component.connectors.values() if c.causality == "parameter"])
+
+
 def _declared(title: str, connectors: Iterable[Connector]) -> type:
     """The declaration of variables; those with dots in their names are in groups. A variable is left out if
     no table of a file can have its name."""

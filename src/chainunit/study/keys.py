@@ -251,6 +251,8 @@ def _of_system() -> Iterator[Key]:
                 left_out=left_out,
                 follows=follows,
             )
+        elif name == "motor_parameters":
+            yield from _of_fields({name: (dict[str, Any], field)})
         else:
             inner: Any = field.annotation
             for key, below in inner.model_fields.items():

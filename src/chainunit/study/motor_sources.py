@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +15,13 @@ from ..drives.catalogue import CatalogueMotor
 from ..drives.induction_motor import InductionMotor
 from ..drives.motor import Motor
 from ..machines.machine import Machine
+from ..reading.tables import given_values, read_table, schema
 from ..system import FmuComponent, foreign_component
 from .catalogue_drive import as_used, catalogue_drive, with_inertia
 from .cycle import Cycle
 from .drive import Drive
 from .drive_tables import DriveTables
+from .foreign_machine import declared_parameters
 from .registry import registered
 
 
@@ -95,6 +97,8 @@ class ForeignMotor(MotorSource):
     file: Path
     names: Mapping[str, str]
     """the FMU's names by ours, where they differ"""
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    """values of its parameters, as the file has them"""
     kind: type[Motor] = Motor
     plate: None = None
 
@@ -103,7 +107,10 @@ class ForeignMotor(MotorSource):
         """The FMU as it is now, as its file may change between two runs of a study; errors are those of
         `chainunit.system.foreign_component`."""
         with refusal_prefix("system.motor: ", "system.motor"):
-            return foreign_component(self.file, "motor", self.names)
+            component = foreign_component(self.file, "motor", self.names)
+        prefix = "system.motor_parameters."
+        form = schema(declared_parameters(component), "motor_parameters", prefix)
+        return replace(component, start=given_values(read_table(form, self.parameters, prefix)))
 
     def check(self, tables: DriveTables, plans: Mapping[str, Any]) -> None:
         """See `MotorSource`; also refused is a quantity that only a motor of this package has."""

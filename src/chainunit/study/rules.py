@@ -164,6 +164,7 @@ def _of_parts() -> Iterator[Rule]:
     for part, foreign in (("motor", MOTOR_FMU), ("machine", MACHINE_FMU)):
         words = f'are of an FMU of somebody else; add {part} = "file.fmu", or leave them out'
         yield Rule(f"system.{part}_names", ~foreign, words)
+    yield Rule("system.motor_parameters", ~MOTOR_FMU, "are of a motor that is an FMU; write them in [motor]")
     yield Rule("feed_forward", MACHINE_FMU, NEEDS_MODEL, is_one_of("feed_forward", True))
 
 

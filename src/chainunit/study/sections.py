@@ -187,6 +187,10 @@ SystemTable = create_model(
         Field("", min_length=1, description="motor: a model, a designation of the catalogue, or an FMU"),
     ),
     motor_names=(_MotorNames, Field(default_factory=_MotorNames)),
+    motor_parameters=(
+        dict[str, Any],
+        Field({}, description="parameters of a motor that is an FMU, by its names of them"),
+    ),
     machine_names=(_MachineNames, Field(default_factory=_MachineNames)),
 )
 """Machine and motor of the system: names of models, of motors in the catalogue, or of foreign FMUs, with the

@@ -25,14 +25,14 @@ PeakOf = Callable[[Drive, "xr.Dataset"], float]
 def on_coupling(drive: Drive, run: xr.Dataset) -> float:
     """Peak torque in a run on a coupling that sits on the motor shaft behind rotor and added inertia, at the crank
     [N m]: the torque of the motor less the one that accelerates the inertia on its side."""
-    return peak(run["motor.tau"].values) * drive.ratio
+    return peak(run[drive.motor_torque].values) * drive.ratio
 
 
 def gear_torque(drive: Drive, run: xr.Dataset) -> Any:
     """Torque in a run at the output of the gear [N m], shape (time,): in the shaft behind the gear where the
     driveline is there, else at the crank."""
     behind_gear = bool(drive.line) and drive.driven_machine.ratio == 1.0
-    return run["motor.tau"].values * drive.ratio if behind_gear else crank_torque(drive, run)
+    return run[drive.motor_torque].values * drive.ratio if behind_gear else crank_torque(drive, run)
 
 
 def at_gear(drive: Drive, run: xr.Dataset) -> float:

@@ -6,7 +6,7 @@ reference solution (`monolithic`), the certificate of a run (`energy_residual` o
 (`chainunit.system.ssp`), and twins without one part (`without`, `rigid`, `hold_loads`). A foreign FMU can be a
 component, too: `foreign_component`."""
 
-from .certificate import certify, energy_residual, shaft_torque, through
+from .certificate import certify, energy_residual, shaft_torque, through, torque_names
 from .compiled import compiled, export_compiled
 from .compiled_simulation import CompiledSimulation, run_together
 from .fmus import export
@@ -59,5 +59,6 @@ __all__ = [
     "shaft_joints",
     "shaft_torque",
     "through",
+    "torque_names",
     "without",
 ]

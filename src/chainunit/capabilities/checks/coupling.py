@@ -240,7 +240,7 @@ def _cycle(study: StudyRecord, place: str, start: float) -> _Cycle:
     drive, turns = study.drive, study.steady
 
     def torque_of(run: xr.Dataset) -> Any:
-        return gear_torque(drive, run) if place == "crank" else run["motor.tau"].values
+        return gear_torque(drive, run) if place == "crank" else run[drive.motor_torque].values
 
     most, run = largest(study, torque_of)
     ratio = drive.ratio if place == "crank" else 1.0

@@ -359,7 +359,9 @@ def _rocker_until(study: StudyRecord, setting: Setting) -> float | None:
         run = from_event_on(study, name)
         if "machine.rocker.tau" not in run:
             return None
-        passed = np.flatnonzero(np.abs(run["motor.tau"].values) * study.drive.ratio > setting.least)
+        passed = np.flatnonzero(
+            np.abs(run[study.drive.motor_torque].values) * study.drive.ratio > setting.least
+        )
         end = int(passed[0]) + 1 if passed.size else None
         peaks.append(peak(run["machine.rocker.tau"].values[:end]))
     return max(peaks, default=None)

@@ -75,7 +75,7 @@ def effects(
         runs = {name: from_event_on(study, name) for name in names}
     found = {}
     for name, run in runs.items():
-        time, torque = run["time"].values, np.abs(run["motor.tau"].values) * drive.ratio
+        time, torque = run["time"].values, np.abs(run[drive.motor_torque].values) * drive.ratio
         passed = np.flatnonzero(torque > setting)
         if not passed.size:
             continue

@@ -297,11 +297,12 @@
     });
   };
   const whole = data.runs || data.without_runs ? "study" : "file";
+  const ofWhole = `the ${whole}'s${data.organs ? ` machine with ${data.organs}` : ""}`;
   for (const each of document.querySelectorAll(".live-whole")) each.textContent = whole;
   if (!data.turn.turns) byId("live-turn-title").textContent = `Over the way of the ${data.turn.driver}, forth at constant speed`;
   const ofTurn = data.turn.results.filter((r) => !r.group), ofPins = data.turn.results.filter((r) => r.group);
-  const cells = tableOf("live-results", ["", "now", `the ${whole}'s`, "change"], ofTurn);
-  const pinCells = tableOf("live-pins", ["largest force in a pin", "now", `the ${whole}'s`, "change"], ofPins);
+  const cells = tableOf("live-results", ["", "now", ofWhole, "change"], ofTurn);
+  const pinCells = tableOf("live-pins", ["largest force in a pin", "now", ofWhole, "change"], ofPins);
   const fill = (list, into, now, before) =>
     list.forEach((r, n) => {
       const [cell, base, change] = into[n], x = now[r.name], y = before[r.name];

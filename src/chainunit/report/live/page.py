@@ -17,6 +17,7 @@ from .. import blocks as b
 from ..lines import line
 from ..live_block import Live, LiveMachine
 from .linkage import of_linkage
+from .runs import whole_of
 from .study import of_study, without_drive
 
 
@@ -44,9 +45,8 @@ def live_page(file: Path | None, speed: str | None, folder: Path) -> b.Report:
                 "--speed is for a linkage; leave it out: the speed of a study is run.crank_speed in its file"
             )
         live = live_of_config(config, folder)
-        return _report(
-            config.title or "Study", "Live study", "the study", live, str(file or "packaged example")
-        )
+        whole = whole_of(live.data.get("organs", ""))
+        return _report(config.title or "Study", "Live study", whole, live, str(file or "packaged example"))
     machine = Machine(read_linkage(file))
     live = of_linkage(machine, speed_of_driver(machine, speed), file.name)
     return _report(machine.model.description, "Live linkage", "the file", live, str(file))

@@ -54,9 +54,19 @@ def reason_without_runs(drive: Drive) -> str:
         return "motor or machine is an FMU of somebody else, whose equations are not known"
     if drive.feed_forward:
         return "the control has feed-forward, which needs the co-simulation"
-    if drive.simulated_machine.model is not drive.machine.model:
+    if stand_in(drive):
         return "the organs are chains, whose runs take too long for a page"
     return ""
+
+
+def stand_in(drive: Drive) -> str:
+    """The organs of the turn on a page, if those of the study are others; else empty."""
+    return "" if drive.simulated_machine.model is drive.machine.model else "two bars"
+
+
+def whole_of(organs: str) -> str:
+    """What has the values that a reader changes, by the organs of `stand_in`."""
+    return f"the study's machine with {organs} in place of its chains" if organs else "the study"
 
 
 def live_runs(

@@ -24,7 +24,7 @@ from ..capability import capabilities
 from ..live_block import LiveMachine
 from .machine import assembled, speed_of_crank
 from .quantities import LiveQuantity, of_machine
-from .runs import live_runs, reason_without_runs
+from .runs import live_runs, reason_without_runs, stand_in
 from .turn import live_turn
 
 _TITLE = "with other values"
@@ -71,7 +71,7 @@ def of_study(
     copied = _without_dates(_with_drive(copied, drive, tables.start, proposal, config.events))
     live = assembled(turn, runs, why, chosen, copied, units)
     judged = None if verdict is None else {"holds": verdict.holds, "text": verdict.text}
-    return replace(live, data={**live.data, "verdict": judged})
+    return replace(live, data={**live.data, "verdict": judged, "organs": stand_in(drive)})
 
 
 def without_drive(config: Config, why: str) -> LiveMachine:
