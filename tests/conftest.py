@@ -29,6 +29,7 @@ import tempfile
 import threading
 
 import fmpy
+import hypothesis
 import pytest
 
 from chainunit.core.native import cache
@@ -37,6 +38,11 @@ from chainunit.core.native.compilers import compiler
 from chainunit.fmu.export import export
 from chainunit.fmu.native.export import export as export_native
 from chainunit.models import MODELS
+
+hypothesis.settings.register_profile("same", derandomize=True)
+hypothesis.settings.register_profile("random", print_blob=True)
+hypothesis.settings.load_profile("same")
+# `.ci/full` takes other cases each time, by --hypothesis-profile=random
 
 FIRST = "not slow and not second"
 """What `pytest` runs without ``-m`` and files."""

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from chainunit import InputError
@@ -809,6 +809,7 @@ MARKS = ",;\t|. "
     change=st.sampled_from(["left out", "added", "another one", "cut", "quote"]),
     mark=st.sampled_from(MARKS),
 )
+@example(name=".NET TimeSpan", row=70, share=0.984375, change="added", mark=".")
 def test_one_wrong_mark_is_never_misread_in_silence(name, row, share, change, mark, tmp_path_factory):
     """Of each file, all rows that are read are right, or it is refused."""
     text, names = FORMATS[name]
@@ -838,3 +839,23 @@ def test_one_wrong_mark_is_never_misread_in_silence(name, row, share, change, ma
     columns = (recording.columns[name].round(6).tolist() for name in ("crank.tau", "crank.w", "mark"))
     assert set(zip(*columns, strict=True)) <= true
     np.testing.assert_allclose(np.ptp(recording.time), T[-1], atol=0.1)
+
+
+def test_a_rare_fraction_among_whole_numbers_is_refused_and_its_remedy_works(tmp_path):
+    """As for a number without its decimal sign; a fraction with more digits is a measurement."""
+
+    def rows(cell):
+        cells = [str(10 + k % 80) for k in range(200)]
+        cells[120] = cell
+        return "time [s],crank.tau [N.m]\n" + "".join(
+            f"{k / 100:.2f},{cell}\n" for k, cell in enumerate(cells)
+        )
+
+    file = tmp_path / "whole.csv"
+    file.write_text(rows("1.7"))
+    with pytest.raises(
+        InputError, match=r"line 122, column 2, crank.tau .*: 1.7 .*a sign is added; .* write 1.70 if"
+    ):
+        read_recording(file)
+    file.write_text(rows("1.70"))
+    assert read_recording(file).columns["crank.tau"][120] == 1.7

@@ -151,6 +151,7 @@ def _plain(table: LoggerTable, place: int, others: frozenset[str]) -> list[str]:
         text = re.sub(r"(?<=\d)\.(?=\d{3}(?!\d))" if decimal == "," else r"(?<=\d),(?=\d{3}(?!\d))", "", text)
     plain = (text.replace(",", ".") if decimal == "," else text).split("\n")
     _refuse_left_out(table, place, plain)
+    _refuse_added(table, place, plain)
     return plain
 
 
@@ -166,6 +167,23 @@ def _refuse_left_out(table: LoggerTable, place: int, cells: Sequence[str]) -> No
                 f"{table.file}, line {table.lines[k]}, column {place + 1}, {table.heads[place]}: {cells[k]} has no "
                 f"decimal sign, and the other numbers have {max(decimals)} decimals: a sign is left out; mend it, or "
                 "write nan"
+            )
+
+
+def _refuse_added(table: LoggerTable, place: int, cells: Sequence[str]) -> None:
+    """Refuse a rare number with a decimal sign and the digits of a whole one, where all others are whole."""
+    signed = [k for k, cell in enumerate(cells) if "." in cell]
+    whole = {len(m) for cell in cells if (m := _mantissa(cell)).isdigit()} if signed else set()
+    if not whole or len(signed) > max(1.0, LEFT_OUT * len(cells)):
+        return
+    for k in signed:
+        before, _, after = _mantissa(cells[k]).partition(".")
+        if after and (before + after).isdigit() and len(before + after) in whole:
+            longer = f"{before or 0}.{after}" + "0" * (1 + max(whole) - len(before + after))
+            raise InputError(
+                f"{table.file}, line {table.lines[k]}, column {place + 1}, {table.heads[place]}: {cells[k]} has a "
+                "decimal sign, and the other numbers are whole ones with as many digits: a sign is added; mend it, "
+                f"or write {longer} if the number is right"
             )
 
 
