@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import json
 import multiprocessing
 import os
 import re
@@ -22,7 +20,7 @@ import xarray as xr
 
 from chainunit.core.errors import InputError, InterruptedRunError, RunError
 from chainunit.work import runner
-from chainunit.work.job import CHECKS, Job, ResultVariable, text_array, texts
+from chainunit.work.job import CHECKS, Job, ResultVariable, text_array
 from chainunit.work.store import BatchStore
 
 HERE = Path(__file__).parent
@@ -30,11 +28,6 @@ HERE = Path(__file__).parent
 
 def quiet(*said):
     pass
-
-
-def content(store):
-    """All files of a store, by their names."""
-    return {p.relative_to(store).as_posix(): p.read_bytes() for p in store.rglob("*") if p.is_file()}
 
 
 def seen(folder):
@@ -54,27 +47,19 @@ def test_the_dataset_is_the_work(unbroken):
     np.testing.assert_array_equal(dataset["height"], wanted["height"])
     np.testing.assert_array_equal(dataset["curve"], wanted["curve"].astype("float32"))
     assert dataset["colour"].dtype == np.int8 and list(dataset["colour"].values[:4]) == [0, 1, 2, 0]
-    assert texts(dataset["remark"]) == wanted["remark"]
+    assert dataset["remark"].values.tolist() == wanted["remark"]
     assert dataset["curve"].attrs == {"units": "N.m", "long_name": "torque over the angle"}
     assert dataset["colour"].attrs["flag_meanings"] == "red green blue"
     assert list(dataset["colour"].attrs["flag_values"]) == [0, 1, 2]
     assert list(dataset["angle"].values) == [0.0, 0.5, 1.0] and dataset["angle"].attrs["units"] == "rad"
-    # the store is one of Zarr to any reader
-    other = xr.open_zarr(unbroken.file, consolidated=False)
+    # the store is a file of NetCDF to any reader
+    other = xr.open_dataset(unbroken.file)
     xr.testing.assert_identical(other[list(wanted)].drop_attrs(), dataset.drop_attrs())
 
 
-def test_the_dataset_is_read_when_it_is_used(tmp_path):
-    """A chunk that goes after the dataset is opened is missing in it."""
-    made = runner.run(batches.job(), tmp_path, quiet, workers=1)
-    dataset = made.dataset
-    chunk(made.file, "curve", 1).unlink()
-    assert np.isnan(dataset["curve"][16:32]).all() and not np.isnan(dataset["curve"][32:]).any()
-
-
-def test_a_small_job_needs_no_dask(tmp_path):
+def test_local_processes_need_no_dask(tmp_path):
     made = subprocess.run(
-        [sys.executable, HERE / "batches.py", tmp_path, "8", "1"], capture_output=True, text=True, check=True
+        [sys.executable, HERE / "batches.py", tmp_path, "8", "2"], capture_output=True, text=True, check=True
     )
     assert made.stdout.split() == ["0", "False"]
 
@@ -105,13 +90,8 @@ def test_progress_and_the_end_are_told(tmp_path):
 @pytest.mark.second
 def test_local_processes_make_the_same_store(unbroken, tmp_path):
     (tmp_path / "seen").mkdir()
-    with contextlib.ExitStack() as stack:
-        for host in ("127.0.0.1", "0.0.0.0"):
-            # the port at which a scheduler shows its state is taken, by this or another process
-            with contextlib.suppress(OSError):
-                stack.enter_context(socket.create_server((host, 8787)))
-        made = runner.run(batches.job(seen=str(tmp_path / "seen")), tmp_path, quiet, workers=2)
-    assert content(made.file) == content(unbroken.file)
+    made = runner.run(batches.job(seen=str(tmp_path / "seen")), tmp_path, quiet, workers=2)
+    assert made.file.read_bytes() == unbroken.file.read_bytes()
     processes = {p.name.split("_")[1] for p in (tmp_path / "seen").iterdir()}
     assert seen(tmp_path / "seen") == list(range(0, 100, 16)) and str(os.getpid()) not in processes
     assert not multiprocessing.active_children()
@@ -125,18 +105,20 @@ def test_a_killed_run_goes_on(tmp_path):
     first = subprocess.Popen(
         [sys.executable, HERE / "batches.py", killed, "400", "2", "slowly"], start_new_session=True
     )
-    marks = killed / batches.job().store_name / CHECKS / "c"
-    while not marks.exists() or len(list(marks.iterdir())) < 8:
+    store = killed / batches.job().store_name
+    while batches.finished(store) < 8:
         assert first.poll() is None
         time.sleep(0.01)
     first.kill()
     first.wait()
-    assert len(list(marks.iterdir())) < 100
+    assert batches.finished(store) < 100
     (tmp_path / "seen").mkdir()
     again = runner.run(batches.job(400, 4, seen=str(tmp_path / "seen")), killed, quiet, workers=1)
     assert again.earlier_points >= 32 and again.damaged_batches == 0
     assert len(seen(tmp_path / "seen")) == (400 - again.earlier_points) // 4
-    assert content(again.file) == content(runner.run(batches.job(400, 4), whole, quiet, workers=1).file)
+    assert (
+        again.file.read_bytes() == runner.run(batches.job(400, 4), whole, quiet, workers=1).file.read_bytes()
+    )
 
 
 class Killed(BaseException):
@@ -144,20 +126,17 @@ class Killed(BaseException):
 
 
 @pytest.mark.parametrize("before", [True, False])
-def test_a_kill_at_any_file(before, unbroken, tmp_path, monkeypatch):
-    """Before or after each file that a run of three batches writes; before it, a temporary file is left behind."""
+def test_a_kill_at_any_write(before, tmp_path, monkeypatch):
+    """Before or after each variable that a run of three batches writes."""
     put, job = BatchStore._put, batches.job(40)
-    wanted = content(runner.run(job, tmp_path / "whole", quiet, workers=1).file)
-    for last in range(len(wanted)):
+    wanted = runner.run(job, tmp_path / "whole", quiet, workers=1).file.read_bytes()
+    for last in range(3 * (len(batches.VARIABLES) + 1)):
         count, folder = iter(range(1000)), tmp_path / str(last)
 
-        def dies(self, file, *rest, count=count, last=last, **more):
+        def dies(self, *values, count=count, last=last):
             ends = next(count) == last
             if not (ends and before):
-                put(self, file, *rest, **more)
-            if ends and before:
-                file.parent.mkdir(parents=True, exist_ok=True)
-                file.with_name(f"{file.name}.0123456789abcdef.part").write_bytes(b"half")
+                put(self, *values)
             if ends:
                 raise Killed
 
@@ -166,58 +145,74 @@ def test_a_kill_at_any_file(before, unbroken, tmp_path, monkeypatch):
             runner.run(job, folder, quiet, workers=1)
         monkeypatch.setattr(BatchStore, "_put", put)
         again = runner.run(job, folder, quiet, workers=1)
-        assert content(again.file) == wanted and again.damaged_batches == 0
+        assert again.file.read_bytes() == wanted and again.damaged_batches == 0
 
 
-def chunk(store, name, batch):
-    inner = {"curve": "/0/0", "remark": "/0"}.get(name, "")
-    return store / name / f"c/{batch}{inner}"
+def test_a_kill_while_the_file_is_made_leaves_nothing(tmp_path, monkeypatch):
+    def dies(self, file):
+        part = Path(file.filepath())
+        shutil.copy(part, part.with_name(re.sub(r"[0-9a-f]{16}", "0123456789abcdef", part.name)))
+        raise Killed
+
+    monkeypatch.setattr(BatchStore, "_declare", dies)
+    with pytest.raises(Killed):
+        runner.run(batches.job(), tmp_path, quiet, workers=1)
+    monkeypatch.undo()
+    assert len(list(tmp_path.iterdir())) == 1
+    made = runner.run(batches.job(), tmp_path, quiet, workers=1)
+    assert list(tmp_path.iterdir()) == [made.file]
 
 
 def changed(file, change):
     file.write_bytes(change(file.read_bytes()))
 
 
-def reshaped(store):
-    file = store / "height" / "zarr.json"
-    changed(file, lambda old: json.dumps(json.loads(old) | {"shape": [7]}).encode())
+def anew(file):
+    file.unlink()
 
 
+ALL = list(range(7))
 DAMAGES = {
-    "a chunk is missing": (lambda s: chunk(s, "curve", 2).unlink(), [2]),
-    "a chunk is cut off": (lambda s: changed(chunk(s, "height", 1), lambda b: b[:-5]), [1]),
-    "a chunk is empty": (lambda s: changed(chunk(s, "height", 0), lambda b: b""), [0]),
-    "a byte is another": (lambda s: changed(chunk(s, "remark", 6), lambda b: b[:9] + b"x" + b[10:]), [6]),
-    "the chunk of another batch": (
-        lambda s: shutil.copy(chunk(s, "height", 3), chunk(s, "height", 4)),
-        [4],
+    "a number is another": (lambda s: batches.damage(s, "height", 16), [1]),
+    "a letter is another": (lambda s: batches.damage(s, "remark", 96), [6]),
+    "a curve is another": (lambda s: batches.damage(s, "curve", 47), [2]),
+    "a checksum is another": (lambda s: batches.damage(s, CHECKS, 5), [5]),
+    "two batches": (lambda s: [batches.damage(s, "height", 16), batches.damage(s, "colour", 63)], [1, 3]),
+    "a checksum is missing": (lambda s: batches.damage(s, CHECKS, 5, 0), [5]),
+    "the checksums are cut off": (lambda s: changed(s, lambda b: b[:-12]), [4, 5, 6]),
+    "the file is cut off": (lambda s: changed(s, lambda b: b[: len(b) // 2]), ALL),
+    "the file has a head alone": (lambda s: changed(s, lambda b: b[:200]), ALL),
+    "the head is another": (lambda s: changed(s, lambda b: b[:40] + b"?" + b[41:]), ALL),
+    "the size in the head is another": (lambda s: changed(s, lambda b: b[:45] + b"?" + b[46:]), ALL),
+    "the digest is another": (
+        lambda s: changed(s, lambda b: b[: b.index(SEAL) + 70] + b"?" + b[b.index(SEAL) + 71 :]),
+        ALL,
     ),
-    "a checksum is missing": (lambda s: chunk(s, CHECKS, 5).unlink(), [5]),
-    "a checksum is cut off": (lambda s: changed(chunk(s, CHECKS, 5), lambda b: b[:2]), [5]),
-    "a variable is missing": (lambda s: shutil.rmtree(s / "colour"), list(range(7))),
-    "two batches": (
-        lambda s: [chunk(s, "height", 1).unlink(), chunk(s, "colour", 3).unlink()],
-        [1, 3],
-    ),
-    "the shape is another": (reshaped, []),
-    "no declaration": (lambda s: (s / "curve" / "zarr.json").unlink(), []),
-    "no group": (lambda s: changed(s / "zarr.json", lambda b: b"{"), []),
+    "no store of ours": (lambda s: s.write_text("hello"), ALL),
+    "an empty file": (lambda s: s.write_bytes(b""), ALL),
+    "no file": (anew, ALL),
 }
+SEAL = batches.job().layout()
+UNNOTICED = [name for name, (_, gaps) in DAMAGES.items() if gaps == ALL] + [
+    "a checksum is missing",
+    "the checksums are cut off",
+]
+"""Batches without a checksum are missing, and not damaged."""
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_damage_is_noticed_and_made_anew(damage, unbroken, tmp_path):
     """Only the damaged batches are made again."""
-    store = shutil.copytree(unbroken.file, tmp_path / unbroken.file.name)
-    spoil, anew = DAMAGES[damage]
+    store = Path(shutil.copy(unbroken.file, tmp_path))
+    spoil, gaps = DAMAGES[damage]
     spoil(store)
-    assert content(store) != content(unbroken.file)
+    assert not store.exists() or store.read_bytes() != unbroken.file.read_bytes()
     (tmp_path / "seen").mkdir()
     again = runner.run(batches.job(seen=str(tmp_path / "seen")), tmp_path, quiet, workers=1)
-    assert content(store) == content(unbroken.file)
-    assert seen(tmp_path / "seen") == [16 * batch for batch in anew]
-    assert again.damaged_batches == (0 if damage == "a checksum is missing" else len(anew))
-    assert again.earlier_points == 100 - sum(4 if batch == 6 else 16 for batch in anew)
+    assert store.read_bytes() == unbroken.file.read_bytes()
+    assert seen(tmp_path / "seen") == [16 * batch for batch in gaps]
+    assert again.damaged_batches == (0 if damage in UNNOTICED else len(gaps))
+    assert again.earlier_points == 100 - sum(4 if batch == 6 else 16 for batch in gaps)
 
 
 def test_a_store_grows_and_never_shrinks(unbroken, tmp_path):
@@ -227,29 +222,21 @@ def test_a_store_grows_and_never_shrinks(unbroken, tmp_path):
     grown = runner.run(batches.job(100, seen=str(tmp_path / "seen")), tmp_path, quiet, workers=1)
     assert (grown.earlier_points, grown.damaged_batches) == (32, 0)
     assert seen(tmp_path / "seen") == [32, 48, 64, 80, 96] and small.file == grown.file
-    assert content(grown.file) == content(unbroken.file)
+    assert grown.file.read_bytes() == unbroken.file.read_bytes()
     few = runner.run(batches.job(40, fails=32), tmp_path, quiet, workers=1)
     assert few.earlier_points == 40 and few.dataset.sizes["point"] == 40
     np.testing.assert_array_equal(few.dataset["height"], batches.results(0, 40)["height"])
-    assert content(grown.file) == content(unbroken.file)
+    assert grown.file.read_bytes() == unbroken.file.read_bytes()
 
 
 def test_results_of_another_digest_or_declaration_are_not_mixed_in(unbroken, tmp_path):
     other = runner.run(batches.job(digest="fedcba9876543210"), tmp_path, quiet, workers=1)
     assert other.file.name != unbroken.file.name and other.earlier_points == 0
     # the same name, other batches: nothing of it counts
-    shutil.copytree(unbroken.file, tmp_path / unbroken.file.name)
+    shutil.copy(unbroken.file, tmp_path)
     again = runner.run(batches.job(batch=20), tmp_path, quiet, workers=1)
     assert again.earlier_points == 0
     np.testing.assert_array_equal(again.dataset["height"], batches.results(0, 100)["height"])
-
-
-def test_two_runs_do_not_write_to_one_store(tmp_path):
-    def second(*said):
-        with pytest.raises(InputError, match="another chainunit writes"):
-            runner.run(batches.job(), tmp_path, quiet, workers=1)
-
-    runner.run(batches.job(), tmp_path, second, workers=1)
 
 
 @pytest.mark.second
@@ -263,13 +250,13 @@ def test_two_runs_do_not_write_to_one_store(tmp_path):
 )
 def test_a_batch_that_fails_is_named_and_the_others_are_kept(workers, wrong, words, unbroken, tmp_path):
     # the others are written before it goes wrong, and 48 is in work, perhaps on the worker that ends
-    marks = str(tmp_path / batches.job().store_name / CHECKS / "c")
+    marks = str(tmp_path / batches.job().store_name)
     with pytest.raises(RunError, match=words):
         runner.run(batches.job(**wrong, waits=32, marks=marks), tmp_path, quiet, workers=workers)
     assert not multiprocessing.active_children()
     (tmp_path / "seen").mkdir()
     again = runner.run(batches.job(seen=str(tmp_path / "seen")), tmp_path, quiet, workers=1)
-    assert again.earlier_points == 32 and content(again.file) == content(unbroken.file)
+    assert again.earlier_points == 32 and again.file.read_bytes() == unbroken.file.read_bytes()
     assert seen(tmp_path / "seen") == [32, 48, 64, 80, 96]
 
 
@@ -306,25 +293,14 @@ def test_results_that_were_not_declared_are_refused(tmp_path):
 
 
 @pytest.mark.second
-def test_few_batches_are_in_work(tmp_path, monkeypatch):
-    """The memory holds a batch for each worker, and the one that is being written."""
-    from distributed import Client
+def test_few_batches_are_in_work(tmp_path):
+    """The memory holds a batch for each worker, and the one that is being written: the other worker waits for it."""
+    (tmp_path / "seen").mkdir()
 
-    submit, write, balance, most = Client.submit, BatchStore.write, [0], [0]
+    def counted(title, done, todo):
+        assert len(seen(tmp_path / "seen")) <= done // 8 + 3
 
-    def counted(*args, **more):
-        balance[0] += 1
-        most[0] = max(most[0], balance[0])
-        return submit(*args, **more)
-
-    def written(*args):
-        write(*args)
-        balance[0] -= 1
-
-    monkeypatch.setattr(Client, "submit", counted)
-    monkeypatch.setattr(BatchStore, "write", written)
-    runner.run(batches.job(400, 8), tmp_path, quiet, workers=2)
-    assert balance == [0] and most[0] == 3
+    runner.run(batches.job(400, 8, seen=str(tmp_path / "seen")), tmp_path, counted, workers=2)
 
 
 def free_port():
@@ -333,7 +309,14 @@ def free_port():
         return taken.getsockname()[1]
 
 
+def test_a_scheduler_without_dask_is_refused_with_a_remedy(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(InputError, match=r"a scheduler needs Dask: pip install 'chainunit\[cluster\]'"):
+        runner.check_scheduler("tcp://127.0.0.1:8786")
+
+
 def test_a_scheduler_that_does_not_answer_is_refused(tmp_path, monkeypatch):
+    pytest.importorskip("distributed")
     monkeypatch.setattr(runner, "PATIENCE", 0.3)
     with socket.create_server(("127.0.0.1", 0)) as mute:
         addresses = [
@@ -352,6 +335,7 @@ def test_a_scheduler_that_does_not_answer_is_refused(tmp_path, monkeypatch):
 @pytest.mark.second
 def test_a_scheduler_with_two_workers_makes_the_same_store(unbroken, tmp_path):
     """Processes of their own, as on other machines; then one of them ends."""
+    pytest.importorskip("distributed")
     port = free_port()
     address = f"tcp://127.0.0.1:{port}"
     local = ["--host", "127.0.0.1", "--no-dashboard"]
@@ -384,7 +368,7 @@ def test_a_scheduler_with_two_workers_makes_the_same_store(unbroken, tmp_path):
             start("distributed.cli.dask_worker", address, "--nthreads", "2", "--no-nanny")
         answer("never")
         made = runner.run(batches.job(seen=str(tmp_path / "seen")), tmp_path, quiet, scheduler=address)
-        assert content(made.file) == content(unbroken.file)
+        assert made.file.read_bytes() == unbroken.file.read_bytes()
         processes = {int(p.name.split("_")[1]) for p in (tmp_path / "seen").iterdir()}
         assert processes <= {process.pid for process in started[1:]}
         with pytest.raises(RunError, match=r"batch \d+ \(point .*\) was lost, as its worker"):
@@ -397,8 +381,8 @@ def test_a_scheduler_with_two_workers_makes_the_same_store(unbroken, tmp_path):
 
 def test_texts_are_cut_between_characters():
     array = text_array(["", "Öl", "Öl und mehr"], 4)
-    assert array.shape == (3, 4) and texts(array) == ["", "Öl", "Öl "]
-    assert texts(text_array(["aaÖ"], 3)) == ["aa"]
+    assert array.shape == (3, 4) and [b"".join(row).decode() for row in array] == ["", "Öl", "Öl "]
+    assert b"".join(text_array(["aaÖ"], 3)[0]).decode() == "aa"
 
 
 @pytest.mark.parametrize(
@@ -420,23 +404,13 @@ def test_a_wrong_declaration_is_refused(wrong):
         Job(**{**good, **wrong})
 
 
-def test_what_others_put_into_a_store_is_not_read(tmp_path, recwarn):
-    """A damaged array, a file and a folder beside the arrays of the job; a pipe in place of a chunk is named."""
-    made = runner.run(batches.job(), tmp_path, quiet, workers=1).file
-    for name, text in (("extra/zarr.json", "{damaged"), ("old/.zarray", "{"), ("note.txt", "hello")):
-        (made / name).parent.mkdir(exist_ok=True)
-        (made / name).write_text(text)
-    again = runner.run(batches.job(), tmp_path, quiet, workers=1)
-    assert again.earlier_points == 100 and set(again.dataset.load()) == {
-        v.name for v in batches.job().variables
-    }
-    assert not list(recwarn)
+def test_a_store_that_is_no_file_is_refused(tmp_path):
+    store = tmp_path / batches.job().store_name
+    store.mkdir()
+    with pytest.raises(InputError, match=r"demo_0123456789ab.nc: is not a regular file; remove it"):
+        runner.run(batches.job(), tmp_path, quiet, workers=1)
     if hasattr(os, "mkfifo"):
-        for name in ("height/c/0", f"{CHECKS}/c/0", "zarr.json"):
-            content = (made / name).read_bytes()
-            (made / name).unlink()
-            os.mkfifo(made / name)
-            with pytest.raises(InputError, match=rf"{re.escape(name)}: is not a regular file"):
-                runner.run(batches.job(), tmp_path, quiet, workers=1)
-            (made / name).unlink()
-            (made / name).write_bytes(content)
+        store.rmdir()
+        os.mkfifo(store)
+        with pytest.raises(InputError, match=r"demo_0123456789ab.nc: is not a regular file; remove it"):
+            runner.run(batches.job(), tmp_path, quiet, workers=1)

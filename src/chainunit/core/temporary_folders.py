@@ -20,7 +20,7 @@ import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NoReturn, TypeVar
+from typing import Any, TypeVar
 
 from .files import take_lock
 
@@ -144,16 +144,3 @@ def end_at_signals() -> None:
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, leave)
-
-
-def dask_setup(worker: Any) -> None:
-    """What a worker of Dask calls when it begins, as this module is preloaded there."""
-    end_at_signals()
-    leave = os._exit
-
-    def leave_nothing(status: int) -> NoReturn:
-        remove_folders()
-        leave(status)
-
-    # a thread of Dask ends the worker so, and calls nothing else, where the process that started it is gone
-    os._exit = leave_nothing

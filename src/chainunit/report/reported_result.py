@@ -104,11 +104,7 @@ class ReportedResult(Generic[Question, Outcome]):
         return html.fragment(self._shown)
 
 
-def _copy(kept: Path, to: Path) -> None:
-    """Copy a file, or a folder with all that is in it."""
-    files = [each for each in sorted(kept.rglob("*")) if each.is_file()] if kept.is_dir() else [kept]
-    for file in files:
-        target = to / file.relative_to(kept)
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with atomic_file(target) as part:
-            shutil.copyfile(file, part)
+def _copy(file: Path, target: Path) -> None:
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with atomic_file(target) as part:
+        shutil.copyfile(file, part)

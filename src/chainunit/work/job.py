@@ -20,6 +20,8 @@ CHECKS = "batch_checksum"
 """Name of the variable with the checksum of each batch in the store of a job."""
 BATCH = "batch"
 """Name of its dimension."""
+DECLARATION = "declaration"
+"""Name of the variable with the digest of the declaration in the store of a job."""
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
@@ -57,23 +59,18 @@ class ResultVariable:
 
     @property
     def kind(self) -> np.dtype:
-        """The type of the stored numbers, little-endian."""
-        return np.dtype("uint8" if self.letters else self.dtype).newbyteorder("<")
-
-    @property
-    def fill(self) -> float:
-        """The number behind the last point in the last chunk."""
-        return float("nan") if self.kind.kind == "f" else 0
+        """The type of the stored values."""
+        return np.dtype("S1" if self.letters else self.dtype)
 
     @property
     def attributes(self) -> dict[str, Any]:
         """The attributes of the stored variable, by the CF conventions."""
         attributes: dict[str, Any] = {"units": self.unit, "long_name": self.description}
         if self.flags:
-            attributes["flag_values"] = list(range(len(self.flags)))
+            attributes["flag_values"] = np.arange(len(self.flags), dtype=self.kind)
             attributes["flag_meanings"] = " ".join(self.flags)
         if self.letters:
-            attributes["charset"] = "utf-8"
+            attributes["_Encoding"] = "utf-8"
         return attributes
 
 
@@ -90,7 +87,7 @@ class Job:
     name : begin of the file name of the store, in letters, digits and ``_``
     title : the work in words, for progress and messages
     points : number of points
-    batch : number of points of a batch; each batch is a chunk of each variable. A batch should take a second
+    batch : number of points of a batch. A batch should take a second
         or so: less than 0.1 s is lost in messages between processes, and a batch in work is lost at a kill
     variables : the results of a point
     work : the function that makes a batch; it is pickled by its name, so that it must be at the top of a module
@@ -123,7 +120,7 @@ class Job:
         if self.points < 0 or self.batch < 1:
             raise ValueError(f"a job of {self.points} points in batches of {self.batch}")
         names = [v.name for v in self.variables] + [c.name for c in self.coordinates]
-        names += [CHECKS, self.dimension, BATCH]
+        names += [CHECKS, self.dimension, BATCH, DECLARATION]
         wrong = [name for name in (self.name, *names) if not _NAME.fullmatch(name)]
         if wrong or len(set(names)) < len(names):
             raise ValueError(f"names of a job must be plain and differ: {wrong or names}")
@@ -135,8 +132,8 @@ class Job:
 
     @property
     def store_name(self) -> str:
-        """Name of the folder that is the store."""
-        return f"{self.name}_{self.digest[:12]}.zarr"
+        """Name of the file that is the store."""
+        return f"{self.name}_{self.digest[:12]}.nc"
 
     def batches(self, points: int | None = None) -> int:
         """The number of batches, of all points by default."""
@@ -155,25 +152,17 @@ class Job:
         return (self.dimension, *((f"{variable.name}_letter",) if variable.letters else variable.dims))
 
     def layout(self) -> bytes:
-        """A digest of the declaration of the results, without the number of points."""
+        """A digest of the declaration of the results, without the number of points, in hexadecimal digits."""
         variables = [
             [v.name, v.unit, v.kind.str, self.dims(v), self.shape(v), v.flags] for v in self.variables
         ]
         axes = [[c.name, c.unit, list(c.values)] for c in self.coordinates]
         text = json.dumps([self.digest, self.dimension, self.batch, variables, axes])
-        return hashlib.sha256(text.encode()).digest()
+        return hashlib.sha256(text.encode()).hexdigest().encode()
 
 
 def text_array(texts: Sequence[str], letters: int) -> np.ndarray:
     """Texts as an array of their bytes in UTF-8, shape (n, letters), with zeros behind; a longer text is cut
     between two characters."""
-    array = np.zeros((len(texts), letters), np.uint8)
-    for row, text in zip(array, texts, strict=True):
-        cut = text.encode()[:letters].decode(errors="ignore").encode()
-        row[: len(cut)] = list(cut)
-    return array
-
-
-def texts(array: Any) -> list[str]:
-    """The texts of a text variable, from its array of bytes, shape (n, letters)."""
-    return [bytes(row).rstrip(b"\0").decode() for row in np.asarray(array, np.uint8)]
+    cut = [text.encode()[:letters].decode(errors="ignore").encode() for text in texts]
+    return np.array(cut, f"S{letters}").reshape(-1, 1).view("S1")

@@ -11,9 +11,10 @@ import asyncio
 import concurrent.futures
 import contextlib
 import logging
+import multiprocessing
+import multiprocessing.connection
 import os
 import pickle
-import signal
 import threading
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
@@ -24,7 +25,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from .. import __version__
 from ..core import temporary_folders
 from ..core.errors import InputError, InterruptedRunError, RunError, printable
-from ..core.files import claim
+from ..core.files import folder as make_folder
 from .job import Job
 from .progress import TaskProgress
 from .store import BatchStore
@@ -50,7 +51,7 @@ class Outcome:
 
     @property
     def file(self) -> Path:
-        """The store, a folder."""
+        """The store, a file."""
         return self.store.path
 
     @property
@@ -67,10 +68,11 @@ def run(
     Parameters
     ----------
     job : the work; of its store see `BatchStore`
-    folder : where the store is, or is made, by its `Job.store_name`
+    folder : where the store is, or is made, by its `Job.store_name`; this process alone writes there, see
+        `chainunit.core.files.claim`
     progress : a function that is called with the title of the job and the numbers of complete and of all points
     workers : number of local processes; by default one for each processor. One worker, or a single batch, runs in
-        this process itself, without Dask
+        this process itself
     scheduler : address of a Dask scheduler, such as ``tcp://10.0.0.5:8786``, whose workers make the batches in
         place of local processes. They need this package in the same version, and no files in common with this
         process
@@ -78,7 +80,7 @@ def run(
     Raises
     ------
     InputError
-        where the scheduler or its workers do not answer, or another process writes to the store.
+        where the scheduler or its workers do not answer.
     RunError
         where `work` fails, or a worker ends; the message names the batch. Earlier batches are in the store.
     InterruptedRunError
@@ -86,27 +88,26 @@ def run(
     WriteError
         where the store cannot be written; likewise.
     """
-    with claim(folder / job.store_name) as path:
-        store = BatchStore(job, path)
-        progress(job.title, 0, job.points)
-        gaps, damaged = store.missing(lambda complete: progress(job.title, complete, job.points))
-        complete = earlier = job.points - sum(_size(store, batch) for batch in gaps)
-        workers = min(workers or os.cpu_count() or 1, len(gaps))
-        try:
-            with contextlib.closing(_batches(store, gaps, workers, scheduler)) as batches:
-                for batch, results in batches:
-                    store.write(batch, results)
-                    complete += _size(store, batch)
-                    progress(job.title, complete, job.points)
-        except (KeyboardInterrupt, InterruptedRunError) as error:
-            words = f"interrupted after {complete} of {job.points} {job.title}"
-            raise InterruptedRunError(words) from error
-        except _BatchError as error:
-            begin, end = store.extent(error.batch)
-            raise RunError(
-                f"{job.title}: batch {error.batch} ({job.dimension} {begin} to {end - 1}) {error}; {complete} of "
-                f"{job.points} are in {path}: run it again to go on"
-            ) from error.__cause__
+    store = BatchStore(job, make_folder(folder) / job.store_name)
+    progress(job.title, 0, job.points)
+    gaps, damaged = store.missing(lambda complete: progress(job.title, complete, job.points))
+    complete = earlier = job.points - sum(_size(store, batch) for batch in gaps)
+    workers = min(workers or os.cpu_count() or 1, len(gaps))
+    try:
+        with contextlib.closing(_batches(store, gaps, workers, scheduler)) as batches:
+            for batch, results in batches:
+                store.write(batch, results)
+                complete += _size(store, batch)
+                progress(job.title, complete, job.points)
+    except (KeyboardInterrupt, InterruptedRunError) as error:
+        words = f"interrupted after {complete} of {job.points} {job.title}"
+        raise InterruptedRunError(words) from error
+    except _BatchError as error:
+        begin, end = store.extent(error.batch)
+        raise RunError(
+            f"{job.title}: batch {error.batch} ({job.dimension} {begin} to {end - 1}) {error}; {complete} of "
+            f"{job.points} are in {store.path}: run it again to go on"
+        ) from error.__cause__
     return Outcome(store, earlier, damaged)
 
 
@@ -127,7 +128,9 @@ class _BatchError(Exception):
 def _batches(store: BatchStore, gaps: list[int], workers: int, scheduler: str | None) -> Made:
     if not gaps or (scheduler is None and workers == 1):
         return _in_this_process(store, gaps)
-    return _on_workers(store, gaps, workers, scheduler)
+    if scheduler is None:
+        return _on_processes(store, gaps, workers)
+    return _on_cluster(store, gaps, scheduler)
 
 
 def _in_this_process(store: BatchStore, gaps: list[int]) -> Made:
@@ -140,18 +143,106 @@ def _in_this_process(store: BatchStore, gaps: list[int]) -> Made:
             except InterruptedRunError:
                 raise
             except Exception as error:
-                raise _BatchError(batch, f"failed: {_words(error)}") from error
+                raise _BatchError(batch, _failure(error)) from error
             yield batch, results
     finally:
         if job.close is not None:
             job.close()
 
 
-def _words(error: BaseException) -> str:
-    return printable(str(error) if isinstance(error, RunError | InputError) else repr(error), 500)
+def _failure(error: BaseException) -> str:
+    words = str(error) if isinstance(error, RunError | InputError) else repr(error)
+    return f"failed: {printable(words, 500)}"
 
 
 # -- on workers
+
+
+class _Worker:
+    """A local process that makes one batch at a time. Its pipe closes when it ends, and its own end of the pipe when
+    this process does: so the batch in work is known, and no worker is left over. An executor of the standard library
+    has neither."""
+
+    def __init__(self, parcel: bytes) -> None:
+        context = multiprocessing.get_context("spawn")
+        self.pipe, end = context.Pipe()
+        self._process = context.Process(target=_serve, args=(end, parcel), daemon=True)
+        self._process.start()
+        end.close()
+
+    def end(self) -> None:
+        """End the process at once, without the batch that it makes."""
+        self.pipe.close()
+        self._process.terminate()
+        self._process.join()
+
+
+def _serve(pipe: Any, parcel: bytes) -> None:
+    """Make the batches that come through the pipe, until it closes."""
+    temporary_folders.end_at_signals()
+    work, task, close = pickle.loads(parcel)
+    try:
+        pipe.send(None)
+        while True:
+            begin, end = pipe.recv()
+            results, failure = None, None
+            try:
+                results = work(task, begin, end)
+            except Exception as error:
+                failure = error if isinstance(error, InterruptedRunError) else _failure(error)
+            pipe.send((results, failure))
+    except (EOFError, OSError):
+        if close is not None:
+            close()
+
+
+def _on_processes(store: BatchStore, gaps: list[int], workers: int) -> Made:
+    """Make batches in local processes. A process gets its next batch when the last one is finished; the finished one
+    is then yielded."""
+    job = store.job
+    parcel = pickle.dumps((job.work, job.task, job.close))
+    processes: list[_Worker] = []
+    try:
+        try:
+            processes.extend(_Worker(parcel) for _ in range(workers))
+            for process in processes:
+                process.pipe.recv()
+        except (EOFError, RuntimeError, OSError) as error:
+            raise RunError(
+                f"the local processes cannot be started ({_reason(error)}); a script must have its calls below "
+                'if __name__ == "__main__":'
+            ) from error
+        waiting = iter(gaps)
+        batch_of: dict[Any, int] = {}
+
+        def send(pipe: Any) -> None:
+            if (batch := next(waiting, None)) is not None:
+                batch_of[pipe] = batch
+                with contextlib.suppress(OSError):  # the process has ended, which `wait` tells
+                    pipe.send(store.extent(batch))
+
+        for process in processes:
+            send(process.pipe)
+        while batch_of:
+            pipe: Any
+            for pipe in multiprocessing.connection.wait(batch_of):
+                batch = batch_of.pop(pipe)
+                try:
+                    results, failure = pipe.recv()
+                except (EOFError, OSError) as error:
+                    raise _BatchError(batch, "was lost, as its worker process ended") from error
+                if isinstance(failure, InterruptedRunError):
+                    raise failure
+                if failure is not None:
+                    raise _BatchError(batch, failure)
+                send(pipe)
+                yield batch, results
+    finally:
+        for process in processes:
+            process.end()
+
+
+# -- on a cluster, by the extra of this name
 
 _at_work = threading.Lock()
 """Held by the thread that makes a batch: a worker with several threads makes one batch at a time."""
@@ -188,24 +279,22 @@ def _finish() -> None:
             _at_work.release()
 
 
-def _on_workers(store: BatchStore, gaps: list[int], workers: int, scheduler: str | None) -> Made:
-    """Make batches on the workers of a cluster. A worker gets its next batch when the last one is finished; the
-    finished one is then yielded."""
+def _on_cluster(store: BatchStore, gaps: list[int], scheduler: str) -> Made:
+    """Make batches on the workers of a scheduler, as `_on_processes` does in processes."""
     from distributed import as_completed
     from distributed.scheduler import KilledWorker
 
     job = store.job
-    digest = job.layout().hex()
+    digest = job.layout().decode()
     parcel = pickle.dumps((job.work, job.task, job.close))
-    with _client(workers, scheduler) as client:
+    with _silent(), _connection(scheduler) as client:
         sent = client.scatter(parcel, broadcast=True, hash=False)
         waiting = iter(gaps)
         batch_of: dict[str, int] = {}
         finished = as_completed(loop=client.loop)
 
         def refill() -> None:
-            wanted = len(client.nthreads()) if scheduler else workers
-            while len(batch_of) < wanted and (batch := next(waiting, None)) is not None:
+            while len(batch_of) < len(client.nthreads()) and (batch := next(waiting, None)) is not None:
                 future = client.submit(
                     _made_on_worker, __version__, digest, sent, *store.extent(batch), pure=False
                 )
@@ -217,32 +306,18 @@ def _on_workers(store: BatchStore, gaps: list[int], workers: int, scheduler: str
             batch = batch_of.pop(future.key)
             try:
                 results = future.result()
-            except KilledWorker as error:
-                raise _BatchError(batch, "was lost, as its worker process ended") from error
-            except (asyncio.CancelledError, concurrent.futures.CancelledError) as error:
+            except (KilledWorker, asyncio.CancelledError, concurrent.futures.CancelledError) as error:
                 # a worker that held the data of a batch cancels it, too, when it ends
-                ended = f"its worker or the scheduler {scheduler}" if scheduler else "its worker process"
-                raise _BatchError(batch, f"was lost, as {ended} ended") from error
+                words = f"was lost, as its worker or the scheduler {scheduler} ended"
+                raise _BatchError(batch, words) from error
             except InterruptedRunError:
                 raise
             except Exception as error:
-                raise _BatchError(batch, f"failed: {_words(error)}") from error
+                raise _BatchError(batch, _failure(error)) from error
             del future
             refill()
             yield batch, results
         client.run(_finish)
-
-
-@contextmanager
-def _client(workers: int, scheduler: str | None) -> Iterator[Any]:
-    """A client of that scheduler, or of as many local processes."""
-    with _silent():
-        if scheduler is not None:
-            with _connection(scheduler) as client:
-                yield client
-        else:
-            with _local(workers) as client:
-                yield client
 
 
 _LOGS = ("distributed", "distributed.client", "tornado.application")
@@ -251,8 +326,10 @@ _LOGS = ("distributed", "distributed.client", "tornado.application")
 @contextmanager
 def _silent() -> Iterator[None]:
     """No lines of Dask on the terminal: every failure becomes an error of this package."""
-    import distributed  # noqa: F401 - it sets the levels when it is imported
-
+    try:
+        import distributed  # noqa: F401 - it sets the levels when it is imported
+    except ImportError as error:
+        raise InputError("a scheduler needs Dask: pip install 'chainunit[cluster]'") from error
     before = {name: logging.getLogger(name).level for name in _LOGS}
     for name in _LOGS:
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)
@@ -261,45 +338,6 @@ def _silent() -> Iterator[None]:
     finally:
         for name, level in before.items():
             logging.getLogger(name).setLevel(level)
-
-
-@contextmanager
-def _local(workers: int) -> Iterator[Any]:
-    """A client of local processes with one thread each."""
-    import dask
-    from distributed import Client, LocalCluster
-
-    # a batch whose worker ends is not tried again: it would end the next worker, too
-    settings = {"distributed.scheduler.allowed-failures": 0, "distributed.worker.profile.enabled": False}
-    with dask.config.set(settings), contextlib.ExitStack() as stack:
-        try:
-            cluster = LocalCluster(
-                n_workers=workers,
-                threads_per_worker=1,
-                dashboard_address=None,
-                # any free port, and not the one that another scheduler of this machine may have
-                scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},
-                memory_limit=0,
-                silence_logs=logging.CRITICAL + 1,
-                preload=[temporary_folders.__name__],
-            )
-        except (RuntimeError, OSError) as error:
-            raise RunError(
-                f"the local processes cannot be started ({_reason(error)}); a script must have its calls below "
-                'if __name__ == "__main__":'
-            ) from error
-        client = stack.enter_context(Client(stack.enter_context(cluster), set_as_default=False))
-        try:
-            yield client
-        except BaseException:
-            for nanny in cluster.workers.values():
-                # it would wait for its batch first, and then be killed with its temporary folders left behind
-                process = nanny.pid
-                nanny.close_gracefully()
-                if process:
-                    with contextlib.suppress(ProcessLookupError):
-                        os.kill(process, signal.SIGTERM)
-            raise
 
 
 @contextmanager

@@ -1,102 +1,144 @@
-"""The results of a job in a folder: a Zarr store (format 3), in which each batch is one chunk of each variable.
+"""The results of a job in one NetCDF file, which is written batch by batch.
 
-One process writes. A chunk appears whole or not at all, and the checksum of a batch is written after its chunks:
-a batch without the right checksum is missing. The bytes of the store follow from the job alone, and not from the
-order of the batches or the number of kills between them. Any reader of Zarr reads the store::
+One process writes. Each value has its place in the file from the begin, and the checksum of a batch is written after
+its values: a batch without the right checksum is missing. The bytes of the file follow from the job alone, and not
+from the order of the batches or the number of kills between them. Any reader of NetCDF reads it::
 
-    xarray.open_zarr("results/monte_carlo_0123456789ab.zarr", consolidated=False)
+    xarray.open_dataset("results/monte_carlo_0123456789ab.nc")
 """
 
 from __future__ import annotations
 
-import json
+import hashlib
 import re
 import zlib
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from .. import __version__
-from ..core.errors import RunError
-from ..core.files import atomic_file, writing
-from ..core.inputs import regular_bytes
-from .job import BATCH, CHECKS, Job, ResultVariable, text_array
+from ..core.errors import InputError, RunError
+from ..core.files import atomic_file, netcdf, writing
+from .job import BATCH, CHECKS, DECLARATION, Job, ResultVariable, text_array
 
 if TYPE_CHECKING:
     import xarray as xr
 
-_GROUP = "zarr.json"
-_LEVEL = 1  # of zstd: results are noise in their last digits, so that more effort gains little
+_FORMAT: Literal["NETCDF3_64BIT_DATA"] = "NETCDF3_64BIT_DATA"
+"""The classic format: a kill between two writes leaves all other values as they are."""
+_HEAD = 1 << 20  # bytes, more than the head of the file of any job
+_COPIED = 1 << 16  # points that are copied at once into a larger file
 
 
 class BatchStore:
-    """The store of a `job` at `path`, which is made where it is missing and mended where its declaration is
-    damaged. A store that already has more points than the job keeps them.
+    """The store of a `job` at `path`, which is made where it is missing or has another declaration. A store that
+    already has more points than the job keeps them.
 
     Raises
     ------
+    InputError
+        where `path` is no regular file.
     WriteError
         where the store cannot be written.
     """
 
     def __init__(self, job: Job, path: Path) -> None:
         self.job, self.path = job, path
+        self._layout = job.layout()
         self.earlier_points = self._stored_points()
         """number of points that the store was made for before, complete or not"""
         self.points = max(job.points, self.earlier_points)
-        self._chunks: dict[str, Any] = {}
-        self._arrays = self._declare()
-        self._layout = job.layout()
-        for name, content in self._chunks.items():
-            self._put(path / name, content.to_bytes(), only_changes=True)
-        self._chunks.clear()
+        self._remove_leftovers()
+        if not self.earlier_points or self.points > self.earlier_points:
+            self._make()
 
     def _stored_points(self) -> int:
-        try:
-            points = json.loads(regular_bytes(self.path / _GROUP) or b"")["attributes"]["points"]
-        except (ValueError, KeyError, TypeError):
+        """The number of points of a file of this job; 0 without one. The NetCDF library trusts the head of a file, so
+        that its digest is checked first."""
+        if not self.path.exists():
             return 0
-        return points if isinstance(points, int) and points > 0 else 0
+        if not self.path.is_file():
+            raise InputError(f"{self.path}: is not a regular file; remove it")
+        head, seal = self._head(self.path)
+        if not seal or not head.endswith(seal):
+            return 0
+        with self._opened() as file:
+            return len(file.dimensions[self.job.dimension])
 
-    def _declare(self) -> dict[str, Any]:
-        """The arrays by their names, in memory: their declarations, and later single chunks of them."""
-        import zarr
-        from zarr.codecs import ZstdCodec
-        from zarr.storage import MemoryStore
+    def _head(self, path: Path) -> tuple[bytes, bytes]:
+        """The head of a file to the end of its digest, and the digest that it must have; empty for the head of
+        another job."""
+        with writing(path), path.open("rb") as file:
+            head = file.read(_HEAD)
+        end = head.find(self._layout) + len(self._layout)
+        seal = hashlib.sha256(head[:end]).hexdigest().encode()
+        return (head[: end + len(seal)], seal) if end >= len(self._layout) else (b"", b"")
 
+    def _make(self) -> None:
+        """Make the file for all points, with the whole batches that a smaller one has."""
+        from netCDF4 import Dataset
+
+        with atomic_file(self.path, is_result=False) as part:
+            with netcdf(), Dataset(part, "w", format=_FORMAT) as new:
+                new.set_fill_off()
+                self._declare(new)
+                new.set_auto_maskandscale(False)
+                new.set_auto_chartostring(False)
+                if self.earlier_points:
+                    self._copy(new)
+            head, seal = self._head(part)
+            with part.open("r+b") as file:
+                file.seek(len(head) - len(seal))
+                file.write(seal)
+
+    def _declare(self, file: Any) -> None:
+        """Declare the dimensions and variables. The declaration's digest comes first, and the checksums last."""
         job = self.job
-        attributes = {"title": job.title, "source": f"chainunit {__version__}", "points": self.points}
-        group = zarr.create_group(MemoryStore(self._chunks), zarr_format=3, attributes=attributes)
-
-        def array(name: str, shape: Any, chunks: Any, dims: Any, kind: Any, fill: Any, about: Any) -> Any:
-            # an empty chunk is written, too, so that a chunk that is missing is noticed
-            return group.create_array(
-                name,
-                shape=shape,
-                chunks=tuple(max(1, n) for n in chunks),
-                dtype=kind,
-                fill_value=fill,
-                compressors=None if name == CHECKS else ZstdCodec(level=_LEVEL),
-                dimension_names=dims,
-                attributes=about,
-                config={"write_empty_chunks": True},
-            )
-
-        arrays = {}
-        for v in job.variables:
-            shape = job.shape(v)
-            arrays[v.name] = array(
-                v.name, (self.points, *shape), (job.batch, *shape), job.dims(v), v.kind, v.fill, v.attributes
-            )
+        file.setncatts({"title": job.title, "source": f"chainunit {__version__}"})
+        file.createDimension(job.dimension, self.points)
+        file.createDimension(BATCH, job.batches(self.points))
+        file.createDimension(DECLARATION, 2 * len(self._layout))
+        file.createVariable(DECLARATION, "S1", (DECLARATION,))
         for c in job.coordinates:
-            about, size = {"units": c.unit, "long_name": c.description}, (len(c.values),)
-            array(c.name, size, size, (c.name,), np.dtype("<f8"), 0.0, about)[:] = np.array(c.values)
-        about = {"units": "1", "long_name": "CRC-32 of the chunks of a batch"}
-        count = job.batches(self.points)
-        arrays[CHECKS] = array(CHECKS, (count,), (1,), (BATCH,), np.dtype("<u4"), 0, about)
-        return arrays
+            file.createDimension(c.name, len(c.values))
+            file.createVariable(c.name, "f8", (c.name,)).setncatts(
+                {"units": c.unit, "long_name": c.description}
+            )
+        for v in job.variables:
+            for name, size in zip(job.dims(v), (self.points, *job.shape(v)), strict=True):
+                if name not in file.dimensions:
+                    file.createDimension(name, size)
+            file.createVariable(v.name, v.kind, job.dims(v)).setncatts(v.attributes)
+        about = {"units": "1", "long_name": "CRC-32 of the values of a batch"}
+        file.createVariable(CHECKS, "u4", (BATCH,)).setncatts(about)
+        file.sync()
+        file[DECLARATION][: len(self._layout)] = np.frombuffer(self._layout, "S1")
+        for c in job.coordinates:
+            file[c.name][:] = np.array(c.values)
+
+    def _copy(self, new: Any) -> None:
+        earlier = self.earlier_points
+        with self._opened() as old:
+            for name in self._names:
+                for begin in range(0, earlier, _COPIED):
+                    rows = slice(begin, min(begin + _COPIED, earlier))
+                    new[name][rows] = old[name][rows]
+            # an incomplete last batch gets more points
+            whole = earlier // self.job.batch
+            new[CHECKS][:whole] = old[CHECKS][:whole]
+
+    @contextmanager
+    def _opened(self, mode: Literal["r", "r+"] = "r") -> Iterator[Any]:
+        """The file, with its values as they are."""
+        from netCDF4 import Dataset
+
+        with writing(self.path), netcdf(), Dataset(self.path, mode) as file:
+            file.set_auto_maskandscale(False)
+            file.set_auto_chartostring(False)
+            yield file
 
     def extent(self, batch: int, points: int | None = None) -> tuple[int, int]:
         """The first point of a batch, and the first one behind it."""
@@ -107,19 +149,17 @@ class BatchStore:
         """The batches of the job that the store does not have, and how many of these it has damaged. `progress`
         is called with the number of points that are complete."""
         gaps, damaged, complete = [], 0, 0
-        for batch in range(self.job.batches()):
-            begin, end = self.extent(batch)
-            mark = self._read(CHECKS, batch)
-            if mark is not None and mark == self._mark(batch, [self._read(v, batch) for v in self._names]):
-                complete += min(end, self.job.points) - begin
-                if batch % 1000 == 999:
-                    progress(complete)
-                continue
-            gaps.append(batch)
-            # the last batch of an earlier, smaller number of points is incomplete, and not damaged
-            damaged += mark is not None and end == self.extent(batch, self.earlier_points)[1]
-        if gaps:
-            self._remove_leftovers()
+        with self._opened() as file:
+            marks = file[CHECKS][:]
+            for batch in range(self.job.batches()):
+                begin, end = self.extent(batch)
+                if marks[batch] and marks[batch] == self._mark(file, batch):
+                    complete += min(end, self.job.points) - begin
+                    if batch % 1000 == 999:
+                        progress(complete)
+                else:
+                    gaps.append(batch)
+                    damaged += bool(marks[batch])
         progress(complete)
         return gaps, damaged
 
@@ -127,48 +167,36 @@ class BatchStore:
     def _names(self) -> list[str]:
         return [v.name for v in self.job.variables]
 
-    def _file(self, name: str, batch: int) -> Path:
-        others = self._arrays[name].ndim - 1
-        return self.path / name / "/".join(["c", str(batch), *["0"] * others])
-
-    def _read(self, name: str, batch: int) -> bytes | None:
-        """The bytes of a chunk; None where it has no file."""
-        return regular_bytes(self._file(name, batch))
-
-    def _mark(self, batch: int, chunks: list[bytes | None]) -> bytes | None:
-        """The checksum of a batch as it is stored: of the declaration, the extent of the batch, and its chunks.
-        None where a chunk is missing."""
-        check = zlib.crc32(f"{self.extent(batch)}".encode(), zlib.crc32(self._layout))
-        for chunk in chunks:
-            if chunk is None:
-                return None
-            check = zlib.crc32(chunk, check)
-        return check.to_bytes(4, "little")
+    def _mark(self, file: Any, batch: int) -> int:
+        """The checksum of a batch: of the declaration, the extent of the batch, and its values as they are stored."""
+        begin, end = self.extent(batch)
+        check = zlib.crc32(f"{begin, end}".encode(), zlib.crc32(self._layout))
+        for name in self._names:
+            check = zlib.crc32(np.ascontiguousarray(file[name][begin:end]).tobytes(), check)
+        return check
 
     def write(self, batch: int, results: Mapping[str, Any]) -> None:
-        """Write the results of a batch as whole chunks, and then its checksum.
+        """Write the results of a batch, and then its checksum.
 
         Raises
         ------
         RunError
             for results that the job does not declare.
         WriteError
-            where a file cannot be written.
+            where the file cannot be written.
         """
         begin, end = self.extent(batch)
         if set(results) != set(self._names):
             raise RunError(f"{self.job.title}: the results are {sorted(results)}, must be {self._names}")
-        chunks = []
-        for v in self.job.variables:
-            file = self._file(v.name, batch)
-            self._arrays[v.name][begin:end] = self._values(v, results[v.name], end - begin)
-            # the array has put the chunk into the dictionary of its store, under the name of its file
-            content = self._chunks.pop(file.relative_to(self.path).as_posix()).to_bytes()
-            self._put(file, content)
-            chunks.append(content)
-        mark = self._mark(batch, chunks)
-        assert mark is not None
-        self._put(self._file(CHECKS, batch), mark)
+        values = {v.name: self._values(v, results[v.name], end - begin) for v in self.job.variables}
+        with self._opened("r+") as file:
+            for name, array in values.items():
+                self._put(file, name, slice(begin, end), array)
+            self._put(file, CHECKS, batch, np.uint32(self._mark(file, batch)))
+
+    def _put(self, file: Any, name: str, place: slice | int, values: Any) -> None:
+        file[name][place] = values
+        file.sync()
 
     def _values(self, variable: ResultVariable, values: Any, points: int) -> np.ndarray:
         """The results of a variable, checked."""
@@ -182,44 +210,20 @@ class BatchStore:
             )
         return array.astype(variable.kind)
 
-    def _put(self, file: Path, content: bytes, *, only_changes: bool = False) -> None:
-        if only_changes and regular_bytes(file) == content:
-            return
-        with writing(file):
-            file.parent.mkdir(parents=True, exist_ok=True)
-        with atomic_file(file, is_result=False) as part:
-            part.write_bytes(content)
-
     def _remove_leftovers(self) -> None:
-        """Remove the temporary files of a process that was killed while it wrote; see `atomic_file`."""
-        for part in self.path.rglob("*.part"):
+        """Remove the temporary files of a process that was killed while it made the file; see `atomic_file`."""
+        for part in self.path.parent.glob(f"{self.path.name}.*.part"):
             if re.search(r"\.[0-9a-f]{16}\.part$", part.name):
                 part.unlink(missing_ok=True)
 
     def open(self) -> xr.Dataset:
-        """The points of the job; each variable is read when its values are used. `Dataset.chunk` makes Dask arrays
-        of them, for more points than the memory holds."""
+        """The points of the job, with texts as str; each variable is read when its values are used."""
         import xarray as xr
 
-        own = _store_of(self.path, frozenset({*self._arrays, *(c.name for c in self.job.coordinates)}))
-        dataset = xr.open_zarr(own, chunks=None, consolidated=False, decode_times=False)
+        with netcdf():
+            dataset = xr.open_dataset(self.path, engine="netcdf4", decode_times=False, cache=False)
         dataset.attrs["points"] = self.job.points
         return dataset[self._names].isel({self.job.dimension: slice(0, self.job.points)})
-
-
-def _store_of(path: Path, names: frozenset[str]) -> Any:
-    """The store with its own arrays alone: what others have put beside them is not read."""
-    from zarr.storage import LocalStore, WrapperStore
-
-    class OwnArrays(WrapperStore):  # type: ignore[misc]
-        """A store that lists no other names."""
-
-        async def list_dir(self, prefix: str) -> AsyncIterator[str]:
-            async for name in super().list_dir(prefix):
-                if prefix or name in names:
-                    yield name
-
-    return OwnArrays(LocalStore(path, read_only=True))
 
 
 def made_anew(batches: int, points: str, store: str) -> str:

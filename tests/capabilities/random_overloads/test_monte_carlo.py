@@ -18,6 +18,8 @@ import time
 from pathlib import Path
 from types import SimpleNamespace
 
+import batches
+import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
@@ -41,7 +43,7 @@ from chainunit.study.drive_fmus import export_drive, with_files
 from chainunit.study.quantiles import Estimate
 from chainunit.study.rig import Rig
 from chainunit.system import CoSimulation, monolithic
-from chainunit.work.job import CHECKS
+from chainunit.work.job import CHECKS, DECLARATION
 
 needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 RUNS = 50
@@ -95,9 +97,9 @@ def start(folder, runs, **more):
     )
 
 
-def marks(folder):
-    """The checksums of the finished batches."""
-    return list(folder.glob(f"*.zarr/{CHECKS}/c/*"))
+def finished(folder):
+    """The number of finished batches."""
+    return sum(map(batches.finished, folder.glob("monte_carlo_*.nc")))
 
 
 def vanish(process):
@@ -110,24 +112,20 @@ def vanish(process):
 
 def opened(folder):
     """The results in a folder."""
-    (store,) = folder.glob("*.zarr")
-    dataset = xr.open_zarr(store, consolidated=False).drop_vars(CHECKS)
+    (store,) = folder.glob("monte_carlo_*.nc")
+    dataset = xr.open_dataset(store).drop_vars([CHECKS, DECLARATION])
     return monte_carlo.MonteCarloResult(dataset.load(), store, "cs")
-
-
-def content(store):
-    return {p.relative_to(store).as_posix(): p.read_bytes() for p in store.rglob("*") if p.is_file()}
 
 
 @pytest.fixture(scope="module")
 def killed(tmp_path_factory):
-    """The folder of a study that was killed after its first batch, whose first chunk was then cut off, and that was
+    """The folder of a study that was killed after its first batch, of which a number was then changed, and that was
     resumed; the number of batches that it had, and what the second process said."""
     folder = tmp_path_factory.mktemp("monte carlo")
     scratch = folder / "scratch"
     scratch.mkdir()
     first = start(folder, RUNS, env=os.environ | {"TMPDIR": str(scratch)})
-    while not marks(folder):
+    while not finished(folder):
         assert first.poll() is None, first.stderr.read()
         time.sleep(0.02)
     # its workers notice, and remove what they have unpacked
@@ -135,13 +133,15 @@ def killed(tmp_path_factory):
     first.communicate()
     vanish(first)
     assert list(scratch.glob("chainunit*")) == []
-    done = marks(folder)
-    (store,) = folder.glob("*.zarr")
-    (store / "crank_torque_peak" / "c" / done[0].name).write_bytes(b"cut off")
+    done = finished(folder)
+    (store,) = folder.glob("monte_carlo_*.nc")
+    with netCDF4.Dataset(store) as stored:
+        first_run = int(np.flatnonzero(stored[CHECKS][:])[0]) * monte_carlo.COSIMULATED_BATCH
+    batches.damage(store, "crank_torque_peak", first_run)
     second = start(folder, RUNS)
     message, errors = second.communicate()
     assert second.returncode == 0, errors
-    return folder, len(done), message
+    return folder, done, message
 
 
 def task_of(folder, runs=RUNS, text=STUDY, cosimulated=True):
@@ -185,7 +185,7 @@ def test_the_store_is_that_of_an_unbroken_study(killed, tmp_path):
     """In this process, from the first to the last run: the bytes of every file are the same."""
     folder, _, _ = killed
     result = monte_carlo.run(task_of(folder), tmp_path, lambda *said: None, workers=1)
-    assert content(result.file) == content(opened(folder).file) and not monte_carlo._systems
+    assert result.file.read_bytes() == opened(folder).file.read_bytes() and not monte_carlo._systems
 
 
 def branches(task, simulation, *drawn):
@@ -324,7 +324,7 @@ def test_what_the_numbers_depend_on_is_in_the_name(killed):
     folder, _, _ = killed
     task = task_of(folder)
     digest = task.digest()
-    assert opened(folder).file.name == f"monte_carlo_{digest}.zarr"
+    assert opened(folder).file.name == f"monte_carlo_{digest}.nc"
     for other in (
         with_rig(task, drive=dataclasses.replace(task.rig.drive, feed_forward=True)),
         with_rig(task, operation=dataclasses.replace(task.rig.operation, simulation="me")),
@@ -360,14 +360,14 @@ def test_a_run_that_fails_is_a_result(killed, tmp_path, monkeypatch):
 
 @pytest.mark.second
 def test_a_damaged_batch_is_computed_anew_and_told(killed, tmp_path):
-    (store,) = killed[0].glob("*.zarr")
-    copy = shutil.copytree(store, tmp_path / store.name)
-    (copy / "stalls" / "c" / "3").unlink()
+    (store,) = killed[0].glob("monte_carlo_*.nc")
+    copy = Path(shutil.copy(store, tmp_path))
+    batches.damage(copy, "stalls", 49)
     reports = []
     result = monte_carlo.run(task_of(killed[0]), tmp_path, lambda *said: reports.append(said[1:]), workers=1)
     assert (result.earlier_runs, result.damaged_batches) == (48, 1)
     assert as_data(result)["damaged_batches"]["value"] == 1
-    assert reports == [(0, 50), (48, 50), (50, 50)] and content(copy) == content(store)
+    assert reports == [(0, 50), (48, 50), (50, 50)] and copy.read_bytes() == store.read_bytes()
 
 
 @pytest.mark.second
@@ -388,6 +388,7 @@ def test_a_machine_without_the_files_of_the_fmus_makes_the_same_runs(killed, tmp
 
 @pytest.mark.second
 def test_a_scheduler_is_asked_before_any_run(tmp_path):
+    pytest.importorskip("distributed")
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         address = f"tcp://127.0.0.1:{taken.getsockname()[1]}"
@@ -409,7 +410,7 @@ def test_processes_leave_nothing_behind(end, tmp_path):
     scratch.mkdir()
     running = start(tmp_path, 18 if end is None else 10_000, env=os.environ | {"TMPDIR": str(scratch)})
     if end is not None:
-        while not marks(tmp_path) or len(list(scratch.glob("chainunit*"))) < 4:
+        while not finished(tmp_path) or len(list(scratch.glob("chainunit*"))) < 4:
             assert running.poll() is None
             time.sleep(0.02)
         os.killpg(running.pid, end)
@@ -424,13 +425,13 @@ def test_a_current_at_its_limit_and_damaged_batches_are_noted(current, told):
     drive = choose(parse(""), Path(), lambda *said: None).drive
     assert drive.parameters.limit.i == 4.4
     quantiles = {"current_peak": {"q50": Estimate(2.0, 1.0, 3.0), "q95": Estimate(current, 4.0, 4.4)}}
-    random = SimpleNamespace(quantiles=quantiles, shortage="", damaged_batches=1, file_name="runs.zarr")
+    random = SimpleNamespace(quantiles=quantiles, shortage="", damaged_batches=1, file_name="runs.nc")
     notes = {}
     study = SimpleNamespace(drive=drive, note=lambda kind, words, **of: notes.update({kind: of}))
     monte_carlo.MonteCarloResult.remark(random, study)
     at = notes.get("random overloads at current limit")
     assert at == ({"limit": (4.4, "A")} if told else None)
-    words = "1 batch of runs in runs.zarr was damaged, and was computed anew"
+    words = "1 batch of runs in runs.nc was damaged, and was computed anew"
     assert notes["runs made anew"] == {"text": words}
 
 

@@ -1,7 +1,7 @@
 """Overloads at random sides, crank angles, times and sizes, in batches of runs (see `chainunit.work.runner`).
 
 Each run branches from the same steady state and is determined by the study and its own number alone. The runs
-are a Zarr store, ``monte_carlo_<study>.zarr``, where <study> is a digest of everything on which they depend. A
+are a NetCDF file, ``monte_carlo_<study>.nc``, where <study> is a digest of everything on which they depend. A
 study that was killed goes on from it, and never uses the runs of another study.
 """
 
@@ -36,7 +36,7 @@ from ...study.readings import crank_angle
 from ...study.record import StudyRecord
 from ...study.rig import Rig
 from ...study.window import Phase, Window
-from ...work.job import Job, ResultVariable, texts
+from ...work.job import Job, ResultVariable
 from ...work.progress import TaskProgress
 from ...work.runner import run as run_job
 from ...work.store import made_anew
@@ -385,7 +385,7 @@ class MonteCarloResult(Findings):
     @cached_property
     def reasons(self) -> dict[int, str]:
         """Why a run failed, by its number."""
-        return {k: words for k, words in enumerate(texts(self.dataset["failed"])) if words}
+        return {k: words for k, words in enumerate(self.dataset["failed"].values.tolist()) if words}
 
     @derived("1", name="failed")
     def failures(self) -> int:
