@@ -64,6 +64,7 @@ def test_the_list_names_the_folders():
     assert len([part for part in capabilities() if part.motor_table]) <= 1
 
 
+@pytest.mark.second
 def test_nothing_outside_a_folder_imports_from_it():
     outside = set()
     for file in PACKAGE.rglob("*.py"):

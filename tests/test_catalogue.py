@@ -231,6 +231,7 @@ def test_every_motor_has_its_circuit(motor):
     assert locked.tau == pytest.approx(n.locked_torque_ratio * n.torque, rel=1e-8)
 
 
+@pytest.mark.second
 @pytest.mark.parametrize("k", [4, 30, 65], ids=lambda k: MOTORS[k].designation)
 def test_rated_running_is_the_dynamic_models(k):
     """A warm motor under rated torque settles at rated speed, current, power factor, and stays as warm."""

@@ -98,6 +98,7 @@ def test_two_bars_are_the_machines_statics():
             assert result.last == pytest.approx([hand * float(expected.fx), float(expected.fy)], rel=1e-9)
 
 
+@pytest.mark.second
 def test_random_chains_hang_or_are_refused():
     """2,000 of them: each closes and is in balance with all rods pulled, or is stretched or folded, which is
     shown."""

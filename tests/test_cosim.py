@@ -134,6 +134,7 @@ def test_energy_residual_of_a_power_that_jumps():
     assert float(gap[-1]) == pytest.approx(-5.0) and float(gap[9]) == 0.0
 
 
+@pytest.mark.second
 def test_energy_residual_with_friction_processing_and_feed(fmus):
     """Mass flows from right to left while the machine runs: the feed's energy closes the balance."""
     machine = ChainUnitMachine(ratio=RATIO)

@@ -185,6 +185,7 @@ def check_random(count):
     return kinds, swings
 
 
+@pytest.mark.second
 def test_equilibria_of_a_few_random_linkages():
     kinds, swings = check_random(9)
     assert swings >= 3 and len({driver for driver, _ in kinds}) == 3

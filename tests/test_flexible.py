@@ -278,6 +278,7 @@ def test_the_direct_model_goes_on_from_where_the_inverse_one_is():
             assert got[name] == pytest.approx(value, rel=1e-9, abs=1e-9), name
 
 
+@pytest.mark.second
 @native
 def test_the_direct_fmu_goes_on_from_where_the_inverse_one_is(tmp_path):
     model = flexible(2, 1)
@@ -425,6 +426,7 @@ def along(case, a, read, h):
     return (ends[0] - ends[1]) / (2.0 * h)
 
 
+@pytest.mark.second
 def test_port_carries_the_torque_and_its_slopes_follow_the_motion():
     """tau = J a + tau_bias; what the port says of the next instant is what comes: d tau_bias = tau_bias_dphi dphi +
     tau_bias_dw dw and dJ = dJ_dphi dphi along the motion, at constant speed and with any acceleration."""
@@ -625,6 +627,7 @@ def test_port_is_that_of_dense_equations():
 # -- coupling
 
 
+@pytest.mark.second
 @native
 def test_coupling_is_of_second_order_with_slopes_of_first_without(files, tmp_path):
     """A DC motor behind its gear, from a start without current; errors at instants 4 ms apart in parts of the peak.
@@ -664,6 +667,7 @@ def test_coupling_is_of_second_order_with_slopes_of_first_without(files, tmp_pat
 # -- energy
 
 
+@pytest.mark.second
 @native
 @pytest.mark.parametrize("law", [{}, LOOSE], ids=["assumed", "loose"])
 def test_energy_over_twenty_turns(files, law):

@@ -353,6 +353,7 @@ points = { B = ["300 mm", "250 mm"] }
     assert group.margin == pytest.approx(0.6) and group.margin_at == 0.0
 
 
+@pytest.mark.second
 def test_a_driver_that_slides_is_shown_there_and_back(tmp_path):
     """Friction adds to the force of a lift on its way up, and carries a part of it on the way down."""
     done = run(

@@ -96,6 +96,7 @@ MACHINES = {
 }
 
 
+@pytest.mark.second
 @pytest.mark.parametrize("name", MACHINES)
 def test_links_that_turn_fully(name):
     data, turns = MACHINES[name]

@@ -179,6 +179,7 @@ def test_runs_that_last_too_long_are_refused(packaged):
     assert refused and words == "these runs last too long for a page: 10004\u00a0s and more"
 
 
+@pytest.mark.second
 @pytest.mark.parametrize("ratio", [30.0, 80.0], ids=["fast enough", "never fast enough"])
 def test_an_empty_start_is_made_once(ratio, tmp_path):
     """From rest, without the feed until the crank is fast enough: a turn is made twice. Where the crank is never fast

@@ -801,6 +801,7 @@ def test_what_is_written_is_read(
 MARKS = ",;\t|. "
 
 
+@pytest.mark.second
 @settings(max_examples=200, deadline=None)
 @given(
     name=st.sampled_from(sorted(FORMATS)),

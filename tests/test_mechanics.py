@@ -44,6 +44,7 @@ def scale_of(machine, phi, w, a, left, right, stop=FREE) -> float:
 SEEDS = range(1000)
 
 
+@pytest.mark.second
 def test_two_routes_agree_on_1000_machines():
     worst = 0.0
     for seed in SEEDS:
@@ -55,6 +56,7 @@ def test_two_routes_agree_on_1000_machines():
     assert worst < 1e-9
 
 
+@pytest.mark.second
 def test_power_balance_on_1000_machines():
     """tau w = d/dt energy + dissipation; the rate of energy by dual numbers in time."""
     xp = engines.dual(engines.numpy_())

@@ -682,6 +682,7 @@ def test_the_page_carries_the_library_packed(written):
     assert written.stat().st_size < 2.5e6
 
 
+@pytest.mark.second
 def test_a_piece_of_another_page_has_nothing_that_a_script_draws(study):
     report = study_report.report(study)
     kinds = {type(block).__name__ for block in report.blocks("long")}

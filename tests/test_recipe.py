@@ -118,6 +118,7 @@ def test_values_that_do_not_follow_stand_in_the_script():
         assert set(script_of(MODELS[name]).sizes) <= set(MODELS[name].input_layout.names)
 
 
+@pytest.mark.second
 @pytest.mark.parametrize("name", ["DcMotor", "ChainUnitFlexible"])
 def test_a_model_without_a_script_becomes_a_python_fmu(name, fmus, tmp_path, monkeypatch):
     monkeypatch.setattr(python, "script_file", lambda model: None)

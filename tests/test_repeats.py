@@ -118,6 +118,7 @@ def test_operations_that_stand_once_stay():
     assert short == Outlined(items, [[499]], {})
 
 
+@pytest.mark.second
 def test_the_branch_of_a_triad_is_short_and_has_the_same_bits():
     whole = derive_of(KnifeDrive)
     short = outlined(whole.items, whole.results, "derive")
@@ -130,6 +131,7 @@ def test_the_branch_of_a_triad_is_short_and_has_the_same_bits():
         assert bits(want[k] for k in before) == bits(got[k] for k in after)
 
 
+@pytest.mark.second
 @pytest.mark.skipif(NODE is None, reason="no node, which runs the modules as a browser does")
 def test_a_module_has_the_same_bits_with_functions_and_without(monkeypatch):
     start = np.array([v.quantity.start for v in KnifeDrive.parameter_layout.variables])

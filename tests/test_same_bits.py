@@ -136,6 +136,7 @@ class Job:
         return run.stdout.split()
 
 
+@pytest.mark.second
 @here
 @node
 @pytest.mark.parametrize("name", SYSTEMS)

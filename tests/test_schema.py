@@ -262,6 +262,7 @@ def _file(*parts):
     return tables.pop("") + "".join(f"\n[{name}]{lines}" for name, lines in tables.items())
 
 
+@pytest.mark.second
 @pytest.mark.parametrize("drive", DRIVES)
 def test_each_table_beside_each_machine(drive):
     """The reader and the schema refuse the same pairs of a drive and a table."""
@@ -273,6 +274,7 @@ def test_each_table_beside_each_machine(drive):
     assert not off
 
 
+@pytest.mark.second
 def test_each_unit_that_is_read_is_matched_and_no_other_of_one_name():
     """Each key of a quantity with each unit of one name, as the reader takes it."""
     seen = set()

@@ -313,6 +313,7 @@ def test_an_old_result_does_not_survive_a_new_run(tmp_path, done):
     assert (out / "reactions.png").read_bytes()[:4] == b"\x89PNG"
 
 
+@pytest.mark.second
 def test_a_motor_that_cannot_reach_the_speed_is_told(tmp_path):
     weak = ONE_JAM + "[motor]\nlimit = { v = 60 }"
     (tmp_path / "mine.toml").write_text(weak)
@@ -379,6 +380,7 @@ def test_export_with_a_config_burns_the_start_values_in(tmp_path):
     assert float(starts["r"]) == 0.14 and float(starts["left.material_mass"]) == 12.0
 
 
+@pytest.mark.second
 def test_export_with_a_config_has_the_motor_of_the_study(tmp_path):
     import fmpy
 

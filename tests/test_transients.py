@@ -87,6 +87,7 @@ def test_a_run_is_the_monolithic_solution(rig, longest):
         assert np.max(np.abs(result.rows[k, 0] - wanted)) < 1e-7 * np.max(np.abs(wanted)), name
 
 
+@pytest.mark.second
 def test_chains_are_the_monolithic_solution_to_their_tolerance():
     rig = Rig('organ = "chain"\n[chain]\nrods = 4\n')
     signals = events(rig.drive, 200.0)

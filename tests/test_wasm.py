@@ -546,6 +546,7 @@ def test_a_run_stops_where_it_cannot_go_on(engine):
         np.testing.assert_array_equal(states, rows[5])
 
 
+@pytest.mark.second
 @engines
 def test_start_and_requirements_are_those_of_python(engine):
     """Also of chains, whose start is an iteration."""

@@ -23,6 +23,8 @@ from chainunit.reading.text import number
 from chainunit.report.blocks import at
 from chainunit.study.config import parse
 
+pytestmark = pytest.mark.second
+
 DOCS = (Path(__file__).parents[3] / "docs" / "checks.md").read_text("utf-8")
 STUDY = """
 title = "Bearings of a chain unit"

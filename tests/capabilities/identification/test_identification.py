@@ -421,6 +421,7 @@ def test_a_number_beyond_its_bound_is_held_there():
     assert 6.0 <= found.marginals[0].low < found.marginals[0].high < 6.3
 
 
+@pytest.mark.second
 def test_two_numbers_in_a_corner_are_not_held():
     """Two numbers that are truly at their bounds, of which the data tell the sum well and the difference hardly."""
     for seed in range(20):

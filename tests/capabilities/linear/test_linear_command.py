@@ -113,6 +113,7 @@ def test_texts_in_a_table_of_numbers_begin_at_the_left(done):
     assert re.fullmatch(r"│ a    │ short         │       1 │", first), first
 
 
+@pytest.mark.second
 def test_a_later_model_replaces_all_files(tmp_path):
     for pairs in (["--pairs", "w_ref:w,load.tau_bias:w"], ["--pairs", "tau_ff:i_ref"], []):
         run = chainunit("linearize", "DcMotor", *pairs, cwd=tmp_path)

@@ -260,6 +260,7 @@ def _moved(limit, each, step):
     return _with(limit, **{"low" if each.side == "min" else "high": each.value + step})
 
 
+@pytest.mark.second
 def test_one_parameter_without_limits(monkeypatch):
     """A counterweight alone: the RMS torque is a smooth function of one number."""
     monkeypatch.setattr(kernels, "native_kernel", lambda *_: None)
@@ -308,6 +309,7 @@ def test_an_impossible_wish(changes, names, held):
     )
 
 
+@pytest.mark.second
 def test_each_impossible_wish_is_named():
     pair = {'"16 deg", max = "20 deg"': '"40 deg"', '"4 kN"': '"1 N"', "starts = 4": "starts = 1"}
     text = TABLE
@@ -367,6 +369,7 @@ def test_small_powers_are_in_watts(best):
         assert units_of(found, chosen.file.tables, chosen.units)["power"] == ("kW",)
 
 
+@pytest.mark.second
 def test_two_wishes_that_conflict():
     """A swing and a speed of slack, each of which can be met alone."""
     pair = {'"16 deg"': '"19 deg"', "4 rad/s": "8 rad/s", "starts = 4": "starts = 2"}
@@ -404,6 +407,7 @@ def press(tmp_path):
     return PRESS.replace('"PRESS"', f'"{pressed_both_ways(tmp_path).as_posix()}"')
 
 
+@pytest.mark.second
 def test_a_linkage_file(press):
     """The best of three parameters is that of a map over all of them; a fourth one, on which nothing depends, keeps
     its value."""
@@ -701,6 +705,7 @@ def test_a_speed_beyond_the_limit_of_the_organs_is_told(best):
     assert best_machine(slow, Heading.of(config.title, config.file)).organs == []
 
 
+@pytest.mark.second
 def test_in_python(best):
     result = Study.from_text(TABLE).optimize()
     assert result.met and result.best.answer.value == pytest.approx(best.answer.value, rel=1e-6)

@@ -494,6 +494,7 @@ def compiled_task(text, folder=None, runs=6):
     return random_task(config, drive, files, 1.2)
 
 
+@pytest.mark.second
 @needs_compiler
 @pytest.mark.parametrize(
     "text", [STUDY, BLOCKED, MOTOR + STUDY, CHAIN + STUDY], ids="bars blocked induction chains".split()

@@ -40,6 +40,8 @@ from chainunit.study.config import load, parse
 from chainunit.study.cycle import cycle
 from chainunit.study.limits import Check
 
+pytestmark = pytest.mark.second
+
 EXAMPLE = Path(__file__).parents[3] / "examples" / "own_catalogue.toml"
 
 _COLUMNS = "ratio,rated_torque [N.m],efficiency,J [kg.m2],thermal_power [W],overhung_load [N],price"

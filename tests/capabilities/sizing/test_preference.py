@@ -665,6 +665,7 @@ def test_the_beam_pump_gets_four_poles_and_one_gear(tmp_path, monkeypatch):
     check_order(config, result, "beam_pump", tmp_path, monkeypatch, *motors)
 
 
+@pytest.mark.second
 def test_a_gear_that_the_start_alone_breaks_asks_for_a_soft_start(tmp_path, monkeypatch):
     """The nearest is the same motor, and the result of its soft start is told. It was the motor of 2 poles, whose
     start is the softest, with two gear units; where that fits, a note names the better one."""
@@ -687,6 +688,7 @@ def test_a_gear_that_the_start_alone_breaks_asks_for_a_soft_start(tmp_path, monk
     assert note.startswith(motors[1]) and words in note
 
 
+@pytest.mark.second
 def test_an_inverter_takes_the_next_ratio_before_a_larger_motor(tmp_path, monkeypatch):
     """At a ratio of 180, 11 kW missed the limit of the torque by 2 % of it, and 15 kW was chosen."""
     monkeypatch.setattr(
@@ -881,6 +883,7 @@ def pressed(tmp_path, monkeypatch, more="", *designations):
     return sized_by(parse(PRESS + more, str(folder / "press.toml")), tmp_path)
 
 
+@pytest.mark.second
 def test_a_motor_that_stalls_in_the_peak_runs_with_a_flywheel(tmp_path, monkeypatch):
     """The press takes 200 W in the mean and 837 W by the RMS torque: 1.1 kW was chosen as the smallest. Without a
     flywheel the motor of 0.55 kW stalls where the ram meets the workpiece."""

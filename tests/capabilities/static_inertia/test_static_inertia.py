@@ -249,6 +249,7 @@ def scipy_rms(study, inertia, terms):
     return rms(at_gear), rms(gaps)
 
 
+@pytest.mark.second
 def test_an_integration_with_scipy_has_the_same_rms_torques(given):
     findings = StaticInertiaFindings.of_study(given)
     mean, w0 = findings.inertia.mean, findings.speed

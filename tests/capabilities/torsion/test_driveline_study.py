@@ -248,6 +248,7 @@ def test_stiff_shafts_carry_what_rigid_ones_do():
     assert np.all(np.abs(elastic.peak2 / want.peak2 - 1.0) > 0.1)
 
 
+@pytest.mark.second
 def test_time_simulation_finds_the_steady_motion_where_it_is_stable():
     p = bent(35.0, 8.0, damping=0.03)
     k = frequency(p)
@@ -280,6 +281,7 @@ def test_undamped_multipliers_lie_on_the_circle_but_for_tongues():
     np.testing.assert_allclose(found.drive, 10.0, rtol=1e-6)
 
 
+@pytest.mark.second
 def test_steps_are_fine_enough(monkeypatch):
     p = bent(45.0, 10.0, damping=0.02)
     speed = np.array([0.2, 0.9, 1.5]) * frequency(p)
@@ -485,6 +487,7 @@ def test_numbers_are_those_of_the_former_program():
         compare(before[key], now[key])
 
 
+@pytest.mark.second
 def test_the_orders_of_one_joint_have_a_closed_form():
     """The series of atan(tan(x)/cos(alpha)) - x."""
     found = findings("[driveline]\nalpha1 = '30 deg'\nalpha2 = 0\n[feed]\nload = 0\n" + SMALL)
@@ -536,6 +539,7 @@ damping_ratios = [0.05]
 """
 
 
+@pytest.mark.second
 def test_ranges_of_the_natural_frequency_say_over_what_they_are():
     """The inertia of a chain unit varies over its turn, i23 over that of the shaft; an order meets both."""
     study = study_of(SLOW_LINE)
@@ -649,6 +653,7 @@ def test_a_slow_line_is_not_analysed(monkeypatch, speed, made):
         assert [remark.kind for remark in study.remarks] == [] if found else ["torsion left out"]
 
 
+@pytest.mark.second
 def test_the_co_simulation_finds_the_steady_motion_of_the_analysis(tmp_path):
     """A motor that gives a constant torque, as the analysis takes it, in the FMUs of the study."""
     found = findings(SMALL)

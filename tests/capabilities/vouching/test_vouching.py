@@ -307,6 +307,7 @@ def spans(data, stated):
     return found
 
 
+@pytest.mark.second
 def test_500_changes_of_one_bit_are_found_and_named(data):
     stated = integrity(data).manifest.members
     places, rng = spans(data, stated), random.Random(34)
@@ -555,6 +556,7 @@ def test_other_sources_that_are_signed_again_are_found(tmp_path, members, other)
     assert found["reference experiment"].holds is False and found["smooth experiment"].holds is False
 
 
+@pytest.mark.second
 def test_without_library_and_sources_or_compiler_the_equations_are_compared(
     tmp_path, members, other, monkeypatch
 ):
@@ -1302,6 +1304,7 @@ def test_a_point_without_torque_has_no_gap_of_its_powers():
     assert experiments.power_gap(interface, [*points, still], balance) < 1e-12
 
 
+@pytest.mark.second
 def test_a_chain_has_no_limits_of_two_bars(tmp_path):
     """The lowest natural frequency is also that of the chain; slack webs and resonance are in its model."""
     model = MODELS["ChainUnitFlexible"]

@@ -29,6 +29,8 @@ from chainunit.study.run import run_study
 from chainunit.study.transients import follow
 from chainunit.system import CompiledSimulation, CoSimulation
 
+pytestmark = pytest.mark.second
+
 native = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 RUN = "[run]\nramp = 0.5\nsettle_turns = 1\n"
 EVENTS = """

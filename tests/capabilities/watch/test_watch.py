@@ -136,6 +136,7 @@ def test_a_machine_that_does_not_describe_the_begin(tmp_path):
     assert any(each.startswith("feed.left.material_mass") for each in doubts)
 
 
+@pytest.mark.second
 def test_errors_of_an_identified_machine_widen_the_threshold(tmp_path):
     """By the factor that the page states; a file that is no identification is refused."""
     covariance = {
@@ -174,6 +175,7 @@ def changed(folder, keep=lambda time: time < 60.0, **columns):
     return folder / "changed.csv"
 
 
+@pytest.mark.second
 def test_behind_a_gap_the_observer_starts_anew(tmp_path):
     """Without a false alarm, and it finds the shift that comes later. A noise that is louder than stated is told and
     counts, and so are errors of the forces and an identification that failed."""
