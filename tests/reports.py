@@ -2,20 +2,38 @@
 
 from __future__ import annotations
 
+import base64
 import io
 import json
 import re
 
+import numpy as np
+import plotly.graph_objects as go
 from rich.console import Console
 
 from chainunit.reading.text import DEFAULT_UNITS
-from chainunit.report import files, html, motion, series, terminal
+from chainunit.report import files, html, motion, page_figures, series, terminal
 from chainunit.report import study as study_report
 from chainunit.report.packing import unpacked
 
 
 def page_of(study, result=None):
     return html.render(study_report.report(study, result))
+
+
+def plotly_figure(spec, units=DEFAULT_UNITS):
+    """A figure of the page, whose properties plotly's own classes check, with its arrays as such."""
+    drawn = page_figures.page_figure(spec, units)
+    return go.Figure(
+        [{name: _array(x) for name, x in trace.items()} for trace in drawn["data"]], drawn["layout"]
+    )
+
+
+def _array(x):
+    if not (isinstance(x, dict) and "bdata" in x):
+        return x
+    array = np.frombuffer(base64.b64decode(x["bdata"]), x["dtype"])
+    return array.reshape(list(map(int, x["shape"].split(",")))) if "shape" in x else array
 
 
 def said_of(study, width=200):

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 from event_tables import event_line
 from plotly.offline import get_plotlyjs
-from reports import page_of, pictures, said_of, write
+from reports import page_of, pictures, plotly_figure, said_of, write
 
 from chainunit import EMPTY, InputError, RunError
 from chainunit.capabilities.chains.analysis import rest_forces
@@ -27,7 +27,7 @@ from chainunit.drives.induction_motor import SoftStart
 from chainunit.machines.chain_unit import Feed
 from chainunit.reading.text import DEFAULT_UNITS, digits_text, forms, scales, unit_text
 from chainunit.reading.text import number as told_as
-from chainunit.report import html, page_figures, study_motion
+from chainunit.report import html, study_motion
 from chainunit.report import study as study_report
 from chainunit.report.blocks import Report, Section, at
 from chainunit.report.figure import Label, Mark, Shade
@@ -377,7 +377,7 @@ def test_steady_running_begins_where_the_study_takes_it(study):
     )
     slow = dataclasses.replace(study, config=config, started=None)
     start_up = next(each for each in study_report.report(slow).figures if each.name == "time-start-up")
-    (mark,) = page_figures.figure(start_up, DEFAULT_UNITS).layout.annotations
+    (mark,) = plotly_figure(start_up, DEFAULT_UNITS).layout.annotations
     assert mark.text == "steady from here" and mark.x == slow.steady_begin == pytest.approx(
         0.7 + math.pi / 3.0
     )
@@ -912,7 +912,7 @@ def test_one_bearing_has_room_for_its_bars(study):
     pins = {run: dict([next(iter(table.items()))]) for run, table in study.pins.items()}
     figures = study_report.report(dataclasses.replace(study, pins=pins)).figures
     (reactions,) = (figure for figure in figures if figure.name == "reactions")
-    layout = page_figures.figure(reactions, DEFAULT_UNITS).layout
+    layout = plotly_figure(reactions, DEFAULT_UNITS).layout
     assert layout.height - layout.margin.t - layout.margin.b > 100
 
 

@@ -12,14 +12,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from reports import screen_of
+from reports import plotly_figure, screen_of
 from rich.console import Console
 
 import chainunit.report
 from chainunit.reading.text import DEFAULT_UNITS, chosen_units
 from chainunit.report import blocks as b
 from chainunit.report import figure as fig
-from chainunit.report import html, page_figures, print_figures, terminal
+from chainunit.report import html, print_figures, terminal
 from chainunit.report.lines import Aside, Number, Strong, Words, join, line
 from chainunit.report.markdown import markdown
 from chainunit.report.motion import Animation, Arrow, Clip, DrawnLink, Reading, pictures
@@ -165,9 +165,9 @@ def test_the_chosen_units_are_everywhere():
     for messages in (text, page.replace("\u00a0", " ").replace("</span>", ""), document):
         assert "rad/s" not in re.sub(r'title="[^"]*"', "", messages.partition("<script")[0])
     assert "3000 rev/min" in text and "1.46 kN m" in text and "2200 W" in document
-    axes = page_figures.figure(a_figure(), units).layout
+    axes = plotly_figure(a_figure(), units).layout
     assert axes.xaxis.title.text == "speed [rev/min]" and axes.yaxis.title.text == "torque [kN m]"
-    drawn = page_figures.figure(a_figure(), units).data[0]
+    drawn = plotly_figure(a_figure(), units).data[0]
     assert drawn.x[-1] == pytest.approx(30.0 / np.pi) and np.max(drawn.y) == pytest.approx(1e-3, rel=1e-2)
 
 
@@ -195,7 +195,7 @@ def test_a_figure_is_drawn_for_page_and_print_from_one_description(tmp_path, mon
         (fig.Panel(fig.Axis("size", "N", low=0.0), fig.Axis("pin", names=("A", "B")), (bars,)), None),
     )
     figure = fig.Figure("many", "Many", "Everything.", panels, file="many.png")
-    drawn = page_figures.figure(figure, DEFAULT_UNITS)
+    drawn = plotly_figure(figure, DEFAULT_UNITS)
     names = [trace.name for trace in drawn.data if trace.showlegend]
     reference = {
         "a line",
@@ -241,7 +241,7 @@ def test_a_scale_that_panels_share_holds_all_of_them(tmp_path, monkeypatch):
     figure = fig.Figure("two", "", "", ((small, large),), file="two.png", level=True)
     print_figures.write([figure], tmp_path, DEFAULT_UNITS)
     assert [axis.get_ylim() for axis in seen] == [(0.0, pytest.approx(10.5))] * 2
-    assert page_figures.figure(figure, DEFAULT_UNITS).layout.yaxis2.matches == "y"
+    assert plotly_figure(figure, DEFAULT_UNITS).layout.yaxis2.matches == "y"
 
 
 def test_a_curve_that_hardly_changes_is_not_on_the_edge(tmp_path, monkeypatch):
@@ -257,7 +257,7 @@ def test_curves_over_the_same_points_are_thinned_together():
     x = np.linspace(0.0, 1.0, 5001)
     straight, bent = fig.Curve("straight", x, x), fig.Curve("bent", x, np.abs(x - 0.3))
     other = fig.Curve("other", x.copy(), x)
-    drawn = page_figures.figure(a_figure(straight, bent, other), DEFAULT_UNITS).data
+    drawn = plotly_figure(a_figure(straight, bent, other), DEFAULT_UNITS).data
     assert [len(trace.x) for trace in drawn] == [3, 3, 2]
     assert drawn[0].x[1] == pytest.approx(0.3, abs=1e-6)
 

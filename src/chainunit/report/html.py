@@ -123,19 +123,15 @@ def _figures(report: b.Report) -> dict[str, Any]:
     if not figures:
         return {}
     # a page without figures is written at once
-    from plotly.io.json import to_json_plotly  # type: ignore[import-untyped]
-
     from .page_figures import page_figure
 
-    return {figure.name: json.loads(to_json_plotly(page_figure(figure, report.units))) for figure in figures}
+    return {figure.name: page_figure(figure, report.units) for figure in figures}
 
 
 @cache
 def _packed_plotly() -> str:
     """plotly.js, packed."""
-    from plotly.offline import get_plotlyjs  # type: ignore[import-untyped]
-
-    return packed_bytes(get_plotlyjs().encode())
+    return packed_bytes((resources.files("plotly") / "package_data" / "plotly.min.js").read_bytes())
 
 
 def fragment(report: b.Report) -> str:
