@@ -92,6 +92,16 @@ class _Commands(typer.core.TyperGroup):
                     [row for name, rest in group.items() for row in zip((name, ""), rest, strict=True)]
                 )
 
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """As typer does; a wrong name suggests no hidden command."""
+        commands = self.commands
+        if args and args[0] not in commands:
+            self.commands = {name: command for name, command in commands.items() if not command.hidden}
+        try:
+            return super().resolve_command(ctx, args)
+        finally:
+            self.commands = commands
+
     def invoke(self, ctx: Any) -> Any:
         try:
             return super().invoke(ctx)

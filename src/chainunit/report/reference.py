@@ -71,10 +71,7 @@ def keys_of(name: str) -> Report:
         table_names = dict.fromkeys(table.name for table in key_tables() if table.name)
         kinds = dict.fromkeys(_kind(table) for table in _tables() if table.of)
         near = near_name(name, (*table_names, *kinds, *_key_names())) or ";"
-        raise InputError(
-            f"{name}: no such table and no such key{near} tables: {', '.join(table_names)}; tables of single types: "
-            f"{', '.join(kinds)}"
-        )
+        raise InputError(f"{name}: no such table and no such key{near} chainunit keys lists the tables")
     if sum(name == table.name and bool(table.of) for table in tables) > 1:
         heading = tables[0].heading.removesuffix(f" of {tables[0].of}")
         lead = Text(f"{heading} has a table of keys for each type; a command shows one of them:")
