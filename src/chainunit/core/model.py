@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple
 
-from . import messages
+from .bounds import refusal
 from .engines import MATH
 from .errors import GeometryError, InputError
 from .quantities import Layout, Variable, violations, within_bounds
@@ -37,23 +37,8 @@ class Requirement:
 
     def refusal(self, value: float, low: float, high: float, values: Mapping[str, float]) -> str:
         """The line that refuses `value`."""
-        unit = messages.unit_behind(self.unit)
-        formats = (messages.FIRST_PARAMETER, *[messages.NEXT_PARAMETER] * len(self.context))
-        those = "".join(
-            f.format(name=n, value=values[n]) for f, n in zip(formats, self.context, strict=False)
-        )
-        sides = math.isfinite(low), math.isfinite(high)
-        limits = {(True, False): messages.ABOVE, (False, True): messages.BELOW}.get(sides, messages.BETWEEN)
-        return messages.REQUIREMENT.format(
-            subject=self.subject,
-            value=value,
-            unit=unit,
-            why=self.why,
-            parameters=those,
-            limits=(limits if low < high else messages.NO_VALUE).format(
-                low=low, high=high, unit=unit, remedy=self.remedy
-            ),
-        )
+        context = {name: values[name] for name in self.context}
+        return refusal(self.subject, self.unit, self.why, self.remedy, context, (value, low, high))
 
 
 @dataclass(frozen=True)
@@ -89,7 +74,9 @@ class FmuData:
     about: About | None = None
     """who made the model, where its user did; None for the models of this package"""
     experiment: Mapping[str, float] = field(default_factory=dict)
-    """``step`` and ``stop`` [s] of the default experiment, where the maker of the model knows them"""
+    """``step``, ``stop`` [s] or ``tolerance`` of the default experiment, in place of the usual ones"""
+    sizes: Mapping[str, float] = field(default_factory=dict)
+    """sizes of inputs in the reference results, by name, in place of the usual ones"""
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,10 @@ from operator import attrgetter
 from typing import Any
 
 from .errors import InputError
-from .integrators import MAX_STEPS, Solver
+from .integrators import MAX_STEPS
 from .model import Model, Requirement, Terminal
 from .quantities import Layout, Value, declaration, declared_class, group, pruned, quantity
+from .solver import Solver
 
 _SOLVER = MAX_STEPS.partition(".")[0]
 RESERVED = (_SOLVER, "derived", "of_components")

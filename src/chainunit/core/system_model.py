@@ -226,6 +226,22 @@ def system_model(text: str) -> type[SystemModel]:
     return _system_model(text, *(model_at(each) for _, each in json.loads(text)["components"]))
 
 
+def _shortest(models: Iterable[type[Model]]) -> dict[str, float]:
+    """The shortest step and stop, and the least tolerance, of the components' default experiments."""
+    experiment: dict[str, float] = {}
+    for model in models:
+        own = model.fmu_data.experiment
+        experiment = {key: min(x, experiment.get(key, x)) for key, x in {**experiment, **own}.items()}
+    return experiment
+
+
+def _sizes(of: SystemDescription) -> dict[str, float]:
+    """The components' sizes of the free inputs."""
+    free = set(Layout(of.Inputs).names)
+    sizes = {f"{name}.{key}": x for name, m in of.models.items() for key, x in m.fmu_data.sizes.items()}
+    return {name: x for name, x in sizes.items() if name in free}
+
+
 @cache
 def _system_model(text: str, *models: type[Model]) -> type[SystemModel]:
     of = SystemDescription(json.loads(text), models)
@@ -251,7 +267,8 @@ def _system_model(text: str, *models: type[Model]) -> type[SystemModel]:
         ),
         "fmu_data": FmuData(
             about=None if about is None else About(**about),
-            experiment=MappingProxyType(of.data["experiment"]),
+            experiment=MappingProxyType(_shortest(models) | of.data["experiment"]),
+            sizes=MappingProxyType(_sizes(of)),
         ),
         "repeated": {
             f"{own}.{name}": f"{own}.{one}"
