@@ -1,7 +1,4 @@
-"""A model: declarations, and equations written for any engine `xp`.
-
-Standard library only: FMUs carry this file.
-"""
+"""A model: declarations, and equations written for any engine `xp`."""
 
 from __future__ import annotations
 
@@ -79,16 +76,12 @@ class FmuData:
     """sizes of inputs in the reference results, by name, in place of the usual ones"""
 
 
-@dataclass(frozen=True)
-class Making:
-    """How a class is made that no module names: the `call` as text of Python, the same as `function` and `arguments`,
-    by which another process gets the class, and further `modules` of this package that the call imports by name,
-    such as ``drives.dc_motor``."""
+class Making(NamedTuple):
+    """The call of a function of a module that makes a class that no module names: by it another process gets the
+    class."""
 
-    call: str
     function: Callable[..., Any]
     arguments: tuple[Any, ...]
-    modules: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -149,7 +142,7 @@ def _pickled_form(model: Any) -> str | tuple[Callable[..., Any], tuple[Any, ...]
     """A model as pickle stores it: by its name, or, for a class that has no name in a module, by the call
     that makes it."""
     made = vars(model).get("made")
-    return model.__qualname__ if made is None else (made.function, made.arguments)
+    return model.__qualname__ if made is None else tuple(made)
 
 
 copyreg.pickle(ModelType, _pickled_form)
@@ -229,11 +222,6 @@ class Model(metaclass=ModelType):
         cls.input_layout = Layout(cls.Inputs)
         cls.state_layout = Layout(cls.States) if cls.States else None
 
-    @classmethod
-    def expression(cls) -> str:
-        """The expression of Python that gives this class in its module."""
-        return cls.made.call if cls.made else cls.__qualname__
-
     @staticmethod
     def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
         """Value, lower limit and upper limit of each requirement of `required`, in order. A later one may be
@@ -256,9 +244,9 @@ class Model(metaclass=ModelType):
         return ready
 
     @classmethod
-    def check(cls, p: Any, derived: list[Any] | None = None) -> Any:
-        """The parameters `with_derived`, with the values `derived` if they are given. Parameters that are out of
-        bounds, or with which the machine does not work, are refused.
+    def check(cls, p: Any) -> Any:
+        """The parameters `with_derived`. Parameters that are out of bounds, or with which the machine does not work,
+        are refused.
 
         Raises
         ------
@@ -271,7 +259,7 @@ class Model(metaclass=ModelType):
             raise InputError(line)
         p = within_bounds(cls.parameter_layout, p)
         try:
-            p = cls.with_derived(MATH, p, derived)
+            p = cls.with_derived(MATH, p)
         except (ArithmeticError, ValueError):
             # `math` raises where other engines give NaN, which no requirement admits
             p = cls.with_derived(MATH, p, [math.nan] * cls.derived_count)

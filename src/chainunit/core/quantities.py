@@ -3,7 +3,7 @@
 A model states its quantities as frozen dataclasses whose fields come from `quantity` (one
 scalar) or `group` (a nested dataclass, whose fields have a prefix: ``crank.m``).
 Everything else - modelDescription.xml, config validation, tables, netCDF attributes - is
-generated from these declarations. Standard library only: FMUs carry this file.
+generated from these declarations.
 
 Units are written as in FMI: ``.`` multiplies, ``/`` divides, an integer behind a name is its power:
 ``kg.m2``, ``N.m.s/rad``, ``1`` for a pure number. Several factors in the denominator stand in brackets:

@@ -1,8 +1,8 @@
 """A system of models as one: declarations side by side, and equations in the order of their dependencies.
 
-The description of a system is a text in JSON, from which another process, or an FMU, makes the same model
+The description of a system is a text in JSON, from which another process makes the same model
 (`chainunit.core.system_model.system_model`); `chainunit.system.compiled` writes it. Each component is a group: the
-names are the full names of the system, such as ``motor.armature.R``. Standard library only: FMUs carry this file.
+names are the full names of the system, such as ``motor.armature.R``.
 """
 
 from __future__ import annotations
@@ -85,15 +85,6 @@ def model_at(place: Mapping[str, Any]) -> Any:
     if "arguments" not in place:
         return thing
     return thing(*(model_at(each) if isinstance(each, dict) else each for each in place["arguments"]))
-
-
-def modules_of(place: Mapping[str, Any]) -> set[str]:
-    """The modules of this package that a `reference` names, such as ``drives.dc_motor``."""
-    own = {place["of"].partition(":")[0]}
-    own = {module.removeprefix(".") for module in own if module.startswith(".")}
-    inner = [each for each in place.get("arguments", ()) if isinstance(each, dict)]
-    made = model_at(place).made
-    return own.union(*map(modules_of, inner), made.modules if made else ())
 
 
 # -- the parts of a system

@@ -1,7 +1,4 @@
-"""The model of a system of models: `system_model` makes it from a description (`core.system_description`).
-
-Standard library only: FMUs carry this file.
-"""
+"""The model of a system of models: `system_model` makes it from a description (`core.system_description`)."""
 
 from __future__ import annotations
 
@@ -15,7 +12,7 @@ from typing import Any, ClassVar
 from .errors import GeometryError, refusal_prefix
 from .model import About, FmuData, Making, Model, Part, StartProblem, keep
 from .quantities import Layout
-from .system_description import SystemDescription, SystemPoint, model_at, modules_of
+from .system_description import SystemDescription, SystemPoint, model_at
 
 
 class SystemModel(Model):
@@ -62,10 +59,10 @@ class SystemModel(Model):
         return [v for name, model in cls._components() for v in model.derive(xp, own[name])]
 
     @classmethod
-    def check(cls, p: Any, derived: list[Any] | None = None) -> Any:
+    def check(cls, p: Any) -> Any:
         """See `Model.check`; where a model has more to say on its geometry, the refusal says it."""
         try:
-            return super().check(p, derived)
+            return super().check(p)
         except GeometryError as error:
             own = cls.system.parameters(p)
             for name, model in cls._components():
@@ -245,8 +242,7 @@ def _sizes(of: SystemDescription) -> dict[str, float]:
 @cache
 def _system_model(text: str, *models: type[Model]) -> type[SystemModel]:
     of = SystemDescription(json.loads(text), models)
-    references = [each for _, each in of.data["components"]]
-    apart, modules = of.by_differences(), set[str]().union(*map(modules_of, references))
+    apart = of.by_differences()
     about = of.data["about"]
     members: dict[str, Any] = {
         "__module__": __name__,
@@ -255,7 +251,7 @@ def _system_model(text: str, *models: type[Model]) -> type[SystemModel]:
         "description": of.data["title"],
         "system": of,
         "components": MappingProxyType(of.models),
-        "made": Making(f"system_model({text!r})", system_model, (text,), tuple(sorted(modules))),
+        "made": Making(system_model, (text,)),
         "Parameters": of.Parameters,
         "Inputs": of.Inputs,
         "States": of.States if of.has_states else None,

@@ -210,7 +210,7 @@ def _flexible(walls: int, webs: int) -> type[InverseMachine]:
         """
 
         name = "ChainUnitFlexible"
-        made = Making(f"flexible({walls}, {webs})", flexible, (walls, webs))
+        made = Making(flexible, (walls, webs))
         fmu_data = FmuData(sizes=ChamberForces.fmu_data.sizes)
         description = (
             f"Forces in a chain unit whose organs are chains of {chains.number} rods, {walls} in the wall and {webs} "

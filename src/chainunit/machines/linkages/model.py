@@ -1,7 +1,7 @@
 """A machine from the description of its linkage: the model of a file, without a line of code of its own.
 
 The description is a text in JSON, which a checked file gives (`chainunit.machines.linkages.file`). It is the
-whole definition: by it another process, or an FMU, builds the same model. Standard library only.
+whole definition: by it another process builds the same model.
 
 x points right, y up, angles count counter-clockwise from the x axis. The coordinate q is that of the driver.
 """
@@ -390,7 +390,7 @@ class LinkageDescription(LinkageOutputs):
             driver_noun = data["driver"]["link"]
             description = data["title"] or f"linkage {data['name']}"
             direct_description = words_on_motion(f"{noun}, moving by itself", described.port)
-            made = Making(f"machine_of({described.text!r})", machine_of, (described.text,))
+            made = Making(machine_of, (described.text,))
             fmu_data = FmuData(described.notes, About(**data.get("about", {})))
             repeated = repeated_outputs(described.structure, described.variable)
             constant = constant_outputs(described.structure, described.variable)
@@ -413,10 +413,10 @@ class LinkageDescription(LinkageOutputs):
                 return described.linkage(xp, p, u)
 
             @classmethod
-            def check(cls, p: Any, derived: list[Any] | None = None) -> Any:
+            def check(cls, p: Any) -> Any:
                 """See `Model.check`; a refusal says where the linkage does not close."""
                 try:
-                    return super().check(p, derived)
+                    return super().check(p)
                 except GeometryError as error:
                     where = described.obstacle(p)
                     raise (GeometryError(where) if where else error) from None
