@@ -1,6 +1,6 @@
 """A system of models as one: declarations side by side, and equations in the order of their dependencies.
 
-The description of a system is a text in JSON, from which another process makes the same model
+The description of a system is data as JSON has them, from which another process makes the same model
 (`chainunit.core.system_model.system_model`); `chainunit.system.compiled` writes it. Each component is a group: the
 names are the full names of the system, such as ``motor.armature.R``.
 """
@@ -84,7 +84,9 @@ def model_at(place: Mapping[str, Any]) -> Any:
     thing = attrgetter(name)(import_module(module, __package__))
     if "arguments" not in place:
         return thing
-    return thing(*(model_at(each) if isinstance(each, dict) else each for each in place["arguments"]))
+    return thing(
+        *(model_at(each) if isinstance(each, dict) and "of" in each else each for each in place["arguments"])
+    )
 
 
 # -- the parts of a system

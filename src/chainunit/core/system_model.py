@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
-from collections.abc import Callable, Iterable, Iterator
-from functools import cache
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, ClassVar
 
@@ -217,10 +216,17 @@ class SystemModel(Model):
         return values
 
 
-def system_model(text: str) -> type[SystemModel]:
-    """The model of a description."""
+_MODELS: dict[Any, type[SystemModel]] = {}
+
+
+def system_model(data: Mapping[str, Any]) -> type[SystemModel]:
+    """The model of a description; equal descriptions of the same components have one model."""
     # a class that was defined anew, as in a notebook, makes a new model
-    return _system_model(text, *(model_at(each) for _, each in json.loads(text)["components"]))
+    models = tuple(model_at(each) for _, each in data["components"])
+    key = json.dumps(data, sort_keys=True), models
+    if key not in _MODELS:
+        _MODELS[key] = _system_model(SystemDescription(data, models))
+    return _MODELS[key]
 
 
 def _shortest(models: Iterable[type[Model]]) -> dict[str, float]:
@@ -239,9 +245,8 @@ def _sizes(of: SystemDescription) -> dict[str, float]:
     return {name: x for name, x in sizes.items() if name in free}
 
 
-@cache
-def _system_model(text: str, *models: type[Model]) -> type[SystemModel]:
-    of = SystemDescription(json.loads(text), models)
+def _system_model(of: SystemDescription) -> type[SystemModel]:
+    models = of.models.values()
     apart = of.by_differences()
     about = of.data["about"]
     members: dict[str, Any] = {
@@ -251,7 +256,7 @@ def _system_model(text: str, *models: type[Model]) -> type[SystemModel]:
         "description": of.data["title"],
         "system": of,
         "components": MappingProxyType(of.models),
-        "made": Making(system_model, (text,)),
+        "made": Making(system_model, (of.data,)),
         "Parameters": of.Parameters,
         "Inputs": of.Inputs,
         "States": of.States if of.has_states else None,
